@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The one door to numba: plain Python functions, compiled when first needed.
+
+A module of kernels decorates its functions with `kernel` and is imported *inside* the function that first needs it,
+so that importing `rockfall` compiles nothing. Kernels release the GIL; `in_chunks` spreads rows over the cores.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+CHUNK_ROWS = 4096
+
+
+def use_cache_directory(directory: str | Path) -> None:
+    """Keep compiled kernels in a writable directory; to be called before the first kernel module is imported."""
+    from numba import config
+
+    Path(directory).mkdir(parents=True, exist_ok=True)
+    config.CACHE_DIR = str(directory)
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a plain Python function with numba: no Python objects, the GIL released, cached on disk."""
+    from numba import njit
+
+    return njit(cache=True, nogil=True, error_model="numpy")(function)
+
+
+def in_chunks(function: Callable[[int, int], None], rows: int) -> None:
+    """Call ``function(start, stop)`` over ``range(rows)`` in chunks, on all cores."""
+    starts = range(0, rows, CHUNK_ROWS)
+    if len(starts) <= 1:
+        if rows:
+            function(0, rows)
+        return
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        list(pool.map(lambda start: function(start, min(start + CHUNK_ROWS, rows)), starts))
+
+
+def as_rows(points: Any) -> np.ndarray:
+    """C-contiguous float64 (n, 3), which is what the kernels take."""
+    return np.ascontiguousarray(np.atleast_2d(np.asarray(points, dtype=np.float64)))

@@ -1,0 +1,14 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Physical constants and their sources."""
+
+GRAVITY_MPS2 = 9.81
+"""Acceleration of gravity [m/s²], as in Noël et al. 2018, eq. 5."""
+
+AIR_DENSITY_KGPM3 = 1.2
+"""Density of air [kg/m³], Noël et al. 2017 (EGU2017-16699)."""
+
+DRAG_COEFFICIENT = 0.9
+"""Drag coefficient C_D of a tumbling block [-], Noël et al. 2017 (EGU2017-16699)."""
+
+ROCK_DENSITY_KGPM3 = 2650.0
+"""Density of a limestone or crystalline block [kg/m³], the usual textbook value; a project gives its own."""

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Survey coordinates and the local frame in which everything is computed and drawn.
+
+Blender and graphics cards are single precision: at 2 600 000 m a coordinate moves in steps of 0.25 m. So a
+project has one `GlobalShift`, chosen in double precision before anything becomes single precision.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import RockfallError
+from .vectors import Array
+
+LARGE_COORDINATE_M = 10_000.0
+"""Beyond this, single precision no longer resolves a millimetre, and a shift is proposed."""
+
+
+@dataclass(frozen=True)
+class GlobalShift:
+    """What is subtracted from survey coordinates to get local ones.
+
+    Attributes
+    ----------
+    x, y, z : the survey coordinates of the local origin [m].
+    crs : coordinate reference system as the source states it ("EPSG:2056"), empty when unknown.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    crs: str = ""
+
+    @property
+    def vector(self) -> Array:
+        """(3,) [m]."""
+        return np.array([self.x, self.y, self.z])
+
+    def to_local(self, survey: Array) -> Array:
+        """Survey → local coordinates, (..., 3) [m]."""
+        return np.asarray(survey, dtype=np.float64) - self.vector
+
+    def to_survey(self, local: Array) -> Array:
+        """Local → survey coordinates, (..., 3) [m]."""
+        return np.asarray(local, dtype=np.float64) + self.vector
+
+    @classmethod
+    def proposed(cls, minimum: Array, maximum: Array, crs: str = "") -> "GlobalShift":
+        """The shift proposed for data within a box: none for small coordinates, else the box's centre rounded to 100 m.
+
+        Raises
+        ------
+        RockfallError : the box is not finite.
+        """
+        low, high = np.asarray(minimum, dtype=np.float64), np.asarray(maximum, dtype=np.float64)
+        if not (np.isfinite(low).all() and np.isfinite(high).all()):
+            raise RockfallError("No global shift can be proposed: the coordinates are not finite.")
+        far = np.maximum(np.abs(low), np.abs(high)) > LARGE_COORDINATE_M
+        x, y, z = np.where(far, np.round((low + high) / 2, -2), 0.0).tolist()
+        return cls(x, y, z, crs)

@@ -1,0 +1,426 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``project.toml``: everything that a run without a window needs.
+
+Paths are relative to the file. Keys and sections that this version does not know are kept when a project is read and
+written again, so that an older Rockfall does not lose what a newer one has stored.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
+from ..errors import InputError
+from ..georeference import GlobalShift
+
+SCHEMA = 1
+ENGINES = ("auto", "cycles", "eevee", "workbench")
+UP_AXES = ("auto", "z", "y")
+
+Extra = Mapping[str, Any]
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Site:
+    """What is shown as the title, and written into the column ``site`` of impacts.csv."""
+
+    name: str = ""
+    description: str = ""
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TerrainSource:
+    """The terrain file, and how its numbers are to be understood.
+
+    Attributes
+    ----------
+    file : the mesh, grid or point cloud.
+    shift : the survey coordinates of the local origin; None lets the reader propose it.
+    crs : coordinate reference system as the survey states it ("EPSG:2154"), empty when unknown.
+    up : the axis that points up in the file, one of `UP_AXES`.
+    unit_m : length of the file's unit [m].
+    """
+
+    file: Path
+    shift: Vector3 | None = None
+    crs: str = ""
+    up: str = "auto"
+    unit_m: float = 1.0
+    extra: Extra = field(default_factory=dict)
+
+    @property
+    def global_shift(self) -> GlobalShift | None:
+        """The shift as the terrain and table readers take it; None when the project leaves it to the reader."""
+        return None if self.shift is None else GlobalShift(*self.shift, crs=self.crs)
+
+
+@dataclass(frozen=True)
+class BlockEntry:
+    """One block: principal diameters [m] and density [kg/m³]; ``name`` is its trajectory in the table of picks."""
+
+    name: str = ""
+    d1_m: float = 0.35
+    d2_m: float = 0.35
+    d3_m: float = 0.35
+    density_kgpm3: float = ROCK_DENSITY_KGPM3
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ReconstructionSettings:
+    """How flights and impacts are computed.
+
+    Attributes
+    ----------
+    normal_radius_m : radius within which the terrain normal is fitted; None for the default at block scale.
+    gravity_mps2 : acceleration of gravity.
+    drag : whether the flights are computed with the drag of air.
+    drag_coefficient, air_density_kgpm3 : C_D and ρ, used when ``drag`` is true.
+    """
+
+    normal_radius_m: float | None = None
+    gravity_mps2: float = GRAVITY_MPS2
+    drag: bool = False
+    drag_coefficient: float = DRAG_COEFFICIENT
+    air_density_kgpm3: float = AIR_DENSITY_KGPM3
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CameraPlacement:
+    """Where the film's camera stands and looks, in survey coordinates [m]; ``fov_deg`` is the horizontal angle."""
+
+    position: Vector3
+    target: Vector3
+    fov_deg: float = 40.0
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RenderPreset:
+    """One way to make the film.
+
+    Attributes
+    ----------
+    width, height : size of the picture [px].
+    fps : frames per second of the film.
+    engine : one of `ENGINES`; "auto" takes the quickest that works on the machine.
+    stagger_s : the blocks start one after the other with this delay; None keeps the time that was observed.
+    time_scale : seconds of the fall shown in one second of film (below 1: slow motion).
+    camera : None places it so that the whole of the trajectories is seen.
+    """
+
+    name: str
+    width: int = 1920
+    height: int = 1080
+    fps: float = 24.0
+    engine: str = "auto"
+    stagger_s: float | None = None
+    time_scale: float = 1.0
+    camera: CameraPlacement | None = None
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Project:
+    """A whole project; all paths are absolute or relative to the working directory, as `read_project` resolves them.
+
+    Attributes
+    ----------
+    block : what holds for every trajectory that ``blocks`` does not name.
+    """
+
+    site: Site = field(default_factory=Site)
+    terrain: TerrainSource | None = None
+    picks: Path | None = None
+    block: BlockEntry = field(default_factory=BlockEntry)
+    blocks: tuple[BlockEntry, ...] = ()
+    reconstruction: ReconstructionSettings = field(default_factory=ReconstructionSettings)
+    render: tuple[RenderPreset, ...] = ()
+    extra: Extra = field(default_factory=dict)
+
+    def block_of(self, trajectory: str) -> BlockEntry:
+        """The block of a trajectory, or the project's default block."""
+        return next((block for block in self.blocks if block.name == trajectory), self.block)
+
+    def preset(self, name: str) -> RenderPreset:
+        """A render preset by its name.
+
+        Raises
+        ------
+        InputError : the project has no such preset; the message lists those that it has.
+        """
+        found = next((preset for preset in self.render if preset.name == name), None)
+        if found is None:
+            known = ", ".join(preset.name for preset in self.render) or "none"
+            raise InputError(f"The project has no render preset {name!r}", advice=f"Known presets: {known}")
+        return found
+
+
+def read_project(path: str | Path) -> Project:
+    """Read ``project.toml``.
+
+    Raises
+    ------
+    InputError : the file is missing or no TOML, has another schema, a wrong type, value or name, or points to a
+        terrain or table that is not there. The message names the file, the key and what to do.
+    """
+    path = Path(path)
+    top = _Table(_load(path), "", path)
+    _check_schema(top)
+    site, terrain, picks = top.table("site"), top.table("terrain"), top.table("picks")
+    block = _block(top.table("block"), BlockEntry(), named=False)
+    blocks = tuple(_block(table, block, named=True) for table in top.tables("blocks"))
+    render = tuple(_preset(table) for table in top.tables("render"))
+    for key, names in (("blocks", [entry.name for entry in blocks]), ("render", [preset.name for preset in render])):
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise top.wrong(key, f"names {repeated[0]!r} twice", "Give each entry a name of its own")
+    return Project(
+        site=Site(site.text("name", ""), site.text("description", ""), site.rest()),
+        terrain=None if terrain.absent else _terrain(terrain),
+        picks=None if picks.absent else picks.path("file"),
+        block=block,
+        blocks=blocks,
+        reconstruction=_reconstruction(top.table("reconstruction")),
+        render=render,
+        extra=top.rest() | ({"picks": picks.rest()} if picks.rest() else {}),
+    )
+
+
+def write_project(project: Project, path: str | Path) -> None:
+    """Write ``project.toml``; files inside its folder, or beside it, are named relative to it."""
+    import tomli_w
+
+    path = Path(path)
+    folder = path.resolve().parent
+
+    def relative(file: Path) -> str:
+        try:
+            return file.resolve().relative_to(folder, walk_up=True).as_posix()
+        except ValueError:  # another drive
+            return file.resolve().as_posix()
+
+    extra = dict(project.extra)
+    picks_extra = extra.pop("picks", {})
+    content: dict[str, Any] = {"schema": SCHEMA, "site": _plain(project.site)}
+    if project.terrain is not None:
+        content["terrain"] = _plain(project.terrain) | {"file": relative(project.terrain.file)}
+    if project.picks is not None or picks_extra:
+        content["picks"] = ({} if project.picks is None else {"file": relative(project.picks)}) | picks_extra
+    content["block"] = {key: value for key, value in _plain(project.block).items() if key != "name"}
+    content["blocks"] = [_plain(block) for block in project.blocks]
+    content["reconstruction"] = _plain(project.reconstruction)
+    content["render"] = [_plain(preset) for preset in project.render]
+    content = {key: value for key, value in content.items() if value not in ({}, [])} | extra
+    path.write_text(tomli_w.dumps(content), encoding="utf-8", newline="\n")
+
+
+def _plain(part: Any) -> dict[str, Any]:
+    """A part as TOML can hold it: None left out, the unknown keys at the end."""
+    values: dict[str, Any] = {}
+    for key, value in vars(part).items():
+        if key == "extra" or value is None:
+            continue
+        if isinstance(value, tuple):
+            values[key] = list(value)
+        elif isinstance(value, CameraPlacement):
+            values[key] = _plain(value)
+        else:
+            values[key] = value
+    return values | dict(part.extra)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(
+            f"The project cannot be read ({error.strerror})", file=path, advice="Check the path"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("The project is not UTF-8 text", file=path, advice="Save it as UTF-8") from error
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        row = re.search(r"line (\d+)", str(error))
+        raise InputError(
+            f"This is not valid TOML: {error}",
+            file=path,
+            row=int(row[1]) if row else text.count("\n") + 1,
+            advice="Text stands in quotation marks, a section's name in square brackets",
+        ) from error
+
+
+def _check_schema(top: "_Table") -> None:
+    schema = top.take("schema")
+    if schema is None:
+        raise top.wrong("schema", "is missing", f"Start the file with: schema = {SCHEMA}")
+    if not isinstance(schema, int) or isinstance(schema, bool) or schema < 1:
+        raise top.wrong("schema", f"is {schema!r}", f"Write: schema = {SCHEMA}")
+    if schema != SCHEMA:
+        raise top.wrong(
+            "schema",
+            f"is {schema}, but this Rockfall reads version {SCHEMA}",
+            "The project was written by a newer Rockfall: update, or write the project again with this version",
+        )
+
+
+def _terrain(table: "_Table") -> TerrainSource:
+    return TerrainSource(
+        file=table.path("file"),
+        shift=table.optional_vector("shift"),
+        crs=table.text("crs", ""),
+        up=table.choice("up", UP_AXES, "auto"),
+        unit_m=table.number("unit_m", 1.0),
+        extra=table.rest(),
+    )
+
+
+def _block(table: "_Table", default: BlockEntry, named: bool) -> BlockEntry:
+    return BlockEntry(
+        name=table.text("name") if named else "",
+        d1_m=table.number("d1_m", default.d1_m),
+        d2_m=table.number("d2_m", default.d2_m),
+        d3_m=table.number("d3_m", default.d3_m),
+        density_kgpm3=table.number("density_kgpm3", default.density_kgpm3),
+        extra=table.rest(),
+    )
+
+
+def _reconstruction(table: "_Table") -> ReconstructionSettings:
+    return ReconstructionSettings(
+        normal_radius_m=table.optional_number("normal_radius_m"),
+        gravity_mps2=table.number("gravity_mps2", GRAVITY_MPS2),
+        drag=table.flag("drag", False),
+        drag_coefficient=table.number("drag_coefficient", DRAG_COEFFICIENT),
+        air_density_kgpm3=table.number("air_density_kgpm3", AIR_DENSITY_KGPM3),
+        extra=table.rest(),
+    )
+
+
+def _preset(table: "_Table") -> RenderPreset:
+    camera = table.table("camera")
+    return RenderPreset(
+        name=table.text("name"),
+        width=table.whole("width", 1920),
+        height=table.whole("height", 1080),
+        fps=table.number("fps", 24.0),
+        engine=table.choice("engine", ENGINES, "auto"),
+        stagger_s=table.optional_number("stagger_s", zero_allowed=True),
+        time_scale=table.number("time_scale", 1.0),
+        camera=None if camera.absent else _camera(camera),
+        extra=table.rest(),
+    )
+
+
+def _camera(table: "_Table") -> CameraPlacement:
+    fov_deg = table.number("fov_deg", 40.0)
+    if fov_deg >= 180.0:
+        raise table.wrong("fov_deg", f"is {fov_deg:g}", "Give the horizontal angle of view, below 180")
+    return CameraPlacement(table.vector("position"), table.vector("target"), fov_deg, table.rest())
+
+
+_REQUIRED: Any = object()
+
+
+class _Table:
+    """One TOML table being read: keys are taken out with a check of their type, what is left over is unknown."""
+
+    def __init__(self, content: dict[str, Any] | None, place: str, file: Path) -> None:
+        self.absent = content is None
+        self._content, self._place, self._file = dict(content or {}), place, file
+
+    def wrong(self, key: str, problem: str, advice: str) -> InputError:
+        return InputError(f"{self._place}{key} {problem}", file=self._file, advice=advice)
+
+    def take(self, key: str) -> Any:
+        return self._content.pop(key, None)
+
+    def rest(self) -> dict[str, Any]:
+        return dict(self._content)
+
+    def _taken(self, key: str, default: Any, wanted: str) -> Any:
+        value = self.take(key)
+        if value is None:
+            if default is _REQUIRED:
+                raise self.wrong(key, "is missing", f"Give {wanted}")
+            return default
+        return value
+
+    def text(self, key: str, default: Any = _REQUIRED) -> str:
+        value = self._taken(key, default, "a text in quotation marks")
+        if not isinstance(value, str):
+            raise self.wrong(key, f"is {value!r}, not a text", "Put it in quotation marks")
+        if default is _REQUIRED and not value:
+            raise self.wrong(key, "is empty", "Give a name")
+        return value
+
+    def choice(self, key: str, known: tuple[str, ...], default: str) -> str:
+        value = self.text(key, default)
+        if value not in known:
+            raise self.wrong(key, f"is {value!r}", f"Choose one of {', '.join(known)}")
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        value = self._taken(key, default, "true or false")
+        if not isinstance(value, bool):
+            raise self.wrong(key, f"is {value!r}", "Write true or false, without quotation marks")
+        return value
+
+    def number(self, key: str, default: float, zero_allowed: bool = False) -> float:
+        value = self._taken(key, default, "a number")
+        if not _is_number(value):
+            raise self.wrong(key, f"is {value!r}, not a number", "Write a number without quotation marks")
+        if value < 0.0 or (value == 0.0 and not zero_allowed):
+            raise self.wrong(key, f"is {value:g}", f"Give a number {'not below' if zero_allowed else 'above'} zero")
+        return float(value)
+
+    def optional_number(self, key: str, zero_allowed: bool = False) -> float | None:
+        return self.number(key, _REQUIRED, zero_allowed) if key in self._content else None
+
+    def whole(self, key: str, default: int) -> int:
+        value = self._taken(key, default, "a whole number")
+        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+            raise self.wrong(key, f"is {value!r}", "Give a whole number above zero")
+        return value
+
+    def vector(self, key: str) -> Vector3:
+        value = self._taken(key, _REQUIRED, "three numbers, [x, y, z]")
+        if not isinstance(value, list) or len(value) != 3 or not all(_is_number(item) for item in value):
+            raise self.wrong(key, f"is {value!r}", "Give three numbers, [x, y, z]")
+        x, y, z = (float(item) for item in value)
+        return x, y, z
+
+    def optional_vector(self, key: str) -> Vector3 | None:
+        return self.vector(key) if key in self._content else None
+
+    def path(self, key: str) -> Path:
+        file = self._file.parent / self.text(key)
+        if not file.is_file():
+            raise self.wrong(key, f"names a file that is not there: {file}", "Paths are relative to the project file")
+        return file
+
+    def table(self, key: str) -> "_Table":
+        value = self.take(key)
+        if value is not None and not isinstance(value, dict):
+            raise self.wrong(key, f"is {value!r}, not a section", f"Write a section: [{self._place}{key}]")
+        return _Table(value, f"{self._place}{key}.", self._file)
+
+    def tables(self, key: str) -> list["_Table"]:
+        value = self.take(key)
+        if value is None:
+            return []
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            raise self.wrong(key, "is not a list of sections", f"Write one section for each: [[{key}]]")
+        return [_Table(item, f"{key} {number}: ", self._file) for number, item in enumerate(value, 1)]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The preferences, and the panel that says whether everything Rockfall needs is there."""
+
+import os
+import sys
+import textwrap
+
+import bpy
+
+from .. import __package__ as ADDON_ID  # noqa: N812
+from .. import __version__
+
+problem = ""
+"""Why nothing but this module is registered; empty when all is well. Set by the add-on's `register`."""
+
+ADVICE = (
+    "The libraries travel inside the extension's zip. Install the zip for your system (Linux, Windows or macOS on "
+    "Apple silicon) with Preferences > Get Extensions > Install from Disk, then restart Blender. "
+    "A checkout of the sources has no libraries: run scripts/build_extension.py there."
+)
+
+
+def draw_state(layout: bpy.types.UILayout, width: int) -> None:
+    """The version, and what is wrong with the installation if anything is."""
+    python = f"Python {sys.version_info.major}.{sys.version_info.minor}"
+    column = layout.column(align=True)
+    column.label(text=f"Rockfall {__version__}, {python}, {sys.platform}", icon="ERROR" if problem else "CHECKMARK")
+    if problem:
+        for paragraph in (problem, ADVICE):
+            column.separator()
+            for line in textwrap.wrap(paragraph, width):
+                column.label(text=line)
+
+
+class InstallationPanel(bpy.types.Panel):
+    """Version and state of the installation; open when something is missing."""
+
+    bl_idname = "ROCKFALL_PT_installation"
+    bl_label = "Installation"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Rockfall"
+    bl_order = 1000
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_state(self.layout, width=max(20, int(context.region.width / context.preferences.system.ui_scale / 7)))
+
+
+class RockfallPreferences(bpy.types.AddonPreferences):
+    bl_idname = ADDON_ID
+
+    def draw(self, context: bpy.types.Context) -> None:
+        draw_state(self.layout, width=90)
+
+
+CLASSES = (InstallationPanel, RockfallPreferences)
+
+
+def register() -> None:
+    InstallationPanel.bl_options = set() if problem else {"DEFAULT_CLOSED"}
+    for each in CLASSES:
+        bpy.utils.register_class(each)
+    _keep_kernels_in_user_directory()
+
+
+def unregister() -> None:
+    for each in reversed(CLASSES):
+        bpy.utils.unregister_class(each)
+
+
+def _keep_kernels_in_user_directory() -> None:
+    """The extension's own directory may be read-only, and is replaced when it is updated."""
+    if ADDON_ID.startswith("bl_ext."):
+        os.environ.setdefault("NUMBA_CACHE_DIR", bpy.utils.extension_path_user(ADDON_ID, path="kernels", create=True))

@@ -1,1 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar tab "Rockfall": one panel per step. Panels compute nothing and name operators by their ids."""
+
+import bpy
+
+from . import impact, picks, playback, share, terrain
+
+CLASSES = (*terrain.CLASSES, *picks.CLASSES, *impact.CLASSES, *playback.CLASSES, *share.CLASSES)
+
+
+def register() -> None:
+    for cls in CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister() -> None:
+    for cls in reversed(CLASSES):
+        bpy.utils.unregister_class(cls)

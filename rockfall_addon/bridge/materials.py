@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials and geometry-node groups, made by code so that no binary file has to be trusted."""
+
+from collections.abc import Callable
+
+import bpy
+import numpy as np
+
+from ...core.colours import srgb_to_linear
+
+ROCK_COLOUR = (0.47, 0.43, 0.38)
+THIN_COLOUR = (0.30, 0.42, 0.60)
+RELIEF_FLOOR = 0.25  # what is left of the light where hillshade or eye-dome are zero
+RELIEF_BRIGHTNESS = 1.6
+SUN_DIRECTION = (-0.5, -0.5, 0.7071)  # from the north-west as on maps would be behind a camera that looks up the slope
+TRAIL_GROUP = "Rockfall trail"
+TIME_ATTRIBUTE = "display_time_s"
+SPEED_ATTRIBUTE = "speed_mps"
+SPEED_COLOUR = "speed_colour"
+RELIEF_COLOUR = "relief"
+
+
+def terrain_material() -> bpy.types.Material:
+    """Relief as in Noël et al. 2018, figure 3: hillshade × eye-dome from the vertex attributes, thin data hatched.
+
+    It emits its colour: no lamp, no shadow rays, no noise, the same picture from every engine.
+    """
+    return _material("Rockfall terrain", _build_terrain)
+
+
+def emission_material(name: str, attribute: str, strength: float = 1.0) -> bpy.types.Material:
+    """Shows a colour attribute as it is, whatever the light."""
+
+    def build(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> None:
+        colour = tree.nodes.new("ShaderNodeAttribute")
+        colour.attribute_name = attribute
+        emission = tree.nodes.new("ShaderNodeEmission")
+        emission.inputs["Strength"].default_value = strength
+        tree.links.new(colour.outputs["Color"], emission.inputs["Color"])
+        tree.links.new(emission.outputs[0], output.inputs["Surface"])
+
+    return _material(name, build)
+
+
+def shaded_material(name: str, attribute: str) -> bpy.types.Material:
+    """A colour attribute, brighter where the surface faces the hillshade's sun; needs no lamp."""
+
+    def build(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> None:
+        colour, geometry = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeNewGeometry")
+        colour.attribute_name = attribute
+        towards = tree.nodes.new("ShaderNodeVectorMath")
+        towards.operation = "DOT_PRODUCT"
+        towards.inputs[1].default_value = SUN_DIRECTION
+        tree.links.new(geometry.outputs["Normal"], towards.inputs[0])
+        light = _math(tree, "MULTIPLY_ADD", towards.outputs["Value"], 0.45)
+        light.node.inputs[2].default_value = 0.6
+        _emit(tree, output, colour.outputs["Color"], light)
+
+    return _material(name, build)
+
+
+def trail_group() -> bpy.types.GeometryNodeTree:
+    """Geometry nodes: a polyline with times becomes a tube, wholly or up to the current time.
+
+    The polyline itself is joined to the tube because Blender keeps the active colour attribute (which the viewport's
+    solid mode shows) from it alone.
+    """
+    existing = bpy.data.node_groups.get(TRAIL_GROUP)
+    if existing is not None:
+        return existing
+    group = bpy.data.node_groups.new(TRAIL_GROUP, "GeometryNodeTree")
+    group.is_modifier = True
+    interface = group.interface
+    interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    radius = interface.new_socket("Radius", in_out="INPUT", socket_type="NodeSocketFloat")
+    radius.subtype, radius.default_value, radius.min_value = "DISTANCE", 0.06, 0.0
+    until_now = interface.new_socket("Up to now", in_out="INPUT", socket_type="NodeSocketBool")
+    until_now.default_value = False
+    interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+
+    new, link = group.nodes.new, group.links.new
+    source, result = new("NodeGroupInput"), new("NodeGroupOutput")
+    seconds = new("GeometryNodeInputSceneTime")
+    time = new("GeometryNodeInputNamedAttribute")
+    time.data_type = "FLOAT"
+    time.inputs["Name"].default_value = TIME_ATTRIBUTE
+    later = new("FunctionNodeCompare")
+    later.data_type, later.operation = "FLOAT", "GREATER_THAN"
+    both = new("FunctionNodeBooleanMath")
+    both.operation = "AND"
+    cut = new("GeometryNodeDeleteGeometry")
+    cut.domain = "POINT"
+    curve, circle, tube = new("GeometryNodeMeshToCurve"), new("GeometryNodeCurvePrimitiveCircle"), new("GeometryNodeCurveToMesh")
+    circle.inputs["Resolution"].default_value = 6
+    material = new("GeometryNodeSetMaterial")
+    material.inputs["Material"].default_value = emission_material("Rockfall trail", SPEED_COLOUR)
+    join = new("GeometryNodeJoinGeometry")
+    link(time.outputs["Attribute"], later.inputs[0])
+    link(seconds.outputs["Seconds"], later.inputs[1])
+    link(later.outputs[0], both.inputs[0])
+    link(source.outputs["Up to now"], both.inputs[1])
+    link(source.outputs["Geometry"], cut.inputs["Geometry"])
+    link(both.outputs[0], cut.inputs["Selection"])
+    link(cut.outputs[0], curve.inputs[0])
+    link(source.outputs["Radius"], circle.inputs["Radius"])
+    link(curve.outputs[0], tube.inputs["Curve"])
+    link(circle.outputs[0], tube.inputs["Profile Curve"])
+    link(tube.outputs[0], material.inputs[0])
+    link(material.outputs[0], join.inputs[0])
+    link(cut.outputs[0], join.inputs[0])
+    link(join.outputs[0], result.inputs[0])
+    return group
+
+
+def socket_id(group: bpy.types.GeometryNodeTree, name: str) -> str:
+    """Identifier under which a modifier keeps the value of a group's input."""
+    return next(s.identifier for s in group.interface.items_tree if s.name == name and s.in_out == "INPUT")
+
+
+def linear_colour(colour: tuple[float, float, float]) -> tuple[float, float, float, float]:
+    """An sRGB colour as Blender's materials and attributes want it."""
+    r, g, b = srgb_to_linear(np.array(colour)).tolist()
+    return r, g, b, 1.0
+
+
+def _material(
+    name: str, build: Callable[[bpy.types.ShaderNodeTree, bpy.types.Node], None]
+) -> bpy.types.Material:
+    existing = bpy.data.materials.get(name)
+    if existing is not None:
+        return existing
+    material = bpy.data.materials.new(name)
+    tree = material.node_tree
+    tree.nodes.clear()
+    build(tree, tree.nodes.new("ShaderNodeOutputMaterial"))
+    return material
+
+
+def _emit(
+    tree: bpy.types.ShaderNodeTree, output: bpy.types.Node, colour: bpy.types.NodeSocket, light: bpy.types.NodeSocket
+) -> None:
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(colour, emission.inputs["Color"])
+    tree.links.new(light, emission.inputs["Strength"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+
+
+def _build_terrain(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> None:
+    new, link = tree.nodes.new, tree.links.new
+
+    def attribute(name: str) -> bpy.types.NodeSocket:
+        node = new("ShaderNodeAttribute")
+        node.attribute_name = name
+        return node.outputs["Fac"]
+
+    # hatches: stripes of one metre across the diagonal, where data are thin
+    place, split = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ")
+    link(place.outputs["Object"], split.inputs[0])
+    diagonal = _math(tree, "ADD", split.outputs["X"], _math(tree, "ADD", split.outputs["Y"], split.outputs["Z"]))
+    stripe = _math(tree, "GREATER_THAN", _math(tree, "FRACT", diagonal, 0.0), 0.5)
+    hatch = _math(tree, "MULTIPLY", stripe, _math(tree, "MULTIPLY", attribute("thin"), 0.7))
+
+    rock = new("ShaderNodeMix")
+    rock.data_type = "RGBA"
+    rock.inputs["A"].default_value = (*ROCK_COLOUR, 1.0)
+    rock.inputs["B"].default_value = (*THIN_COLOUR, 1.0)
+    link(hatch, rock.inputs["Factor"])
+    light = _math(tree, "MULTIPLY", _affine(tree, attribute("hillshade")), _affine(tree, attribute("eye_dome")))
+    bright = _math(tree, "MULTIPLY", light, RELIEF_BRIGHTNESS)
+    _emit(tree, output, rock.outputs["Result"], bright)
+
+
+def _affine(tree: bpy.types.ShaderNodeTree, value: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    """RELIEF_FLOOR + (1 - RELIEF_FLOOR) · value, so that no shade is black."""
+    result = _math(tree, "MULTIPLY_ADD", value, 1.0 - RELIEF_FLOOR)
+    result.node.inputs[2].default_value = RELIEF_FLOOR
+    return result
+
+
+def _math(
+    tree: bpy.types.ShaderNodeTree, operation: str, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket | float
+) -> bpy.types.NodeSocket:
+    node = tree.nodes.new("ShaderNodeMath")
+    node.operation = operation
+    tree.links.new(a, node.inputs[0])
+    if isinstance(b, float):
+        node.inputs[1].default_value = b
+    else:
+        tree.links.new(b, node.inputs[1])
+    return node.outputs[0]

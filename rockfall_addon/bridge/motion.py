@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keyframes that are the trajectory itself.
+
+Between two impacts a block's coordinates are polynomials of degree two in time, and a cubic Bézier segment whose handles
+lie at the thirds represents them exactly. So a key at each impact (at its sub-frame time) with handles from the
+velocities gives the exact parabola at every frame and at any frame rate.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.reconstruction.trajectory import Flights, flight_states
+from ...core.vectors import Array
+
+DRAG_KEY_STEP_S = 0.1  # with drag the cubic is an approximation: Hermite's error at this step is below 0.1 mm
+JUMP_FRAMES = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Keys:
+    """Keyframes of a motion: times (k,) [s], positions (k, 3) [m], velocities before and after each key (k, 3) [m/s],
+    and whether the motion is undefined after a key (held until the next)."""
+
+    time_s: Array
+    position: Array
+    velocity_before: Array
+    velocity_after: Array
+    held: np.ndarray
+
+
+def motion_keys(flights: Flights, which: Array, offset: Array | float = 0.0) -> Keys:
+    """Keys of the consecutive motion segments `which` (k,) of one trajectory.
+
+    offset : (3,) [m] added to the positions, from the surface to the block's centre.
+    """
+    times, positions, before, after, held = [], [], [], [], []
+    for index in np.asarray(which, dtype=int):
+        start, end = flights.start_time_s[index], flights.end_time_s[index]
+        pieces = 1 if flights.drag_per_m[index] == 0 else max(1, int(np.ceil((end - start) / DRAG_KEY_STEP_S)))
+        knots = np.linspace(start, end, pieces + 1)
+        position, velocity = flight_states(flights, np.full(len(knots), index), knots)
+        joined = bool(times) and abs(times[-1] - start) < 1e-9 and np.allclose(positions[-1], position[0], atol=1e-6)
+        if joined:
+            after[-1], held[-1] = velocity[0], False
+        else:
+            if times:
+                held[-1] = True
+            times.append(start)
+            positions.append(position[0])
+            before.append(velocity[0])
+            after.append(velocity[0])
+            held.append(False)
+        for knot, place, speed in zip(knots[1:], position[1:], velocity[1:], strict=True):
+            times.append(knot)
+            positions.append(place)
+            before.append(speed)
+            after.append(speed)
+            held.append(False)
+    return Keys(
+        np.array(times),
+        np.array(positions).reshape(-1, 3) + offset,
+        np.array(before).reshape(-1, 3),
+        np.array(after).reshape(-1, 3),
+        np.array(held, dtype=bool),
+    )
+
+
+def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float) -> None:
+    """Replace an object's location curves by these keys, at frame = time × rate."""
+    frames = keys.time_s * rate
+    same = np.flatnonzero(np.diff(frames) < JUMP_FRAMES) + 1  # a jump: two positions at one time
+    frames[same] += JUMP_FRAMES
+    third = np.diff(frames) / 3
+    count = len(frames)
+    bag = _channelbag(thing)
+    for axis in range(3):
+        old = bag.fcurves.find("location", index=axis)
+        if old is not None:
+            bag.fcurves.remove(old)
+        curve = bag.fcurves.new("location", index=axis)
+        curve.keyframe_points.add(count)
+        value = keys.position[:, axis]
+        left, right = np.column_stack([frames, value]), np.column_stack([frames, value])
+        right[:-1] += np.column_stack([third, third / rate * keys.velocity_after[:-1, axis]])
+        left[1:] -= np.column_stack([third, third / rate * keys.velocity_before[1:, axis]])
+        points = curve.keyframe_points
+        points.foreach_set("co", np.column_stack([frames, value]).ravel())
+        points.foreach_set("handle_left_type", np.zeros(count, dtype=np.int32))
+        points.foreach_set("handle_right_type", np.zeros(count, dtype=np.int32))
+        points.foreach_set("handle_left", left.ravel())
+        points.foreach_set("handle_right", right.ravel())
+        for index in np.flatnonzero(keys.held):
+            points[int(index)].interpolation = "CONSTANT"
+        curve.update()
+
+
+def key_location_once(thing: bpy.types.Object, frame: float) -> None:
+    """One key at a (sub-)frame: the place and the time of a pick."""
+    bag = _channelbag(thing)
+    for axis in range(3):
+        curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
+        curve.keyframe_points.clear()
+        curve.keyframe_points.insert(frame, thing.location[axis], options={"FAST"})
+        curve.update()
+
+
+def _channelbag(thing: bpy.types.Object) -> bpy.types.ActionChannelbag:
+    animation = thing.animation_data or thing.animation_data_create()
+    if animation.action is None:
+        action = bpy.data.actions.new(thing.name)
+        animation.action = action
+        animation.action_slot = action.slots.new(id_type="OBJECT", name=thing.name)
+    action, slot = animation.action, animation.action_slot
+    layer = action.layers[0] if action.layers else action.layers.new("Layer")
+    strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
+    return strip.channelbag(slot, ensure=True)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trajectories: a reconstruction ↔ what the scene shows of it.
+
+Of each trajectory: its picks, one polyline of its flights coloured by speed, and its block, keyed on the parabolas.
+"""
+
+import bpy
+import numpy as np
+
+from ...core.colours import rounded_top, scale_colours, srgb_to_linear
+from ...core.reconstruction.trajectory import Flights, Reconstruction, flight_states
+from . import materials, motion, picks, state, timing
+
+SAMPLE_STEP_S = 0.02
+BLOCK_COLOUR = (0.86, 0.16, 0.10)
+RESULT_KEY = "rockfall_result"
+
+
+def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
+    """Bring the scene's picks, flights and blocks in line with a reconstruction."""
+    settings = scene.rockfall
+    offsets = timing.display_offsets(result.picks, settings.playback == "REAL", settings.stagger_s)
+    scene[state.KEYED_RATE_KEY] = timing.frame_rate(scene)
+    normals = result.picks.normal.copy()
+    normals[result.impacts.pick] = result.impacts.normal
+    picks.show_picks(scene, result.picks, normals, offsets, settings.marker_radius_m)
+    _store_results(scene, result)
+    state.remove_objects(state.with_role(scene, state.FLIGHTS_ROLE) + state.with_role(scene, state.BLOCK_ROLE))
+    speeds = np.linalg.norm(np.vstack([result.flights.start_velocity, result.flights.end_velocity]), axis=1)
+    settings.speed_top_mps = rounded_top(float(speeds.max(initial=0.0)))
+    last = 1.0
+    for name, offset in offsets.items():
+        which = np.flatnonzero(result.flights.trajectory == name)
+        if len(which):
+            _show_flights(scene, name, result.flights, which, offset)
+            _show_block(scene, name, result, which, offset)
+            last = max(last, float(result.flights.end_time_s[which].max()) - offset)
+    scene.frame_start = 0
+    scene.frame_end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
+
+
+def _show_flights(scene: bpy.types.Scene, name: str, flights: Flights, which: np.ndarray, offset: float) -> None:
+    times, positions, speeds, edges = [], [], [], []
+    count = 0
+    for index in which:
+        start, end = flights.start_time_s[index], flights.end_time_s[index]
+        clock = np.linspace(start, end, max(2, int(np.ceil((end - start) / SAMPLE_STEP_S)) + 1))
+        position, velocity = flight_states(flights, np.full(len(clock), index), clock)
+        times.append(clock - offset)
+        positions.append(position)
+        speeds.append(np.linalg.norm(velocity, axis=1))
+        first = np.arange(count, count + len(clock) - 1)
+        edges.append(np.column_stack([first, first + 1]))
+        count += len(clock)
+    speed = np.concatenate(speeds)
+    mesh = bpy.data.meshes.new(f"{name} flights")
+    mesh.vertices.add(count)
+    mesh.vertices.foreach_set("co", np.vstack(positions).astype(np.float32).ravel())
+    pairs = np.vstack(edges).astype(np.int32)
+    mesh.edges.add(len(pairs))
+    mesh.edges.foreach_set("vertices", pairs.ravel())
+    for attribute, values in ((materials.TIME_ATTRIBUTE, np.concatenate(times)), (materials.SPEED_ATTRIBUTE, speed)):
+        mesh.attributes.new(attribute, "FLOAT", "POINT").data.foreach_set("value", values.astype(np.float32))
+    colours = np.ones((count, 4), dtype=np.float32)
+    colours[:, :3] = srgb_to_linear(scale_colours(speed, 0.0, scene.rockfall.speed_top_mps))
+    mesh.attributes.new(materials.SPEED_COLOUR, "FLOAT_COLOR", "POINT").data.foreach_set("color", colours.ravel())
+    mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.SPEED_COLOUR
+    mesh.update()
+
+    thing = bpy.data.objects.new(f"{name} flights", mesh)
+    thing[state.ROLE_KEY], thing["rockfall_trajectory"] = state.FLIGHTS_ROLE, name
+    modifier = thing.modifiers.new("Trail", "NODES")
+    modifier.node_group = materials.trail_group()
+    state.collection(scene, "Trajectories", name).objects.link(thing)
+    set_trails(scene, [thing])
+
+
+def set_trails(scene: bpy.types.Scene, things: list[bpy.types.Object] | None = None) -> None:
+    """Apply the trail's radius and whether it ends at the current time."""
+    group = materials.trail_group()
+    radius, until_now = materials.socket_id(group, "Radius"), materials.socket_id(group, "Up to now")
+    for thing in state.with_role(scene, state.FLIGHTS_ROLE) if things is None else things:
+        modifier = thing.modifiers.get("Trail")
+        if modifier is not None:
+            modifier[radius], modifier[until_now] = scene.rockfall.trail_radius_m, scene.rockfall.trail_until_now
+            thing.update_tag()
+
+
+def _show_block(
+    scene: bpy.types.Scene, name: str, result: Reconstruction, which: np.ndarray, offset: float
+) -> None:
+    diameters = np.array(result.block_of(name).diameters_m) * scene.rockfall.block_scale
+    thing = bpy.data.objects.new(f"{name} block", block_mesh())
+    thing[state.ROLE_KEY], thing["rockfall_trajectory"] = state.BLOCK_ROLE, name
+    thing.scale = diameters / 2
+    state.collection(scene, "Trajectories", name).objects.link(thing)
+    thing.delta_location.z = (scene.rockfall.block_scale - 1) * float(diameters.mean()) / scene.rockfall.block_scale / 2
+    keys = motion.motion_keys(result.flights, which)
+    keys.time_s[:] -= offset
+    motion.write_location_keys(thing, keys, timing.frame_rate(scene))
+
+
+def _store_results(scene: bpy.types.Scene, result: Reconstruction) -> None:
+    """Write each impact's numbers into its object, where panels and exports find them."""
+    impacts = result.impacts
+    of_pick = {(str(n), float(t)): i for i, (n, t) in enumerate(zip(impacts.trajectory, impacts.time_s, strict=True))}
+    for thing in state.with_role(scene, state.PICK_ROLE):
+        i = of_pick.get((thing["rockfall_trajectory"], thing["rockfall_time_s"]))
+        if i is None or thing["rockfall_kind"] != "impact":
+            continue
+        values = {
+            "incident_mps": impacts.v1[i],
+            "restituted_mps": impacts.v2[i],
+            "rn": impacts.rn[i],
+            "rt": impacts.rt[i],
+            "r": impacts.r[i],
+            "theta1_deg": np.degrees(impacts.theta1[i]),
+            "theta_dev_deg": np.degrees(impacts.theta_dev[i]),
+        }
+        thing[RESULT_KEY] = {key: np.atleast_1d(value).tolist() for key, value in values.items()} | {
+            "number": int(impacts.impact[i]),
+            "flags": ";".join(impacts.flags[i]),
+        }
+
+
+def block_mesh() -> bpy.types.Mesh:
+    """An angular block of radius 1 (convex hull of seeded directions), shared by all blocks."""
+    existing = bpy.data.meshes.get("Rockfall block")
+    if existing is not None:
+        return existing
+    import bmesh
+
+    random = np.random.default_rng(7)
+    directions = random.normal(size=(28, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    corners = directions * random.uniform(0.88, 1.0, (28, 1))
+    shape = bmesh.new()
+    for corner in corners:
+        shape.verts.new(corner)
+    bmesh.ops.convex_hull(shape, input=shape.verts)
+    mesh = bpy.data.meshes.new("Rockfall block")
+    shape.to_mesh(mesh)
+    shape.free()
+    colour = mesh.attributes.new("colour", "FLOAT_COLOR", "POINT")
+    colour.data.foreach_set("color", np.tile(materials.linear_colour(BLOCK_COLOUR), len(mesh.vertices)).astype(np.float32))
+    mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
+    mesh.materials.append(materials.shaded_material("Rockfall block", "colour"))
+    return mesh

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the 3-D view shows the slope: relief, cavities and trajectories in their own colours, without a render."""
+
+import bpy
+from bpy.props import BoolProperty
+
+from ..bridge import state
+
+
+def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
+    """Set every 3-D view of the window to the relief look; optionally look at everything."""
+    if context.window is None:
+        return
+    for area in context.window.screen.areas:
+        if area.type != "VIEW_3D":
+            continue
+        space = area.spaces.active
+        shading = space.shading
+        shading.type, shading.light, shading.color_type = "SOLID", "FLAT", "VERTEX"
+        shading.show_cavity, shading.cavity_type = True, "BOTH"
+        shading.cavity_ridge_factor, shading.cavity_valley_factor = 0.6, 1.0
+        shading.curvature_ridge_factor, shading.curvature_valley_factor = 0.6, 0.8
+        shading.show_object_outline = False
+        shading.background_type, shading.background_color = "VIEWPORT", (0.055, 0.065, 0.08)
+        space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+        space.overlay.show_relationship_lines = space.overlay.show_extras = False
+        space.overlay.show_cursor = False
+        space.clip_end = max(space.clip_end, 5000.0)
+        if frame_all:
+            region = next(r for r in area.regions if r.type == "WINDOW")
+            with context.temp_override(area=area, region=region):
+                bpy.ops.view3d.view_all()
+    context.scene.view_settings.view_transform = "Standard"
+
+
+class ROCKFALL_OT_show_relief(bpy.types.Operator):
+    """Show the slope's relief and everything on it in the 3-D views"""
+
+    bl_idname = "rockfall.show_relief"
+    bl_label = "Relief View"
+    bl_options = {"REGISTER", "UNDO"}
+
+    frame_all: BoolProperty(name="Frame all", default=True)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        show_relief(context, self.frame_all)
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_show_impact(bpy.types.Operator):
+    """Go to the moment of the selected pick"""
+
+    bl_idname = "rockfall.show_impact"
+    bl_label = "Go to This Moment"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.get(state.ROLE_KEY) == state.PICK_ROLE
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        frame = context.object.animation_data.action_slot and context.object.animation_data.action.frame_range[0]
+        context.scene.frame_set(int(frame // 1), subframe=float(frame % 1))
+        return {"FINISHED"}
+
+
+CLASSES = (ROCKFALL_OT_show_relief, ROCKFALL_OT_show_impact)

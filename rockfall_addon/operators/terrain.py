@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 1: the terrain."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ...core.errors import RockfallError
+from ...core.georeference import GlobalShift
+from ...core.terrain.readers import inspect_terrain, read_terrain
+from ...core.terrain.shading import shade
+from ..bridge import reconstruction, state, terrain
+from . import look
+from .reporting import reported
+
+EXTENSIONS = (".ply", ".obj", ".stl", ".glb", ".gltf", ".asc", ".tif", ".tiff", ".las", ".laz", ".xyz")
+
+
+class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
+    """Import a scanned slope: a mesh, a grid or a point cloud, in survey coordinates"""
+
+    bl_idname = "rockfall.import_terrain"
+    bl_label = "Import Terrain"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: StringProperty(default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"})
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    shift_x: StringProperty(name="Shift X", description="Subtracted from the file's coordinates [m]")
+    shift_y: StringProperty(name="Y", description="Subtracted from the file's coordinates [m]")
+    shift_z: StringProperty(name="Z", description="Subtracted from the file's coordinates [m]")
+    up: EnumProperty(
+        name="Up", description="The axis that points up in the file",
+        items=[("auto", "Automatic", "Z, but Y for glTF"), ("z", "Z", ""), ("y", "Y", "")],
+    )  # fmt: skip
+    unit_m: FloatProperty(
+        name="File unit", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
+        default=1.0, min=1e-6, precision=4,
+    )  # fmt: skip
+    ground: EnumProperty(
+        name="Points", description="Which points of a cloud are meshed",
+        items=[
+            ("AUTO", "Ground if classified", "The ground class when the file has one, else all points"),
+            ("GROUND", "Ground only", "Only points of the class ground"),
+            ("ALL", "All", "All points, vegetation and noise too"),
+        ],
+    )  # fmt: skip
+    max_edge_m: FloatProperty(
+        name="Longest edge", description="Longer edges are left out when a cloud is meshed. 0: from the points' spacing",
+        default=0.0, min=0.0, unit="LENGTH",
+    )  # fmt: skip
+    asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.filepath:
+            return super().invoke(context, event)
+        return self._ask(context)
+
+    @reported
+    def _ask(self, context: bpy.types.Context) -> set[str]:
+        found = inspect_terrain(self.filepath)
+        shift = state.read_shift(context.scene) if state.has_shift(context.scene) else found.shift
+        self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
+        self.asked = True
+        self.facts = found.sentences()
+        return context.window_manager.invoke_props_dialog(self, width=420, title="Import Terrain", confirm_text="Import")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        if not self.asked:
+            return
+        layout = self.layout
+        box = layout.column(align=True)
+        for sentence in self.facts:
+            box.label(text=sentence)
+        layout.separator()
+        layout.use_property_split = True
+        column = layout.column(align=True)
+        known = state.has_shift(context.scene)
+        column.enabled = not known
+        for name in ("shift_x", "shift_y", "shift_z"):
+            column.prop(self, name)
+        column.label(text="The project's shift, shared by all its files." if known else "Proposed: kept for the project.")
+        for name in ("up", "unit_m", "ground", "max_edge_m"):
+            layout.prop(self, name)
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self.asked and not bpy.app.background and not self.options.is_repeat and not self.shift_x:
+            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath)
+        surface = read_terrain(
+            self.filepath,
+            shift=self._shift(context.scene),
+            up=self.up,
+            unit_m=float(f"{self.unit_m:.7g}"),
+            max_edge_m=self.max_edge_m or None,
+            ground_only={"AUTO": None, "GROUND": True, "ALL": False}[self.ground],
+        )
+        terrain.add_terrain(context.scene, surface, shade(surface))
+        reconstruction.refresh(context.scene)
+        look.show_relief(context, frame_all=True)
+        self.report({"INFO"}, " ".join(surface.summary))
+        return {"FINISHED"}
+
+    def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:
+        if state.has_shift(scene):
+            return state.read_shift(scene)
+        texts = (self.shift_x, self.shift_y, self.shift_z)
+        if not any(texts):
+            return None
+        try:
+            return GlobalShift(*(float(text or "0") for text in texts))
+        except ValueError:
+            raise RockfallError(f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0.") from None
+
+
+class ROCKFALL_FH_terrain(bpy.types.FileHandler):
+    """Drop a scanned slope into the 3-D view"""
+
+    bl_idname = "ROCKFALL_FH_terrain"
+    bl_label = "Rockfall terrain"
+    bl_import_operator = "rockfall.import_terrain"
+    bl_file_extensions = ";".join(EXTENSIONS)
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+CLASSES = (ROCKFALL_OT_import_terrain, ROCKFALL_FH_terrain)

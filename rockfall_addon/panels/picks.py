@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 2: picks and trajectories."""
+
+import bpy
+
+from ..bridge import state
+from .base import RockfallPanel, advise
+
+
+class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
+    bl_label = "2  Picks and Trajectories"
+    bl_idname = "ROCKFALL_PT_picks"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        picks = state.with_role(scene, state.PICK_ROLE)
+        flights = state.with_role(scene, state.FLIGHTS_ROLE)
+        if not picks:
+            advise(layout, False, "Import a table of timed picks (picks.csv).")
+            layout.operator("rockfall.import_picks", icon="IMPORT")
+            return
+        advise(layout, True, f"{len(picks)} picks, {len(flights)} trajectories.")
+        layout.use_property_split = True
+        settings = scene.rockfall
+        column = layout.column(align=True)
+        for name in ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag"):
+            column.prop(settings, name)
+        layout.operator("rockfall.reconstruct", icon="FILE_REFRESH")
+
+
+CLASSES = (ROCKFALL_PT_picks,)

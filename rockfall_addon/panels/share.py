@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exports."""
+
+import bpy
+
+from ..bridge import state
+from .base import RockfallPanel, advise
+
+
+class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
+    bl_label = "4  Share"
+    bl_idname = "ROCKFALL_PT_share"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(state.with_role(context.scene, state.PICK_ROLE))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        advise(self.layout, True, "Tables in survey coordinates, with units.")
+        self.layout.operator("rockfall.export_tables", icon="EXPORT")
+
+
+CLASSES = (ROCKFALL_PT_share,)

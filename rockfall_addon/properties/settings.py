@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of the scene. A number shown here is single precision: `double` gives back what the user typed."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty
+
+from ...core.constants import ROCK_DENSITY_KGPM3
+
+
+def double(value: float) -> float:
+    """The double nearest to what the user typed into a single-precision property (0.35, not 0.3499999940)."""
+    return float(f"{value:.7g}")
+
+
+def _playback_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from ..bridge import reconstruction
+
+    reconstruction.refresh(self.id_data)
+
+
+def _trails_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from ..bridge import trajectories
+
+    trajectories.set_trails(self.id_data)
+
+
+class SceneSettings(bpy.types.PropertyGroup):
+    """How the scene reconstructs, plays and shows."""
+
+    block_diameter_m: FloatProperty(
+        name="Block diameter", description="Mean diameter of the blocks that the project does not describe one by one",
+        default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_playback_changed,
+    )  # fmt: skip
+    density_kgpm3: FloatProperty(
+        name="Density", description="Density of the rock [kg/m³]; masses and energies come from it",
+        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_playback_changed,
+    )  # fmt: skip
+    normal_radius_m: FloatProperty(
+        name="Normal radius",
+        description="Radius within which the terrain normal of an impact is fitted. "
+        "0: the block's diameter, at least three times the spacing of the terrain's points",
+        default=0.0, min=0.0, soft_max=5.0, unit="LENGTH", precision=2, update=_playback_changed,
+    )  # fmt: skip
+    use_drag: BoolProperty(
+        name="Air drag", description="Compute the flights with the drag of air (½ρ C_D A v², Noël et al. 2017)",
+        default=False, update=_playback_changed,
+    )  # fmt: skip
+    playback: EnumProperty(
+        name="Playback", description="When each block starts in the scene",
+        items=[
+            ("TOGETHER", "Together", "All blocks start together, one after the other by the delay below"),
+            ("REAL", "As filmed", "At the times of the common clock"),
+        ],
+        default="TOGETHER", update=_playback_changed,
+    )  # fmt: skip
+    stagger_s: FloatProperty(
+        name="Delay", description="Delay between the starts of two blocks [s]",
+        default=0.5, min=0.0, soft_max=10.0, precision=2, update=_playback_changed,
+    )  # fmt: skip
+    block_scale: FloatProperty(
+        name="Block size", description="Blocks are drawn this many times their size, so that they are seen from afar",
+        default=1.0, min=0.1, soft_max=10.0, precision=1, update=_playback_changed,
+    )  # fmt: skip
+    marker_radius_m: FloatProperty(
+        name="Impact marker", description="Radius of the discs that mark the picks on the terrain",
+        default=0.35, min=0.001, soft_max=5.0, unit="LENGTH", precision=2, update=_playback_changed,
+    )  # fmt: skip
+    trail_radius_m: FloatProperty(
+        name="Trail", description="Radius of the flight curves",
+        default=0.08, min=0.0, soft_max=2.0, unit="LENGTH", precision=3, update=_trails_changed,
+    )  # fmt: skip
+    trail_until_now: BoolProperty(
+        name="Grow with time", description="Show the flights up to the current time only",
+        default=False, update=_trails_changed,
+    )  # fmt: skip
+    speed_top_mps: FloatProperty(
+        name="Top of the scale", description="Speed at the upper end of the colour scale [m/s]",
+        default=20.0, min=0.1, precision=1,
+    )  # fmt: skip
+    show_legend: BoolProperty(name="Legend", description="Draw the colour scale over the 3-D view", default=True)

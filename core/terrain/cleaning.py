@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faults that mesh files commonly have: vertices stored several times, faces without area, loose vertices."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..vectors import Array
+from .surface import face_cross_products
+
+CHUNK = 1 << 18
+FLAT = 1e-12
+"""A triangle is degenerate when twice its area is below this part of its longest edge squared."""
+
+
+def merge_duplicates(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, NDArray[np.int32], int]:
+    """Vertices with exactly the same coordinates become one; the third value says how many are gone.
+
+    The order of the remaining vertices is kept.
+    """
+    # Sorting one hash per vertex is many times faster than sorting rows; equal hashes are checked below.
+    bits = (vertices + 0.0).view(np.uint64)
+    hashed = np.zeros(len(vertices), np.uint64)
+    for axis, factor in enumerate((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)):
+        hashed ^= bits[:, axis] * np.uint64(factor)
+        hashed = (hashed ^ (hashed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+    ordered = np.sort(hashed)
+    if not (ordered[1:] == ordered[:-1]).any():
+        return vertices, faces, 0
+    order = np.argsort(hashed, kind="stable")
+    ordered = hashed[order]
+    first_of_run = np.r_[True, ordered[1:] != ordered[:-1]]
+    original = np.empty(len(vertices), np.int64)
+    original[order] = order[first_of_run][np.cumsum(first_of_run) - 1]
+    original = np.where((vertices[original] == vertices).all(axis=1), original, np.arange(len(vertices)))
+    kept = original == np.arange(len(vertices))
+    number = (np.cumsum(kept) - 1)[original].astype(np.int32)
+    return vertices[kept], number[faces], int((~kept).sum())
+
+
+def is_degenerate(vertices: Array, faces: NDArray[np.int32], cross: Array) -> NDArray[np.bool_]:
+    """(m,) whether a face has no area to speak of."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    longest2 = np.maximum.reduce([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))])
+    return (cross**2).sum(axis=1) <= (FLAT * longest2) ** 2
+
+
+def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[NDArray[np.bool_], Array, NDArray[np.bool_]]:
+    """Chunk by chunk, to stay small: (m,) degenerate; (3,) twice the total vector area; (2,) any face up, any down."""
+    degenerate = np.zeros(len(faces), np.bool_)
+    total = np.zeros(3)
+    up_down = np.zeros(2, np.bool_)
+    for start in range(0, len(faces), CHUNK):
+        part = faces[start : start + CHUNK]
+        cross = face_cross_products(vertices, part)
+        degenerate[start : start + CHUNK] = is_degenerate(vertices, part, cross)
+        total += cross.sum(axis=0)
+        up_down |= ((cross[:, 2] > 0).any(), (cross[:, 2] < 0).any())
+    return degenerate, total, up_down
+
+
+def drop_loose(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, NDArray[np.int32], int]:
+    """Only vertices that a face uses; the third value says how many are gone."""
+    used = np.zeros(len(vertices), np.bool_)
+    used[faces] = True
+    loose = len(vertices) - int(used.sum())
+    if not loose:
+        return vertices, faces, 0
+    return vertices[used], (np.cumsum(used, dtype=np.int32) - 1)[faces].astype(np.int32), loose

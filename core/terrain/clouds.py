@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Point clouds: LAS, LAZ and tables of coordinates (XYZ, TXT, CSV)."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..vectors import Array
+from .crs import crs_beside, crs_from_geokeys, crs_from_wkt
+from .source import Source
+from .text import number_table, read_text
+
+GROUND_CLASS = 2
+"""ASPRS LAS 1.4 R15, table 17."""
+AXIS_NAMES = (
+    ("x", "x_m", "easting", "east", "e", "x_coord", "//x"),
+    ("y", "y_m", "northing", "north", "n", "y_coord"),
+    ("z", "z_m", "height", "elevation", "altitude", "h", "z_coord"),
+)
+
+
+def read_las(path: Path, ground_only: bool | None) -> Source:
+    """Read a LAS or LAZ cloud, its ground class (2) when it has one and ``ground_only`` is not False.
+
+    Points marked as withheld or synthetic noise (classes 7 and 18) are left out.
+
+    Raises
+    ------
+    InputError : not a LAS file, truncated, fewer points than its header promises; no ground class when it is asked for.
+    """
+    header, crs, geographic = _las_header(path)
+    points, classes = _las_points(path, header)
+    if len(points) != header.point_count:
+        raise _truncated(path, header.point_count, len(points))
+    ground = classes == GROUND_CLASS
+    notes = [f"Cloud of {len(points):,} points."]
+    if ground_only and not ground.any():
+        raise InputError(
+            f"None of the {len(points)} points is classified as ground (class {GROUND_CLASS})",
+            file=path,
+            advice="Use all points, or classify the cloud first",
+        )
+    if ground.any() and ground_only is not False:
+        points = points[ground]
+        notes.append(f"Used the {len(points):,} points of the ground class ({GROUND_CLASS}).")
+    else:
+        noise = (classes == 7) | (classes == 18)
+        if noise.any():
+            points = points[~noise]
+            notes.append(f"Left out {int(noise.sum()):,} points classified as noise (7, 18).")
+        notes.append(
+            "Used all classes, as asked."
+            if ground.any()
+            else "The cloud has no ground class: vegetation and buildings, if any, are part of the surface."
+        )
+    return Source(points, crs=crs, geographic=geographic, notes=tuple(notes))
+
+
+def inspect_las(path: Path) -> tuple[Array, int, str, bool]:
+    """Box (2, 3), number of points, CRS and whether it is geographic, from the header alone."""
+    header, crs, geographic = _las_header(path)
+    return np.array([header.mins, header.maxs]), int(header.point_count), crs, geographic
+
+
+def _las_header(path: Path) -> tuple[Any, str, bool]:
+    import laspy
+
+    size = path.stat().st_size
+    if not size:
+        raise InputError("The file is empty", file=path, advice="Export it again")
+    with path.open("rb") as file:
+        if file.read(4) != b"LASF":
+            raise InputError('Not a LAS file: it does not begin with "LASF"', file=path, advice="Check its extension")
+    try:
+        with laspy.open(path) as reader:
+            header = reader.header
+    except (laspy.errors.LaspyException, ValueError, OSError, RuntimeError, IndexError, KeyError, TypeError) as error:
+        raise _damaged(path, error) from error
+    needed = header.offset_to_point_data + header.point_count * header.point_format.size
+    compressed = header.are_points_compressed
+    if compressed and header.point_count:
+        # The first eight bytes of the points say where their table of chunks is: behind the end in a truncated file.
+        with path.open("rb") as file:
+            file.seek(header.offset_to_point_data)
+            needed = int.from_bytes(file.read(8).ljust(8, b"\0"), "little", signed=True)
+    if needed > size:
+        held = (size - header.offset_to_point_data) // header.point_format.size
+        raise _truncated(path, header.point_count, None if compressed else max(held, 0))
+    if not header.point_count:
+        raise InputError("The cloud has no points", file=path, advice="Export it again")
+    return header, *_las_crs(header, path)
+
+
+def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
+    records = [*header.vlrs, *(header.evlrs or [])]
+    for record in records:
+        if text := getattr(record, "string", ""):
+            return crs_from_wkt(text)
+    for record in records:
+        if keys := getattr(record, "geo_keys", None):
+            return crs_from_geokeys([(k.id, k.value_offset) for k in keys if k.tiff_tag_location == 0])
+    return crs_beside(path)
+
+
+def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray]:
+    import laspy
+
+    points = np.empty((header.point_count, 3))
+    classes = np.empty(header.point_count, np.uint8)
+    at = 0
+    try:
+        with laspy.open(path) as reader:
+            for chunk in reader.chunk_iterator(2_000_000):
+                part = slice(at, at + len(chunk))
+                for axis, name in enumerate("XYZ"):
+                    points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
+                classes[part] = np.asarray(chunk.classification)
+                at += len(chunk)
+    except (laspy.errors.LaspyException, ValueError, OSError, RuntimeError, IndexError) as error:
+        raise _damaged(path, error) from error
+    except BaseException as error:
+        # A panic inside the Rust decoder is no ordinary Exception, and has no importable name.
+        if type(error).__name__ != "PanicException":
+            raise
+        raise _damaged(path, error) from error
+    return points[:at], classes[:at]
+
+
+def _truncated(path: Path, promised: int, held: int | None) -> InputError:
+    found = "the file ends before they do" if held is None else f"it holds {held}"
+    return InputError(
+        f"The file is truncated: its header promises {promised} points, {found}",
+        file=path,
+        advice="Copy or export it again",
+    )
+
+
+def _damaged(path: Path, error: BaseException) -> InputError:
+    return InputError(
+        f"The cloud cannot be read ({error})", file=path, advice="It is truncated or damaged: copy or export it again"
+    )
+
+
+def read_xyz(path: Path) -> Source:
+    """Read a table of coordinates: blanks, commas, semicolons or tabs between columns, a header row or none.
+
+    With a header the columns x, y, z (or easting, northing, elevation) are used, else the first three.
+
+    Raises
+    ------
+    InputError : a row without three numbers, with its row.
+    """
+    text = read_text(path)
+    if b";" in text[:4096] and re.search(rb"\d,\d+\s*;", text[:4096]):
+        raise InputError("The numbers have decimal commas", file=path, advice="Export the table with decimal points")
+    lines = re.sub(rb"[,;\t]", b" ", text).split(b"\n")
+    original = text.split(b"\n")
+    rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith((b"#", b"//"))]
+    columns = [0, 1, 2]
+    if rows and re.match(rb'[\s"]*[A-Za-z_]', lines[rows[0]]) and not re.match(rb"\s*(nan|inf)", lines[rows[0]], re.I):
+        columns = _named_columns(original[rows[0]], path, rows[0] + 1)
+        rows = rows[1:]
+    elif rows and len(lines[rows[0]].split()) == 1 and len(rows) > 1 and len(lines[rows[1]].split()) >= 3:
+        rows = rows[1:]  # some programs begin with the number of points
+    table = number_table([lines[i] for i in rows], [i + 1 for i in rows], path, "Coordinates")
+    if not len(table):
+        raise InputError("The table has no points", file=path, advice="Export it again")
+    if table.shape[1] <= max(columns):
+        raise InputError(
+            f"{table.shape[1]} columns, where x, y and z are needed",
+            file=path,
+            row=rows[0] + 1,
+            advice="Export x, y and z",
+        )
+    crs, geographic = crs_beside(path)
+    note = f"Cloud of {len(table):,} points."
+    return Source(np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=(note,))
+
+
+def _named_columns(line: bytes, path: Path, row: int) -> list[int]:
+    text = line.decode("utf-8", "replace").lower()
+    names = [name.strip(' "') for name in (re.split(r"[,;\t]", text) if re.search(r"[,;\t]", text) else text.split())]
+    found = [next((names.index(n) for n in accepted if n in names), -1) for accepted in AXIS_NAMES]
+    if min(found) < 0:
+        raise InputError(
+            f'The header "{text[:80].strip()}" names no x, y and z',
+            file=path,
+            row=row,
+            advice="Name the columns x, y, z",
+        )
+    return found

@@ -1,0 +1,360 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiled kernels over triangles: the spatial index, rays, closest points, neighbours across edges.
+
+A tree is the plain tuple ``(bounds, first, count, corners)`` of `index.TriangleIndex.tree`: ``bounds`` (k, 6) low and
+high corner of a node's box; a leaf holds the triangles ``first[i] : first[i] + count[i]``, an inner node has
+``count`` 0 and its children are ``first[i]`` and ``first[i] + 1``; ``corners`` (m, 3, 3) are the triangles in the order
+of the leaves. A traversal works on a ``stack`` of `STACK_SIZE` that its caller allocates once. Everything is float64.
+"""
+
+import numpy as np
+
+from ..compiled import kernel
+
+LEAF_TRIANGLES = 4
+BINS = 16
+DEEP = 48
+"""Below this depth nodes are halved by count, which bounds the depth of any tree."""
+STACK_SIZE = 128
+BOX_MARGIN = 1.0 + 4e-15
+"""Widens a ray's interval in a box by more than its rounding error, so that no box is missed."""
+
+
+@kernel
+def build_tree(corners, bounds, first, count, order):  # type: ignore[no-untyped-def]
+    """Fill the nodes and the order of the triangles, by the surface area heuristic; returns the number of nodes."""
+    m = corners.shape[0]
+    low, high = np.empty((m, 3)), np.empty((m, 3))
+    for i in range(m):
+        order[i] = i
+        for a in range(3):
+            low[i, a] = min(corners[i, 0, a], corners[i, 1, a], corners[i, 2, a])
+            high[i, a] = max(corners[i, 0, a], corners[i, 1, a], corners[i, 2, a])
+    todo = np.empty((STACK_SIZE, 4), np.int64)
+    todo[0, 0], todo[0, 1], todo[0, 2], todo[0, 3] = 0, 0, m, 0
+    pending, nodes = 1, 1
+    bin_low, bin_high = np.empty((BINS, 3)), np.empty((BINS, 3))
+    bin_count = np.empty(BINS, np.int64)
+    cost_right = np.empty(BINS)
+    box = np.empty(6)
+    while pending:
+        pending -= 1
+        node, start, stop, depth = todo[pending, 0], todo[pending, 1], todo[pending, 2], todo[pending, 3]
+        centre_low, centre_high = np.full(3, np.inf), np.full(3, -np.inf)
+        for a in range(3):
+            bounds[node, a], bounds[node, a + 3] = np.inf, -np.inf
+        for j in range(start, stop):
+            i = order[j]
+            for a in range(3):
+                bounds[node, a] = min(bounds[node, a], low[i, a])
+                bounds[node, a + 3] = max(bounds[node, a + 3], high[i, a])
+                centre = low[i, a] + high[i, a]
+                centre_low[a] = min(centre_low[a], centre)
+                centre_high[a] = max(centre_high[a], centre)
+        if stop - start <= LEAF_TRIANGLES:
+            first[node], count[node] = start, stop - start
+            continue
+        axis = 0
+        for a in range(1, 3):
+            if centre_high[a] - centre_low[a] > centre_high[axis] - centre_low[axis]:
+                axis = a
+        extent = centre_high[axis] - centre_low[axis]
+        middle = (start + stop) // 2
+        if extent > 0.0 and depth < DEEP:
+            scale = BINS * (1.0 - 1e-9) / extent
+            bin_low[:], bin_high[:], bin_count[:] = np.inf, -np.inf, 0
+            for j in range(start, stop):
+                i = order[j]
+                b = int((low[i, axis] + high[i, axis] - centre_low[axis]) * scale)
+                bin_count[b] += 1
+                for a in range(3):
+                    bin_low[b, a] = min(bin_low[b, a], low[i, a])
+                    bin_high[b, a] = max(bin_high[b, a], high[i, a])
+            best, best_cost = -1, np.inf
+            for side in range(2):
+                box[:3], box[3:] = np.inf, -np.inf
+                total = 0
+                for k in range(BINS - 1):
+                    b = BINS - 1 - k if side == 0 else k
+                    if bin_count[b]:
+                        total += bin_count[b]
+                        for a in range(3):
+                            box[a] = min(box[a], bin_low[b, a])
+                            box[a + 3] = max(box[a + 3], bin_high[b, a])
+                    cost = 0.0
+                    if total:
+                        x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
+                        cost = (x * y + y * z + z * x) * total
+                    if side == 0:
+                        cost_right[b] = cost if total else np.inf
+                    elif total and cost + cost_right[b + 1] < best_cost:
+                        best, best_cost = b, cost + cost_right[b + 1]
+            if best >= 0:
+                left, right = start, stop - 1
+                while left <= right:
+                    i = order[left]
+                    if int((low[i, axis] + high[i, axis] - centre_low[axis]) * scale) <= best:
+                        left += 1
+                    else:
+                        order[left], order[right] = order[right], i
+                        right -= 1
+                if start < left < stop:
+                    middle = left
+        first[node], count[node] = nodes, 0
+        for side in range(2):
+            todo[pending, 0], todo[pending, 3] = nodes + side, depth + 1
+            todo[pending, 1] = start if side == 0 else middle
+            todo[pending, 2] = middle if side == 0 else stop
+            pending += 1
+        nodes += 2
+    return nodes
+
+
+@kernel
+def enter_box(bounds, node, ox, oy, oz, ix, iy, iz, limit):  # type: ignore[no-untyped-def]
+    """Distance at which a ray enters a node's box, inf when it misses it or enters beyond ``limit``."""
+    a, b = (bounds[node, 0] - ox) * ix, (bounds[node, 3] - ox) * ix
+    near, far = min(a, b), max(a, b)
+    a, b = (bounds[node, 1] - oy) * iy, (bounds[node, 4] - oy) * iy
+    near, far = max(near, min(a, b)), min(far, max(a, b))
+    a, b = (bounds[node, 2] - oz) * iz, (bounds[node, 5] - oz) * iz
+    near, far = max(near, min(a, b), 0.0), min(far, max(a, b)) * BOX_MARGIN
+    return near if near <= far and near <= limit * BOX_MARGIN else np.inf
+
+
+@kernel
+def inverse(component):  # type: ignore[no-untyped-def]
+    """1 / component, finite for a zero, so that no box test meets 0 times infinity."""
+    return 1.0 / component if abs(component) > 1e-290 else 1e290
+
+
+@kernel
+def nearest_hit(tree, stack, origin, direction, limit):  # type: ignore[no-untyped-def]
+    """First triangle along a ray: (distance, place in the leaves' order), (inf, -1) when there is none up to ``limit``.
+
+    Watertight intersection of Woop, Benthin & Wald 2013 (JCGT 2(1)), two-sided: neighbouring triangles evaluate
+    their common edge with the same numbers, so that no ray slips between them. ``direction`` has length 1.
+    """
+    bounds, first, count, corners = tree
+    ox, oy, oz = origin[0], origin[1], origin[2]
+    ix, iy, iz = inverse(direction[0]), inverse(direction[1]), inverse(direction[2])
+    kz = 0
+    for a in range(1, 3):
+        if abs(direction[a]) > abs(direction[kz]):
+            kz = a
+    kx, ky = (kz + 1) % 3, (kz + 2) % 3
+    sz = 1.0 / direction[kz]
+    sx, sy = direction[kx] * sz, direction[ky] * sz
+    best, found = limit, -1
+    top = 0
+    if enter_box(bounds, 0, ox, oy, oz, ix, iy, iz, best) < np.inf:
+        stack[0] = 0
+        top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                az = corners[i, 0, kz] - origin[kz]
+                bz = corners[i, 1, kz] - origin[kz]
+                cz = corners[i, 2, kz] - origin[kz]
+                ax, ay = corners[i, 0, kx] - origin[kx] - sx * az, corners[i, 0, ky] - origin[ky] - sy * az
+                bx, by = corners[i, 1, kx] - origin[kx] - sx * bz, corners[i, 1, ky] - origin[ky] - sy * bz
+                cx, cy = corners[i, 2, kx] - origin[kx] - sx * cz, corners[i, 2, ky] - origin[ky] - sy * cz
+                u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
+                if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
+                    continue
+                det = u + v + w
+                if det == 0.0:
+                    continue
+                t = sz * (u * az + v * bz + w * cz) / det
+                if t >= 0.0 and (t < best or (t == best and found < 0)):
+                    best, found = t, i
+            continue
+        left = first[node]
+        near_left = enter_box(bounds, left, ox, oy, oz, ix, iy, iz, best)
+        near_right = enter_box(bounds, left + 1, ox, oy, oz, ix, iy, iz, best)
+        if near_left <= near_right:
+            if near_right < np.inf:
+                stack[top] = left + 1
+                top += 1
+            if near_left < np.inf:
+                stack[top] = left
+                top += 1
+        else:
+            if near_left < np.inf:
+                stack[top] = left
+                top += 1
+            stack[top] = left + 1
+            top += 1
+    return (best, found) if found >= 0 else (np.inf, -1)
+
+
+@kernel
+def box_distance2(bounds, node, x, y, z):  # type: ignore[no-untyped-def]
+    """Squared distance from a point to a node's box, 0 inside."""
+    dx = max(bounds[node, 0] - x, 0.0, x - bounds[node, 3])
+    dy = max(bounds[node, 1] - y, 0.0, y - bounds[node, 4])
+    dz = max(bounds[node, 2] - z, 0.0, z - bounds[node, 5])
+    return dx * dx + dy * dy + dz * dz
+
+
+@kernel
+def closest_on_triangle(corners, i, x, y, z):  # type: ignore[no-untyped-def]
+    """The point of triangle ``i`` that is closest to (x, y, z): Ericson 2005, Real-Time Collision Detection, 5.1.5."""
+    ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
+    bx, by, bz = corners[i, 1, 0] - ax, corners[i, 1, 1] - ay, corners[i, 1, 2] - az
+    cx, cy, cz = corners[i, 2, 0] - ax, corners[i, 2, 1] - ay, corners[i, 2, 2] - az
+    px, py, pz = x - ax, y - ay, z - az
+    d1, d2 = bx * px + by * py + bz * pz, cx * px + cy * py + cz * pz
+    bb, bc, cc = bx * bx + by * by + bz * bz, bx * cx + by * cy + bz * cz, cx * cx + cy * cy + cz * cz
+    d3, d4, d5, d6 = d1 - bb, d2 - bc, d1 - bc, d2 - cc
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    v, w = 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+    elif d6 >= 0.0 and d5 <= d6:
+        w = 1.0
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
+    return ax + v * bx + w * cx, ay + v * by + w * cy, az + v * bz + w * cz
+
+
+@kernel
+def nearest_point(tree, stack, point, limit):  # type: ignore[no-untyped-def]
+    """Closest point on the triangles within ``limit``: (x, y, z, squared distance, place), place -1 when none."""
+    bounds, first, count, corners = tree
+    x, y, z = point[0], point[1], point[2]
+    best, found = limit * limit, -1
+    qx, qy, qz = np.nan, np.nan, np.nan
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if box_distance2(bounds, node, x, y, z) > best:
+            continue
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                tx, ty, tz = closest_on_triangle(corners, i, x, y, z)
+                distance2 = (tx - x) ** 2 + (ty - y) ** 2 + (tz - z) ** 2
+                if distance2 < best or (distance2 == best and found < 0):
+                    best, found = distance2, i
+                    qx, qy, qz = tx, ty, tz
+            continue
+        left = first[node]
+        nearer = left
+        if box_distance2(bounds, left + 1, x, y, z) < box_distance2(bounds, left, x, y, z):
+            nearer = left + 1
+        stack[top], stack[top + 1] = 2 * left + 1 - nearer, nearer
+        top += 2
+    return qx, qy, qz, best, found
+
+
+@kernel
+def cast_many(tree, origins, directions, limit, distance, place, start, stop):  # type: ignore[no-untyped-def]
+    stack = np.empty(STACK_SIZE, np.int64)
+    for i in range(start, stop):
+        distance[i], place[i] = nearest_hit(tree, stack, origins[i], directions[i], limit)
+
+
+@kernel
+def closest_many(tree, points, limit, closest, distance, place, start, stop):  # type: ignore[no-untyped-def]
+    stack = np.empty(STACK_SIZE, np.int64)
+    for i in range(start, stop):
+        x, y, z, distance2, found = nearest_point(tree, stack, points[i], limit)
+        closest[i, 0], closest[i, 1], closest[i, 2] = x, y, z
+        distance[i] = np.sqrt(distance2) if found >= 0 else np.inf
+        place[i] = found
+
+
+@kernel
+def edge_neighbours(faces, vertex_count):  # type: ignore[no-untyped-def]
+    """The face across each edge (m, 3), from corner e to e + 1; -1 at borders, -2 where three or more faces meet."""
+    m = faces.shape[0]
+    order, sorted_order = np.arange(3 * m, dtype=np.int32), np.empty(3 * m, np.int32)
+    neighbours = np.full((m, 3), -1, np.int32)
+    # A stable counting sort by the larger, then by the smaller end brings equal edges together in linear time.
+    for larger in (True, False):
+        place = np.zeros(vertex_count + 1, np.int64)
+        for pass_ in range(2):
+            for j in range(3 * m):
+                edge = order[j]
+                f, e = edge // 3, edge % 3
+                a, b = faces[f, e], faces[f, (e + 1) % 3]
+                key = max(a, b) if larger else min(a, b)
+                if pass_ == 0:
+                    place[key + 1] += 1
+                else:
+                    sorted_order[place[key]] = edge
+                    place[key] += 1
+            if pass_ == 0:
+                for v in range(vertex_count):
+                    place[v + 1] += place[v]
+        order, sorted_order = sorted_order, order
+    j = 0
+    while j < 3 * m:
+        f, e = order[j] // 3, order[j] % 3
+        a, b = faces[f, e], faces[f, (e + 1) % 3]
+        k = j + 1
+        while k < 3 * m:
+            g, h = order[k] // 3, order[k] % 3
+            c, d = faces[g, h], faces[g, (h + 1) % 3]
+            if not ((a == c and b == d) or (a == d and b == c)):
+                break
+            k += 1
+        if k - j == 2:
+            g, h = order[j + 1] // 3, order[j + 1] % 3
+            neighbours[f, e], neighbours[g, h] = g, f
+        elif k - j > 2:
+            for i in range(j, k):
+                neighbours[order[i] // 3, order[i] % 3] = -2
+        j = k
+    return neighbours
+
+
+@kernel
+def flood_winding(faces, neighbours, component, flipped):  # type: ignore[no-untyped-def]
+    """Label connected faces and say which must be turned to agree with the first of their component.
+
+    Returns the number of components and of edges at which no winding agrees (a Möbius strip has some).
+    """
+    m = faces.shape[0]
+    component[:] = -1
+    stack = np.empty(m, np.int32)
+    components, contradictions = 0, 0
+    for seed in range(m):
+        if component[seed] >= 0:
+            continue
+        component[seed], flipped[seed] = components, False
+        stack[0] = seed
+        top = 1
+        while top:
+            top -= 1
+            f = stack[top]
+            for e in range(3):
+                g = neighbours[f, e]
+                if g < 0:
+                    continue
+                a, b = faces[f, e], faces[f, (e + 1) % 3]
+                same = False
+                for h in range(3):
+                    same = same or (faces[g, h] == a and faces[g, (h + 1) % 3] == b)
+                turned = flipped[f] != same
+                if component[g] < 0:
+                    component[g], flipped[g] = components, turned
+                    stack[top] = g
+                    top += 1
+                elif flipped[g] != turned:
+                    contradictions += 1
+        components += 1
+    return components, contradictions // 2

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mesh files other than PLY: Wavefront OBJ, STL and glTF."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .source import Source, check_face_indices, triangulated
+from .text import number_table, read_text
+
+STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+def read_obj(path: Path) -> Source:
+    """Read the vertices and faces of a Wavefront OBJ; materials, normals and texture coordinates are not needed.
+
+    Raises
+    ------
+    InputError : no vertices or faces, something that is not a number, a vertex that does not exist; with its row.
+    """
+    lines = read_text(path).split(b"\n")
+    vertex_rows = [i for i, line in enumerate(lines) if line.startswith((b"v ", b"v\t"))]
+    face_rows = [i for i, line in enumerate(lines) if line.startswith((b"f ", b"f\t"))]
+    if not vertex_rows:
+        raise InputError("The OBJ file has no vertices", file=path, advice="Check its extension or export it again")
+    if not face_rows:
+        raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
+    points = number_table([lines[i][2:] for i in vertex_rows], [i + 1 for i in vertex_rows], path, "Coordinates")
+    if points.shape[1] < 3:
+        raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_rows[0] + 1)
+    polygons, before = [], np.searchsorted(vertex_rows, face_rows).tolist()
+    for row, vertices_before in zip(face_rows, before, strict=True):
+        try:
+            polygon = [int(word) for word in re.sub(rb"/\S*", b"", lines[row][2:]).split()]
+        except ValueError as error:
+            raise InputError(
+                f'"{lines[row][:60].decode("utf-8", "replace")}" is no face', file=path, row=row + 1
+            ) from error
+        # Numbers count from 1; negative ones count back from the last vertex before the face.
+        polygon = [v - 1 if v > 0 else vertices_before + v for v in polygon]
+        if len(polygon) < 3 or min(polygon) < 0 or max(polygon) >= len(points):
+            raise InputError(
+                f'"{lines[row][:60].decode("utf-8", "replace")}" names a vertex that does not exist'
+                if len(polygon) >= 3
+                else "A face needs three vertices",
+                file=path,
+                row=row + 1,
+                advice=f"The file has {len(points)} vertices: export it again",
+            )
+        polygons.append(polygon)
+    faces = triangulated(polygons)
+    return Source(np.ascontiguousarray(points[:, :3]), check_face_indices(faces, len(points), path))
+
+
+def read_stl(path: Path) -> Source:
+    """Read a binary or ascii STL; a soup of triangles, whose corners are merged later.
+
+    Raises
+    ------
+    InputError : truncated, no faces, a corner that is not three numbers.
+    """
+    size = path.stat().st_size
+    if not size:
+        raise InputError("The file is empty", file=path, advice="Export it again")
+    with path.open("rb") as file:
+        beginning = file.read(84)
+    promised = int.from_bytes(beginning[80:84], "little") if len(beginning) == 84 else -1
+    # A binary header may begin with "solid" too: the size is what tells.
+    if size == 84 + promised * STL_TRIANGLE.itemsize:
+        corners = np.fromfile(path, STL_TRIANGLE, offset=84)["corners"].astype(np.float64)
+    elif beginning.lstrip().startswith(b"solid") and b"\0" not in beginning:
+        lines = read_text(path).split(b"\n")
+        rows = [i for i, line in enumerate(lines) if line.lstrip().startswith(b"vertex")]
+        table = number_table([lines[i].strip()[6:] for i in rows], [i + 1 for i in rows], path, "Three coordinates")
+        if len(rows) % 3 or not any(line.lstrip().startswith(b"endsolid") for line in lines[-5:]):
+            raise InputError(
+                "The file is truncated: its solid has no end", file=path, row=len(lines), advice="Export it again"
+            )
+        if len(rows) and table.shape[1] != 3:
+            raise InputError("A corner needs three coordinates", file=path, row=rows[0] + 1)
+        corners = table.reshape(-1, 3, 3)
+    elif promised >= 0 and size > 84:
+        raise InputError(
+            f"The file is truncated or not STL: its header promises {promised} triangles, "
+            f"it holds {(size - 84) // STL_TRIANGLE.itemsize}",
+            file=path,
+            advice="Copy or export it again",
+        )
+    else:
+        raise InputError("Not an STL file", file=path, advice="Check its extension or export it again")
+    points = corners.reshape(-1, 3)
+    return Source(points, check_face_indices(np.arange(len(points)).reshape(-1, 3), len(points), path))
+
+
+def read_gltf(path: Path) -> Source:
+    """Read all meshes of a glTF or GLB scene, in the places its nodes give them; Y is up by the standard.
+
+    Raises
+    ------
+    InputError : damaged, a buffer is missing, no triangles.
+    """
+    import trimesh
+
+    if not path.stat().st_size:
+        raise InputError("The file is empty", file=path, advice="Export it again")
+    if path.suffix.lower() == ".glb":
+        with path.open("rb") as file:
+            beginning = file.read(12)
+        if beginning[:4] != b"glTF":
+            raise InputError('Not a GLB file: it does not begin with "glTF"', file=path, advice="Check its extension")
+        if int.from_bytes(beginning[8:12], "little") > path.stat().st_size:
+            raise InputError("The file is truncated", file=path, advice="Copy or export it again")
+    damaged = (ValueError, KeyError, IndexError, TypeError, AttributeError, AssertionError, OSError, RuntimeError)
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        points, faces, offset = [], [], 0
+        for node in scene.graph.nodes_geometry:
+            transform, name = scene.graph[node]
+            geometry = scene.geometry[name]
+            if not isinstance(geometry, trimesh.Trimesh):
+                continue
+            vertices = np.asarray(geometry.vertices, np.float64)
+            points.append(vertices @ transform[:3, :3].T + transform[:3, 3])
+            triangles = np.asarray(geometry.faces, np.int64)
+            faces.append(check_face_indices(triangles, len(vertices), path).astype(np.int64) + offset)
+            offset += len(vertices)
+    except damaged as error:
+        raise InputError(
+            f"The glTF file cannot be read ({type(error).__name__}: {error})",
+            file=path,
+            advice="Export it again, as GLB or with its .bin beside it",
+        ) from error
+    if not faces:
+        raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
+    notes = (f"{len(faces)} meshes of the scene were joined.",) if len(faces) > 1 else ()
+    return Source(np.concatenate(points), check_face_indices(np.concatenate(faces), offset, path), up="y", notes=notes)

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The surface back into a file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from .surface import Surface
+
+
+def write_ply(surface: Surface, path: str | Path) -> None:
+    """Write a binary PLY in survey coordinates, double precision: nothing is lost."""
+    header = "\n".join(
+        [
+            "ply",
+            "format binary_little_endian 1.0",
+            *([f"comment crs {surface.shift.crs}"] if surface.shift.crs else []),
+            f"element vertex {len(surface.vertices)}",
+            *(f"property double {axis}" for axis in "xyz"),
+            f"element face {len(surface.faces)}",
+            "property list uchar int vertex_indices",
+            "end_header\n",
+        ]
+    )
+    faces = np.empty(len(surface.faces), np.dtype([("count", "u1"), ("vertices", "<i4", 3)]))
+    faces["count"], faces["vertices"] = 3, surface.faces
+    with Path(path).open("wb") as file:
+        file.write(header.encode("ascii", "replace"))
+        file.write(surface.shift.to_survey(surface.vertices).astype("<f8").tobytes())
+        file.write(faces.tobytes())

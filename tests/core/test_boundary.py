@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The house stays as it is drawn: the core without Blender, imports in one direction, one name for each module."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rockfall
+
+ROOT = Path(rockfall.__file__).resolve().parent
+BLENDER_MODULES = {"bpy", "bmesh", "gpu", "blf", "mathutils", "bpy_extras", "gpu_extras", "addon_utils"}
+
+CORE_FLOORS = (
+    {"constants", "errors", "vectors", "compiled", "dependencies", "colours"},
+    {"georeference"},
+    {"terrain", "footage", "camera"},
+    {"reconstruction"},
+    {"impact_models"},
+    {"simulation", "analysis"},
+    {"exchange"},
+    {"commands"},
+    {"cli"},
+)
+"""A module imports from the floors below its own; rooms of the lowest floor also from each other."""
+
+ADDON_FLOORS = (
+    {"preferences"},
+    {"properties", "bridge"},
+    {"operators", "overlays", "graph_editor"},
+    {"panels"},
+)
+"""In the add-on, rooms of one floor may import from each other, and single modules beside them are free."""
+
+
+def modules_of(package: str) -> Iterator[Path]:
+    return (path for path in sorted((ROOT / package).rglob("*.py")) if "__pycache__" not in path.parts)
+
+
+def relative_imports(path: Path) -> Iterator[tuple[str, ...]]:
+    """The absolute place, from the root of the tree, of every module or name that a file imports relatively."""
+    package = path.relative_to(ROOT).parent.parts
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            base = package[: len(package) - node.level + 1] + tuple(
+                (node.module or "").split(".") if node.module else ()
+            )
+            for alias in node.names:
+                yield (*base, alias.name)
+
+
+def upward_imports(package: str, floors: tuple[set[str], ...], *, strict: bool) -> list[str]:
+    floor_of = {room: number for number, rooms in enumerate(floors) for room in rooms}
+    wrong = []
+    for path in modules_of(package):
+        room = path.relative_to(ROOT / package).parts[0].removesuffix(".py")
+        if room == "__init__":
+            continue
+        if room not in floor_of:
+            if not strict:
+                continue
+            wrong.append(f"{package}/{room} has no floor: add it to the list in {Path(__file__).name}")
+            continue
+        for target in relative_imports(path):
+            if target[0] != package or len(target) < 2 or target[1] == room or target[1] not in floor_of:
+                continue
+            here, there = floor_of[room], floor_of[target[1]]
+            if there > here or (there == here and here > 0 and strict):
+                wrong.append(f"{path.relative_to(ROOT)} imports {'.'.join(target)}, which is not below it")
+    return wrong
+
+
+def test_core_imports_run_one_way() -> None:
+    assert upward_imports("core", CORE_FLOORS, strict=True) == []
+
+
+def test_addon_imports_run_one_way() -> None:
+    assert upward_imports("rockfall_addon", ADDON_FLOORS, strict=False) == []
+
+
+def test_core_does_not_know_the_addon() -> None:
+    knows = [path for path in modules_of("core") for target in relative_imports(path) if target[0] == "rockfall_addon"]
+    assert knows == []
+
+
+def test_upward_imports_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The check itself: a package that imports upward is told apart from one that does not."""
+    for name, text in {
+        "core/terrain/readers.py": "from ..exchange.tables import read_picks\nfrom ..errors import InputError",
+        "core/exchange/tables.py": "from .. import terrain\nfrom .project import x",
+        "core/stray.py": "",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setitem(globals(), "ROOT", tmp_path)
+    wrong = upward_imports("core", CORE_FLOORS, strict=True)
+    assert [sentence.split(" ")[0] for sentence in wrong] == ["core/stray", str(Path("core/terrain/readers.py"))]
+
+
+def test_imports_inside_the_tree_are_relative() -> None:
+    absolute = []
+    for package in ("core", "rockfall_addon"):
+        for path in modules_of(package):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom) and not node.level:
+                    names = [node.module or ""]
+                absolute += [f"{path.name}: {name}" for name in names if name.split(".")[0] in {"core", "rockfall"}]
+    assert absolute == []
+
+
+def test_every_package_directory_is_declared() -> None:
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["packages"]
+    present = {"rockfall"}
+    for package in ("core", "rockfall_addon"):
+        for path in modules_of(package):
+            present.add(".".join(("rockfall", *path.relative_to(ROOT).parent.parts)))
+    assert sorted(declared) == sorted(present)
+    without_init = [name for name in present if not ROOT.joinpath(*name.split(".")[1:], "__init__.py").exists()]
+    assert without_init == []
+
+
+def test_no_core_module_imports_blender() -> None:
+    """Each module is imported in a bare interpreter, where importing Blender would show."""
+    names = [
+        ".".join(("rockfall", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+        for path in modules_of("core")
+    ]
+    assert len(names) > 5
+    code = (
+        "import importlib, sys\n"
+        f"for name in {names!r}: importlib.import_module(name)\n"
+        f"print(sorted({BLENDER_MODULES!r} & sys.modules.keys()))\n"
+        "assert importlib.util.find_spec('core') is None, 'core can be imported under a second name'\n"
+        "assert not [name for name in sys.modules if name.split('.')[0] == 'core']\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=Path(sys.prefix)
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip().splitlines()[-1] == "[]"
+
+
+def test_importing_the_root_imports_nothing_else() -> None:
+    code = "import sys; before = set(sys.modules); import rockfall; print(sorted(set(sys.modules) - before))"
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=Path(sys.prefix)
+    )
+    assert result.stdout.strip() == "['rockfall']"
+
+
+def tracked_files() -> list[Path]:
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
+    if listing.returncode:
+        pytest.skip("not a git checkout")
+    return [ROOT / name for name in listing.stdout.decode().split("\0") if name and (ROOT / name).is_file()]
+
+
+def test_no_file_names_a_registry_or_a_place_of_one_machine() -> None:
+    registries = [".".join(name) for name in (("pypi", "org"), ("pythonhosted", "org"), ("deb", "debian", "org"))]
+    options = ["-".join(name) for name in (("index", "url"), ("find", "links"))]
+    places = [f"{ROOT.parent}/", f"{Path.home()}/"]
+    forbidden = re.compile("|".join(re.escape(text) for text in [*registries, *options, *places] if text != "//"))
+    found = []
+    for path in tracked_files():
+        content = path.read_bytes()
+        if b"\0" in content[:8192]:
+            continue
+        for number, line in enumerate(content.decode("utf-8", errors="replace").splitlines(), 1):
+            if match := forbidden.search(line):
+                found.append(f"{path.relative_to(ROOT)}:{number}: {match[0]}")
+    assert found == []
+
+
+def test_every_python_file_names_its_licence() -> None:
+    without = [
+        str(path.relative_to(ROOT))
+        for path in tracked_files()
+        if path.suffix == ".py" and "SPDX-License-Identifier: GPL-3.0-or-later" not in path.read_text(encoding="utf-8")
+    ]
+    assert without == []
+
+
+def test_tests_are_not_a_package() -> None:
+    assert list((ROOT / "tests").rglob("__init__.py")) == []

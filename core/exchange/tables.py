@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""picks.csv, impacts.csv and trajectories.csv. Positions in files are survey coordinates."""
+
+import csv
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..georeference import GlobalShift
+from ..reconstruction.impact import FLAGS, Impacts, apparent
+from ..reconstruction.picks import Picks, make_picks
+from ..reconstruction.sampling import TrajectorySamples
+from ..vectors import Array, dot
+from .csv_text import read_table
+
+POSITION = ("x_m", "y_m", "z_m")
+NORMAL = ("nx", "ny", "nz")
+SPIN = ("omega1x_radps", "omega1y_radps", "omega1z_radps")
+PICKS_REQUIRED = ("trajectory", "time_s", *POSITION)
+PICKS_KNOWN = (*PICKS_REQUIRED, "kind", "status", *NORMAL, "sigma_time_s", "sigma_position_m", *SPIN)
+
+Column = tuple[str, str, int | None, bool]
+"""Name in the file, attribute of `Impacts`, component of a vector, whether it is an angle in degrees."""
+
+V1 = ("v1x_mps", "v1y_mps", "v1z_mps")
+V2 = ("v2x_mps", "v2y_mps", "v2z_mps")
+_DERIVED: tuple[Column, ...] = (
+    *((name, "v1", i, False) for i, name in enumerate(V1)),
+    *((name, "v2", i, False) for i, name in enumerate(V2)),
+    ("vn1_mps", "vn1", None, False),
+    ("vt1_mps", "vt1", None, False),
+    ("vn2_mps", "vn2", None, False),
+    ("vt2_mps", "vt2", None, False),
+    ("rn", "rn", None, False),
+    ("rt", "rt", None, False),
+    ("r", "r", None, False),
+    ("theta1_deg", "theta1", None, True),
+    ("theta_dev_deg", "theta_dev", None, True),
+)
+_BEFORE: tuple[Column, ...] = (
+    ("time_s", "time_s", None, False),
+    *((name, "position", i, False) for i, name in enumerate(POSITION)),
+    *((name, "normal", i, False) for i, name in enumerate(NORMAL)),
+    ("normal_radius_m", "normal_radius_m", None, False),
+)
+_BLOCK: tuple[Column, ...] = (("diameter_m", "diameter_m", None, False), ("mass_kg", "mass_kg", None, False))
+_SPIN: tuple[Column, ...] = tuple((name, "angular_velocity", i, False) for i, name in enumerate(SPIN))
+_ENERGY: tuple[Column, ...] = tuple(
+    (f"{name[:-2]}_{name[-1].upper()}" if name.endswith("_j") else name, name, None, False)
+    for name in ("kinetic1_j", "kinetic2_j", "rotational1_j", "rotational2_j", "bounce_height_m", "chord_height_m")
+)
+_NUMBERS = (*_BEFORE, *_DERIVED, *_BLOCK)
+IMPACTS_COLUMNS = ("site", "trajectory", "impact", *(column[0] for column in _NUMBERS), "flags")
+"""The columns of impacts.csv that are always there, in order."""
+
+
+def read_picks(path: str | Path, shift: GlobalShift | None = None) -> Picks:
+    """Read picks.csv.
+
+    Parameters
+    ----------
+    shift : of the local frame (the terrain's); None takes the shift proposed for the picks.
+
+    Raises
+    ------
+    InputError : anything that is wrong with the table, with the row.
+    """
+    table = read_table(path, PICKS_REQUIRED, PICKS_KNOWN)
+    survey = table.vectors(POSITION, required=True)
+    shift = shift if shift is not None else GlobalShift.proposed(survey.min(axis=0), survey.max(axis=0))
+    return make_picks(
+        table.text("trajectory"),
+        table.numbers("time_s", required=True),
+        shift.to_local(survey),
+        kind=table.text("kind", "impact"),
+        status=table.text("status", "ok"),
+        normal=table.vectors(NORMAL),
+        sigma_time_s=table.numbers("sigma_time_s"),
+        sigma_position_m=table.numbers("sigma_position_m"),
+        angular_velocity=table.vectors(SPIN),
+        row=table.row,
+        extra=table.rest(PICKS_KNOWN),
+        source=str(path),
+        shift=shift,
+    )
+
+
+def write_picks(picks: Picks, path: str | Path) -> None:
+    """Write picks.csv: optional columns only where one has a value, unknown columns at the end."""
+    columns: dict[str, Sequence[str]] = {
+        "trajectory": picks.trajectory.tolist(),
+        "time_s": _numbers(picks.time_s),
+        **_vectors(POSITION, picks.shift.to_survey(picks.position)),
+        "kind": picks.kind.tolist(),
+        "status": picks.status.tolist(),
+    }
+    if np.isfinite(picks.normal).any():
+        columns |= _vectors(NORMAL, picks.normal)
+    for name, values in (("sigma_time_s", picks.sigma_time_s), ("sigma_position_m", picks.sigma_position_m)):
+        if np.isfinite(values).any():
+            columns[name] = _numbers(values)
+    if np.isfinite(picks.angular_velocity).any():
+        columns |= _vectors(SPIN, picks.angular_velocity)
+    columns |= {name: cells.tolist() for name, cells in picks.extra.items()}
+    _write(path, columns)
+
+
+def write_impacts(impacts: Impacts, path: str | Path) -> None:
+    """Write impacts.csv: the fixed columns, then standard deviations, spin, energies and heights if any."""
+    columns: dict[str, Sequence[str]] = {
+        "site": impacts.site.tolist(),
+        "trajectory": impacts.trajectory.tolist(),
+        "impact": [str(number) for number in impacts.impact.tolist()],
+    }
+    columns |= {column[0]: _numbers(_of(impacts, column)) for column in _NUMBERS}
+    columns["flags"] = impacts.flag_text()
+    for name, attribute, component, degrees in _DERIVED:
+        if attribute in impacts.sigma:
+            sigma = impacts.sigma[attribute]
+            values = sigma if component is None else sigma[:, component]
+            columns[f"sigma_{name}"] = _numbers(np.degrees(values) if degrees else values)
+    for column in (*_SPIN, *_ENERGY):
+        values = _of(impacts, column)
+        if np.isfinite(values).any():
+            columns[column[0]] = _numbers(values)
+    columns |= {name: cells.tolist() for name, cells in impacts.extra.items()}
+    _write(path, columns)
+
+
+def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
+    """Read impacts.csv.
+
+    The trajectory, the velocities and the normal must be there; norms, coefficients and angles that have no column are
+    computed (eq. 7–10), other missing columns are undefined.
+
+    Raises
+    ------
+    InputError : anything that is wrong with the table, with the row.
+    """
+    sigma_names = [f"sigma_{column[0]}" for column in _DERIVED]
+    known = (*IMPACTS_COLUMNS, *sigma_names, *SPIN, *(column[0] for column in _ENERGY))
+    table = read_table(path, ("trajectory", *NORMAL, *V1, *V2), known)
+    n = len(table)
+    arrays: dict[str, Any] = {}
+    for columns, of in ((_NUMBERS, arrays), ((*_SPIN, *_ENERGY), arrays)):
+        for name, attribute, component, degrees in columns:
+            values = np.radians(table.numbers(name)) if degrees else table.numbers(name)
+            if component is None:
+                of[attribute] = values
+            else:
+                of.setdefault(attribute, np.empty((n, 3)))[:, component] = values
+    sigma: dict[str, Array] = {}
+    for name, attribute, component, degrees in _DERIVED:
+        if f"sigma_{name}" in table.columns:
+            values = table.numbers(f"sigma_{name}")
+            values = np.radians(values) if degrees else values
+            if component is None:
+                sigma[attribute] = values
+            else:
+                sigma.setdefault(attribute, np.full((n, 3), np.nan))[:, component] = values
+
+    survey = arrays["position"]
+    finite = survey[np.isfinite(survey).all(axis=1)]
+    if shift is None:
+        shift = GlobalShift.proposed(finite.min(axis=0), finite.max(axis=0)) if len(finite) else GlobalShift()
+    arrays["position"] = shift.to_local(survey)
+    flags = [{flag.strip() for flag in cell.split(";")} for cell in table.text("flags")]
+    marks = {name: np.array([name in here for here in flags], dtype=np.bool_) for name in FLAGS}
+
+    computed = apparent(arrays["v1"], arrays["v2"], arrays["normal"])
+    judged = ("rn", "rt", "r", "theta1", "theta_dev")
+    for name, attribute, component, _ in _DERIVED:
+        if component is None and name not in table.columns:
+            value = getattr(computed, attribute)
+            arrays[attribute] = np.where(computed.approach >= 0, np.nan, value) if attribute in judged else value
+    if "flags" not in table.columns:
+        marks["departing"], marks["into_ground"] = computed.approach >= 0, computed.escape < 0
+    if "kinetic1_J" not in table.columns:
+        for name, velocity in (("kinetic1_j", arrays["v1"]), ("kinetic2_j", arrays["v2"])):
+            arrays[name] = 0.5 * arrays["mass_kg"] * dot(velocity, velocity)
+
+    names = np.array(table.text("trajectory"), dtype=np.str_)
+    numbers = table.numbers("impact")
+    return Impacts(
+        site=np.array(table.text("site"), dtype=np.str_),
+        trajectory=names,
+        impact=np.where(np.isfinite(numbers), numbers, 0).astype(np.intp),
+        flags=marks,
+        sigma=sigma,
+        extra=table.rest(known),
+        shift=shift,
+        **arrays,
+    )
+
+
+def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
+    """Write trajectories.csv, to the micrometre and microsecond."""
+    survey = samples.shift.to_survey(samples.position)
+    columns: dict[str, Sequence[str]] = {
+        "source": samples.source.tolist(),
+        "trajectory": samples.trajectory.tolist(),
+        "run": [str(run) for run in samples.run.tolist()],
+        "time_s": _rounded(samples.time_s),
+    }
+    columns |= {name: _rounded(survey[:, i]) for i, name in enumerate(POSITION)}
+    columns |= {name: _rounded(samples.velocity[:, i]) for i, name in enumerate(("vx_mps", "vy_mps", "vz_mps"))}
+    columns |= {"height_m": _rounded(samples.height_m), "kinetic_J": _rounded(samples.kinetic_j)}
+    _write(path, columns)
+
+
+def _of(impacts: Impacts, column: Column) -> Array:
+    _, attribute, component, degrees = column
+    values: Array = getattr(impacts, attribute)
+    if attribute == "position":
+        values = impacts.shift.to_survey(values)
+    values = values if component is None else values[:, component]
+    return np.degrees(values) if degrees else values
+
+
+def _numbers(values: Array) -> list[str]:
+    """The shortest text that reads back as the same number; empty when undefined."""
+    return ["" if value != value else repr(value) for value in values.tolist()]
+
+
+def _rounded(values: Array) -> list[str]:
+    return ["" if value != value else f"{value:.6f}" for value in values.tolist()]
+
+
+def _vectors(names: Iterable[str], values: Array) -> dict[str, Sequence[str]]:
+    return {name: _numbers(values[:, i]) for i, name in enumerate(names)}
+
+
+def _write(path: str | Path, columns: dict[str, Sequence[str]]) -> None:
+    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))

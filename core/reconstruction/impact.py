@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Impacts: apparent coefficients of restitution, angles and flags (Noël et al. 2018, eq. 7–10)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from ..georeference import GlobalShift
+from ..vectors import Array, dot, norm
+from .picks import Indices, Mask, Names
+
+FLAGS = (
+    "first",
+    "last",
+    "departing",
+    "into_ground",
+    "below_terrain",
+    "gap",
+    "contact",
+    "doubtful",
+    "shattered",
+    "discarded",
+)
+"""In the order in which they are written. The last four say why a part is undefined, or repeat the pick's status."""
+
+DeviationForm = Literal["signed", "as_printed"]
+
+
+@dataclass(frozen=True, eq=False)
+class Apparent:
+    """What eq. 7–10 make of n pairs of velocities, without judgement; all (n,).
+
+    Attributes
+    ----------
+    vn1, vt1, vn2, vt2 : norms of the normal and tangential parts [m/s].
+    rn, rt, r : apparent coefficients of restitution [-], eq. 7, 8; NaN where the incident part is zero.
+    theta1 : incident angle to the ground [rad], eq. 9.
+    theta_dev : deviation angle [rad], 0…π, eq. 10.
+    approach, escape : v1·n and v2·n [m/s]; an impact has approach < 0.
+    """
+
+    vn1: Array
+    vt1: Array
+    vn2: Array
+    vt2: Array
+    rn: Array
+    rt: Array
+    r: Array
+    theta1: Array
+    theta_dev: Array
+    approach: Array
+    escape: Array
+
+
+def apparent(v1: Array, v2: Array, normal: Array, eq10: DeviationForm = "signed") -> Apparent:
+    """Apparent coefficients and angles of impacts.
+
+    Parameters
+    ----------
+    v1, v2 : (n, 3) incident and restituted velocity [m/s].
+    normal : (n, 3) unit, out of the ground; NaN rows leave only r and theta_dev.
+    eq10 : "signed", or "as_printed" to replicate the paper.
+
+    Notes
+    -----
+    θ1 is atan2(|v1·n|, |v1×n|): the paper's arc sine (eq. 9) is the same angle but badly conditioned near 0°.
+    θ_dev is atan2(|v1×v2|, v1·v2), 0…180°, as the paper's text says; eq. 10 as printed has |v1·v2| and ends at 90°.
+    The norms are blind to the sense of the velocities, which `approach` and `escape` keep.
+    """
+    approach, escape = dot(v1, normal), dot(v2, normal)
+    vn1, vn2 = np.abs(approach), np.abs(escape)
+    vt1, vt2 = norm(v1 - approach[:, None] * normal), norm(v2 - escape[:, None] * normal)
+    speed1, speed2 = norm(v1), norm(v2)
+    along = dot(v1, v2)
+    if eq10 == "as_printed":
+        along = np.abs(along)
+    return Apparent(
+        vn1=vn1,
+        vt1=vt1,
+        vn2=vn2,
+        vt2=vt2,
+        rn=_ratio(vn2, vn1),
+        rt=_ratio(vt2, vt1),
+        r=_ratio(speed2, speed1),
+        theta1=np.arctan2(vn1, vt1),
+        theta_dev=np.arctan2(norm(cross(v1, v2)), along),
+        approach=approach,
+        escape=escape,
+    )
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Row-wise vector product, several times quicker than `numpy.cross`."""
+    result = np.empty_like(a)
+    result[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    result[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    result[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return result
+
+
+def _ratio(after: Array, before: Array) -> Array:
+    return np.divide(after, before, out=np.full_like(after, np.nan), where=before > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts:
+    """n impacts, the rows of impacts.csv; angles in radians, positions local.
+
+    Attributes
+    ----------
+    site, trajectory : (n,) names.
+    impact : (n,) number within the trajectory, from 1.
+    time_s : (n,) [s].
+    position : (n, 3) of the pick, local [m].
+    normal : (n, 3) unit, out of the ground; NaN where unknown.
+    normal_radius_m : (n,) radius over which the terrain normal was fitted [m]; NaN where the normal was given.
+    v1, v2 : (n, 3) incident and restituted velocity [m/s]; NaN where undefined.
+    vn1, vt1, vn2, vt2 : (n,) norms of their normal and tangential parts [m/s].
+    rn, rt, r : (n,) apparent coefficients of restitution [-]; NaN for a departing "impact".
+    theta1, theta_dev : (n,) incident and deviation angle [rad]; NaN for a departing "impact".
+    diameter_m, mass_kg : (n,) of the block.
+    flags : name → (n,) mask, for each of `FLAGS`.
+    angular_velocity : (n, 3) just before the impact [rad/s]; NaN where not measured.
+    kinetic1_j, kinetic2_j : (n,) translational energy ½mv² before and after [J].
+    rotational1_j, rotational2_j : (n,) ½Iω² before and after [J]; NaN where the spin is not known.
+    bounce_height_m : (n,) greatest height above the terrain, vertically, of the flight that follows [m]; NaN without
+        terrain.
+    chord_height_m : (n,) greatest distance of the flight that follows from the straight line between its ends, at right
+        angles to it, in its vertical plane [m].
+    sigma : column → standard deviation of that column, same shape; empty when no pick has one.
+    extra : further columns of a table that was read, as text.
+    shift : of the local frame.
+    """
+
+    site: Names
+    trajectory: Names
+    impact: Indices
+    time_s: Array
+    position: Array
+    normal: Array
+    normal_radius_m: Array
+    v1: Array
+    v2: Array
+    vn1: Array
+    vt1: Array
+    vn2: Array
+    vt2: Array
+    rn: Array
+    rt: Array
+    r: Array
+    theta1: Array
+    theta_dev: Array
+    diameter_m: Array
+    mass_kg: Array
+    flags: Mapping[str, Mask]
+    angular_velocity: Array
+    kinetic1_j: Array
+    kinetic2_j: Array
+    rotational1_j: Array
+    rotational2_j: Array
+    bounce_height_m: Array
+    chord_height_m: Array
+    sigma: Mapping[str, Array] = field(default_factory=dict)
+    extra: Mapping[str, Names] = field(default_factory=dict)
+    shift: GlobalShift = field(default_factory=GlobalShift)
+
+    def __len__(self) -> int:
+        return self.time_s.size
+
+    @property
+    def complete(self) -> Mask:
+        """(n,) impacts whose R_N, R_T, R, θ1 and θ_dev are all defined."""
+        return np.isfinite(self.rn) & np.isfinite(self.rt) & np.isfinite(self.r)
+
+    def flag_text(self) -> list[str]:
+        """(n,) the flags as they are written, joined by ";"."""
+        marked = np.array([self.flags[name] for name in FLAGS])
+        texts = [""] * len(self)
+        for i in np.flatnonzero(marked.any(axis=0)):
+            texts[i] = ";".join(name for name, here in zip(FLAGS, marked[:, i], strict=True) if here)
+        return texts

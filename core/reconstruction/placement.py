@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Picks on the terrain: do they lie on it, and what is its normal there?"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..vectors import Array
+from .picks import Picks
+
+if TYPE_CHECKING:
+    from ..terrain.surface import Surface
+
+FAR_M = 20.0
+"""A pick on the ground that is further from the terrain than this cannot belong to it."""
+FAR_IN_THE_AIR_M = 500.0
+"""The same for picks that need not be on the ground (release, pass)."""
+NOTICEABLE_M = 1.0
+NOTICEABLE_DIAMETERS = 3.0
+"""Picks further than both of these are mentioned."""
+NEAR_BOX_M = 1000.0
+
+
+def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tuple[str, ...]:
+    """Sentences about picks that lie off the terrain.
+
+    Parameters
+    ----------
+    picks : in the surface's frame.
+    diameter_m : (n,) of the block of each pick [m].
+
+    Raises
+    ------
+    InputError : picks and terrain do not overlap at all (other coordinates), or a pick lies far off the terrain.
+    """
+    from ..terrain.raycast import closest_points
+
+    if not len(picks):
+        return ()
+    _check_overlap(picks, surface)
+    distance = closest_points(surface, picks.position).distance
+    grounded = np.isin(picks.kind, ("impact", "contact", "stop")) & (picks.status != "discarded")
+    limit = np.where(grounded, FAR_M, FAR_IN_THE_AIR_M)
+    far = (distance > limit) & (picks.status != "discarded")
+    if far.any():
+        worst = int(np.argmax(np.where(far, distance / limit, 0.0)))
+        others = f" ({int(far.sum()) - 1} more picks are as far off)" if far.sum() > 1 else ""
+        raise picks.error(
+            worst,
+            f"The pick is {distance[worst]:.1f} m from the terrain{others}",
+            "Correct its coordinates, or discard it (status discarded); a point in the air is of kind pass",
+        )
+    off = grounded & (distance > np.maximum(NOTICEABLE_M, NOTICEABLE_DIAMETERS * diameter_m))
+    return tuple(
+        f"The {picks.kind[i]} pick of trajectory {picks.trajectory[i]} at {picks.time_s[i]:.3f} s"
+        + (f" (row {picks.row[i]})" if picks.row[i] else "")
+        + f" lies {distance[i]:.1f} m off the terrain."
+        for i in np.flatnonzero(off)
+    )
+
+
+def _check_overlap(picks: Picks, surface: "Surface") -> None:
+    low, high = surface.shift.to_survey(surface.bounds)
+    position = picks.shift.to_survey(picks.position)
+    first, last = position.min(axis=0), position.max(axis=0)
+    if (first <= high)[:2].all() and (last >= low)[:2].all():
+        return
+
+    def fits(points: Array) -> bool:
+        return bool(((points.min(axis=0) <= high) & (points.max(axis=0) >= low)).all())
+
+    nearby = bool(((first <= high + NEAR_BOX_M) & (last >= low - NEAR_BOX_M)).all())
+    if fits(position[:, [1, 0, 2]]):
+        advice = "Swap the columns x_m and y_m"
+    elif fits(position[:, [0, 2, 1]] * [1, -1, 1]) or fits(position[:, [0, 2, 1]]):
+        advice = "The terrain seems to have another axis up: give it with --up"
+    elif fits(surface.shift.to_survey(position)):
+        advice = "The picks look like local coordinates: add the terrain's shift to them"
+    elif fits(position * 0.3048):
+        advice = "The picks look like feet: convert them to metres"
+    elif fits(position * 0.001):
+        advice = "The picks look like millimetres: convert them to metres"
+    elif nearby:
+        advice = "They are neighbours: give the terrain of the whole slope, or correct the coordinates"
+    else:
+        advice = "Bring both to the same coordinate reference system (and the same shift)"
+    raise InputError(
+        f"The picks and the terrain {surface.name} do not overlap, they seem to be in different coordinate systems: "
+        f"picks {_box(first, last)}, terrain {_box(low, high)}",
+        file=picks.source or None,
+        advice=advice,
+    )
+
+
+def _box(low: Array, high: Array) -> str:
+    return ", ".join(f"{axis} {a:.1f}…{b:.1f} m" for axis, a, b in zip("xyz", low, high, strict=True))
+
+
+def terrain_normals(
+    surface: "Surface", points: Array, diameter_m: Array, radius_m: float | None
+) -> tuple[Array, Array]:
+    """Normals of the terrain at block scale.
+
+    Parameters
+    ----------
+    points : (n, 3) local [m]; the sphere is set on the closest point of the terrain.
+    diameter_m : (n,) of the block [m].
+    radius_m : of the sphere; None takes `default_normal_radius` for each block.
+
+    Returns
+    -------
+    normal : (n, 3) unit, out of the ground.
+    radius : (n,) that was used [m].
+    """
+    from ..terrain.orientation import block_scale_normals, default_normal_radius
+    from ..terrain.raycast import closest_points
+
+    normal = np.full_like(points, np.nan)
+    radius = np.full(len(points), np.nan if radius_m is None else radius_m)
+    if not len(points):
+        return normal, radius
+    on_terrain = closest_points(surface, points).point
+    if radius_m is None:
+        for diameter in np.unique(diameter_m):
+            radius[diameter_m == diameter] = default_normal_radius(surface, float(diameter))
+    for used in np.unique(radius):
+        rows = radius == used
+        normal[rows] = block_scale_normals(surface, on_terrain[rows], float(used)).normal
+    return normal, radius

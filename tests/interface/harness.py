@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Run one case in the window of a real Blender: simulated clicks, pictures of the screen, assertions.
+
+Blender runs this file; scripts/interface_tests.py starts one Blender for each case:
+
+    blender --factory-startup --enable-event-simulate --addons bl_ext.user_default.rockfall \\
+        --python tests/interface/harness.py -- tests/interface/sidebar.py case_name
+
+A case is a generator function ``case_…(window: Window)``. It yields the seconds that Blender may have for drawing and
+for its events, asserts, and takes screenshots, which end up in out/screenshots:
+
+    def case_something(window):
+        window.show_sidebar("Rockfall")
+        yield 0.5
+        bpy.ops.rockfall.load_demo()
+        yield 1.0
+        yield from window.click(400, 300)
+        window.screenshot("demo")
+        assert "Terrain" in bpy.data.objects
+"""
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import time
+import traceback
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import bpy
+
+ROOT = Path(__file__).resolve().parents[2]
+EXTENSION = "bl_ext.user_default.rockfall"
+FIRST_DRAW_S = 1.0
+BETWEEN_EVENTS_S = 0.2
+
+Steps = Generator[float]
+
+
+class Window:
+    """The one window of this Blender, as a person has it: look, click, type."""
+
+    def __init__(self, case: str) -> None:
+        self.case = case
+
+    @property
+    def window(self) -> bpy.types.Window:
+        return bpy.context.window_manager.windows[0]
+
+    def area(self, kind: str = "VIEW_3D") -> bpy.types.Area:
+        return next(area for area in self.window.screen.areas if area.type == kind)
+
+    def region(self, kind: str = "WINDOW", area: str = "VIEW_3D") -> bpy.types.Region:
+        return next(region for region in self.area(area).regions if region.type == kind)
+
+    def override(self, area: str = "VIEW_3D") -> object:
+        """Context manager in which operators run as if called from that area."""
+        return bpy.context.temp_override(window=self.window, area=self.area(area), region=self.region(area=area))
+
+    def part(self, name: str) -> ModuleType:
+        """A module of the extension: ``part("core.errors")``."""
+        return importlib.import_module(f"{EXTENSION}.{name}")
+
+    def show_sidebar(self, tab: str = "Rockfall", *, width: int | None = None) -> Steps:
+        """Open the sidebar of the 3-D view at a tab."""
+        self.area().spaces.active.show_region_ui = True
+        yield 0.5
+        sidebar = self.region("UI")
+        sidebar.active_panel_category = tab
+        sidebar.tag_redraw()
+        yield 0.5
+        assert sidebar.active_panel_category == tab, f"the sidebar has no tab {tab}"
+
+    def move(self, x: float, y: float) -> Steps:
+        """Move the mouse to a pixel of the window, counted from the bottom left."""
+        self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=round(x), y=round(y))
+        yield BETWEEN_EVENTS_S
+
+    def click(self, x: float, y: float, button: str = "LEFTMOUSE", **modifiers: bool) -> Steps:
+        yield from self.move(x, y)
+        for value in ("PRESS", "RELEASE"):
+            self.window.event_simulate(type=button, value=value, x=round(x), y=round(y), **modifiers)
+            yield BETWEEN_EVENTS_S
+
+    def press(self, key: str, x: float, y: float, **modifiers: bool) -> Steps:
+        """Press a key (``"ESC"``, ``"SPACE"``) with the mouse at a pixel of the window."""
+        yield from self.move(x, y)
+        for value in ("PRESS", "RELEASE"):
+            self.window.event_simulate(type=key, value=value, x=round(x), y=round(y), **modifiers)
+            yield BETWEEN_EVENTS_S
+
+    def centre(self, area: str = "VIEW_3D") -> tuple[int, int]:
+        region = self.region(area=area)
+        return region.x + region.width // 2, region.y + region.height // 2
+
+    def wait_for(self, condition: object, seconds: float = 30.0, what: str = "") -> Steps:
+        """Let Blender work until ``condition()`` is true."""
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, f"after {seconds:g} s still not: {what or condition}"
+            yield BETWEEN_EVENTS_S
+
+    def redraw(self) -> None:
+        for area in self.window.screen.areas:
+            area.tag_redraw()
+
+    def screenshot(self, name: str) -> Path:
+        """A picture of the whole screen, as a person sees it."""
+        directory = Path(os.environ.get("ROCKFALL_SCREENSHOTS") or ROOT / "out" / "screenshots")
+        directory.mkdir(parents=True, exist_ok=True)
+        path = directory / f"{self.case.removeprefix('case_')}-{name}.png"
+        path.unlink(missing_ok=True)
+        if os.environ.get("DISPLAY") and shutil.which("import"):
+            # Blender's own screenshot is black with a software renderer.
+            subprocess.run(["import", "-silent", "-window", "root", str(path)], check=True)
+        else:
+            with self.override():
+                bpy.ops.screen.screenshot(filepath=str(path))
+        assert path.stat().st_size > 5000, f"{path.name} is an empty picture"
+        return path
+
+
+def load_case(file: str, name: str) -> Iterator[float]:
+    spec = importlib.util.spec_from_file_location(Path(file).stem, file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return getattr(module, name)(Window(name))
+
+
+def leave(code: int) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # a regular exit asks whether to save
+
+
+def main() -> None:
+    file, name = sys.argv[sys.argv.index("--") + 1 :]
+    bpy.context.preferences.view.show_splash = False  # it would eat the first click
+    if EXTENSION not in sys.modules:
+        print(f"harness: {EXTENSION} is not enabled in this Blender", file=sys.stderr)
+        leave(4)
+    steps: list[Iterator[float]] = []
+
+    def step() -> float | None:
+        try:
+            if not steps:
+                steps.append(load_case(file, name))
+            return next(steps[0])
+        except StopIteration:
+            leave(0)
+        except BaseException:  # noqa: BLE001 - whatever it was, it goes to the log and ends this Blender
+            traceback.print_exc()
+            leave(1)
+
+    bpy.app.timers.register(step, first_interval=FIRST_DRAW_S)
+
+
+if __name__ == "__main__":
+    main()

@@ -24,82 +24,74 @@ BOX_MARGIN = 1.0 + 4e-15
 def build_tree(corners, bounds, first, count, order):  # type: ignore[no-untyped-def]
     """Fill the nodes and the order of the triangles, by the surface area heuristic; returns the number of nodes."""
     m = corners.shape[0]
-    low, high = np.empty((m, 3)), np.empty((m, 3))
+    # The boxes are sorted along with the order: passes over memory in sequence are what makes this quick.
+    boxes = np.empty((m, 6))
     for i in range(m):
         order[i] = i
         for a in range(3):
-            low[i, a] = min(corners[i, 0, a], corners[i, 1, a], corners[i, 2, a])
-            high[i, a] = max(corners[i, 0, a], corners[i, 1, a], corners[i, 2, a])
-    todo = np.empty((STACK_SIZE, 4), np.int64)
-    todo[0, 0], todo[0, 1], todo[0, 2], todo[0, 3] = 0, 0, m, 0
+            boxes[i, a] = min(corners[i, 0, a], corners[i, 1, a], corners[i, 2, a])
+            boxes[i, a + 3] = max(corners[i, 0, a], corners[i, 1, a], corners[i, 2, a])
+    todo = np.zeros((STACK_SIZE, 4), np.int64)
+    todo[0, 2] = m
     pending, nodes = 1, 1
-    bin_low, bin_high = np.empty((BINS, 3)), np.empty((BINS, 3))
-    bin_count = np.empty(BINS, np.int64)
-    cost_right = np.empty(BINS)
-    box = np.empty(6)
+    bins, bin_count, cost_right = np.empty((BINS, 6)), np.empty(BINS, np.int64), np.empty(BINS)
+    box, centre = np.empty(6), np.empty(6)
     while pending:
         pending -= 1
         node, start, stop, depth = todo[pending, 0], todo[pending, 1], todo[pending, 2], todo[pending, 3]
-        centre_low, centre_high = np.full(3, np.inf), np.full(3, -np.inf)
-        for a in range(3):
-            bounds[node, a], bounds[node, a + 3] = np.inf, -np.inf
-        for j in range(start, stop):
-            i = order[j]
+        box[:3], box[3:], centre[:3], centre[3:] = np.inf, -np.inf, np.inf, -np.inf
+        for i in range(start, stop):
             for a in range(3):
-                bounds[node, a] = min(bounds[node, a], low[i, a])
-                bounds[node, a + 3] = max(bounds[node, a + 3], high[i, a])
-                centre = low[i, a] + high[i, a]
-                centre_low[a] = min(centre_low[a], centre)
-                centre_high[a] = max(centre_high[a], centre)
+                low, high = boxes[i, a], boxes[i, a + 3]
+                box[a], box[a + 3] = min(box[a], low), max(box[a + 3], high)
+                centre[a], centre[a + 3] = min(centre[a], low + high), max(centre[a + 3], low + high)
+        bounds[node] = box
         if stop - start <= LEAF_TRIANGLES:
             first[node], count[node] = start, stop - start
             continue
         axis = 0
         for a in range(1, 3):
-            if centre_high[a] - centre_low[a] > centre_high[axis] - centre_low[axis]:
+            if centre[a + 3] - centre[a] > centre[axis + 3] - centre[axis]:
                 axis = a
-        extent = centre_high[axis] - centre_low[axis]
+        base, extent = centre[axis], centre[axis + 3] - centre[axis]
         middle = (start + stop) // 2
-        if extent > 0.0 and depth < DEEP:
+        if extent > 1e-280 and depth < DEEP:
             scale = BINS * (1.0 - 1e-9) / extent
-            bin_low[:], bin_high[:], bin_count[:] = np.inf, -np.inf, 0
-            for j in range(start, stop):
-                i = order[j]
-                b = int((low[i, axis] + high[i, axis] - centre_low[axis]) * scale)
+            bins[:, :3], bins[:, 3:], bin_count[:] = np.inf, -np.inf, 0
+            for i in range(start, stop):
+                b = int((boxes[i, axis] + boxes[i, axis + 3] - base) * scale)
                 bin_count[b] += 1
                 for a in range(3):
-                    bin_low[b, a] = min(bin_low[b, a], low[i, a])
-                    bin_high[b, a] = max(bin_high[b, a], high[i, a])
+                    bins[b, a] = min(bins[b, a], boxes[i, a])
+                    bins[b, a + 3] = max(bins[b, a + 3], boxes[i, a + 3])
             best, best_cost = -1, np.inf
             for side in range(2):
                 box[:3], box[3:] = np.inf, -np.inf
                 total = 0
                 for k in range(BINS - 1):
                     b = BINS - 1 - k if side == 0 else k
-                    if bin_count[b]:
-                        total += bin_count[b]
-                        for a in range(3):
-                            box[a] = min(box[a], bin_low[b, a])
-                            box[a + 3] = max(box[a + 3], bin_high[b, a])
-                    cost = 0.0
+                    total += bin_count[b]
+                    for a in range(3):
+                        box[a], box[a + 3] = min(box[a], bins[b, a]), max(box[a + 3], bins[b, a + 3])
+                    cost = np.inf
                     if total:
                         x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
                         cost = (x * y + y * z + z * x) * total
                     if side == 0:
-                        cost_right[b] = cost if total else np.inf
-                    elif total and cost + cost_right[b + 1] < best_cost:
+                        cost_right[b] = cost
+                    elif cost + cost_right[b + 1] < best_cost:
                         best, best_cost = b, cost + cost_right[b + 1]
-            if best >= 0:
-                left, right = start, stop - 1
-                while left <= right:
-                    i = order[left]
-                    if int((low[i, axis] + high[i, axis] - centre_low[axis]) * scale) <= best:
-                        left += 1
-                    else:
-                        order[left], order[right] = order[right], i
-                        right -= 1
-                if start < left < stop:
-                    middle = left
+            left, right = start, stop - 1
+            while best >= 0 and left <= right:
+                if int((boxes[left, axis] + boxes[left, axis + 3] - base) * scale) <= best:
+                    left += 1
+                else:
+                    order[left], order[right] = order[right], order[left]
+                    for a in range(6):
+                        boxes[left, a], boxes[right, a] = boxes[right, a], boxes[left, a]
+                    right -= 1
+            if start < left < stop:
+                middle = left
         first[node], count[node] = nodes, 0
         for side in range(2):
             todo[pending, 0], todo[pending, 3] = nodes + side, depth + 1

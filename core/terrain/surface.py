@@ -50,13 +50,16 @@ class Surface:
         return norm(self._cross) / 2
 
     @cached_property
+    def vertex_vector_areas(self) -> Array:
+        """(n, 3) a third of the vector areas of the faces around each vertex [m²]."""
+        corners, count = self.faces.ravel(), len(self.vertices)
+        total = [np.bincount(corners, np.repeat(self._cross[:, axis], 3), count) for axis in range(3)]
+        return np.stack(total, axis=1) / 6
+
+    @cached_property
     def vertex_normals(self) -> Array:
         """(n, 3) unit normals: the area-weighted mean over the faces around; NaN for a vertex without a face."""
-        total = [
-            sum(np.bincount(self.faces[:, k], self._cross[:, axis], len(self.vertices)) for k in range(3))
-            for axis in range(3)
-        ]
-        return unit(np.stack(total, axis=1))
+        return unit(self.vertex_vector_areas)
 
     @cached_property
     def mean_spacing_m(self) -> float:

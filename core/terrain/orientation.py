@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The terrain normal at the scale of a block: what a block of some size feels, not what the scanner saw."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..compiled import in_chunks
+from ..errors import InputError
+from ..vectors import Array, dot, unit
+from .raycast import closest_points
+from .surface import Surface
+
+LEAST_SPACINGS = 3.0
+"""A patch has to span some points: its radius is at least this many mean point spacings."""
+REACH_RADII = 10.0
+"""A point further than this many radii from the surface has no terrain normal: it is not an impact on it."""
+STEEP_FIT = 0.5
+"""Least cosine between the fitted plane's normal and the mean face normal; below, the patch is no sheet."""
+
+
+@dataclass(frozen=True, eq=False)
+class LocalNormals:
+    """Terrain normals at n points.
+
+    Attributes
+    ----------
+    normal : (n, 3) unit, out of the ground; NaN where there is no surface within reach.
+    spread_deg : (n,) area-weighted root mean square angle between the faces and the plane [°]; NaN likewise.
+    area_m2 : (n,) surface inside the sphere that was used [m²]; 0 likewise.
+    point : (n, 3) centre of the sphere: the closest point of the surface [m]; NaN likewise.
+    """
+
+    normal: Array
+    spread_deg: Array
+    area_m2: Array
+    point: Array
+
+
+def default_normal_radius(surface: Surface, block_diameter_m: float) -> float:
+    """Radius of the patch [m]: the block's diameter, at least three times the mean point spacing."""
+    return max(float(block_diameter_m), LEAST_SPACINGS * surface.mean_spacing_m)
+
+
+def block_scale_normals(
+    surface: Surface, points: Any, radius_m: float, *, reach_m: float | None = None
+) -> LocalNormals:
+    """Normal of the plane fitted to the surface within a sphere around the closest point of the surface.
+
+    Parameters
+    ----------
+    points : (n, 3) local coordinates [m], near the surface.
+    radius_m : of the sphere [m], see `default_normal_radius`.
+    reach_m : how far from the surface a point may be [m]; ten radii when None.
+
+    Raises
+    ------
+    InputError : a point that is not finite, a radius that is not positive.
+
+    Notes
+    -----
+    The plane is the one of least squared distances (the smallest principal axis) from the surface, integrated over
+    the triangles clipped to the sphere: large triangles count with their part inside, small ones with their area.
+    Vertices do not matter.
+
+    Only the sheet under the point counts: the patch grows from the closest triangle over shared edges inside the
+    sphere, to faces less than 90° from the patch's own normal. That normal is first the closest triangle's, then the
+    one of the plane that this gave. Where the patch is as deep as wide (a notch), its smallest principal axis lies
+    across it, more than 60° from the mean of the face normals; then this mean is the normal.
+    """
+    from . import patch_kernels
+
+    radius = float(radius_m)
+    if not (np.isfinite(radius) and radius > 0):
+        raise InputError(
+            f"The normal's radius is {radius_m} m", advice="Give a positive radius, such as the block's diameter"
+        )
+    closest = closest_points(surface, points, REACH_RADII * radius if reach_m is None else float(reach_m))
+    n = len(closest.face)
+    vertices, faces, normals, neighbours = surface.vertices, surface.faces, surface.face_normals, surface.neighbours
+    sums = np.zeros((n, patch_kernels.SUMS))
+
+    def integrate(facing: Array, axes: Array) -> Array:
+        def chunk(start: int, stop: int) -> None:
+            stamp = np.zeros(len(faces), np.int32)
+            patch_kernels.integrate_patches(
+                vertices, faces, normals, neighbours, closest.point, closest.face, facing, axes, radius, stamp, sums,
+                start, stop,
+            )  # fmt: skip
+
+        in_chunks(chunk, n)
+        return sums
+
+    seed = normals[closest.face]
+    first = _plane_normals(integrate(seed, seed))
+    normal = _plane_normals(integrate(first, first))
+    sums = integrate(first, normal)
+    area = sums[:, 0]
+    found = area > 0
+    spread = np.sqrt(np.divide(sums[:, 13], area, out=np.full(n, np.nan), where=found))
+    normal[~found] = np.nan
+    return LocalNormals(normal, np.degrees(spread), area.copy(), closest.point)
+
+
+def _plane_normals(sums: Array) -> Array:
+    """(n, 3) normals of the planes of least squares, on the side of the face normals; zero where there is no area."""
+    area = np.where(sums[:, 0] > 0, sums[:, 0], 1.0)
+    mean = sums[:, 1:4] / area[:, None]
+    second = np.empty((len(sums), 3, 3))
+    for (i, j), column in zip(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)), range(4, 10), strict=True):
+        second[:, i, j] = second[:, j, i] = sums[:, column] / area - mean[:, i] * mean[:, j]
+    _, axes = np.linalg.eigh(second)
+    normal, outward = axes[:, :, 0], unit(sums[:, 10:13])
+    cosine = dot(normal, outward)
+    normal = np.where((np.abs(cosine) < STEEP_FIT)[:, None], outward, normal * np.sign(cosine)[:, None])
+    return np.nan_to_num(normal, nan=0.0)

@@ -41,7 +41,7 @@ class InstallationPanel(bpy.types.Panel):
     bl_region_type = "UI"
     bl_category = "Rockfall"
     bl_order = 1000
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_state(self.layout, width=max(20, int(context.region.width / context.preferences.system.ui_scale / 7)))

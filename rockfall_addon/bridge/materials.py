@@ -90,7 +90,11 @@ def trail_group() -> bpy.types.GeometryNodeTree:
     both.operation = "AND"
     cut = new("GeometryNodeDeleteGeometry")
     cut.domain = "POINT"
-    curve, circle, tube = new("GeometryNodeMeshToCurve"), new("GeometryNodeCurvePrimitiveCircle"), new("GeometryNodeCurveToMesh")
+    curve, circle, tube = (
+        new("GeometryNodeMeshToCurve"),
+        new("GeometryNodeCurvePrimitiveCircle"),
+        new("GeometryNodeCurveToMesh"),
+    )
     circle.inputs["Resolution"].default_value = 6
     material = new("GeometryNodeSetMaterial")
     material.inputs["Material"].default_value = emission_material("Rockfall trail", SPEED_COLOUR)
@@ -123,9 +127,7 @@ def linear_colour(colour: tuple[float, float, float]) -> tuple[float, float, flo
     return r, g, b, 1.0
 
 
-def _material(
-    name: str, build: Callable[[bpy.types.ShaderNodeTree, bpy.types.Node], None]
-) -> bpy.types.Material:
+def _material(name: str, build: Callable[[bpy.types.ShaderNodeTree, bpy.types.Node], None]) -> bpy.types.Material:
     existing = bpy.data.materials.get(name)
     if existing is not None:
         return existing

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keyframes that are the trajectory itself.
 
-Between two impacts a block's coordinates are polynomials of degree two in time, and a cubic Bézier segment whose handles
-lie at the thirds represents them exactly. So a key at each impact (at its sub-frame time) with handles from the
+Between two impacts a block's coordinates are polynomials of degree two in time, and a cubic Bézier segment whose
+handles lie at the thirds represents them exactly. So a key at each impact (at its sub-frame time) with handles from the
 velocities gives the exact parabola at every frame and at any frame rate.
 """
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...core.reconstruction.picks import Picks
+from ...core.reconstruction.picks import Picks, make_picks
 from . import materials, motion, state, timing
 
 MARKER_COLOURS = {  # sRGB, told apart also by colour-blind people (Okabe & Ito 2008)
@@ -23,7 +23,9 @@ MARKER_COLOURS = {  # sRGB, told apart also by colour-blind people (Okabe & Ito 
 MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the rough surface
 
 
-def show_picks(scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offsets: dict[str, float], radius_m: float) -> None:
+def show_picks(
+    scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offsets: dict[str, float], radius_m: float
+) -> None:
     """Make the objects of all picks anew.
 
     normals : (n, 3) directions of the discs, NaN rows lie flat.
@@ -62,25 +64,29 @@ def show_picks(scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offset
 
 
 def picks_of(scene: bpy.types.Scene) -> Picks:
-    """The picks as they stand in the scene, by trajectory and time."""
-    things = sorted(
-        state.with_role(scene, state.PICK_ROLE), key=lambda o: (o["rockfall_trajectory"], o["rockfall_time_s"])
-    )
-    names = list(dict.fromkeys(name for o in things for name in o["rockfall_extra"].keys()))
-    return Picks(
-        trajectory=np.array([o["rockfall_trajectory"] for o in things], dtype=object),
-        time_s=np.array([o["rockfall_time_s"] for o in things], dtype=np.float64),
-        position=np.array([_position(o) for o in things], dtype=np.float64).reshape(-1, 3),
-        kind=np.array([o["rockfall_kind"] for o in things], dtype=object),
-        status=np.array([o["rockfall_status"] for o in things], dtype=object),
+    """The picks as they stand in the scene: trajectories in the order of their starts."""
+    things = state.with_role(scene, state.PICK_ROLE)
+    started: dict[str, float] = {}
+    for thing in things:
+        name, time = thing["rockfall_trajectory"], thing["rockfall_time_s"]
+        started[name] = min(time, started.get(name, time))
+    things.sort(key=lambda o: (started[o["rockfall_trajectory"]], o["rockfall_trajectory"], o["rockfall_time_s"]))
+    names = list(dict.fromkeys(name for o in things for name in o["rockfall_extra"]))
+    return make_picks(
+        [o["rockfall_trajectory"] for o in things],
+        [o["rockfall_time_s"] for o in things],
+        [_position(o) for o in things],
+        kind=[o["rockfall_kind"] for o in things],
+        status=[o["rockfall_status"] for o in things],
         normal=_doubles(things, "rockfall_normal", 3),
-        sigma_time_s=_doubles(things, "rockfall_sigma_time_s", 1)[:, 0],
-        sigma_position_m=_doubles(things, "rockfall_sigma_position_m", 1)[:, 0],
+        sigma_time_s=_doubles(things, "rockfall_sigma_time_s", 1),
+        sigma_position_m=_doubles(things, "rockfall_sigma_position_m", 1),
         angular_velocity=_doubles(things, "rockfall_angular_velocity_radps", 3),
-        row=np.array([o["rockfall_row"] for o in things], dtype=np.int64),
-        extra={n: np.array([o["rockfall_extra"].get(n, "") for o in things], dtype=object) for n in names},
+        row=[o["rockfall_row"] for o in things],
+        extra={n: np.array([str(o["rockfall_extra"].get(n, "")) for o in things], dtype=np.str_) for n in names},
         source=str(scene.get("rockfall_picks_source", "")),
         shift=state.read_shift(scene),
+        sort=True,
     )
 
 
@@ -103,13 +109,15 @@ def _marker(kind: str) -> bpy.types.Mesh:
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(24)])
     rings = [radius * circle for radius in (1.0, 0.72, 0.30)]
-    vertices = np.vstack(rings) + (0, 0, MARKER_LIFT)
+    vertices = np.vstack(rings) + np.array([0.0, 0.0, MARKER_LIFT])
     following = (np.arange(24) + 1) % 24
     ring = np.column_stack([np.arange(24), following, 24 + following, 24 + np.arange(24)])
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(vertices.tolist(), [], [*ring.tolist(), (48 + np.arange(24)).tolist()])
     colour = mesh.attributes.new("colour", "FLOAT_COLOR", "POINT")
-    colour.data.foreach_set("color", np.tile(materials.linear_colour(MARKER_COLOURS[kind]), len(vertices)).astype(np.float32))
+    colour.data.foreach_set(
+        "color", np.tile(materials.linear_colour(MARKER_COLOURS[kind]), len(vertices)).astype(np.float32)
+    )
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
     mesh.materials.append(materials.emission_material("Rockfall marker", "colour"))
     return mesh

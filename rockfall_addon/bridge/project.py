@@ -20,18 +20,17 @@ def load_project(scene: bpy.types.Scene, project: Project) -> Reconstruction:
     RockfallError : the project names no picks, or a file is bad. The scene is as it was.
     """
     if project.picks is None:
-        raise RockfallError("The project names no table of picks: add [picks] file = \"picks.csv\" to it.")
+        raise RockfallError('The project names no table of picks: add [picks] file = "picks.csv" to it.')
     source = project.terrain
     surface = shading = None
     if source is not None:
         surface = read_terrain(source.file, shift=source.global_shift, up=source.up, unit_m=source.unit_m)
         shading = shade(surface)
     picks = read_picks(project.picks, None if surface is None else surface.shift)
-    result = reconstruction.reconstruct_project(project, picks, surface)
-
     state.write_shift(scene, picks.shift)
-    reconstruction.keep_project(scene, project)
+    reconstruction.keep_settings(scene, project, sorted(set(picks.trajectory.tolist())))
     if surface is not None and shading is not None:
         terrain.add_terrain(scene, surface, shading)
+    result = reconstruction.reconstruct_scene(scene, picks)
     trajectories.show_reconstruction(scene, result)
     return result

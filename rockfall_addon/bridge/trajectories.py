@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.colours import rounded_top, scale_colours, srgb_to_linear
+from ...core.reconstruction.block import Block
 from ...core.reconstruction.trajectory import Flights, Reconstruction, flight_states
 from . import materials, motion, picks, state, timing
 
@@ -21,9 +22,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
     settings = scene.rockfall
     offsets = timing.display_offsets(result.picks, settings.playback == "REAL", settings.stagger_s)
     scene[state.KEYED_RATE_KEY] = timing.frame_rate(scene)
-    normals = result.picks.normal.copy()
-    normals[result.impacts.pick] = result.impacts.normal
-    picks.show_picks(scene, result.picks, normals, offsets, settings.marker_radius_m)
+    picks.show_picks(scene, result.picks, _normals(result), offsets, settings.marker_radius_m)
     _store_results(scene, result)
     state.remove_objects(state.with_role(scene, state.FLIGHTS_ROLE) + state.with_role(scene, state.BLOCK_ROLE))
     speeds = np.linalg.norm(np.vstack([result.flights.start_velocity, result.flights.end_velocity]), axis=1)
@@ -86,24 +85,40 @@ def set_trails(scene: bpy.types.Scene, things: list[bpy.types.Object] | None = N
             thing.update_tag()
 
 
-def _show_block(
-    scene: bpy.types.Scene, name: str, result: Reconstruction, which: np.ndarray, offset: float
-) -> None:
-    diameters = np.array(result.block_of(name).diameters_m) * scene.rockfall.block_scale
+def _show_block(scene: bpy.types.Scene, name: str, result: Reconstruction, which: np.ndarray, offset: float) -> None:
+    block = result.block if isinstance(result.block, Block) else result.block[name]
+    scale = scene.rockfall.block_scale
+    diameters = np.array([block.d1, block.d2, block.d3]) * scale
     thing = bpy.data.objects.new(f"{name} block", block_mesh())
     thing[state.ROLE_KEY], thing["rockfall_trajectory"] = state.BLOCK_ROLE, name
     thing.scale = diameters / 2
     state.collection(scene, "Trajectories", name).objects.link(thing)
-    thing.delta_location.z = (scene.rockfall.block_scale - 1) * float(diameters.mean()) / scene.rockfall.block_scale / 2
+    thing.delta_location.z = (scale - 1) * block.radius_m  # an enlarged block must not sink into the slope
     keys = motion.motion_keys(result.flights, which)
     keys.time_s[:] -= offset
     motion.write_location_keys(thing, keys, timing.frame_rate(scene))
 
 
+def _impact_rows(result: Reconstruction) -> dict[tuple[str, float], int]:
+    """Row of the impact at (trajectory, time)."""
+    names, times = result.impacts.trajectory.tolist(), result.impacts.time_s.tolist()
+    return {key: i for i, key in enumerate(zip(names, times, strict=True))}
+
+
+def _normals(result: Reconstruction) -> np.ndarray:
+    """(n, 3) normals of the picks, those of the impacts as they were fitted to the terrain."""
+    normals = result.picks.normal.copy()
+    rows = _impact_rows(result)
+    for i, key in enumerate(zip(result.picks.trajectory.tolist(), result.picks.time_s.tolist(), strict=True)):
+        if key in rows:
+            normals[i] = result.impacts.normal[rows[key]]
+    return normals
+
+
 def _store_results(scene: bpy.types.Scene, result: Reconstruction) -> None:
     """Write each impact's numbers into its object, where panels and exports find them."""
-    impacts = result.impacts
-    of_pick = {(str(n), float(t)): i for i, (n, t) in enumerate(zip(impacts.trajectory, impacts.time_s, strict=True))}
+    impacts, flags = result.impacts, result.impacts.flag_text()
+    of_pick = _impact_rows(result)
     for thing in state.with_role(scene, state.PICK_ROLE):
         i = of_pick.get((thing["rockfall_trajectory"], thing["rockfall_time_s"]))
         if i is None or thing["rockfall_kind"] != "impact":
@@ -119,7 +134,7 @@ def _store_results(scene: bpy.types.Scene, result: Reconstruction) -> None:
         }
         thing[RESULT_KEY] = {key: np.atleast_1d(value).tolist() for key, value in values.items()} | {
             "number": int(impacts.impact[i]),
-            "flags": ";".join(impacts.flags[i]),
+            "flags": flags[i],
         }
 
 
@@ -142,7 +157,9 @@ def block_mesh() -> bpy.types.Mesh:
     shape.to_mesh(mesh)
     shape.free()
     colour = mesh.attributes.new("colour", "FLOAT_COLOR", "POINT")
-    colour.data.foreach_set("color", np.tile(materials.linear_colour(BLOCK_COLOUR), len(mesh.vertices)).astype(np.float32))
+    colour.data.foreach_set(
+        "color", np.tile(materials.linear_colour(BLOCK_COLOUR), len(mesh.vertices)).astype(np.float32)
+    )
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
     mesh.materials.append(materials.shaded_material("Rockfall block", "colour"))
     return mesh

@@ -46,7 +46,7 @@ class ROCKFALL_OT_export_tables(bpy.types.Operator):
         )
         with output_folder(Path(bpy.path.abspath(self.directory))) as folder:
             write_picks(result.picks, folder / "picks.csv")
-            write_impacts(result, folder / "impacts.csv")
+            write_impacts(result.impacts, folder / "impacts.csv")
             write_trajectories(samples, folder / "trajectories.csv")
         self.report({"INFO"}, f"picks.csv, impacts.csv and trajectories.csv are in {self.directory}.")
         return {"FINISHED"}

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 1: the terrain."""
 
+import textwrap
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.errors import RockfallError
 from ...core.georeference import GlobalShift
-from ...core.terrain.readers import inspect_terrain, read_terrain
+from ...core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
 from ...core.terrain.shading import shade
 from ..bridge import reconstruction, state, terrain
 from . import look
 from .reporting import reported
 
-EXTENSIONS = (".ply", ".obj", ".stl", ".glb", ".gltf", ".asc", ".tif", ".tiff", ".las", ".laz", ".xyz")
+TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
 
 
 class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
@@ -45,7 +47,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         ],
     )  # fmt: skip
     max_edge_m: FloatProperty(
-        name="Longest edge", description="Longer edges are left out when a cloud is meshed. 0: from the points' spacing",
+        name="Longest edge", description="Longer edges of a meshed cloud are left out. 0: from the points' spacing",
         default=0.0, min=0.0, unit="LENGTH",
     )  # fmt: skip
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
@@ -61,16 +63,21 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         shift = state.read_shift(context.scene) if state.has_shift(context.scene) else found.shift
         self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
         self.asked = True
-        self.facts = found.sentences()
-        return context.window_manager.invoke_props_dialog(self, width=420, title="Import Terrain", confirm_text="Import")
+        self.facts = [
+            f"{found.name}: {found.kind}, {found.point_count:,} points, {found.face_count:,} faces",
+            *found.summary,
+        ]
+        return context.window_manager.invoke_props_dialog(
+            self, width=420, title="Import Terrain", confirm_text="Import"
+        )
 
     def draw(self, context: bpy.types.Context) -> None:
         if not self.asked:
             return
         layout = self.layout
         box = layout.column(align=True)
-        for sentence in self.facts:
-            box.label(text=sentence)
+        for line in (part for sentence in self.facts for part in textwrap.wrap(sentence, 70)):
+            box.label(text=line)
         layout.separator()
         layout.use_property_split = True
         column = layout.column(align=True)
@@ -78,7 +85,9 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         column.enabled = not known
         for name in ("shift_x", "shift_y", "shift_z"):
             column.prop(self, name)
-        column.label(text="The project's shift, shared by all its files." if known else "Proposed: kept for the project.")
+        column.label(
+            text="The project's shift, shared by all its files." if known else "Proposed: kept for the project."
+        )
         for name in ("up", "unit_m", "ground", "max_edge_m"):
             layout.prop(self, name)
 
@@ -109,7 +118,9 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         try:
             return GlobalShift(*(float(text or "0") for text in texts))
         except ValueError:
-            raise RockfallError(f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0.") from None
+            raise RockfallError(
+                f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0."
+            ) from None
 
 
 class ROCKFALL_FH_terrain(bpy.types.FileHandler):
@@ -118,7 +129,7 @@ class ROCKFALL_FH_terrain(bpy.types.FileHandler):
     bl_idname = "ROCKFALL_FH_terrain"
     bl_label = "Rockfall terrain"
     bl_import_operator = "rockfall.import_terrain"
-    bl_file_extensions = ";".join(EXTENSIONS)
+    bl_file_extensions = ";".join(e for e in EXTENSIONS if e not in TEXT_TABLES)
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:

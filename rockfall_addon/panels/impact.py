@@ -16,6 +16,7 @@ FLAG_WORDS = {
     "into_ground": "Restituted into the ground",
     "below_terrain": "Flight passes below the terrain",
     "gap": "The chain is cut here",
+    "contact": "Rolls or slides before or after it",
 }
 
 

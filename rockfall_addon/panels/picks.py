@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 2: picks and trajectories."""
 
+import textwrap
+
 import bpy
 
 from ..bridge import state
@@ -19,6 +21,9 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
             advise(layout, False, "Import a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
+        if problem := scene.get("rockfall_problem"):
+            for part in textwrap.wrap(problem, 48):
+                layout.label(text=part, icon="ERROR")
         advise(layout, True, f"{len(picks)} picks, {len(flights)} trajectories.")
         layout.use_property_split = True
         settings = scene.rockfall

@@ -12,10 +12,10 @@ def double(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _playback_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     from ..bridge import reconstruction
 
-    reconstruction.refresh(self.id_data)
+    reconstruction.refresh_or_tell(self.id_data)
 
 
 def _trails_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -29,21 +29,21 @@ class SceneSettings(bpy.types.PropertyGroup):
 
     block_diameter_m: FloatProperty(
         name="Block diameter", description="Mean diameter of the blocks that the project does not describe one by one",
-        default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_playback_changed,
+        default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_changed,
     )  # fmt: skip
     density_kgpm3: FloatProperty(
         name="Density", description="Density of the rock [kg/m³]; masses and energies come from it",
-        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_playback_changed,
+        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_changed,
     )  # fmt: skip
     normal_radius_m: FloatProperty(
         name="Normal radius",
         description="Radius within which the terrain normal of an impact is fitted. "
         "0: the block's diameter, at least three times the spacing of the terrain's points",
-        default=0.0, min=0.0, soft_max=5.0, unit="LENGTH", precision=2, update=_playback_changed,
+        default=0.0, min=0.0, soft_max=5.0, unit="LENGTH", precision=2, update=_changed,
     )  # fmt: skip
     use_drag: BoolProperty(
         name="Air drag", description="Compute the flights with the drag of air (½ρ C_D A v², Noël et al. 2017)",
-        default=False, update=_playback_changed,
+        default=False, update=_changed,
     )  # fmt: skip
     playback: EnumProperty(
         name="Playback", description="When each block starts in the scene",
@@ -51,19 +51,19 @@ class SceneSettings(bpy.types.PropertyGroup):
             ("TOGETHER", "Together", "All blocks start together, one after the other by the delay below"),
             ("REAL", "As filmed", "At the times of the common clock"),
         ],
-        default="TOGETHER", update=_playback_changed,
+        default="TOGETHER", update=_changed,
     )  # fmt: skip
     stagger_s: FloatProperty(
         name="Delay", description="Delay between the starts of two blocks [s]",
-        default=0.5, min=0.0, soft_max=10.0, precision=2, update=_playback_changed,
+        default=0.5, min=0.0, soft_max=10.0, precision=2, update=_changed,
     )  # fmt: skip
     block_scale: FloatProperty(
         name="Block size", description="Blocks are drawn this many times their size, so that they are seen from afar",
-        default=1.0, min=0.1, soft_max=10.0, precision=1, update=_playback_changed,
+        default=1.0, min=0.1, soft_max=10.0, precision=1, update=_changed,
     )  # fmt: skip
     marker_radius_m: FloatProperty(
         name="Impact marker", description="Radius of the discs that mark the picks on the terrain",
-        default=0.35, min=0.001, soft_max=5.0, unit="LENGTH", precision=2, update=_playback_changed,
+        default=0.35, min=0.001, soft_max=5.0, unit="LENGTH", precision=2, update=_changed,
     )  # fmt: skip
     trail_radius_m: FloatProperty(
         name="Trail", description="Radius of the flight curves",

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compile the kernels in the background, so that the first import does not wait for them."""
+
+import threading
+
+import bpy
+import numpy as np
+
+from ..core.georeference import GlobalShift
+from ..core.terrain.orientation import block_scale_normals
+from ..core.terrain.raycast import cast_rays, closest_points
+from ..core.terrain.surface import Surface
+
+
+def register() -> None:
+    if not bpy.app.background:
+        threading.Thread(target=_compile, name="rockfall kernels", daemon=True).start()
+
+
+def unregister() -> None:
+    """A running compilation ends by itself."""
+
+
+def _compile() -> None:
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    plane = Surface(vertices, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), GlobalShift(), "plane", ())
+    above = np.array([[0.5, 0.4, 1.0]])
+    cast_rays(plane, above, np.array([[0.0, 0.0, -1.0]]))
+    closest_points(plane, above)
+    block_scale_normals(plane, above, 0.3)

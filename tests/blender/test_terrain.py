@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The terrain in the scene is the surveyed one."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+
+def wave(path: Path) -> np.ndarray:
+    """A small ESRI grid in survey coordinates; returns its points."""
+    x, y = np.meshgrid(2600000.25 + 0.5 * np.arange(30), 1200000.25 + 0.5 * np.arange(20)[::-1])
+    z = 500 + 0.4 * (x - 2600000) + np.sin(y)
+    header = "ncols 30\nnrows 20\nxllcorner 2600000\nyllcorner 1200000\ncellsize 0.5\nNODATA_value -9999\n"
+    path.write_text(header + "\n".join(" ".join(f"{v:.6f}" for v in row) for row in z) + "\n", encoding="utf-8")
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+
+
+def test_mesh_and_shift_give_the_survey_coordinates_back(part, tmp_path: Path) -> None:
+    points = wave(tmp_path / "wave.asc")
+    assert bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc")) == {"FINISHED"}
+    state, terrain = part("rockfall_addon.bridge.state"), part("rockfall_addon.bridge.terrain")
+    ground = terrain.active_terrain(bpy.context.scene)
+    coordinates = np.empty(3 * len(ground.data.vertices), dtype=np.float32)
+    ground.data.vertices.foreach_get("co", coordinates)
+    survey = state.read_shift(bpy.context.scene).to_survey(coordinates.reshape(-1, 3).astype(np.float64))
+    order = np.lexsort(survey.T.round(3)), np.lexsort(points.T.round(3))
+    np.testing.assert_allclose(survey[order[0]], points[order[1]], atol=1e-4)
+    assert ground.data.attributes.active_color_name == "relief"
+    assert len(ground.data.polygons) == 2 * 29 * 19
+
+
+def test_surface_of_a_mesh_is_the_mesh(part, tmp_path: Path) -> None:
+    wave(tmp_path / "wave.asc")
+    bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
+    terrain = part("rockfall_addon.bridge.terrain")
+    ground = terrain.active_terrain(bpy.context.scene)
+    imported = terrain.surface_of(ground)
+    terrain.forget_surfaces()
+    again = terrain.surface_of(ground)
+    assert again is not imported
+    np.testing.assert_array_equal(again.faces, imported.faces)
+    np.testing.assert_allclose(again.vertices, imported.vertices, atol=1e-4)
+
+
+def test_second_tile_uses_the_projects_shift(part, tmp_path: Path) -> None:
+    wave(tmp_path / "wave.asc")
+    state = part("rockfall_addon.bridge.state")
+    shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 400.0)
+    state.write_shift(bpy.context.scene, shift)
+    bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
+    assert state.read_shift(bpy.context.scene) == shift
+    ground = part("rockfall_addon.bridge.terrain").active_terrain(bpy.context.scene)
+    assert min(v.co.x for v in ground.data.vertices) == pytest.approx(-9.75, abs=1e-4)
+
+
+def test_bad_terrain_is_reported_and_changes_nothing(part, tmp_path: Path) -> None:
+    (tmp_path / "empty.ply").write_bytes(b"")
+    with pytest.raises(RuntimeError, match=r"empty\.ply"):
+        bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "empty.ply"))
+    assert not bpy.context.scene.objects
+
+
+def test_material_is_made_once(part, tmp_path: Path) -> None:
+    wave(tmp_path / "wave.asc")
+    for _ in range(2):
+        bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
+    assert [m.name for m in bpy.data.materials if m.name.startswith("Rockfall terrain")] == ["Rockfall terrain"]

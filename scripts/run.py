@@ -64,28 +64,31 @@ def dependencies() -> ModuleType:
     return importlib.import_module("rockfall.core.dependencies")
 
 
-def check_system_libraries() -> None:
-    """Blender as a module links to libraries of the system: install them where that is ours to do, or name them."""
+def check_system() -> None:
+    """What comes from the system: install it where that is ours to do (as root or in CI, with apt), or name it."""
     asked = dependencies()
     missing = asked.missing_system_libraries()
-    if not missing:
+    if missing:
+        say(asked.explain_missing_libraries(missing))
+    packages = asked.install_command(asked.missing_system_libraries(graphics=True), "apt").split() if missing else []
+    if importlib.util.find_spec("ensurepip") is None:
+        say("this Python has no venv. On Debian and Ubuntu it comes with: apt-get install python3.13-venv")
+        packages = [*(packages or "apt-get install -y --no-install-recommends".split()), "python3.13-venv"]
+    if not packages:
         return
-    say(asked.explain_missing_libraries(missing))
-    root = os.geteuid() == 0
+    root = sys.platform != "win32" and os.geteuid() == 0
     in_ci = os.environ.get("CI", "").lower() in ("1", "true")
     if asked.package_manager() != "apt" or not (root or (in_ci and shutil.which("sudo"))):
-        fail("run that command, then start this one again.")
-    missing = asked.missing_system_libraries(graphics=True)
-    command = asked.install_command(missing, "apt").split()
-    say(f"installing them now: {' '.join(command)}")
-    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+        fail("install what is missing, then start this again.")
     sudo = [] if root else ["sudo", "-n"]
-    subprocess.run([*sudo, "apt-get", "update", "-qq"], check=False, env=environment)
-    done = subprocess.run([*sudo, *command[:1], "-qq", *command[1:]], check=False, env=environment)
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    say(f"installing it now: {' '.join([*sudo, *packages])}")
+    for command in (["apt-get", "update", "-qq"], packages):
+        done = subprocess.run([*sudo, *command], check=False, env=environment, stdout=subprocess.DEVNULL)
     missing = asked.missing_system_libraries()
     if done.returncode or missing:
         names = ", ".join(library.file for library in missing) or "nothing"
-        fail(f"apt-get ended with status {done.returncode}; still missing: {names}")
+        fail(f"apt-get ended with status {done.returncode}; system libraries still missing: {names}")
 
 
 def set_up() -> None:
@@ -103,8 +106,7 @@ def set_up() -> None:
         say("making .venv with Python {}.{}.{}".format(*sys.version_info[:3]))
         made = subprocess.run([sys.executable, "-m", "venv", "--clear", str(VENV)], check=False)
         if made.returncode:
-            advice = "On Debian and Ubuntu: apt-get install python3.13-venv" if sys.platform == "linux" else ""
-            fail(f"could not make .venv; the message above says why. {advice}")
+            fail("could not make .venv; the message above says why")
     say("installing Rockfall and what it needs; the first time this downloads about 700 MB")
     command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--editable", ".[blender,dev]"]
     command += ["--constraint", str(ROOT / "scripts" / "constraints.txt")]
@@ -193,7 +195,7 @@ def main() -> int:
         print(__doc__)
         return 2
     check_python()
-    check_system_libraries()
+    check_system()
     set_up()
     return commands[sys.argv[1]](sys.argv[2:])
 

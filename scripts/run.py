@@ -73,7 +73,7 @@ def check_system() -> None:
     packages = asked.install_command(asked.missing_system_libraries(graphics=True), "apt").split() if missing else []
     if importlib.util.find_spec("ensurepip") is None:
         say("this Python has no venv. On Debian and Ubuntu it comes with: apt-get install python3.13-venv")
-        packages = [*(packages or "apt-get install -y --no-install-recommends".split()), "python3.13-venv"]
+        packages = [*(packages or ["apt-get", "install", "-y", "--no-install-recommends"]), "python3.13-venv"]
     if not packages:
         return
     root = sys.platform != "win32" and os.geteuid() == 0

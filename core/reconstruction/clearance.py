@@ -59,7 +59,7 @@ def _samples(flights: Flights, which: np.ndarray) -> Array:
 def _above_chord(flights: Flights) -> Array:
     """Closed form gT²/8·cos(inclination) without drag, sampled with it."""
     chord = flights.end_position - flights.start_position
-    length, level = norm(chord), np.hypot(chord[:, 0], chord[:, 1])
+    length, level = norm(chord), norm(chord[:, :2])
     cosine = np.divide(level, length, out=np.zeros_like(length), where=length > 0)
     height = flights.gravity_mps2 * flights.duration_s**2 / 8 * cosine
     height[flights.is_contact] = 0.0

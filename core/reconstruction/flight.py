@@ -99,7 +99,7 @@ def solve_flights(picks: Picks, segments: Segments, gravity_mps2: float, drag_pe
     """
     first, last = segments.first_pick, segments.last_pick
     start_time, end_time = picks.time_s[first], picks.time_s[last]
-    start, end = picks.position[first], picks.position[last]
+    start, end = picks.position.take(first, axis=0), picks.position.take(last, axis=0)
     duration = end_time - start_time
     start_velocity = restituted_velocity(end - start, duration, gravity_mps2)
     end_velocity = incident_velocity(start_velocity, duration, gravity_mps2)
@@ -132,10 +132,12 @@ def solve_flights(picks: Picks, segments: Segments, gravity_mps2: float, drag_pe
         moved, end_velocity[flying] = fly(start_velocity[flying], duration[flying], gravity_mps2, drag[flying])
         end[flying] = start[flying] + moved
 
+    kind = np.full(first.size, "contact")
+    kind[~contact] = "flight"
     flights = Flights(
         trajectory=picks.trajectory[first],
         chain=segments.chain[first],
-        kind=np.where(contact, "contact", "flight"),
+        kind=kind,
         first_pick=first,
         last_pick=last,
         start_time_s=start_time,

@@ -2,7 +2,7 @@
 """Impacts: apparent coefficients of restitution, angles and flags (Noël et al. 2018, eq. 7–10)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Literal
 
 import numpy as np
@@ -26,6 +26,8 @@ FLAGS = (
 """In the order in which they are written. The last four say why a part is undefined, or repeat the pick's status."""
 
 DeviationForm = Literal["signed", "as_printed"]
+CACHED_ROWS = 4096
+"""Rows whose intermediate results stay in the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,39 +71,36 @@ def apparent(v1: Array, v2: Array, normal: Array, eq10: DeviationForm = "signed"
     θ_dev is atan2(|v1×v2|, v1·v2), 0…180°, as the paper's text says; eq. 10 as printed has |v1·v2| and ends at 90°.
     The norms are blind to the sense of the velocities, which `approach` and `escape` keep.
     """
-    approach, escape = dot(v1, normal), dot(v2, normal)
-    vn1, vn2 = np.abs(approach), np.abs(escape)
-    vt1, vt2 = norm(v1 - approach[:, None] * normal), norm(v2 - escape[:, None] * normal)
-    speed1, speed2 = norm(v1), norm(v2)
+    columns = np.empty((len(fields(Apparent)), len(v1)))
+    for start in range(0, len(v1), CACHED_ROWS):
+        rows = slice(start, start + CACHED_ROWS)
+        _apparent(v1[rows], v2[rows], normal[rows], eq10, columns[:, rows])
+    return Apparent(*columns)
+
+
+def _apparent(v1: Array, v2: Array, normal: Array, eq10: DeviationForm, columns: Array) -> None:
+    """Fill the rows of `columns`, which are the fields of `Apparent`."""
+    vn1, vt1, vn2, vt2, rn, rt, r, theta1, theta_dev, approach, escape = columns
+    approach[:], escape[:] = dot(v1, normal), dot(v2, normal)
+    np.abs(approach, out=vn1)
+    np.abs(escape, out=vn2)
+    vt1[:] = norm(v1 - approach[:, None] * normal)
+    vt2[:] = norm(v2 - escape[:, None] * normal)
+    for after, before, ratio in ((vn2, vn1, rn), (vt2, vt1, rt), (norm(v2), norm(v1), r)):
+        ratio[:] = np.nan
+        np.divide(after, before, out=ratio, where=before > 0)
+    np.arctan2(vn1, vt1, out=theta1)
     along = dot(v1, v2)
-    if eq10 == "as_printed":
-        along = np.abs(along)
-    return Apparent(
-        vn1=vn1,
-        vt1=vt1,
-        vn2=vn2,
-        vt2=vt2,
-        rn=_ratio(vn2, vn1),
-        rt=_ratio(vt2, vt1),
-        r=_ratio(speed2, speed1),
-        theta1=np.arctan2(vn1, vt1),
-        theta_dev=np.arctan2(norm(cross(v1, v2)), along),
-        approach=approach,
-        escape=escape,
-    )
+    np.arctan2(norm(cross(v1, v2)), np.abs(along) if eq10 == "as_printed" else along, out=theta_dev)
 
 
 def cross(a: Array, b: Array) -> Array:
     """Row-wise vector product, several times quicker than `numpy.cross`."""
     result = np.empty_like(a)
-    result[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    result[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    result[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[:, y], b[:, z], out=result[:, x])
+        result[:, x] -= a[:, z] * b[:, y]
     return result
-
-
-def _ratio(after: Array, before: Array) -> Array:
-    return np.divide(after, before, out=np.full_like(after, np.nan), where=before > 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From the motion to the rows of impacts.csv."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..vectors import Array, dot
 from .block import per_pick
@@ -28,26 +29,31 @@ def find_impacts(
     """One row per `impact` pick, with the flags; see `reconstruct`."""
     picks, flights, clearance = motion.picks, motion.flights, motion.clearance
     own = np.flatnonzero(picks.kind == "impact")
+
+    def here(column: NDArray[Any]) -> NDArray[Any]:
+        return column if own.size == len(picks) else column.take(own, axis=0)
+
     diameter = per_pick(picks, motion.block, lambda block: block.diameter_m)
-    mass = per_pick(picks, motion.block, lambda block: block.mass_kg)[own]
+    mass = per_pick(picks, motion.block, lambda block: block.mass_kg)
     inertia = per_pick(picks, motion.block, lambda block: block.inertia_kgm2)
 
-    incident, restituted = motion.incident[own], motion.restituted[own]
+    incident, restituted = here(motion.incident), here(motion.restituted)
     rolls_in, rolls_out = _value(flights.is_contact, incident, False), _value(flights.is_contact, restituted, False)
     incident, restituted = np.where(rolls_in, -1, incident), np.where(rolls_out, -1, restituted)
     v1 = _rows(flights.end_velocity, incident)
     v2 = _rows(flights.start_velocity, restituted)
 
-    normal, radius = picks.normal[own], np.full(own.size, np.nan)
+    normal, radius = here(picks.normal), np.full(own.size, np.nan)
     bare = np.isnan(normal[:, 0])
     if surface is not None and bare.any():
+        normal = normal.copy()
         normal[bare], radius[bare] = terrain_normals(
             surface, picks.position[own[bare]], diameter[own[bare]], normal_radius_m
         )
     values = apparent(v1, v2, normal, eq10)
     departing = values.approach >= 0
     deep = clearance.below_terrain_m > diameter[flights.first_pick] / 2
-    status = picks.status[own]
+    status = here(picks.status)
     flags = {
         "first": incident < 0,
         "last": restituted < 0,
@@ -59,23 +65,26 @@ def find_impacts(
         **{name: status == name for name in ("doubtful", "shattered", "discarded")},
     }
 
-    def unless_departing(value: Array) -> Array:
-        return np.where(departing, np.nan, value)
-
+    mass = here(mass)
     sigma: dict[str, Array] = {}
     if np.isfinite(picks.sigma_time_s).any() or np.isfinite(picks.sigma_position_m).any():
         sigma = propagate(picks, flights, incident, restituted, own, values, normal)
-        for name in ("rn", "rt", "r", "theta1", "theta_dev"):
-            sigma[name] = unless_departing(sigma[name])
+    judged = ("rn", "rt", "r", "theta1", "theta_dev")
+    leaving = np.flatnonzero(departing)
+    for column in (*(getattr(values, name) for name in judged), *(sigma[name] for name in judged if sigma)):
+        column[leaving] = np.nan
 
-    spin_energy = 0.5 * inertia * dot(picks.angular_velocity, picks.angular_velocity)
+    spin_energy = np.full(len(picks), np.nan)
+    spinning = np.flatnonzero(np.isfinite(picks.angular_velocity[:, 0]))
+    spin = picks.angular_velocity[spinning]
+    spin_energy[spinning] = 0.5 * inertia[spinning] * dot(spin, spin)
     next_pick = _value(flights.last_pick, restituted, -1)
     return Impacts(
         site=np.full(own.size, site),
-        trajectory=picks.trajectory[own],
+        trajectory=here(picks.trajectory),
         impact=_numbers(picks, own),
-        time_s=picks.time_s[own],
-        position=picks.position[own],
+        time_s=here(picks.time_s),
+        position=here(picks.position),
         normal=normal,
         normal_radius_m=radius,
         v1=v1,
@@ -84,18 +93,18 @@ def find_impacts(
         vt1=values.vt1,
         vn2=values.vn2,
         vt2=values.vt2,
-        rn=unless_departing(values.rn),
-        rt=unless_departing(values.rt),
-        r=unless_departing(values.r),
-        theta1=unless_departing(values.theta1),
-        theta_dev=unless_departing(values.theta_dev),
-        diameter_m=diameter[own],
+        rn=values.rn,
+        rt=values.rt,
+        r=values.r,
+        theta1=values.theta1,
+        theta_dev=values.theta_dev,
+        diameter_m=here(diameter),
         mass_kg=mass,
         flags=flags,
-        angular_velocity=picks.angular_velocity[own],
+        angular_velocity=here(picks.angular_velocity),
         kinetic1_j=0.5 * mass * dot(v1, v1),
         kinetic2_j=0.5 * mass * dot(v2, v2),
-        rotational1_j=spin_energy[own],
+        rotational1_j=here(spin_energy),
         rotational2_j=_value(spin_energy, next_pick, np.nan),  # nothing turns a block in flight
         bounce_height_m=_value(clearance.above_terrain_m, restituted, np.nan),
         chord_height_m=_value(clearance.above_chord_m, restituted, np.nan),
@@ -108,20 +117,21 @@ def _value[T: (Array, Indices, Mask)](values: T, which: Indices, otherwise: floa
     """values[which], and `otherwise` where the index is −1."""
     if not values.size:
         return np.full(which.size, otherwise, dtype=values.dtype)
-    return np.where(which >= 0, values[which], values.dtype.type(otherwise))
+    taken = values.take(which)
+    taken[np.flatnonzero(which < 0)] = otherwise
+    return taken
 
 
 def _rows(vectors: Array, which: Indices) -> Array:
     """vectors[which] (n, 3), and NaN where the index is −1."""
     if not len(vectors):
         return np.full((which.size, 3), np.nan)
-    rows = vectors[which]
-    rows[which < 0] = np.nan
+    rows = vectors.take(which, axis=0)
+    rows[np.flatnonzero(which < 0)] = np.nan
     return rows
 
 
 def _numbers(picks: Picks, own: Indices) -> Indices:
     """Number of each impact within its trajectory, from 1."""
-    group = np.searchsorted(picks.group_starts, own, side="right")
-    first = np.searchsorted(group, group, side="left")
-    return np.arange(own.size) - first + 1
+    edges: Indices = np.searchsorted(own, np.append(picks.group_starts, len(picks)))
+    return np.arange(own.size) - np.repeat(edges[:-1], np.diff(edges)) + 1

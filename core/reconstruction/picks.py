@@ -166,7 +166,7 @@ def _grouped_order(picks: Picks, sort: bool) -> Indices:
     return np.lexsort((picks.time_s, of_row)) if sort else np.argsort(of_row, kind="stable")
 
 
-def _first(mask: Mask) -> int | None:
+def _first(mask: Any) -> int | None:
     return int(np.argmax(mask)) if mask.any() else None
 
 
@@ -184,7 +184,7 @@ def _check_values(picks: Picks) -> None:
     given = np.isfinite(picks.normal)
     if (i := _first(given.any(axis=1) & ~given.all(axis=1))) is not None:
         raise picks.error(i, "Only a part of the terrain normal is given", "Give nx, ny and nz, or none of them")
-    if (i := _first(np.asarray(norm(picks.normal) == 0))) is not None:
+    if (i := _first(norm(picks.normal) == 0)) is not None:
         raise picks.error(i, "The terrain normal has length zero", "Leave nx, ny, nz empty to take the terrain's")
     for label, sigma in (("sigma_time_s", picks.sigma_time_s), ("sigma_position_m", picks.sigma_position_m)):
         if (i := _first((sigma < 0) | np.isinf(sigma))) is not None:

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line ``rockfall COMMAND …``, the same through ``blender --command rockfall COMMAND …``.
+
+A command is a module of `commands` with ``add_arguments(parser)`` and ``run(arguments) -> int``; it is imported only
+when it is asked for, so that help is quick.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from .errors import RockfallError
+
+DONE, BAD_INPUT, USAGE, INTERRUPTED = 0, 1, 2, 130
+
+COMMANDS = {
+    "demo": "the whole job on the bundled site: reconstruct, figures, animation",
+    "reconstruct": "timed picks → impacts.csv and trajectories.csv",
+    "terrain": "any terrain file → terrain.ply, and what there is to know about it",
+    "render": "the animation of a project, through Blender",
+}
+"""Name → help; the module of the same name in `commands` does it."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted."""
+    argv = list(sys.argv[1:] if argv is None else argv)
+    try:
+        arguments = _parser(argv).parse_args(argv)
+    except SystemExit as leaving:  # argparse has printed its help or its complaint
+        return leaving.code if isinstance(leaving.code, int) else USAGE
+    try:
+        status: int = arguments.run(arguments)
+    except RockfallError as error:
+        print(f"rockfall: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("rockfall: interrupted, nothing was written.", file=sys.stderr)
+        return INTERRUPTED
+    return status
+
+
+def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
+    """The parser, with the arguments of the command that `argv` asks for."""
+    parser = argparse.ArgumentParser(
+        prog="rockfall",
+        description="From filmed rockfalls and scanned slopes to trajectories, impacts and films.",
+        epilog="rockfall COMMAND --help tells more about a command.",
+    )
+    parser.add_argument("--version", action="version", version=f"rockfall {_version()}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    asked = next((word for word in argv if not word.startswith("-")), None)
+    for name, purpose in COMMANDS.items():
+        command = commands.add_parser(name, help=purpose, description=purpose[:1].upper() + purpose[1:] + ".")
+        if name == asked:
+            module = import_module(f".commands.{name}", __package__)
+            module.add_arguments(command)
+            command.set_defaults(run=module.run)
+    return parser
+
+
+def _version() -> str:
+    from .. import __version__
+
+    return __version__
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arguments that several commands share."""
+
+import argparse
+from math import isfinite
+
+UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
+
+
+def positive(text: str) -> float:
+    """A number above zero."""
+    value = float(text)
+    if not (isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text} is not a number above zero")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """A number of zero or more."""
+    value = float(text)
+    if not (isfinite(value) and value >= 0):
+        raise argparse.ArgumentTypeError(f"{text} is not a number of zero or more")
+    return value
+
+
+def unit(text: str) -> float:
+    """A unit's name, or its length in metres."""
+    if text in UNITS_M:
+        return UNITS_M[text]
+    try:
+        return positive(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text} is neither {', '.join(UNITS_M)} nor a number of metres") from None
+
+
+def add_out(parser: argparse.ArgumentParser) -> None:
+    """``--out DIR``."""
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder for the output; made when it is missing")
+
+
+def add_terrain_options(parser: argparse.ArgumentParser) -> None:
+    """How to read a terrain file."""
+    group = parser.add_argument_group("reading the terrain")
+    group.add_argument("--up", choices=("auto", "z", "y"), default="auto", help="axis of the file that points up")
+    group.add_argument(
+        "--unit",
+        type=unit,
+        default=1.0,
+        metavar="UNIT",
+        help=f"of the file's coordinates: {', '.join(UNITS_M)}, or its length in metres (default m)",
+    )
+    group.add_argument(
+        "--max-edge",
+        type=positive,
+        metavar="M",
+        help="longest triangle edge where points are meshed [m]",
+    )
+    points = group.add_mutually_exclusive_group()
+    points.add_argument(
+        "--ground-only",
+        dest="ground_only",
+        action="store_true",
+        default=None,
+        help="use the points that are classified as ground (default: when there are any)",
+    )
+    points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")

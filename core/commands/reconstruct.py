@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall reconstruct``: timed picks → impacts.csv and trajectories.csv."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
+from .options import add_out, add_terrain_options, not_negative, positive
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..reconstruction.block import Block
+
+DEFAULT_DIAMETER_M = 0.35
+DEFAULT_STEP_S = 0.05
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("picks", metavar="PICKS", help="picks.csv")
+    add_out(parser)
+    parser.add_argument("--terrain", metavar="MESH", help="mesh, grid or cloud; not needed with nx, ny, nz")
+    parser.add_argument(
+        "--normal-radius",
+        type=positive,
+        metavar="M",
+        help="radius of the terrain normal [m] (default: the block's diameter, at least 3 point spacings)",
+    )
+    parser.add_argument(
+        "--gravity", type=not_negative, default=GRAVITY_MPS2, metavar="G", help="[m/s²] (default %(default)s)"
+    )
+    parser.add_argument("--site", default="", metavar="NAME", help="name of the site, written to the table")
+    parser.add_argument(
+        "--step",
+        type=positive,
+        default=DEFAULT_STEP_S,
+        metavar="S",
+        help="time step of trajectories.csv [s] (default %(default)s)",
+    )
+    parser.add_argument(
+        "--eq10",
+        choices=("signed", "as_printed"),
+        default="signed",
+        help="deviation angle: 0–180° (default), or 0–90° as eq. 10 of Noël et al. 2018 is printed",
+    )
+    block = parser.add_argument_group("the block")
+    size = block.add_mutually_exclusive_group()
+    size.add_argument(
+        "--diameter", type=positive, metavar="M", help=f"diameter of a round block [m] (default {DEFAULT_DIAMETER_M})"
+    )
+    size.add_argument(
+        "--diameters", type=positive, nargs=3, metavar=("D1", "D2", "D3"), help="the three diameters of the block [m]"
+    )
+    block.add_argument("--shape", choices=("ellipsoid", "box"), default="ellipsoid", help="for its volume and inertia")
+    weight = block.add_mutually_exclusive_group()
+    weight.add_argument(
+        "--density",
+        type=positive,
+        default=ROCK_DENSITY_KGPM3,
+        metavar="RHO",
+        help="[kg/m³] (default %(default)s)",
+    )
+    weight.add_argument("--mass", type=positive, metavar="KG", help="weighed mass [kg], instead of the density")
+    drag = parser.add_argument_group("air drag")
+    drag.add_argument("--drag", action="store_true", help="flights with the drag ½ρC_D·A|v|v instead of parabolas")
+    drag.add_argument(
+        "--drag-coefficient", type=positive, default=DRAG_COEFFICIENT, metavar="CD", help="(default %(default)s)"
+    )
+    drag.add_argument(
+        "--air-density", type=positive, default=AIR_DENSITY_KGPM3, metavar="RHO", help="[kg/m³] (default %(default)s)"
+    )
+    add_terrain_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reconstruct, write the tables, print the summary."""
+    from ..exchange.output import output_folder
+    from ..exchange.tables import read_picks, write_impacts, write_trajectories
+    from ..reconstruction.drag import Drag
+    from ..reconstruction.summary import summarise
+    from ..reconstruction.trajectory import reconstruct, sample_trajectories
+
+    with output_folder(arguments.out) as folder, Progress() as progress:
+        progress(f"Reading {arguments.picks}")
+        picks = read_picks(arguments.picks)
+        surface = None
+        if arguments.terrain:
+            from ..terrain.readers import read_terrain
+
+            progress(f"Reading {arguments.terrain}")
+            surface = read_terrain(
+                arguments.terrain,
+                up=arguments.up,
+                unit_m=arguments.unit,
+                max_edge_m=arguments.max_edge,
+                ground_only=arguments.ground_only,
+                progress=progress,
+            )
+        progress("Reconstructing")
+        reconstruction = reconstruct(
+            picks,
+            surface=surface,
+            block=_block(arguments),
+            gravity_mps2=arguments.gravity,
+            drag=Drag(arguments.air_density, arguments.drag_coefficient) if arguments.drag else None,
+            normal_radius_m=arguments.normal_radius,
+            site=arguments.site,
+            eq10=arguments.eq10,
+        )
+        progress("Writing the tables")
+        write_impacts(reconstruction.impacts, folder / "impacts.csv")
+        write_trajectories(sample_trajectories(reconstruction, arguments.step, surface), folder / "trajectories.csv")
+    for sentence in (*(surface.summary if surface else ()), *summarise(reconstruction)):
+        print(sentence)
+    print(f"Written: impacts.csv, trajectories.csv in {arguments.out}")
+    return 0
+
+
+def _block(arguments: argparse.Namespace) -> "Block":
+    from ..reconstruction.block import Block
+
+    d1, d2, d3 = arguments.diameters or [arguments.diameter or DEFAULT_DIAMETER_M] * 3
+    block = Block(d1, d2, d3, arguments.density, arguments.shape)
+    if arguments.mass:
+        block = Block(d1, d2, d3, arguments.mass / block.volume_m3, arguments.shape)
+    return block

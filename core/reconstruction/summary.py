@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A reconstruction in a few sentences."""
+
+import numpy as np
+
+from ..vectors import Array, norm
+from .impact import FLAGS, Impacts
+from .trajectory import Reconstruction
+
+MEANINGS = {
+    "first": "without incident velocity",
+    "last": "without restituted velocity",
+    "departing": "leave the ground before they touch it, no coefficients",
+    "into_ground": "go on into the ground",
+    "below_terrain": "beside a flight that passes under the terrain",
+    "gap": "beside a gap (shattered or discarded)",
+    "contact": "beside rolling or sliding",
+}
+"""What the flags say about impacts, for people."""
+MOST_NOTES = 12
+
+
+def summarise(reconstruction: Reconstruction) -> tuple[str, ...]:
+    """Sentences: what there is, what is typical, what deserves a look."""
+    picks, flights, impacts = reconstruction.picks, reconstruction.flights, reconstruction.impacts
+    contacts = int(flights.is_contact.sum())
+    drag = " with air drag" if reconstruction.drag else ""
+    sentences = [
+        f"{_count(len(picks), 'pick')} of {_count(picks.group_starts.size, 'trajectory', 'trajectories')}: "
+        f"{_count(len(flights) - contacts, 'flight')}{drag}, {_count(contacts, 'contact segment')}, "
+        f"{_count(len(impacts), 'impact')}, {int(np.isfinite(impacts.r).sum())} with R, "
+        f"{int(impacts.complete.sum())} with all coefficients."
+    ]
+    sentences += _typical(impacts)
+    flagged = [f"{name} {int(impacts.flags[name].sum())}" for name in FLAGS if impacts.flags[name].any()]
+    if flagged:
+        sentences.append(f"Flags: {', '.join(flagged)}.")
+    for name in ("departing", "into_ground", "below_terrain"):
+        sentences += _where(impacts, name)
+    if len(impacts) and np.isnan(impacts.normal[:, 0]).any():
+        bare = int(np.isnan(impacts.normal[:, 0]).sum())
+        sentences.append(
+            f"{_count(bare, 'impact')} without a terrain normal: velocities, R and deviation only. "
+            "Give a terrain, or nx, ny, nz."
+        )
+    notes = reconstruction.notes
+    sentences += notes[:MOST_NOTES]
+    if notes[MOST_NOTES:]:
+        sentences.append(f"… and {len(notes) - MOST_NOTES} more.")
+    return tuple(sentences)
+
+
+def _typical(impacts: Impacts) -> list[str]:
+    values: tuple[tuple[str, Array, str, int], ...] = (
+        ("incident speed", norm(impacts.v1), " m/s", 1),
+        ("R_N", impacts.rn, "", 2),
+        ("R_T", impacts.rt, "", 2),
+        ("R", impacts.r, "", 2),
+        ("θ1", np.degrees(impacts.theta1), "°", 1),
+        ("deviation", np.degrees(impacts.theta_dev), "°", 1),
+        ("bounce height", impacts.bounce_height_m, " m", 2),
+    )
+    parts = [
+        f"{name} {np.nanmedian(column):.{digits}f}{unit}"
+        for name, column, unit, digits in values
+        if np.isfinite(column).any()
+    ]
+    return [f"Medians: {', '.join(parts)}."] if parts else []
+
+
+def _where(impacts: Impacts, flag: str) -> list[str]:
+    rows = np.flatnonzero(impacts.flags[flag])
+    if not rows.size:
+        return []
+    named = [f"{impacts.trajectory[i]} #{impacts.impact[i]}" for i in rows[:8]]
+    return [f"{MEANINGS[flag][:1].upper()}{MEANINGS[flag][1:]}: {', '.join(named)}{', …' if rows.size > 8 else ''}."]
+
+
+def _count(number: int, one: str, many: str | None = None) -> str:
+    return f"{number} {one if number == 1 else many or one + 's'}"

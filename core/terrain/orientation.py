@@ -16,6 +16,8 @@ LEAST_SPACINGS = 3.0
 """A patch has to span some points: its radius is at least this many mean point spacings."""
 REACH_RADII = 10.0
 """A point further than this many radii from the surface has no terrain normal: it is not an impact on it."""
+SEED_COSINE = -0.5
+"""Faces further than 120° from the closest triangle are another sheet, whatever it is part of."""
 STEEP_FIT = 0.5
 """Least cosine between the fitted plane's normal and the mean face normal; below, the patch is no sheet."""
 
@@ -65,8 +67,8 @@ def block_scale_normals(
     Vertices do not matter.
 
     Only the sheet under the point counts: the patch grows from the closest triangle over shared edges inside the
-    sphere, to faces less than 90° from the patch's own normal. That normal is first the closest triangle's, then the
-    one of the plane that this gave. Where the patch is as deep as wide (a notch), its smallest principal axis lies
+    sphere, first to faces less than 120° from that triangle, which gives a first plane; then anew, to faces less than
+    90° from this plane's normal. So a single odd triangle does not decide, and the other side of a plate stays out. Where the patch is as deep as wide (a notch), its smallest principal axis lies
     across it, more than 60° from the mean of the face normals; then this mean is the normal.
     """
     from . import patch_kernels
@@ -81,19 +83,19 @@ def block_scale_normals(
     vertices, faces, normals, neighbours = surface.vertices, surface.faces, surface.face_normals, surface.neighbours
     sums = np.zeros((n, patch_kernels.SUMS))
 
-    def integrate(facing: Array, axes: Array) -> Array:
+    def integrate(facing: Array, axes: Array, least_cosine: float = 0.0) -> Array:
         def chunk(start: int, stop: int) -> None:
             stamp = np.zeros(len(faces), np.int32)
             patch_kernels.integrate_patches(
-                vertices, faces, normals, neighbours, closest.point, closest.face, facing, axes, radius, stamp, sums,
-                start, stop,
+                vertices, faces, normals, neighbours, closest.point, closest.face, facing, least_cosine, axes, radius,
+                stamp, sums, start, stop,
             )  # fmt: skip
 
         in_chunks(chunk, n)
         return sums
 
     seed = normals[closest.face]
-    first = _plane_normals(integrate(seed, seed))
+    first = _plane_normals(integrate(seed, seed, SEED_COSINE))
     normal = _plane_normals(integrate(first, first))
     sums = integrate(first, normal)
     area = sums[:, 0]

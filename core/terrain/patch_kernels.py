@@ -129,11 +129,25 @@ def segment_distance2(p, i, j):  # type: ignore[no-untyped-def]
 
 @kernel
 def integrate_patches(  # type: ignore[no-untyped-def]
-    vertices, faces, normals, neighbours, centres, seeds, facing, axes, radius, stamp, sums, start, stop
+    vertices,
+    faces,
+    normals,
+    neighbours,
+    centres,
+    seeds,
+    facing,
+    least_cosine,
+    axes,
+    radius,
+    stamp,
+    sums,
+    start,
+    stop,
 ):
     """Sums over the patch of surface around each centre: from its seed face over edges within the sphere.
 
-    A face belongs to the patch when its normal and ``facing`` are less than 90° apart (the seed always does).
+    A face belongs to the patch when the cosine between its normal and ``facing`` exceeds ``least_cosine``; the seed
+    always does.
     ``stamp`` (m,) int32 zeros is private to the call.
     """
     queue = np.empty(64, np.int32)
@@ -159,7 +173,7 @@ def integrate_patches(  # type: ignore[no-untyped-def]
                 cosine = 0.0
                 for a in range(3):
                     cosine += normals[g, a] * facing[row, a]
-                if cosine <= 0.0 or segment_distance2(p, e, (e + 1) % 3) >= radius * radius:
+                if cosine <= least_cosine or segment_distance2(p, e, (e + 1) % 3) >= radius * radius:
                     continue
                 stamp[g] = mark
                 if tail == len(queue):

@@ -67,8 +67,10 @@ def shade(
     roughness = np.sqrt(mean @ (mean @ residual**2))
 
     # The vector area around a vertex is not inflated by noise or vegetation, as the area of its faces would be.
-    spanned = norm(mean @ (mean @ surface.vertex_vector_areas))
-    density = 1.0 / np.maximum(spanned, np.finfo(np.float64).tiny)
+    spanned = surface.vertex_vector_areas
+    for _ in range(NOISE_STEPS):
+        spanned = mean @ spanned
+    density = 1.0 / np.maximum(norm(spanned), 1e-200)
     sparse = density * thin_spacings**2 < np.median(density)
     thin = border | sparse | (longest > thin_spacings * np.median(longest))
     return Shading(np.clip(normals @ light, 0.0, 1.0), 0.5 + 0.5 * np.tanh(standing_out), density, thin, roughness)

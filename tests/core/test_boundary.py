@@ -23,6 +23,7 @@ CORE_FLOORS = (
     {"impact_models"},
     {"simulation", "analysis"},
     {"exchange"},
+    {"film"},
     {"commands"},
     {"cli"},
 )

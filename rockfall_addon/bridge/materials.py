@@ -121,6 +121,15 @@ def socket_id(group: bpy.types.GeometryNodeTree, name: str) -> str:
     return next(s.identifier for s in group.interface.items_tree if s.name == name and s.in_out == "INPUT")
 
 
+def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
+    """Give an input of a modifier's node group its value, in Blender 5.2 and before."""
+    identifier = socket_id(modifier.node_group, name)
+    if hasattr(modifier, "properties"):
+        getattr(modifier.properties.inputs, identifier).value = value
+    else:
+        modifier[identifier] = value
+
+
 def linear_colour(colour: tuple[float, float, float]) -> tuple[float, float, float, float]:
     """An sRGB colour as Blender's materials and attributes want it."""
     r, g, b = srgb_to_linear(np.array(colour)).tolist()

@@ -76,12 +76,11 @@ def _show_flights(scene: bpy.types.Scene, name: str, flights: Flights, which: np
 
 def set_trails(scene: bpy.types.Scene, things: list[bpy.types.Object] | None = None) -> None:
     """Apply the trail's radius and whether it ends at the current time."""
-    group = materials.trail_group()
-    radius, until_now = materials.socket_id(group, "Radius"), materials.socket_id(group, "Up to now")
     for thing in state.with_role(scene, state.FLIGHTS_ROLE) if things is None else things:
         modifier = thing.modifiers.get("Trail")
         if modifier is not None:
-            modifier[radius], modifier[until_now] = scene.rockfall.trail_radius_m, scene.rockfall.trail_until_now
+            materials.set_input(modifier, "Radius", scene.rockfall.trail_radius_m)
+            materials.set_input(modifier, "Up to now", scene.rockfall.trail_until_now)
             thing.update_tag()
 
 

@@ -13,9 +13,9 @@ def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
     """Turn a RockfallError of an operator's method into a report, and cancel."""
 
     @functools.wraps(execute)
-    def wrapper(self: bpy.types.Operator, *arguments: object) -> set[str]:
+    def wrapper(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:  # Blender counts the arguments
         try:
-            return execute(self, *arguments)
+            return execute(self, context)
         except RockfallError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

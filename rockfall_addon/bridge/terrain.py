@@ -3,6 +3,7 @@
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...core.errors import RockfallError
 from ...core.terrain.shading import Shading
@@ -84,6 +85,13 @@ def surface_of(thing: bpy.types.Object) -> Surface:
 def active_terrain(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The terrain object that the trajectories refer to: the first by name."""
     return next(iter(state.with_role(scene, state.TERRAIN_ROLE)), None)
+
+
+def downhill(thing: bpy.types.Object) -> Vector:
+    """Horizontal direction in which a terrain falls, from its mean normal; to the south when it is level."""
+    mean = Vector(np.nansum(surface_of(thing).face_normals * surface_of(thing).face_areas[:, None], axis=0).tolist())
+    fall = Vector((mean.x, mean.y, 0.0))
+    return fall.normalized() if fall.length > 1e-3 * mean.length else Vector((0.0, -1.0, 0.0))
 
 
 def forget_surfaces() -> None:

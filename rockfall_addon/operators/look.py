@@ -3,12 +3,14 @@
 
 import bpy
 from bpy.props import BoolProperty
+from mathutils import Quaternion, Vector
 
-from ..bridge import state
+from ..bridge import state, terrain
 
 
 def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
-    """Set every 3-D view of the window to the relief look; optionally look at everything."""
+    """Set every 3-D view of the window to the relief look; optionally look up the slope at all that is ours."""
+    context.scene.view_settings.view_transform = "Standard"
     if context.window is None:
         return
     for area in context.window.screen.areas:
@@ -27,10 +29,37 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
         space.overlay.show_cursor = False
         space.clip_end = max(space.clip_end, 5000.0)
         if frame_all:
-            region = next(r for r in area.regions if r.type == "WINDOW")
-            with context.temp_override(area=area, region=region):
-                bpy.ops.view3d.view_all()
-    context.scene.view_settings.view_transform = "Standard"
+            space.region_3d.view_perspective = "PERSP"
+            space.region_3d.view_rotation = _up_the_slope(context.scene)
+            _frame(context, area, _ours(context.scene))
+
+
+def _ours(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    terrain, flights = (state.with_role(scene, role) for role in (state.TERRAIN_ROLE, state.FLIGHTS_ROLE))
+    return terrain or flights
+
+
+def _up_the_slope(scene: bpy.types.Scene) -> Quaternion:
+    """View rotation of somebody who stands below the slope and looks up at it."""
+    ground = terrain.active_terrain(scene)
+    fall = terrain.downhill(ground) if ground is not None else Vector((0.0, -1.0, 0.0))
+    towards_viewer = Vector((fall.x, fall.y, 0.0)).normalized() + Vector((0.0, 0.0, 0.45))
+    return towards_viewer.to_track_quat("Z", "Y")
+
+
+def _frame(context: bpy.types.Context, area: bpy.types.Area, things: list[bpy.types.Object]) -> None:
+    """Frame objects and leave the selection as it was."""
+    selected, active = list(context.selected_objects), context.view_layer.objects.active
+    for thing in context.view_layer.objects:
+        thing.select_set(thing in things)
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    smooth, context.preferences.view.smooth_view = context.preferences.view.smooth_view, 0
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_selected()
+    context.preferences.view.smooth_view = smooth
+    for thing in context.view_layer.objects:
+        thing.select_set(thing in selected)
+    context.view_layer.objects.active = active
 
 
 class ROCKFALL_OT_show_relief(bpy.types.Operator):
@@ -56,10 +85,11 @@ class ROCKFALL_OT_show_impact(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.object is not None and context.object.get(state.ROLE_KEY) == state.PICK_ROLE
+        pick = context.object
+        return pick is not None and pick.get(state.ROLE_KEY) == state.PICK_ROLE and pick.animation_data is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        frame = context.object.animation_data.action_slot and context.object.animation_data.action.frame_range[0]
+        frame = context.object.animation_data.action.frame_range[0]
         context.scene.frame_set(int(frame // 1), subframe=float(frame % 1))
         return {"FINISHED"}
 

@@ -35,7 +35,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         items=[("auto", "Automatic", "Z, but Y for glTF"), ("z", "Z", ""), ("y", "Y", "")],
     )  # fmt: skip
     unit_m: FloatProperty(
-        name="File unit", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
+        name="File unit [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
         default=1.0, min=1e-6, precision=4,
     )  # fmt: skip
     ground: EnumProperty(
@@ -51,9 +51,11 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         default=0.0, min=0.0, unit="LENGTH",
     )  # fmt: skip
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+    browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.filepath:
+            self.browsing = True
             return super().invoke(context, event)
         return self._ask(context)
 
@@ -93,7 +95,8 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        if not self.asked and not bpy.app.background and not self.options.is_repeat and not self.shift_x:
+        if self.browsing:
+            self.browsing = False
             return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath)
         surface = read_terrain(
             self.filepath,

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all panels share."""
 
+import textwrap
+
 import bpy
 
 
@@ -12,9 +14,17 @@ class RockfallPanel:
     bl_category = "Rockfall"
 
 
-def advise(layout: bpy.types.UILayout, ready: bool, sentence: str) -> None:
-    """One line that says how this step stands and what to do next."""
-    layout.label(text=sentence, icon="CHECKMARK" if ready else "RIGHTARROW_THIN")
+def advise(context: bpy.types.Context, layout: bpy.types.UILayout, ready: bool, sentence: str) -> None:
+    """How this step stands and what to do next, in as many lines as the sidebar's width asks for."""
+    paragraph(context, layout, sentence, "CHECKMARK" if ready else "RIGHTARROW_THIN")
+
+
+def paragraph(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: str = "NONE") -> None:
+    """Text broken to the width of the region."""
+    characters = max(16, int(context.region.width / context.preferences.system.ui_scale / 7.2) - 7)
+    column = layout.column(align=True)
+    for number, line in enumerate(textwrap.wrap(sentence, characters)):
+        column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
 def facts(layout: bpy.types.UILayout, rows: list[tuple[str, str]]) -> None:

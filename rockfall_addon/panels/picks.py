@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 2: picks and trajectories."""
 
-import textwrap
-
 import bpy
 
 from ..bridge import state
-from .base import RockfallPanel, advise
+from .base import RockfallPanel, advise, paragraph
 
 
 class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
@@ -18,13 +16,12 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
         picks = state.with_role(scene, state.PICK_ROLE)
         flights = state.with_role(scene, state.FLIGHTS_ROLE)
         if not picks:
-            advise(layout, False, "Import a table of timed picks (picks.csv).")
+            advise(context, layout, False, "Import a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
         if problem := scene.get("rockfall_problem"):
-            for part in textwrap.wrap(problem, 48):
-                layout.label(text=part, icon="ERROR")
-        advise(layout, True, f"{len(picks)} picks, {len(flights)} trajectories.")
+            paragraph(context, layout, problem, "ERROR")
+        advise(context, layout, True, f"{len(picks)} picks, {len(flights)} trajectories.")
         layout.use_property_split = True
         settings = scene.rockfall
         column = layout.column(align=True)

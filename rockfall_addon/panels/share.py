@@ -16,7 +16,7 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
         return bool(state.with_role(context.scene, state.PICK_ROLE))
 
     def draw(self, context: bpy.types.Context) -> None:
-        advise(self.layout, True, "Tables in survey coordinates, with units.")
+        advise(context, self.layout, True, "Tables in survey coordinates, with units.")
         self.layout.operator("rockfall.export_tables", icon="EXPORT")
 
 

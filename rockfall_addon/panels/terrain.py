@@ -15,13 +15,13 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         grounds = state.with_role(scene, state.TERRAIN_ROLE)
         if not grounds:
-            advise(layout, False, "Import your scan, or begin with the demo.")
+            advise(context, layout, False, "Import your scan, or begin with the demo.")
             column = layout.column(align=True)
             column.scale_y = 1.4
             column.operator("rockfall.load_demo", icon="PLAY")
             column.operator("rockfall.import_terrain", icon="IMPORT")
             return
-        advise(layout, True, "Ready.")
+        advise(context, layout, True, "Ready.")
         shift = state.read_shift(scene)
         ground = grounds[0]
         rows = [

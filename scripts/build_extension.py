@@ -79,7 +79,8 @@ def fetch_wheels(system: str, python: str) -> list[Path]:
     missing = wanted - present().keys()
     if missing:
         print(f"{system}, Python {python}: fetching {len(missing)} wheels", flush=True)
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:"]
+        command = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet"]
+        command += ["--no-deps", "--only-binary=:all:"]
         command += ["--implementation", "cp", "--python-version", python, "--dest", str(directory)]
         command += [option for tag in SYSTEMS[system] for option in ("--platform", tag)]
         command += [f"{name}=={version}" for name, version in sorted(missing)]

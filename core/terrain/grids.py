@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Elevation grids: ESRI ASCII and GeoTIFF."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -131,7 +132,7 @@ def read_geotiff(path: Path) -> Source:
             tags = {tag.code: tag.value for tag in page.tags}
             heights = np.asarray(page.asarray())
             bands_first = page.planarconfig == tifffile.PLANARCONFIG.SEPARATE
-    except (tifffile.TiffFileError, ValueError, OSError, RuntimeError, IndexError, KeyError, TypeError) as error:
+    except (tifffile.TiffFileError, struct.error, ValueError, OSError, RuntimeError, LookupError, TypeError) as error:
         raise InputError(
             f"The TIFF file cannot be read ({error})", file=path, advice="It may be truncated: copy or export it again"
         ) from error

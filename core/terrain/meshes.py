@@ -2,6 +2,7 @@
 """Mesh files other than PLY: Wavefront OBJ, STL and glTF."""
 
 import re
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -112,11 +113,21 @@ def read_gltf(path: Path) -> Source:
             raise InputError('Not a GLB file: it does not begin with "glTF"', file=path, advice="Check its extension")
         if int.from_bytes(beginning[8:12], "little") > path.stat().st_size:
             raise InputError("The file is truncated", file=path, advice="Copy or export it again")
-    damaged = (ValueError, KeyError, IndexError, TypeError, AttributeError, AssertionError, OSError, RuntimeError)
+    damaged = (
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        AssertionError,
+        OSError,
+        RuntimeError,
+        struct.error,
+    )
     try:
         scene = trimesh.load_scene(path, process=False)
         points, faces, offset = [], [], 0
-        for node in scene.graph.nodes_geometry:
+        for node in sorted(scene.graph.nodes_geometry):
             transform, name = scene.graph[node]
             geometry = scene.geometry[name]
             if not isinstance(geometry, trimesh.Trimesh):

@@ -68,8 +68,9 @@ def block_scale_normals(
 
     Only the sheet under the point counts: the patch grows from the closest triangle over shared edges inside the
     sphere, first to faces less than 120° from that triangle, which gives a first plane; then anew, to faces less than
-    90° from this plane's normal. So a single odd triangle does not decide, and the other side of a plate stays out. Where the patch is as deep as wide (a notch), its smallest principal axis lies
-    across it, more than 60° from the mean of the face normals; then this mean is the normal.
+    90° from this plane's normal. So a single odd triangle does not decide, and the other side of a plate stays out.
+    Where the patch is as deep as wide (a notch), its smallest principal axis lies across it, more than 60° from the
+    mean of the face normals; then this mean is the normal.
     """
     from . import patch_kernels
 

@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 import trimesh
-
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.cleaning import examine_faces, merge_duplicates
@@ -169,7 +168,7 @@ def test_heights_above_a_slope_and_around_an_overhang():
 def test_mixed_winding_is_made_consistent(seed):
     rng = np.random.default_rng(seed)
     sheet, boulder = rough_sheet(12), trimesh.creation.icosphere(2, 2.0)
-    vertices = np.concatenate([sheet.vertices, boulder.vertices + [0, 0, 50]])
+    vertices = np.concatenate([sheet.vertices, np.add(boulder.vertices, [0, 0, 50])])
     faces = np.concatenate([sheet.faces, boulder.faces.astype(np.int32) + len(sheet.vertices)])
     expected = trimesh.Trimesh(vertices, faces, process=False).face_normals
     turned = rng.uniform(size=len(faces)) < 0.5

@@ -1,0 +1,418 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every terrain format: written by another program or by hand, read back, numbers compared; real lidar."""
+
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pytest
+import tifffile
+import trimesh
+from rockfall.core.errors import InputError
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
+from rockfall.core.terrain.readers import inspect_terrain, read_terrain
+from rockfall.core.terrain.writers import write_ply
+
+DATA = Path(__file__).parents[1] / "data"
+LV95 = np.array([2_600_000.0, 1_200_000.0, 1_500.0])
+
+
+def hill(n: int = 9) -> trimesh.Trimesh:
+    """A small hill around LV95's 2 600 000, 1 200 000, with coordinates that float32 cannot hold."""
+    x, y = np.meshgrid(np.arange(n) * 1.5, np.arange(n) * 1.5)
+    z = 3 * np.sin(x / 3) + np.random.default_rng(0).normal(0, 0.1, x.shape)
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (i[p, q].ravel() for p in (slice(-1), slice(1, None)) for q in (slice(-1), slice(1, None)))
+    faces = np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
+    vertices = np.stack([x, y, z], -1).reshape(-1, 3) + LV95 + 0.123456789
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
+def said(surface, words: str) -> bool:
+    return any(words in sentence for sentence in surface.summary)
+
+
+def ply_bytes(mesh: trimesh.Trimesh, form: str, extra: bool = False) -> bytes:
+    """PLY by hand, in any byte order, with or without properties that are not needed."""
+    header = ["ply", f"format {form} 1.0", "comment by hand", f"element vertex {len(mesh.vertices)}"]
+    header += ["property double x", "property double y"] + ["property uchar red"] * extra + ["property double z"]
+    header += [f"element face {len(mesh.faces)}"] + ["property float quality"] * extra
+    header += ["property list uchar int vertex_indices", "end_header", ""]
+    text = "\n".join(header).encode()
+    if form == "ascii":
+        for x, y, z in mesh.vertices.tolist():
+            text += (f"{x!r} {y!r} 7 {z!r}\n" if extra else f"{x!r} {y!r} {z!r}\n").encode()
+        for face in mesh.faces.tolist():
+            text += (("0.5 " if extra else "") + f"3 {face[0]} {face[1]} {face[2]}\n").encode()
+        return text
+    order = "<" if "little" in form else ">"
+    fields = [("x", f"{order}f8"), ("y", f"{order}f8")] + [("red", "u1")] * extra + [("z", f"{order}f8")]
+    vertices = np.zeros(len(mesh.vertices), fields)
+    for k, axis in enumerate("xyz"):
+        vertices[axis] = mesh.vertices[:, k]
+    faces = np.zeros(len(mesh.faces), [("quality", f"{order}f4")] * extra + [("count", "u1"), ("v", f"{order}i4", 3)])
+    faces["count"], faces["v"] = 3, mesh.faces
+    return text + vertices.tobytes() + faces.tobytes()
+
+
+@pytest.mark.parametrize("extra", [False, True])
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_ply_keeps_doubles_exactly(tmp_path, form, extra):
+    mesh = hill()
+    (tmp_path / "hill.ply").write_bytes(ply_bytes(mesh, form, extra))
+    surface = read_terrain(tmp_path / "hill.ply")
+    assert surface.shift == GlobalShift(2_600_000, 1_200_000, 0)
+    np.testing.assert_array_equal(surface.shift.to_survey(surface.vertices), mesh.vertices)
+    np.testing.assert_array_equal(surface.faces, mesh.faces)
+    assert np.abs(surface.vertices[:, :2]).max() < 20
+    assert said(surface, "Mesh of 81 vertices and 128 faces")
+    assert said(surface, "Shifted by (2600000, 1200000, 0)")
+
+
+def test_survey_coordinates_survive_write_and_read(tmp_path):
+    mesh = hill()
+    surface = read_terrain(write(tmp_path / "a.ply", ply_bytes(mesh, "binary_little_endian")))
+    write_ply(surface, tmp_path / "b.ply")
+    again = read_terrain(tmp_path / "b.ply")
+    np.testing.assert_allclose(again.shift.to_survey(again.vertices), mesh.vertices, rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(again.vertices, surface.vertices)
+    np.testing.assert_array_equal(again.faces, surface.faces)
+    loaded = trimesh.load_mesh(tmp_path / "b.ply", process=False)
+    np.testing.assert_array_equal(loaded.faces, surface.faces)
+
+
+def write(path: Path, data: bytes | str) -> Path:
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    return path
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_ply_with_quads_and_triangles(tmp_path, form):
+    head = f"ply\nformat {form} 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element face 2\nproperty list uchar int vertex_index\nend_header\n"
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 1]], "<f4")
+    if form == "ascii":
+        body = "\n".join(" ".join(map(str, p)) for p in points.tolist()) + "\n4 0 1 2 3\n3 1 4 2\n"
+        path = write(tmp_path / "q.ply", head + body)
+    else:
+        quad = b"\4" + np.array([0, 1, 2, 3], "<i4").tobytes()
+        path = write(
+            tmp_path / "q.ply", head.encode() + points.tobytes() + quad + b"\3" + np.array([1, 4, 2], "<i4").tobytes()
+        )
+    surface = read_terrain(path)
+    np.testing.assert_array_equal(surface.vertices, points)
+    np.testing.assert_array_equal(surface.faces, [[0, 1, 2], [0, 2, 3], [1, 4, 2]])
+
+
+def test_ply_with_points_only_is_a_cloud(tmp_path):
+    path = tmp_path / "cloud.ply"
+    path.write_bytes(trimesh.PointCloud(hill().vertices - LV95).export(file_type="ply"))
+    surface = read_terrain(path)
+    assert len(surface.vertices) == 81
+    assert said(surface, "2.5-D Delaunay")
+    assert (surface.face_normals[:, 2] > 0).all()
+
+
+def test_ply_of_trimesh_and_other_mesh_formats(tmp_path):
+    mesh = hill()
+    mesh.apply_translation(-LV95)
+    for name in ("a.ply", "a.obj", "a.stl", "b.stl"):
+        mesh.export(tmp_path / name, **({"file_type": "stl_ascii"} if name == "b.stl" else {}))
+        surface = read_terrain(tmp_path / name)
+        assert len(surface.vertices) == 81, name
+        triangles = surface.vertices[surface.faces]
+        np.testing.assert_allclose(triangles, mesh.triangles, atol=1e-5, err_msg=name)
+        assert said(surface, "Merged 303 vertices") == name.endswith("stl")
+
+
+def test_obj_keeps_doubles_and_understands_its_face_forms(tmp_path):
+    obj = "# made by hand\nmtllib x.mtl\nv 2600000.123456789 1200000.5 3 0.5 0.5 0.5\nv 2600001 1200000 3 1 1 1\n"
+    obj += "v 2600001 1200001 3.5 0 0 0\nv 2600000 1200001 3 0 0 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1 4\n"
+    obj += "v 2600002 1200000.5 4 0 0 0\n"
+    obj += "f -4 -1 -3\n"
+    surface = read_terrain(write(tmp_path / "a.obj", obj))
+    assert surface.shift.to_survey(surface.vertices)[0, 0] == 2600000.123456789
+    np.testing.assert_array_equal(surface.faces, [[0, 1, 2], [0, 2, 3], [1, 4, 2]])
+
+
+@pytest.mark.parametrize("extension", ["glb", "gltf"])
+def test_gltf_is_y_up_and_its_nodes_place_it(tmp_path, extension):
+    mesh = hill()
+    mesh.apply_translation(-LV95)
+    y_up = mesh.copy()
+    y_up.vertices = np.stack([mesh.vertices[:, 0], mesh.vertices[:, 2], -mesh.vertices[:, 1]], 1)
+    scene = trimesh.Scene()
+    scene.add_geometry(y_up, node_name="a")
+    scene.add_geometry(y_up, node_name="b", transform=trimesh.transformations.translation_matrix([100, 0, 0]))
+    for name, data in (
+        {f"a.{extension}": scene.export(file_type="glb")} if extension == "glb" else scene.export(file_type="gltf")
+    ).items():
+        (tmp_path / name.replace("model", "a")).write_bytes(data)
+    surface = read_terrain(tmp_path / f"a.{extension}")
+    np.testing.assert_allclose(surface.vertices[:81], mesh.vertices, atol=1e-5)
+    np.testing.assert_allclose(surface.vertices[81:], np.add(mesh.vertices, [100, 0, 0]), atol=2e-5)
+    assert (surface.face_normals[:, 2] > 0).all()
+    assert said(surface, "Turned from Y up to Z up")
+    flat = read_terrain(tmp_path / f"a.{extension}", up="z")
+    np.testing.assert_allclose(flat.vertices[:81], y_up.vertices, atol=1e-5)
+    assert said(flat, "read it with Y up")
+
+
+def test_y_up_and_millimetres_are_options(tmp_path):
+    mesh = hill()
+    in_mm = (mesh.vertices - LV95)[:, [0, 2, 1]] * [1000, 1000, -1000]
+    path = write(tmp_path / "a.ply", ply_bytes(trimesh.Trimesh(in_mm, mesh.faces, process=False), "ascii"))
+    surface = read_terrain(path, up="y", unit_m=0.001)
+    np.testing.assert_allclose(surface.vertices, mesh.vertices - LV95, atol=1e-9)
+    assert said(surface, "Turned from Y up to Z up, as asked")
+    assert said(surface, "Multiplied by 0.001")
+    info = inspect_terrain(path, up="y", unit_m=0.001)
+    np.testing.assert_allclose([info.minimum, info.maximum], surface.bounds)
+    for bad in ({"up": "x"}, {"unit_m": 0}, {"unit_m": np.nan}):
+        with pytest.raises(InputError, match=r"up axis|unit of"):
+            read_terrain(path, **bad)
+
+
+def test_size_gives_away_millimetres_and_degrees(tmp_path):
+    table = np.random.default_rng(0).uniform(0, 1, (50, 3))
+    np.savetxt(tmp_path / "mm.xyz", table * [80_000, 90_000, 60_000])
+    assert said(read_terrain(tmp_path / "mm.xyz"), "in millimetres")
+    np.savetxt(tmp_path / "degrees.xyz", table * [0.002, 0.002, 100] + [7.1, 46.2, 1500])
+    with pytest.raises(InputError, match="look like degrees"):
+        read_terrain(tmp_path / "degrees.xyz")
+
+
+def test_any_winding_ends_with_normals_out_of_the_ground(tmp_path):
+    mesh = hill()
+    expected = mesh.face_normals
+    rng = np.random.default_rng(1)
+    for turned in (np.ones(len(mesh.faces), bool), rng.uniform(size=len(mesh.faces)) < 0.3):
+        faces = np.where(turned[:, None], mesh.faces[:, ::-1], mesh.faces)
+        path = write(tmp_path / "w.ply", ply_bytes(trimesh.Trimesh(mesh.vertices, faces, process=False), "ascii"))
+        surface = read_terrain(path)
+        np.testing.assert_allclose(surface.face_normals, expected, atol=1e-7)
+        assert said(surface, f"Turned {turned.sum()} of 128 faces")
+
+
+def test_degenerate_faces_and_loose_vertices_are_dropped_and_said(tmp_path):
+    mesh = hill(3)
+    vertices = np.concatenate([mesh.vertices, [mesh.vertices[0] + 50, (mesh.vertices[0] + mesh.vertices[1]) / 2]])
+    faces = np.concatenate([mesh.faces, [[0, 0, 1], [0, 10, 1]]])
+    path = write(tmp_path / "d.ply", ply_bytes(trimesh.Trimesh(vertices, faces, process=False), "binary_big_endian"))
+    surface = read_terrain(path)
+    assert (len(surface.vertices), len(surface.faces)) == (9, 8)
+    assert said(surface, "Dropped 2 degenerate faces")
+    assert said(surface, "Left out 2 points that no triangle uses")
+
+
+ASC = "ncols 3\nnrows 2\nxllcorner 2600000\nyllcorner 1200000\ncellsize 2\nNODATA_value -9999\n{}"
+
+
+def test_ascii_grid_places_heights_at_cell_centres(tmp_path):
+    path = write(tmp_path / "a.asc", ASC.format("1 2 3\n4 5 6\n"))
+    surface = read_terrain(path)
+    expected = [[1, 3, 1], [3, 3, 2], [5, 3, 3], [1, 1, 4], [3, 1, 5], [5, 1, 6]]
+    np.testing.assert_array_equal(surface.vertices, expected)
+    assert surface.shift.vector.tolist() == [2_600_000, 1_200_000, 0]
+    assert len(surface.faces) == 4
+    assert surface.face_areas.sum() > 8
+    assert (surface.face_normals[:, 2] > 0).all()
+    centred = write(tmp_path / "b.asc", path.read_text().replace("llcorner", "llcenter"))
+    np.testing.assert_array_equal(read_terrain(centred).vertices, np.subtract(expected, [1, 1, 0]))
+
+
+def test_grid_cells_split_along_the_shorter_diagonal_and_leave_holes(tmp_path):
+    along = read_terrain(write(tmp_path / "a.asc", ASC.format("9 0 7\n5 9 0\n"))).faces.tolist()
+    assert sorted(map(sorted, along)) == [[0, 1, 4], [0, 3, 4], [1, 2, 5], [1, 4, 5]]
+    across = read_terrain(write(tmp_path / "a.asc", ASC.format("0 9 0\n9 5 7\n"))).faces.tolist()
+    assert sorted(map(sorted, across)) == [[0, 1, 3], [1, 2, 5], [1, 3, 4], [1, 4, 5]]
+    hole = read_terrain(write(tmp_path / "b.asc", ASC.format("1 2 3\n4 -9999 6\n")))
+    assert (len(hole.vertices), len(hole.faces)) == (5, 2)
+    assert hole.face_areas.sum() == pytest.approx(2 * 2 * np.sqrt(1 + 0.25 + 2.25), rel=0.2)
+    assert said(hole, "1 cells without data are holes")
+
+
+def geotiff(path: Path, heights, tags, **options) -> Path:
+    tifffile.imwrite(path, heights, extratags=[(c, t, len(v) if t != 2 else 0, v, True) for c, t, v in tags], **options)
+    return path
+
+
+def geokeys(*keys: tuple[int, int]) -> tuple[int, int, tuple[int, ...]]:
+    return 34735, 3, (1, 1, 0, len(keys), *(n for key, value in keys for n in (key, 0, 1, value)))
+
+
+SCALE, TIEPOINT = (33550, 12, (2.0, 2.0, 0.0)), (33922, 12, (0.0, 0.0, 0.0, 2600000.0, 1200004.0, 0.0))
+HEIGHTS = np.array([[1, 2, 3], [4, 5, 6]], np.float32)
+
+
+@pytest.mark.parametrize("compression", [None, "deflate", "lzw", "zstd"])
+def test_geotiff_georeference_and_crs(tmp_path, compression):
+    tags = [SCALE, TIEPOINT, geokeys((1024, 1), (1025, 1), (3072, 2056))]
+    surface = read_terrain(geotiff(tmp_path / "a.tif", HEIGHTS, tags, compression=compression))
+    expected = [[1, 3, 1], [3, 3, 2], [5, 3, 3], [1, 1, 4], [3, 1, 5], [5, 1, 6]]
+    np.testing.assert_array_equal(surface.vertices, expected)
+    assert surface.shift == GlobalShift(2600000, 1200000, 0, "EPSG:2056")
+    assert said(surface, "EPSG:2056")
+    with pytest.raises(InputError, match=r"EPSG:2056.*EPSG:21781"):
+        read_terrain(tmp_path / "a.tif", shift=GlobalShift(crs="EPSG:21781"))
+
+
+def test_geotiff_pixel_is_point_nodata_and_transformation(tmp_path):
+    tags = [SCALE, TIEPOINT, geokeys((1024, 1), (1025, 2), (3072, 2056)), (42113, 2, "-32768")]
+    heights = np.array([[1, 2, 3], [4, -32768, 6]], np.int16)
+    surface = read_terrain(geotiff(tmp_path / "p.tif", heights, tags))
+    np.testing.assert_array_equal(surface.vertices, [[0, 4, 1], [2, 4, 2], [4, 4, 3], [0, 2, 4], [4, 2, 6]])
+    # A quarter turn: columns run north, rows run east.
+    matrix = (0.0, 2.0, 0.0, 100.0, 2.0, 0.0, 0.0, 200.0, *(0.0,) * 7, 1.0)
+    turned = read_terrain(geotiff(tmp_path / "t.tiff", HEIGHTS, [(34264, 12, matrix)]))
+    np.testing.assert_array_equal(turned.vertices[:4], [[101, 201, 1], [101, 203, 2], [101, 205, 3], [103, 201, 4]])
+    assert (turned.face_normals[:, 2] > 0).all()
+
+
+def test_geotiff_in_degrees_or_without_georeference_is_refused(tmp_path):
+    with pytest.raises(InputError, match="in degrees"):
+        read_terrain(geotiff(tmp_path / "g.tif", HEIGHTS, [SCALE, TIEPOINT, geokeys((1024, 2), (2048, 4326))]))
+    with pytest.raises(InputError, match="no georeference"):
+        read_terrain(geotiff(tmp_path / "n.tif", HEIGHTS, []))
+    with pytest.raises(InputError, match="picture of 3 bands"):
+        read_terrain(geotiff(tmp_path / "rgb.tif", np.zeros((4, 5, 3), np.uint8), [SCALE, TIEPOINT], photometric="rgb"))
+
+
+def cloud_file(path: Path, classes, points=None) -> Path:
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    las.header.scales, las.header.offsets = [0.001] * 3, LV95
+    points = hill().vertices if points is None else points
+    las.x, las.y, las.z = points.T
+    las.classification = classes
+    las.write(path)
+    return path
+
+
+@pytest.mark.parametrize("extension", ["las", "laz"])
+def test_las_cloud_and_its_ground_class(tmp_path, extension):
+    points = hill().vertices
+    classes = np.where(np.arange(81) % 3 == 0, 5, 2)
+    path = cloud_file(tmp_path / f"a.{extension}", classes)
+    ground, every = read_terrain(path), read_terrain(path, ground_only=False)
+    assert (len(ground.vertices), len(every.vertices)) == (54, 81)
+    survey = every.shift.to_survey(every.vertices)
+    expected = points[np.lexsort((points[:, 1], points[:, 0]))]
+    np.testing.assert_allclose(survey[np.lexsort((survey[:, 1], survey[:, 0]))], expected, atol=0.00051)
+    assert said(ground, "the 54 points of the ground class (2)")
+    assert said(every, "all classes, as asked")
+    unclassified = cloud_file(tmp_path / f"b.{extension}", np.ones(81, int))
+    assert said(read_terrain(unclassified), "no ground class")
+    with pytest.raises(InputError, match="ground"):
+        read_terrain(unclassified, ground_only=True)
+    noisy = read_terrain(cloud_file(tmp_path / f"c.{extension}", np.where(np.arange(81) < 4, 7, 1)))
+    assert said(noisy, "Left out 4 points classified as noise")
+    info = inspect_terrain(path)
+    assert (info.kind, info.point_count, info.face_count) == ("cloud", 81, 0)
+    np.testing.assert_allclose(info.minimum, points.min(axis=0), atol=0.00051)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{0} {1} {2}\n", "{0},{1},{2}\n", "{0};{1};{2};77\n", "{0}\t{1}\t{2}\t12\t99\n", "  {0}   {1} {2}\r\n"],
+)
+def test_tables_of_coordinates(tmp_path, text):
+    points = hill().vertices
+    path = write(
+        tmp_path / "a.txt", "# comment\n" + "".join(text.format(*map(repr, p)) for p in points.tolist()) + "\n"
+    )
+    surface = read_terrain(path)
+    survey = surface.shift.to_survey(surface.vertices)
+    np.testing.assert_array_equal(survey[np.lexsort(survey.T[::-1])], points[np.lexsort(points.T[::-1])])
+    assert said(surface, "Meshed 81 points in plan")
+
+
+def test_table_with_named_columns_and_prj_beside(tmp_path):
+    points = hill().vertices.tolist()
+    rows = "".join(f"{i},{z!r},{y!r},{x!r}\n" for i, (x, y, z) in enumerate(points))
+    path = write(tmp_path / "a.csv", "id,Elevation,Northing,Easting\n" + rows)
+    write(
+        tmp_path / "a.prj",
+        'PROJCS["CH1903+ / LV95",GEOGCS["CH1903+",AUTHORITY["EPSG","4150"]],AUTHORITY["EPSG","2056"]]',
+    )
+    surface = read_terrain(path)
+    assert surface.shift.crs == "EPSG:2056"
+    assert surface.vertices[:, 0].max() == pytest.approx(12.123456789)
+
+
+def test_maximum_edge_and_duplicates_of_clouds(tmp_path):
+    x, y = np.meshgrid(np.arange(20.0), np.arange(20.0))
+    left = np.stack([x, y, 0 * x], -1).reshape(-1, 3)
+    points = np.concatenate([left, np.add(left, [60, 0, 0]), np.add(left[:5], [0, 0, 7])])
+    np.savetxt(tmp_path / "two.xyz", points)
+    surface = read_terrain(tmp_path / "two.xyz")
+    assert surface.face_areas.sum() == pytest.approx(2 * 19 * 19)
+    assert surface.vertices[:, 2].max() == 0
+    assert said(surface, "5 points above another")
+    assert said(surface, "10 times the spacing")
+    bridged = read_terrain(tmp_path / "two.xyz", max_edge_m=100)
+    assert bridged.face_areas.sum() == pytest.approx(79 * 19)
+    with pytest.raises(InputError, match=r"two\.xyz.*below 0.5 m"):
+        read_terrain(tmp_path / "two.xyz", max_edge_m=0.5)
+
+
+def test_a_given_shift_is_used_and_a_far_one_said(tmp_path):
+    path = write(tmp_path / "a.ply", ply_bytes(hill(), "ascii"))
+    shift = GlobalShift(2_600_010, 1_199_990, 1500, "EPSG:2056")
+    surface = read_terrain(path, shift=shift)
+    assert surface.shift == shift
+    np.testing.assert_allclose(surface.vertices[0], [-9.876543211, 10.123456789, 0.12 + 0.003456789], atol=0.5)
+    assert said(read_terrain(path, shift=GlobalShift()), "2,600 km from the project's origin")
+
+
+def test_crs_names():
+    assert crs_from_geokeys([(1024, 1), (3072, 2056)]) == ("EPSG:2056", False)
+    assert crs_from_geokeys([(1024, 2), (2048, 4326)]) == ("EPSG:4326", True)
+    assert crs_from_geokeys([(1024, 1), (2048, 4150), (3072, 32767)]) == ("", False)
+    assert crs_from_geokeys([]) == ("", False)
+    lv95 = 'PROJCS["CH1903+ / LV95",GEOGCS["CH1903+",AUTHORITY["EPSG","4150"]],AUTHORITY["EPSG","2056"]]'
+    assert crs_from_wkt(lv95) == ("EPSG:2056", False)
+    compound = f'COMPD_CS["LV95 + LN02",{lv95},VERT_CS["LN02",AUTHORITY["EPSG","5728"]],AUTHORITY["EPSG","6790"]]'
+    assert crs_from_wkt(compound) == ("EPSG:2056", False)
+    assert crs_from_wkt('PROJCS["Local grid",GEOGCS["x"]]') == ("Local grid", False)
+    assert crs_from_wkt('GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]') == ("EPSG:4326", True)
+    assert crs_from_wkt('PROJCRS["a",BASEGEOGCRS["b"],ID["EPSG",2975]]') == ("EPSG:2975", False)
+
+
+def test_real_vegetated_tile_of_la_reunion():
+    path = DATA / "sample_lareunion_epsg2975.laz"
+    surface = read_terrain(path)
+    assert said(surface, "59,712 points")
+    assert said(surface, "no ground class")
+    assert surface.shift == GlobalShift(377_000, 7_656_000, 0, "EPSG:2975")
+    assert 59_600 < len(surface.vertices) <= 59_712
+    # 24 points/m² in plan: 0.20 m apart, a little more on the slope.
+    assert surface.mean_spacing_m == pytest.approx(0.21, abs=0.015)
+    centred = surface.vertices - surface.vertices.mean(axis=0)
+    slope = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)[0]
+    assert np.degrees(np.arctan(np.hypot(*slope))) == pytest.approx(32, abs=1.5)
+    info = inspect_terrain(path)
+    assert (info.point_count, info.crs, info.shift) == (59_712, "EPSG:2975", surface.shift)
+    np.testing.assert_allclose(info.maximum - info.minimum, [50, 49.99, 61.84], atol=0.02)
+
+
+def test_real_classified_tile_of_the_chablais():
+    surface = read_terrain(DATA / "las_chablais3.laz")
+    assert said(surface, "8,047 points of the ground class")
+    assert surface.shift.crs == "EPSG:2154"
+    assert len(surface.vertices) == 8_047
+    assert surface.mean_spacing_m == pytest.approx(0.94, abs=0.03)
+    every = read_terrain(DATA / "las_chablais3.laz", ground_only=False)
+    assert said(every, "92,097 points")
+    assert every.mean_spacing_m < surface.mean_spacing_m / 2
+
+
+def test_real_grid_of_tschamut():
+    surface = read_terrain(DATA / "tschamut_2014_terrain.asc")
+    assert (len(surface.vertices), len(surface.faces)) == (43 * 46, 2 * 42 * 45)
+    np.testing.assert_allclose(surface.bounds[:, :2], [[-32.5, 87.5], [177.5, 312.5]])
+    np.testing.assert_array_equal(surface.vertices[0], [-32.5, 312.5, 125.494105])
+    # The trend plane that the grid was made from: z falls 0.25 per metre in x, rises 0.41 in y.
+    centred = surface.vertices - surface.vertices.mean(axis=0)
+    slope = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)[0]
+    np.testing.assert_allclose(slope, [-0.2531, 0.4066], atol=0.05)

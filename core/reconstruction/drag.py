@@ -17,8 +17,12 @@ SETTLED_M = 1e-10
 """The integration is refined until an end point moves by less than this."""
 SOLVED_M = 1e-10
 """The fit ends when no start position and no end point moves by more than this."""
-MAX_STEPS = 1 << 15
+FEWEST_STEPS, MOST_STEPS = 4, 1 << 14
+COARSEST = 0.5
+"""Largest product of a first step and the rate at which drag changes the velocity."""
 MAX_ITERATIONS = 60
+CACHED_ROWS = 4096
+"""Flights whose intermediate results stay in the processor's cache."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class Drag:
 
 
 def fly(velocity: Array, duration_s: Array, gravity_mps2: float, drag_per_m: Array) -> tuple[Array, Array]:
-    """Displacements (n, 3) [m] and final velocities (n, 3) [m/s] of flights with drag.
+    """Displacements (n, 3) [m] and final velocities (n, 3) [m/s] of flights with drag, to 1e-10 m.
 
     Parameters
     ----------
@@ -50,49 +54,76 @@ def fly(velocity: Array, duration_s: Array, gravity_mps2: float, drag_per_m: Arr
 
     Raises
     ------
-    RockfallError : a flight cannot be integrated to 1e-10 m.
-
-    Notes
-    -----
-    Classical Runge–Kutta steps, doubled for each flight until its end point settles, then extrapolated.
+    RockfallError : a flight cannot be integrated.
     """
-    moved, final = np.empty_like(velocity), np.empty_like(velocity)
-    open_rows = np.arange(duration_s.size)
-    steps = 8
-    coarse = _runge_kutta(velocity, duration_s, gravity_mps2, drag_per_m, steps)
-    while open_rows.size:
-        steps *= 2
-        if steps > MAX_STEPS:
-            raise RockfallError("A flight with drag cannot be integrated. Check the block's size and density.")
-        rows = open_rows
-        fine = _runge_kutta(velocity[rows], duration_s[rows], gravity_mps2, drag_per_m[rows], steps)
-        change = fine - coarse
-        better = fine + change / 15
-        settled = (np.abs(change[:, :3]) < SETTLED_M).all(axis=1)
-        moved[rows[settled]], final[rows[settled]] = better[settled, :3], better[settled, 3:]
-        open_rows, coarse = rows[~settled], fine[~settled]
+    moved, final = _integrate(velocity, duration_s, gravity_mps2, drag_per_m)
+    if np.isnan(moved).any():
+        raise RockfallError(
+            "A flight with drag cannot be integrated. Check its duration, and the block's size and density."
+        )
     return moved, final
+
+
+def _integrate(velocity: Array, duration_s: Array, gravity_mps2: float, drag_per_m: Array) -> tuple[Array, Array]:
+    """As `fly`, with NaN where it fails. Flights that need steps of about one number are taken together."""
+    states = np.full((duration_s.size, 6), np.nan)
+    rate = drag_per_m * norm(velocity) + np.sqrt(drag_per_m * gravity_mps2)
+    with np.errstate(invalid="ignore"):
+        least = np.maximum(np.abs(duration_s) * rate / COARSEST, FEWEST_STEPS)
+    feasible = least <= MOST_STEPS
+    size = np.zeros(duration_s.size, dtype=np.int64)
+    size[feasible] = 2 ** np.ceil(np.log2(least[feasible])).astype(np.int64)
+    for steps in np.unique(size[feasible]):
+        rows = np.flatnonzero(size == steps)
+        states[rows] = _extrapolate(velocity[rows], duration_s[rows], gravity_mps2, drag_per_m[rows], int(steps))
+    return states[:, :3], states[:, 3:]
+
+
+def _extrapolate(velocity: Array, duration_s: Array, gravity_mps2: float, drag_per_m: Array, steps: int) -> Array:
+    """(n, 6): displacement and velocity; Runge–Kutta with doubled steps, extrapolated (Romberg) until they settle."""
+    states = np.full((duration_s.size, 6), np.nan)
+    rows = np.arange(duration_s.size)
+    table = [_runge_kutta(velocity, duration_s, gravity_mps2, drag_per_m, steps)]
+    while rows.size and steps < MOST_STEPS:
+        steps *= 2
+        line = [_runge_kutta(velocity[rows], duration_s[rows], gravity_mps2, drag_per_m[rows], steps)]
+        for order, coarser in enumerate(table, start=4):  # the errors go as h⁴, h⁵, h⁶ …
+            line.append(line[-1] + (line[-1] - coarser) / (2**order - 1))
+        settled = (np.abs(line[-1] - table[-1])[:, :3] < SETTLED_M).all(axis=1)
+        states[rows[settled]] = line[-1][settled]
+        rows, table = rows[~settled], [entry[~settled] for entry in line]
+    return states
 
 
 def _runge_kutta(velocity: Array, duration_s: Array, gravity_mps2: float, drag_per_m: Array, steps: int) -> Array:
     """(n, 6): displacement and velocity after `steps` equal steps of the classical fourth-order method."""
-    h = (duration_s / steps)[:, None]
-    k = drag_per_m[:, None]
-    fall = np.array([0.0, 0.0, -gravity_mps2])
-    x, v = np.zeros_like(velocity), velocity.copy()
+    states = np.empty((duration_s.size, 6))
+    for i in range(0, duration_s.size, CACHED_ROWS):
+        rows = slice(i, i + CACHED_ROWS)
+        h, k = duration_s[rows] / steps, -drag_per_m[rows]
+        states[rows] = _steps(velocity[rows].T.copy(), h, gravity_mps2, k, steps).T
+    return states
+
+
+def _steps(v: Array, h: Array, gravity_mps2: float, k: Array, steps: int) -> Array:
+    """(6, n) from (3, n): components first, which is quicker here."""
+    x = np.zeros_like(v)
 
     def acceleration(u: Array) -> Array:
-        return fall - k * norm(u)[:, None] * u
+        result = (k * np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])) * u
+        result[2] -= gravity_mps2
+        return result
 
-    with np.errstate(over="ignore", invalid="ignore"):  # a step that is far too long: the next doubling mends it
-        for _ in range(steps):
-            a1 = acceleration(v)
-            a2 = acceleration(v + h / 2 * a1)
-            a3 = acceleration(v + h / 2 * a2)
-            a4 = acceleration(v + h * a3)
-            x += h * v + h**2 / 6 * (a1 + a2 + a3)
-            v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-    return np.concatenate([x, v], axis=1)
+    half, third, sixth = h / 2, h * h / 6, h / 6
+    for _ in range(steps):
+        a1 = acceleration(v)
+        a2 = acceleration(v + half * a1)
+        a3 = acceleration(v + half * a2)
+        a4 = acceleration(v + h * a3)
+        middle = a2 + a3
+        x += h * v + third * (a1 + middle)
+        v += sixth * (a1 + 2 * middle + a4)
+    return np.concatenate([x, v])
 
 
 def fit_with_drag(
@@ -127,6 +158,9 @@ def fit_with_drag(
     obs = observations
     for _ in range(MAX_ITERATIONS):
         step = _gauss_newton_step(obs, position[active], velocity[active], gravity_mps2, drag_per_m[active])
+        if np.isnan(step).any():
+            active = active[np.isnan(step).any(axis=1)]
+            break
         position[active] += step[:, :3]
         velocity[active] += step[:, 3:]
         longest = np.maximum.reduceat(obs.time_s, np.flatnonzero(np.r_[True, np.diff(obs.flight) > 0]))
@@ -154,21 +188,18 @@ def _gauss_newton_step(
 ) -> Array:
     """(k, 6) change of start position and velocity."""
     group, m = obs.flight, obs.time_s.size
-    v, k = velocity[group], drag_per_m[group]
-    nudge = 1e-4 * (1.0 + norm(v))
-    nudged = [v]
-    for axis in range(3):
-        shift = np.zeros((m, 3))
-        shift[:, axis] = nudge
-        nudged += [v + shift, v - shift]
-    moved, _ = fly(np.concatenate(nudged), np.tile(obs.time_s, 7), gravity_mps2, np.tile(k, 7))
-    moved = moved.reshape(7, m, 3)
-    slope = (moved[1::2] - moved[2::2]) / (2 * nudge[None, :, None])  # (by axis, m, xyz)
+    later = np.flatnonzero(obs.time_s > 0)
+    start = velocity[group[later]]
+    nudge = 1e-4 * (1.0 + norm(start))
+    nudged = [start + sign * nudge[:, None] * axis for axis in np.eye(3) for sign in (1, -1)]
+    times, drags = np.tile(obs.time_s[later], 7), np.tile(drag_per_m[group[later]], 7)
+    ends = _integrate(np.concatenate([start, *nudged]), times, gravity_mps2, drags)[0].reshape(7, -1, 3)
+    moved, slope = np.zeros((m, 3)), np.zeros((m, 3, 3))
+    moved[later] = ends[0]
+    slope[later] = ((ends[1::2] - ends[2::2]) / (2 * nudge[:, None])).transpose(1, 2, 0)
 
-    jacobian = np.zeros((m, 3, 6))
-    jacobian[:, :, :3] = np.eye(3)
-    jacobian[:, :, 3:] = slope.transpose(1, 2, 0)
-    misfit = obs.position - position[group] - moved[0]
+    jacobian = np.concatenate([np.broadcast_to(np.eye(3), (m, 3, 3)), slope], axis=2)
+    misfit = obs.position - position[group] - moved
     weighted = jacobian * obs.weight[:, None, None]
     normal = obs.sums(np.einsum("mij,mik->mjk", weighted, jacobian))
     right = obs.sums(np.einsum("mij,mi->mj", weighted, misfit))

@@ -119,7 +119,8 @@ def solve_flights(picks: Picks, segments: Segments, gravity_mps2: float, drag_pe
     drag = np.zeros(first.size)
     if drag_per_m is not None:
         drag = np.where(contact, 0.0, drag_per_m[first])
-        flying = np.flatnonzero(drag > 0)
+    flying = np.flatnonzero(drag > 0)
+    if flying.size:
         obs = observe(picks, first[flying], last[flying])
         start[flying], start_velocity[flying] = fit_with_drag(
             obs,

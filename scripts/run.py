@@ -107,7 +107,7 @@ def set_up() -> None:
         made = subprocess.run([sys.executable, "-m", "venv", "--clear", str(VENV)], check=False)
         if made.returncode:
             fail("could not make .venv; the message above says why")
-    say("installing Rockfall and what it needs; the first time this downloads about 700 MB")
+    say("installing Rockfall and what it needs; the first time this downloads about 600 MB")
     command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--editable", ".[blender,dev]"]
     command += ["--constraint", str(ROOT / "scripts" / "constraints.txt")]
     if subprocess.run(command, check=False, cwd=ROOT, env=environment).returncode:

@@ -5,12 +5,12 @@ import numpy as np
 
 from .vectors import Array
 
-# Eight evenly spaced colours of the perceptually uniform map "plasma" (S. van der Walt & N. Smith, CC0), sRGB;
-# the darkest end is left out so that slow blocks show on a dark slope.
+# Eight evenly spaced sRGB colours after the perceptually uniform map "plasma" (S. van der Walt & N. Smith, CC0), its dark
+# end made brighter so that slow blocks show on a shaded slope.
 SPEED_SCALE = np.array(
     [
-        [0.29, 0.02, 0.63],
-        [0.49, 0.01, 0.66],
+        [0.42, 0.10, 0.80],
+        [0.55, 0.10, 0.75],
         [0.66, 0.14, 0.59],
         [0.80, 0.28, 0.47],
         [0.90, 0.42, 0.36],
@@ -54,4 +54,10 @@ def rounded_top(value: float) -> float:
     if not np.isfinite(value) or value <= 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
-    return float(next(step * power for step in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0) if step * power >= value * (1 - 1e-9)))
+    return float(
+        next(
+            step * power
+            for step in (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+            if step * power >= value * (1 - 1e-9)
+        )
+    )

@@ -11,7 +11,7 @@ from ...core.colours import srgb_to_linear
 ROCK_COLOUR = (0.47, 0.43, 0.38)
 THIN_COLOUR = (0.30, 0.42, 0.60)
 RELIEF_FLOOR = 0.25  # what is left of the light where hillshade or eye-dome are zero
-RELIEF_BRIGHTNESS = 1.6
+RELIEF_BRIGHTNESS = 1.2
 SUN_DIRECTION = (-0.5, -0.5, 0.7071)  # from the north-west as on maps would be behind a camera that looks up the slope
 TRAIL_GROUP = "Rockfall trail"
 TIME_ATTRIBUTE = "display_time_s"

@@ -20,6 +20,8 @@ RESULT_KEY = "rockfall_result"
 def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
     """Bring the scene's picks, flights and blocks in line with a reconstruction."""
     settings = scene.rockfall
+    if not state.with_role(scene, state.FLIGHTS_ROLE):
+        _choose_sizes(settings, result)
     offsets = timing.display_offsets(result.picks, settings.playback == "REAL", settings.stagger_s)
     scene[state.KEYED_RATE_KEY] = timing.frame_rate(scene)
     picks.show_picks(scene, result.picks, _normals(result), offsets, settings.marker_radius_m)
@@ -36,6 +38,16 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
             last = max(last, float(result.flights.end_time_s[which].max()) - offset)
     scene.frame_start = 0
     scene.frame_end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
+
+
+def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> None:
+    """Sizes at which markers, trails and blocks are seen when the whole slope is: the user may change them afterwards."""
+    extent = float(np.ptp(result.picks.position, axis=0).max(initial=0.0))
+    blocks = [result.block] if isinstance(result.block, Block) else list(result.block.values())
+    radius = float(np.mean([block.radius_m for block in blocks]))
+    settings.marker_radius_m = max(radius, 0.005 * extent)
+    settings.trail_radius_m = max(0.2 * radius, 0.002 * extent)
+    settings.block_scale = max(1.0, round(0.006 * extent / radius * 2) / 2)
 
 
 def _show_flights(scene: bpy.types.Scene, name: str, flights: Flights, which: np.ndarray, offset: float) -> None:

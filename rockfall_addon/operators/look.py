@@ -20,8 +20,8 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
         shading = space.shading
         shading.type, shading.light, shading.color_type = "SOLID", "FLAT", "VERTEX"
         shading.show_cavity, shading.cavity_type = True, "BOTH"
-        shading.cavity_ridge_factor, shading.cavity_valley_factor = 0.6, 1.0
-        shading.curvature_ridge_factor, shading.curvature_valley_factor = 0.6, 0.8
+        shading.cavity_ridge_factor, shading.cavity_valley_factor = 0.2, 0.6
+        shading.curvature_ridge_factor, shading.curvature_valley_factor = 0.2, 0.4
         shading.show_object_outline = False
         shading.background_type, shading.background_color = "VIEWPORT", (0.055, 0.065, 0.08)
         space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False

@@ -51,7 +51,8 @@ def _draw() -> None:
     for part in (0.0, 0.5, 1.0):
         text = f"{top * part:g}"
         _text(left + width * part - blf.dimensions(0, text)[0] / 2, bottom - (TEXT + 4) * scale, text)
-    _text(left, bottom + height + 6 * scale, "Block speed [m/s]")
+    size = f", blocks drawn {settings.block_scale:g}× their size" if settings.block_scale != 1 else ""
+    _text(left, bottom + height + 6 * scale, f"Block speed [m/s]{size}")
     blf.disable(0, blf.SHADOW)
 
 

@@ -4,10 +4,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array
-from .surface import face_cross_products
+from ..vectors import Array, dot
+from .surface import cross_product
 
-CHUNK = 1 << 18
+CHUNK = 1 << 15
 FLAT = 1e-12
 """A triangle is degenerate when twice its area is below this part of its longest edge squared."""
 
@@ -37,22 +37,17 @@ def merge_duplicates(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, 
     return vertices[kept], number[faces], int((~kept).sum())
 
 
-def is_degenerate(vertices: Array, faces: NDArray[np.int32], cross: Array) -> NDArray[np.bool_]:
-    """(m,) whether a face has no area to speak of."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    longest2 = np.maximum.reduce([((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a))])
-    return (cross**2).sum(axis=1) <= (FLAT * longest2) ** 2
-
-
 def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[NDArray[np.bool_], Array, NDArray[np.bool_]]:
     """Chunk by chunk, to stay small: (m,) degenerate; (3,) twice the total vector area; (2,) any face up, any down."""
     degenerate = np.zeros(len(faces), np.bool_)
     total = np.zeros(3)
     up_down = np.zeros(2, np.bool_)
     for start in range(0, len(faces), CHUNK):
-        part = faces[start : start + CHUNK]
-        cross = face_cross_products(vertices, part)
-        degenerate[start : start + CHUNK] = is_degenerate(vertices, part, cross)
+        a, b, c = (vertices[faces[start : start + CHUNK, k]] for k in range(3))
+        u, v, w = b - a, c - a, c - b
+        cross = cross_product(u, v)
+        longest2 = np.maximum(np.maximum(dot(u, u), dot(v, v)), dot(w, w))
+        degenerate[start : start + CHUNK] = dot(cross, cross) <= (FLAT * longest2) ** 2
         total += cross.sum(axis=0)
         up_down |= ((cross[:, 2] > 0).any(), (cross[:, 2] < 0).any())
     return degenerate, total, up_down

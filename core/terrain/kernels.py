@@ -273,44 +273,48 @@ def closest_many(tree, points, limit, closest, distance, place, start, stop):  #
 def edge_neighbours(faces, vertex_count):  # type: ignore[no-untyped-def]
     """The face across each edge (m, 3), from corner e to e + 1; -1 at borders, -2 where three or more faces meet."""
     m = faces.shape[0]
-    order, sorted_order = np.arange(3 * m, dtype=np.int32), np.empty(3 * m, np.int32)
     neighbours = np.full((m, 3), -1, np.int32)
-    # A stable counting sort by the larger, then by the smaller end brings equal edges together in linear time.
-    for larger in (True, False):
-        place = np.zeros(vertex_count + 1, np.int64)
-        for pass_ in range(2):
-            for j in range(3 * m):
-                edge = order[j]
-                f, e = edge // 3, edge % 3
-                a, b = faces[f, e], faces[f, (e + 1) % 3]
-                key = max(a, b) if larger else min(a, b)
-                if pass_ == 0:
-                    place[key + 1] += 1
-                else:
-                    sorted_order[place[key]] = edge
-                    place[key] += 1
-            if pass_ == 0:
-                for v in range(vertex_count):
-                    place[v + 1] += place[v]
-        order, sorted_order = sorted_order, order
-    j = 0
-    while j < 3 * m:
-        f, e = order[j] // 3, order[j] % 3
-        a, b = faces[f, e], faces[f, (e + 1) % 3]
-        k = j + 1
-        while k < 3 * m:
-            g, h = order[k] // 3, order[k] % 3
-            c, d = faces[g, h], faces[g, (h + 1) % 3]
-            if not ((a == c and b == d) or (a == d and b == c)):
-                break
-            k += 1
-        if k - j == 2:
-            g, h = order[j + 1] // 3, order[j + 1] % 3
-            neighbours[f, e], neighbours[g, h] = g, f
-        elif k - j > 2:
-            for i in range(j, k):
-                neighbours[order[i] // 3, order[i] % 3] = -2
-        j = k
+    # Edges in buckets of their lower end, a counting sort: linear, and a bucket holds only a handful.
+    start = np.zeros(vertex_count + 2, np.int32)
+    for f in range(m):
+        for e in range(3):
+            start[min(faces[f, e], faces[f, (e + 1) % 3]) + 2] += 1
+    for v in range(vertex_count):
+        start[v + 2] += start[v + 1]
+    edges, other = np.empty(3 * m, np.int32), np.empty(3 * m, np.int32)
+    for f in range(m):
+        for e in range(3):
+            a, b = faces[f, e], faces[f, (e + 1) % 3]
+            place = start[min(a, b) + 1]
+            start[min(a, b) + 1] += 1
+            edges[place], other[place] = 3 * f + e, max(a, b)
+    for v in range(vertex_count):
+        low, high = start[v], start[v + 1]
+        if high - low > 64:
+            # The hub of a fan has a bucket as large as the mesh: sorting keeps it from quadratic time.
+            by_end = np.argsort(other[low:high])
+            edges[low:high], other[low:high] = edges[low:high][by_end], other[low:high][by_end]
+        for j in range(low, high):
+            if edges[j] < 0:
+                continue
+            partner, met = -1, 1
+            for k in range(j + 1, high):
+                if other[k] == other[j]:
+                    partner, met = k, met + 1
+                elif high - low > 64:
+                    break
+            if met == 2:
+                f, g = edges[j], edges[partner]
+                neighbours[f // 3, f % 3], neighbours[g // 3, g % 3] = g // 3, f // 3
+                edges[partner] = -1
+            elif met > 2:
+                for k in range(j, high):
+                    if other[k] == other[j]:
+                        neighbours[edges[k] // 3, edges[k] % 3] = -2
+                        if k > j:
+                            edges[k] = -1
+                    elif high - low > 64:
+                        break
     return neighbours
 
 

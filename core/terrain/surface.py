@@ -95,8 +95,13 @@ class Surface:
 def face_cross_products(vertices: Array, faces: NDArray[np.int32]) -> Array:
     """(m, 3) twice the vector area of each face [m²], its direction after the right-hand rule."""
     a = vertices[faces[:, 0]]
-    u, v = vertices[faces[:, 1]] - a, vertices[faces[:, 2]] - a
+    return cross_product(vertices[faces[:, 1]] - a, vertices[faces[:, 2]] - a)
+
+
+def cross_product(u: Array, v: Array) -> Array:
+    """(m, 3) row-wise; several times quicker than `numpy.cross` on millions of rows."""
+    product = np.empty_like(u)
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
-        a[:, axis] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
-    return a
+        product[:, axis] = u[:, i] * v[:, j] - u[:, j] * v[:, i]
+    return product

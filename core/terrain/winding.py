@@ -31,12 +31,13 @@ class Oriented:
     contradictions: int = 0
 
 
-def orient(vertices: Array, faces: NDArray[np.int32], any_up: bool, any_down: bool) -> Oriented:
+def orient(vertices: Array, faces: NDArray[np.int32], any_up: bool, any_down: bool, total_up: float = 0.0) -> Oriented:
     """Turn faces so that neighbours agree and normals point out of the ground.
 
     Parameters
     ----------
     any_up, any_down : whether any face has a normal with positive, negative z; all faces alike need no more work.
+    total_up : z of the total vector area; when clear, it settles a mesh of one consistent component.
 
     Notes
     -----
@@ -55,6 +56,8 @@ def orient(vertices: Array, faces: NDArray[np.int32], any_up: bool, any_down: bo
     neighbours = kernels.edge_neighbours(faces, len(vertices))
     component, flipped = np.empty(m, np.int32), np.empty(m, np.bool_)
     components, contradictions = kernels.flood_winding(faces, neighbours, component, flipped)
+    if components == 1 and total_up and not flipped.any() and (neighbours < 0).any():
+        return Oriented(faces if total_up > 0 else np.ascontiguousarray(faces[:, ::-1]), 0 if total_up > 0 else m, 1)
     cross = face_cross_products(vertices, faces)
     area = norm(cross)
     sign = np.where(flipped, -1.0, 1.0)

@@ -16,7 +16,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 from demo_site import campaign, terrain
 from rockfall.core.exchange.project import (
     BlockEntry,
-    CameraPlacement,
     Project,
     ReconstructionSettings,
     RenderPreset,
@@ -58,7 +57,7 @@ def main() -> None:
     observed = [field.observed(block) for block in range(campaign.BLOCKS)]
     write_csv(folder / "picks.csv", PICK_COLUMNS, (row for one in observed for row in pick_rows(field, one)))
     write_csv(folder / "truth.csv", TRUTH_COLUMNS, (row for one in observed for row in truth_rows(field, one)))
-    write_project(project(field, observed, folder), folder / "project.toml")
+    write_project(project(observed, folder), folder / "project.toml")
     print(f"{sum(len(one.impacts) for one in observed)} impacts of {len(observed)} blocks in {folder}")
 
 
@@ -132,19 +131,9 @@ end_header
     path.write_bytes(header.encode("ascii") + site.survey.astype("<f8").tobytes() + faces.tobytes())
 
 
-def project(field: campaign.Campaign, observed: list[campaign.Observed], folder: Path) -> Project:
+def project(observed: list[campaign.Observed], folder: Path) -> Project:
     """Everything that ``rockfall reconstruct`` and ``rockfall render`` need."""
-    line = field.terrain.line
-
-    def seen_from(
-        position: tuple[float, float, float], target: tuple[float, float, float], fov_deg: float
-    ) -> CameraPlacement:
-        apex = np.array([line.apex_m, 0.0, 0.0])
-        ends = np.round(terrain.to_survey(np.array([position, target]) + apex, line), 2).tolist()
-        return CameraPlacement(tuple(ends[0]), tuple(ends[1]), fov_deg)
-
-    camera = seen_from((105.0, -28.0, 75.0), (-33.0, 2.0, 52.0), 48.0)
-    film = {"stagger_s": 0.6, "time_scale": 1.5, "engine": "auto", "camera": camera}
+    film = {"stagger_s": 0.6, "engine": "auto"}
     return Project(
         site=Site(
             "Synthetic gully", "Made by a script after the Riou Bourdoux gully of Noël et al. 2018; no real place"
@@ -155,8 +144,8 @@ def project(field: campaign.Campaign, observed: list[campaign.Observed], folder:
         blocks=tuple(BlockEntry(one.name, *one.diameters.tolist()) for one in observed),
         reconstruction=ReconstructionSettings(normal_radius_m=0.6),
         render=(
-            RenderPreset("preview", 640, 360, 20.0, **film),
-            RenderPreset("film", 1920, 1080, 25.0, **film | {"time_scale": 1.0}),
+            RenderPreset("preview", 640, 360, 25.0, **film),
+            RenderPreset("hd", 1920, 1080, 25.0, **film),
         ),
     )
 

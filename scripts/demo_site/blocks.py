@@ -200,7 +200,7 @@ def _one(group: list[Impact]) -> Impact:
     )
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _window(low, high, nodes):
     """Cells (first, end) of sorted nodes that a span can touch; nodes are known to a few millimetres."""
     first = max(np.searchsorted(nodes, low - 0.01) - 1, 0)
@@ -208,7 +208,7 @@ def _window(low, high, nodes):
     return first, max(end, first)
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _on_triangle(p, a, b, c):
     """The point of a triangle nearest to p (Ericson 2005, Real-Time Collision Detection, 5.1.5)."""
     ab, ac, ap = b - a, c - a, p - a
@@ -235,7 +235,7 @@ def _on_triangle(p, a, b, c):
     return a + vb / (va + vb + vc) * ab + vc / (va + vb + vc) * ac
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _closest(p, reach, vertices, faces, rows_x, columns_y):
     columns = columns_y.size - 1
     best, nearest = reach, np.full(3, np.nan)
@@ -251,7 +251,7 @@ def _closest(p, reach, vertices, faces, rows_x, columns_y):
     return best, nearest
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _normal(p, radius, vertices, faces, rows_x, columns_y):
     columns = columns_y.size - 1
     total = np.zeros(3)
@@ -266,7 +266,7 @@ def _normal(p, radius, vertices, faces, rows_x, columns_y):
     return total / np.sqrt(np.dot(total, total))
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _height(x, y, vertices, faces, rows_x, columns_y):
     columns = columns_y.size - 1
     first_i, end_i = _window(x, x, rows_x)
@@ -283,7 +283,7 @@ def _height(x, y, vertices, faces, rows_x, columns_y):
     return np.nan
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _fly(start, v, radius, vertices, faces, rows_x, columns_y):
     """Seconds until the sphere touches the ground, NaN when it leaves the terrain.
 

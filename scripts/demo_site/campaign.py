@@ -134,7 +134,7 @@ class Campaign:
             elif doubtful and i == 2:
                 status, note = "doubtful", "dust hides the contact"
             yield pick(impact.time, impact.contact, "impact", status, note)
-            if i < last and observed.impacts[i + 1].time - impact.leave_time > 1.15:
+            if i < last and observed.impacts[i + 1].time - impact.leave_time > 1.4:
                 yield self._passing(observed, impact, observed.impacts[i + 1], rng)
         if observed.stopped:
             for (time, _, contact), kind in zip(observed.run.rolling[1:], ("contact", "stop"), strict=True):

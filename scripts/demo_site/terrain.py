@@ -81,7 +81,7 @@ def fractal(
     return noise / noise.std()
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _drain(z, step):
     """Steepest-descent receiver of each cell, and the distance to it; a cell without one is its own receiver."""
     rows, columns = z.shape
@@ -104,7 +104,7 @@ def _drain(z, step):
     return receiver, distance
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _carve(z, order, receiver, distance, pinned, erodibility, floor, cell_area, steepest):
     """One implicit step of the stream-power law, channel cells pinned, slopes limited to the rock's strength."""
     area = np.full(z.size, cell_area)
@@ -180,7 +180,7 @@ def bedded(rng: np.random.Generator, x: Array, y: Array, z: Array, strength: Arr
     return z + strength * (np.interp(stack, nodes, heights) - stack)
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _filled(z, rise):
     """Closed hollows filled to their rim, as scree does, with a slight fall (priority flood, Barnes et al. 2014)."""
     rows, columns = z.shape

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Statistics of impacts: analytic tables, and scipy and numpy as independent implementations."""
+
+import numpy as np
+import pytest
+import scipy.stats
+from rockfall.core.analysis.statistics import (
+    ImpactStatistics,
+    impact_statistics,
+    line,
+    line_through_origin,
+    power_law,
+)
+from rockfall.core.reconstruction.impact import Impacts
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct
+
+RNG = np.random.default_rng(7)
+
+
+def impacts_with(theta1_deg: np.ndarray, rn: np.ndarray, rt: np.ndarray, speed: np.ndarray) -> Impacts:
+    """A table of impacts on level ground with given angles and coefficients, through the reconstruction itself."""
+    angle = np.radians(theta1_deg)
+    v1 = np.stack([speed * np.cos(angle), 0.0 * angle, -speed * np.sin(angle)], axis=1)
+    v2 = np.stack([rt * v1[:, 0], 0.0 * angle, -rn * v1[:, 2]], axis=1)
+    drop, seconds = np.array([0.0, 0.0, 9.81]), 0.4
+    names, times, places = [], [], []
+    for i, (before, after) in enumerate(zip(v1, v2, strict=True)):
+        names += [f"T{i:03d}"] * 3
+        times += [0.0, seconds, 2 * seconds]
+        # one flight that arrives with v1, one that leaves with v2
+        places += [-(before * seconds + drop * seconds**2 / 2), np.zeros(3), after * seconds - drop * seconds**2 / 2]
+    normal = np.tile([0.0, 0.0, 1.0], (len(names), 1))
+    return reconstruct(make_picks(names, times, np.array(places), normal=normal)).impacts
+
+
+@pytest.fixture
+def exact() -> ImpactStatistics:
+    theta1_deg = np.linspace(6.0, 60.0, 40)
+    speed = np.linspace(4.0, 18.0, 40)
+    return impact_statistics(impacts_with(theta1_deg, 12.0 * theta1_deg**-1.1, np.full(40, 0.66), speed))
+
+
+def test_exact_laws_are_found_exactly(exact: ImpactStatistics) -> None:
+    assert (exact.impacts, exact.used) == (120, 40)
+    assert exact.rt.slope == pytest.approx(0.66, abs=1e-9)
+    assert exact.rt.r2 == pytest.approx(1.0)
+    assert exact.rt_free.intercept == pytest.approx(0.0, abs=1e-8)
+    assert exact.rn_angle.slope == pytest.approx(-1.1, abs=1e-8)
+    assert exact.rn_factor == pytest.approx(12.0, rel=1e-8)
+
+
+def test_counts_and_quantiles(exact: ImpactStatistics) -> None:
+    theta1_deg = np.linspace(6.0, 60.0, 40)
+    rn = 12.0 * theta1_deg**-1.1
+    assert exact.rn_above_one == (rn > 1).sum() == exact.rn_above_one_grazing
+    assert exact.grazing == (theta1_deg < 20).sum()
+    spread = exact.spreads["theta1", "deg"]
+    assert (spread.least, spread.greatest) == (pytest.approx(6.0), pytest.approx(60.0))
+    assert spread.median == pytest.approx(33.0)
+    assert spread.low == pytest.approx(np.quantile(theta1_deg, 0.1))
+    assert exact.spreads["rt", ""].median == pytest.approx(0.66)
+
+
+def test_free_line_against_scipy() -> None:
+    x = RNG.uniform(0, 90, 103)
+    y = 1.0 - 0.006 * x + 0.1 * RNG.standard_normal(103)
+    mine, reference = line(x, y), scipy.stats.linregress(x, y)
+    assert mine.slope == pytest.approx(reference.slope, rel=1e-10)
+    assert mine.intercept == pytest.approx(reference.intercept, rel=1e-10)
+    assert mine.r2 == pytest.approx(reference.rvalue**2, rel=1e-9)
+    reach = scipy.stats.t.ppf(0.975, 101) * reference.stderr
+    assert (mine.low, mine.high) == pytest.approx((reference.slope - reach, reference.slope + reach))
+
+
+def test_line_through_the_origin_against_numpy_and_by_hand() -> None:
+    x = RNG.uniform(2, 18, 103)
+    y = 0.66 * x + 2.0 * RNG.standard_normal(103)
+    mine = line_through_origin(x, y)
+    slope, squares, _, _ = np.linalg.lstsq(x[:, None], y, rcond=None)
+    assert mine.slope == pytest.approx(slope[0], rel=1e-12)
+    assert mine.r2 == pytest.approx(1 - squares[0] / np.sum((y - y.mean()) ** 2), rel=1e-10)
+
+    # x = 1, 2, 3 and y = 1, 1, 2: slope 9/14, residual 6 − 81/14, centred sum 2/3
+    small = line_through_origin(np.array([1.0, 2.0, 3.0]), np.array([1.0, 1.0, 2.0]))
+    assert small.slope == pytest.approx(9 / 14)
+    assert small.r2 == pytest.approx(1 - (6 - 81 / 14) / (2 / 3))
+    assert (small.high - small.low) / 2 == pytest.approx(4.302652729911275 * np.sqrt((6 - 81 / 14) / 2 / 14))
+
+
+def test_the_interval_holds_the_true_slope_as_often_as_it_says() -> None:
+    x = np.linspace(2, 18, 30)
+    held = 0
+    for _ in range(2000):
+        fit = line_through_origin(x, 0.66 * x + RNG.standard_normal(30))
+        held += fit.low <= 0.66 <= fit.high
+    assert held / 2000 == pytest.approx(0.95, abs=0.015)
+
+
+def test_power_law_is_not_moved_by_the_papers_outliers() -> None:
+    theta1_deg = np.concatenate([RNG.uniform(6, 60, 100), [0.3, 1.1, 4.3]])
+    rn = 12.0 * theta1_deg**-1.1 * np.exp(0.15 * RNG.standard_normal(103))
+    rn[-3:] = 24.4, 8.1, 5.1
+    fit = power_law(theta1_deg, rn)
+    assert fit.slope == pytest.approx(-1.1, abs=0.1)
+    assert fit.low < -1.1 < fit.high
+    reference = scipy.stats.theilslopes(np.log(rn), np.log(theta1_deg), 0.95)
+    assert (fit.slope, fit.low, fit.high) == pytest.approx((reference[0], reference[2], reference[3]))
+
+
+def test_rows_and_sentences(exact: ImpactStatistics) -> None:
+    rows = exact.as_rows()
+    names = [row[0] for row in rows]
+    assert len(set(names)) == len(names)
+    values = {row[0]: row[1] for row in rows}
+    assert values["rt_slope"] == pytest.approx(0.66)
+    assert values["rn_angle_exponent"] == pytest.approx(-1.1)
+    assert values["theta1_median"] == pytest.approx(33.0)
+    text = " ".join(exact.sentences())
+    assert "R_T = 0.66" in text
+    assert "Published: 0.66, R² 0.31" in text
+    assert "40 of 120" in text
+
+
+def test_too_few_impacts_give_no_numbers_and_no_warnings() -> None:
+    few = impact_statistics(impacts_with(np.array([20.0]), np.array([0.8]), np.array([0.7]), np.array([9.0])))
+    assert few.used == 1
+    assert np.isnan(few.rt.slope)
+    assert few.sentences() == ["1 of 3 impacts have all coefficients: too few for statistics."]
+    same = line(np.ones(5), np.arange(5.0))
+    assert np.isnan(same.slope)
+    assert np.isnan(power_law(np.full(4, 10.0), np.ones(4)).slope)

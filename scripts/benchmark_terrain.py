@@ -27,9 +27,10 @@ from rockfall.core.terrain.readers import read_terrain
 surface = read_terrain(sys.argv[1])
 seconds = time.perf_counter() - start
 try:
-    import resource
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-except ImportError:
+    # Not getrusage, whose peak begins with that of the parent process.
+    status = open("/proc/self/status").read()
+    peak = int(status.split("VmHWM:")[1].split()[0]) / 1024
+except (OSError, IndexError):
     peak = float("nan")
 print(len(surface.faces), seconds, peak)
 """

@@ -25,7 +25,7 @@ AXIS_NAMES = (
 def read_las(path: Path, ground_only: bool | None) -> Source:
     """Read a LAS or LAZ cloud, its ground class (2) when it has one and ``ground_only`` is not False.
 
-    Points marked as withheld or synthetic noise (classes 7 and 18) are left out.
+    Points classified as noise (7 and 18) are left out.
 
     Raises
     ------

@@ -43,9 +43,10 @@ def crs_beside(path: Path) -> tuple[str, bool]:
     return "", False
 
 
-def same_crs(a: str, b: str) -> bool:
-    """Whether two names mean the same system, as far as can be told without a database."""
-    return "".join(a.lower().split()) == "".join(b.lower().split())
+def surely_different(a: str, b: str) -> bool:
+    """Whether two names mean different systems: of two codes this is certain, other names may be of the same one."""
+    codes = [re.fullmatch(r"\s*EPSG\s*:\s*(\d+)\s*", name, re.IGNORECASE) for name in (a, b)]
+    return codes[0] is not None and codes[1] is not None and int(codes[0][1]) != int(codes[1][1])
 
 
 def _balanced(text: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from .source import Source, check_face_indices, triangulated
-from .text import number_table, read_text
+from .text import even_table, number_table, read_text
 
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -31,6 +31,17 @@ def read_obj(path: Path) -> Source:
     points = number_table([lines[i][2:] for i in vertex_rows], [i + 1 for i in vertex_rows], path, "Coordinates")
     if points.shape[1] < 3:
         raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_rows[0] + 1)
+    plain = [re.sub(rb"/\S*", b"", lines[i][2:]) for i in face_rows]
+    triangles = even_table(plain, 3)
+    if triangles is not None and triangles.min() >= 1 and triangles.max() <= len(points) and (triangles % 1 == 0).all():
+        faces = triangles.astype(np.int64) - 1
+    else:
+        faces = triangulated(_polygons(lines, face_rows, vertex_rows, path))
+    return Source(np.ascontiguousarray(points[:, :3]), check_face_indices(faces, len(points), path))
+
+
+def _polygons(lines: list[bytes], face_rows: list[int], vertex_rows: list[int], path: Path) -> list[list[int]]:
+    """The faces of an OBJ one by one: any number of corners, counted from the front or back."""
     polygons, before = [], np.searchsorted(vertex_rows, face_rows).tolist()
     for row, vertices_before in zip(face_rows, before, strict=True):
         try:
@@ -41,18 +52,17 @@ def read_obj(path: Path) -> Source:
             ) from error
         # Numbers count from 1; negative ones count back from the last vertex before the face.
         polygon = [v - 1 if v > 0 else vertices_before + v for v in polygon]
-        if len(polygon) < 3 or min(polygon) < 0 or max(polygon) >= len(points):
+        if len(polygon) < 3 or min(polygon) < 0 or max(polygon) >= len(vertex_rows):
             raise InputError(
                 f'"{lines[row][:60].decode("utf-8", "replace")}" names a vertex that does not exist'
                 if len(polygon) >= 3
                 else "A face needs three vertices",
                 file=path,
                 row=row + 1,
-                advice=f"The file has {len(points)} vertices: export it again",
+                advice=f"The file has {len(vertex_rows)} vertices: export it again",
             )
         polygons.append(polygon)
-    faces = triangulated(polygons)
-    return Source(np.ascontiguousarray(points[:, :3]), check_face_indices(faces, len(points), path))
+    return polygons
 
 
 def read_stl(path: Path) -> Source:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .source import Source, check_face_indices, triangulated
-from .text import number_table
+from .text import even_table, number_table
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -217,6 +217,9 @@ def _ascii_faces(element: Element, lines: list[bytes], rows: list[int], path: Pa
         raise InputError("The faces have no vertex_indices", file=path, advice="Export the mesh again")
     if any(p.count_type for p in element.properties[:index]):
         raise InputError(f"The list {names[0]} before the vertex indices is not supported", file=path)
+    triangles = even_table(lines, len(names) + 3)
+    if triangles is not None and (triangles[:, index] == 3).all() and (triangles % 1 == 0).all():
+        return triangles[:, index + 1 : index + 4].astype(np.int64)
     polygons = []
     for line, row in zip(lines, rows, strict=True):
         words = line.split()

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array
 from . import advice, cleaning, clouds, grids, meshes, ply, triangulation, winding
-from .crs import same_crs
+from .crs import surely_different
 from .source import Source
 from .surface import Surface
 
@@ -110,7 +110,7 @@ def read_terrain(
             meshed = triangulation.mesh_cloud(local, max_edge_m)
         else:
             meshed = triangulation.Meshed(local, source.faces, ())
-        kind = source.kind
+        kind, source_crs = source.kind, source.crs
         del local, source
         vertices, faces, done = _cleaned(meshed, kind)
     except InputError as error:
@@ -118,6 +118,8 @@ def read_terrain(
     notes += [*meshed.notes, *done, *advice.sentences(low, high, shift)]
     if shift.vector.any():
         notes.append(f"Shifted by ({shift.x:.0f}, {shift.y:.0f}, {shift.z:.0f}) m from survey to local coordinates.")
+    if source_crs and source_crs != shift.crs:
+        notes.append(f"The file names its system {source_crs}: check that this is the same as the project's.")
     notes.append(
         f"Coordinate reference system {shift.crs}." if shift.crs else "The coordinate reference system is unknown."
     )
@@ -228,7 +230,7 @@ def _box(points: Array, path: Path, count: int | None = None) -> tuple[Array, Ar
 def _shift(given: GlobalShift | None, low: Array, high: Array, crs: str, path: Path) -> GlobalShift:
     if given is None:
         return GlobalShift.proposed(low, high, crs)
-    if crs and given.crs and not same_crs(crs, given.crs):
+    if surely_different(crs, given.crs):
         raise InputError(
             f"The file is in {crs}, the project in {given.crs}",
             file=path,

@@ -43,9 +43,9 @@ def number_table(lines: Sequence[bytes], rows: Sequence[int] | range, path: Path
     if not lines:
         return np.empty((0, 0))
     columns = len(lines[0].split())
-    values = all_numbers(b"\n".join(lines))
-    if values is not None and values.size == columns * len(lines) and _same_columns(lines, columns):
-        return values.reshape(len(lines), columns)
+    table = even_table(lines, columns)
+    if table is not None:
+        return table
     for line, row in zip(lines, rows, strict=False):
         words = line.split()
         for word in words:
@@ -73,8 +73,12 @@ def all_numbers(text: bytes) -> Array | None:
             return None
 
 
-def _same_columns(lines: Sequence[bytes], columns: int) -> bool:
-    return all(len(line.split()) == columns for line in lines)
+def even_table(lines: Sequence[bytes], columns: int) -> Array | None:
+    """The numbers of lines that have so many each, (n, columns); None when any line differs."""
+    if any(len(line.split()) != columns for line in lines):
+        return None
+    values = all_numbers(b"\n".join(lines))
+    return values.reshape(len(lines), columns) if values is not None and values.size == columns * len(lines) else None
 
 
 def _is_number(word: bytes) -> bool:

@@ -338,6 +338,8 @@ def test_table_with_named_columns_and_prj_beside(tmp_path):
     surface = read_terrain(path)
     assert surface.shift.crs == "EPSG:2056"
     assert surface.vertices[:, 0].max() == pytest.approx(12.123456789)
+    write(tmp_path / "a.prj", 'PROJCS["CH1903+_LV95",GEOGCS["GCS_CH1903+"]]')
+    assert said(read_terrain(path, shift=surface.shift), "names its system CH1903+_LV95: check")
 
 
 def test_maximum_edge_and_duplicates_of_clouds(tmp_path):

@@ -226,3 +226,18 @@ def test_merging_keeps_order_and_close_vertices_apart():
     np.testing.assert_array_equal(merged, vertices[[0, 1, 4, 5]])
     np.testing.assert_array_equal(faces, [[0, 1, 0], [1, 2, 3]])
     assert gone == 2
+
+
+def test_neighbours_around_the_hub_of_a_large_fan():
+    n = 300
+    angle = np.arange(n) * 2 * np.pi / n
+    vertices = np.concatenate([[[0, 0, 1]], np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)])
+    i = np.arange(n)
+    faces = np.stack([0 * i, i + 1, (i + 1) % n + 1], axis=1)
+    shuffled = np.random.default_rng(0).permutation(n)
+    cone = surface_of(vertices, faces[shuffled])
+    of_trimesh = trimesh.Trimesh(cone.vertices, cone.faces, process=False).face_adjacency
+    pairs = {(f, g) for f, row in enumerate(cone.neighbours.tolist()) for g in row if f < g}
+    assert pairs == {tuple(sorted(pair)) for pair in of_trimesh.tolist()}
+    fin = surface_of(np.concatenate([vertices, [[2, 0, 1]]]), np.concatenate([cone.faces, [[0, 1, n + 1]]]))
+    assert (fin.neighbours == -2).sum() == 3

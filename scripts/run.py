@@ -110,8 +110,14 @@ def set_up() -> None:
     say("installing Rockfall and what it needs; the first time this downloads about 600 MB")
     command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--editable", ".[blender,dev]"]
     command += ["--constraint", str(ROOT / "scripts" / "constraints.txt")]
-    if subprocess.run(command, check=False, cwd=ROOT, env=environment).returncode:
-        fail("pip could not install. Is the network there, and right what `pip config list` says? Then start again.")
+    for attempt in (1, 2):
+        if subprocess.run(command, check=False, cwd=ROOT, env=environment).returncode == 0:
+            break
+        if attempt == 2:
+            fail(
+                "pip could not install. Is the network there, and right what `pip config list` says? Then start again."
+            )
+        say("pip failed; trying once more, in case the network was at fault")
     STAMP.write_text(wanted, encoding="utf-8")
     say(f"set up in {time.monotonic() - started:.0f} s")
 

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import fsum, isfinite, pi
+from math import isfinite, pi
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class Block:
     @property
     def diameter_m(self) -> float:
         """Mean diameter (d1 + d2 + d3)/3 [m]: twice the radius of Noël et al. 2017."""
-        return fsum((self.d1, self.d2, self.d3)) / 3
+        return self.d1 + ((self.d2 - self.d1) + (self.d3 - self.d1)) / 3  # exact for a round block
 
     @property
     def radius_m(self) -> float:

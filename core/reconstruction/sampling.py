@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from .trajectory import Reconstruction
 
 
+NEARLY = 1e-6
+"""Part of a step: an end of a segment that is this near to a multiple of the step takes its place."""
+
+
 @dataclass(frozen=True, eq=False)
 class TrajectorySamples:
     """Motion sampled in time: the q rows of trajectories.csv.
@@ -64,8 +68,8 @@ def sample_trajectories(
         raise RockfallError(f"The time step must be a positive number [s], not {step_s}.")
     picks, flights = reconstruction.picks, reconstruction.flights
     k = len(flights)
-    first = np.floor(flights.start_time_s / step_s).astype(np.int64) + 1
-    last = np.ceil(flights.end_time_s / step_s).astype(np.int64) - 1
+    first = np.floor(flights.start_time_s / step_s + NEARLY).astype(np.int64) + 1
+    last = np.ceil(flights.end_time_s / step_s - NEARLY).astype(np.int64) - 1
     inner = np.maximum(last - first + 1, 0)
     stops = picks.kind[flights.last_pick] == "stop"
     size = inner + 2 + stops

@@ -128,8 +128,8 @@ def test_a_far_pick_may_be_a_pass_or_discarded():
         (lambda survey: survey - SHIFT.vector, "add the terrain's shift"),
         (lambda survey: survey / 0.3048, "feet"),
         (lambda survey: survey * 1000, "millimetres"),
-        (lambda survey: survey + [300.0, 0, 0], "neighbours"),
-        (lambda survey: survey - [2_000_000.0, 1_000_000, 0], "same coordinate reference system"),
+        (lambda survey: survey + np.array([300.0, 0, 0]), "neighbours"),
+        (lambda survey: survey - np.array([2_000_000.0, 1_000_000, 0]), "same coordinate reference system"),
     ],
 )
 def test_other_coordinates_are_recognised(change, advice):

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The command line: what it writes, what it says, and how it refuses."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from rockfall.core.cli import main
+from rockfall.core.exchange.tables import read_impacts
+
+DIP = np.radians(30)
+GOOD = "trajectory,time_s,x_m,y_m,z_m,kind\n" + "".join(
+    f"a,{0.8 * i},{2600000 + 5 * i},1200000,{1000 - 5 * i * np.tan(DIP):.3f},{kind}\n"
+    for i, kind in enumerate(["release", "impact", "impact", "impact", "stop"])
+)
+
+
+@pytest.fixture
+def picks(tmp_path):
+    table = tmp_path / "in" / "picks.csv"
+    table.parent.mkdir()
+    table.write_text(GOOD, encoding="utf-8")
+    return table
+
+
+@pytest.fixture
+def terrain(tmp_path):
+    """A plane that dips by 30° to the east, as a grid with 2 m cells around the picks."""
+    x = np.arange(-20, 42, 2.0) + 1
+    rows = "\n".join(" ".join(f"{1000 - value * np.tan(DIP):.4f}" for value in x) for _ in range(20))
+    head = f"ncols {x.size}\nnrows 20\nxllcorner 2599980\nyllcorner 1199980\ncellsize 2\nNODATA_value -9999\n"
+    path = tmp_path / "plane.asc"
+    path.write_text(head + rows + "\n")
+    return path
+
+
+def refused(capsys, out, *argv):
+    """Run a command that must be refused, check that nothing is left, return its message."""
+    assert main([*map(str, argv), "--out", str(out)]) == 1
+    assert not out.exists()
+    assert not [path for path in out.parent.iterdir() if path.name.startswith(f".{out.name}")]
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def test_reconstruct_writes_both_tables_and_a_summary(picks, tmp_path, capsys):
+    assert main(["reconstruct", str(picks), "--site", "plane", "--out", str(tmp_path / "out")]) == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["impacts.csv", "trajectories.csv"]
+    impacts = read_impacts(tmp_path / "out" / "impacts.csv")
+    assert impacts.flag_text() == ["", "", "last;contact"]
+    assert impacts.site.tolist() == ["plane"] * 3
+    said = capsys.readouterr().out
+    assert (
+        "5 picks of 1 trajectory: 3 flights, 1 contact segment, 3 impacts, 2 with R, 0 with all coefficients." in said
+    )
+    assert "without a terrain normal" in said
+
+
+def test_reconstruct_takes_the_terrains_normals(picks, terrain, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["reconstruct", str(picks), "--terrain", str(terrain), "--normal-radius", "3", "--out", str(out)]) == 0
+    impacts = read_impacts(out / "impacts.csv")
+    np.testing.assert_allclose(impacts.normal, np.tile([np.sin(DIP), 0, np.cos(DIP)], (3, 1)), atol=1e-4)
+    np.testing.assert_array_equal(impacts.normal_radius_m, 3)
+    np.testing.assert_allclose(impacts.bounce_height_m[:2], 9.81 * 0.8**2 / 8, rtol=2e-3)
+    assert impacts.complete.tolist() == [True, True, False]
+    assert "R_N" in capsys.readouterr().out
+
+
+def test_options_reach_the_reconstruction(picks, tmp_path):
+    out = tmp_path / "out"
+    block = ["--diameters", "0.3", "0.4", "0.5", "--mass", "80"]
+    assert main(["reconstruct", str(picks), "--gravity", "1.62", *block, "--step", "0.4", "--out", str(out)]) == 0
+    moon = read_impacts(out / "impacts.csv")
+    np.testing.assert_allclose(moon.mass_kg, 80)
+    np.testing.assert_allclose(moon.diameter_m, 0.4)
+    np.testing.assert_allclose(moon.v2[0, 2], -5 * np.tan(DIP) / 0.8 + 1.62 * 0.4, atol=1e-3)
+    assert len((out / "trajectories.csv").read_text().splitlines()) == 1 + 4 * 3 + 1
+    assert main(["reconstruct", str(picks), "--drag", "--out", str(out)]) == 0
+    drag = read_impacts(out / "impacts.csv")
+    assert main(["reconstruct", str(picks), "--out", str(out)]) == 0
+    free = read_impacts(out / "impacts.csv")
+    assert np.linalg.norm(drag.v1[0]) < np.linalg.norm(free.v1[0])
+    assert np.linalg.norm(drag.v1[0]) == pytest.approx(np.linalg.norm(free.v1[0]), rel=0.01)
+
+
+def test_terrain_becomes_a_ply_that_reads_the_same(terrain, tmp_path, capsys):
+    assert main(["terrain", str(terrain), "--out", str(tmp_path / "one")]) == 0
+    said = capsys.readouterr().out
+    assert "Written: terrain.ply" in said
+    assert main(["terrain", str(tmp_path / "one" / "terrain.ply"), "--out", str(tmp_path / "two")]) == 0
+    one, two = ((tmp_path / name / "terrain.ply").read_bytes() for name in ("one", "two"))
+    assert one == two
+
+
+BAD = {
+    "empty": ("", "empty"),
+    "column": (GOOD.replace("time_s", "time"), "row 1: The required column time_s is missing"),
+    "non-number": (GOOD.replace("a,0.8,", "a,soon,"), "row 3, trajectory a: 'soon' in column time_s is not a number"),
+    "same time": (GOOD.replace("a,0.8,", "a,0.0,"), "row 3, trajectory a: Two picks at one time"),
+    "unsorted": (GOOD.replace("a,0.8,", "a,9,"), "row 4, trajectory a: The times are not sorted"),
+    "nan": (GOOD.replace("2600005", "nan"), "row 3, trajectory a: 'nan' in column x_m is not finite"),
+    "kind": (GOOD.replace("stop", "stopp"), "row 6, trajectory a: Unknown kind 'stopp'. Did you mean stop?"),
+    "cells": (GOOD.replace("a,0.8,", "a,"), "row 3: The row has 5 cells"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_picks_are_refused_and_nothing_is_written(picks, tmp_path, capsys, case):
+    text, message = BAD[case]
+    picks.write_text(text, encoding="utf-8")
+    said = refused(capsys, tmp_path / "out", "reconstruct", picks)
+    assert said.startswith(f"rockfall: {picks}")
+    assert message in said
+
+
+def test_a_missing_picks_file_is_refused(tmp_path, capsys):
+    assert "no such file" in refused(capsys, tmp_path / "out", "reconstruct", tmp_path / "none.csv")
+
+
+def test_a_binary_file_is_refused(picks, tmp_path, capsys):
+    picks.write_bytes(bytes(range(256)))
+    assert "binary file" in refused(capsys, tmp_path / "out", "reconstruct", picks)
+
+
+def test_bad_terrain_is_refused(picks, tmp_path, capsys):
+    broken = tmp_path / "broken.ply"
+    broken.write_bytes(b"ply\nformat binary_little_endian 1.0\nelement vertex 100\nproperty float x\n")
+    said = refused(capsys, tmp_path / "out", "reconstruct", picks, "--terrain", broken)
+    assert "broken.ply" in said
+    said = refused(capsys, tmp_path / "out", "terrain", tmp_path / "none.laz")
+    assert "none.laz" in said
+
+
+def test_a_pick_50_m_off_the_terrain_is_refused(picks, terrain, tmp_path, capsys):
+    rows = GOOD.splitlines()
+    cells = rows[3].split(",")
+    cells[4] = str(float(cells[4]) + 50)
+    picks.write_text("\n".join([*rows[:3], ",".join(cells), *rows[4:]]), encoding="utf-8")
+    said = refused(capsys, tmp_path / "out", "reconstruct", picks, "--terrain", terrain)
+    assert "row 4, trajectory a: The pick is 43.3 m from the terrain" in said
+
+
+def test_picks_in_other_coordinates_are_refused(picks, terrain, tmp_path, capsys):
+    picks.write_text(GOOD.replace("26000", "6000"), encoding="utf-8")
+    said = refused(capsys, tmp_path / "out", "reconstruct", picks, "--terrain", terrain)
+    assert "do not overlap" in said
+    assert "terrain x 2599981.0…" in said
+
+
+def test_a_refusal_spares_what_is_in_the_folder(picks, tmp_path):
+    out = tmp_path / "out"
+    assert main(["reconstruct", str(picks), "--out", str(out)]) == 0
+    before = (out / "impacts.csv").read_bytes()
+    picks.write_text(GOOD.replace("stop", "stopp"), encoding="utf-8")
+    assert main(["reconstruct", str(picks), "--out", str(out)]) == 1
+    assert (out / "impacts.csv").read_bytes() == before
+    assert len(list(out.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        [],
+        ["fly"],
+        ["reconstruct"],
+        ["reconstruct", "picks.csv"],
+        ["reconstruct", "picks.csv", "--out", "o", "--gravity", "heavy"],
+        ["reconstruct", "picks.csv", "--out", "o", "--diameter", "-1"],
+        ["reconstruct", "picks.csv", "--out", "o", "--density", "2600", "--mass", "80"],
+        ["terrain", "mesh.ply", "--out", "o", "--unit", "furlong"],
+    ],
+)
+def test_wrong_usage_exits_with_2(argv, capsys):
+    assert main(argv) == 2
+    assert "usage: rockfall" in capsys.readouterr().err
+
+
+def test_help_names_the_commands_and_exits_with_0(capsys):
+    assert main(["--help"]) == 0
+    said = capsys.readouterr().out
+    for name in ("demo", "reconstruct", "terrain", "render"):
+        assert name in said
+    assert main(["reconstruct", "--help"]) == 0
+    assert "--normal-radius" in capsys.readouterr().out
+
+
+def test_an_interruption_exits_with_130_and_leaves_nothing(picks, tmp_path, capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rockfall.core.reconstruction.trajectory.reconstruct", interrupted)
+    assert main(["reconstruct", str(picks), "--out", str(tmp_path / "out")]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
+def test_help_imports_no_numerical_library():
+    code = (
+        "import sys; from rockfall.core.cli import main; main(['--help']); "
+        "assert not {'numpy', 'scipy', 'numba', 'trimesh'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

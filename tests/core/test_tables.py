@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tables: what is written is what is read, and every mistake is located."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from rockfall.core.errors import InputError
+from rockfall.core.exchange.output import output_folder
+from rockfall.core.exchange.tables import (
+    read_impacts,
+    read_picks,
+    write_impacts,
+    write_picks,
+    write_trajectories,
+)
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.impact import Impacts
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct, sample_trajectories
+
+HEADER = (
+    "site,trajectory,impact,time_s,x_m,y_m,z_m,nx,ny,nz,normal_radius_m,v1x_mps,v1y_mps,v1z_mps,v2x_mps,v2y_mps,v2z_mps,"
+    "vn1_mps,vt1_mps,vn2_mps,vt2_mps,rn,rt,r,theta1_deg,theta_dev_deg,diameter_m,mass_kg,flags"
+)
+SHIFT = GlobalShift(2_793_300.0, 1_180_200.0, 2300.0, "EPSG:2056")
+
+
+def picks(n=6, **more):
+    rng = np.random.default_rng(3)
+    names = ["a"] * (n // 2) + ["b"] * (n - n // 2)
+    return make_picks(
+        names,
+        np.arange(n) * 0.7 + 1691.92,
+        np.arange(n)[:, None] * [3.0, 0.1, -4] + rng.normal(size=(n, 3)),
+        normal=np.tile([0.3, 0.1, 0.9], (n, 1)),
+        shift=SHIFT,
+        **more,
+    )
+
+
+FULL = {
+    "sigma_time_s": np.full(6, 0.01),
+    "sigma_position_m": np.full(6, 0.1),
+    "angular_velocity": np.arange(18.0).reshape(6, 3),
+}
+
+
+def assert_equal_impacts(one, other, rtol=1e-14):
+    for field in fields(Impacts):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if field.name in ("flags", "sigma"):
+            assert set(a) == set(b)
+            for name in a:
+                np.testing.assert_allclose(a[name], b[name], rtol=rtol)
+        elif field.name in ("site", "trajectory"):
+            assert a.tolist() == b.tolist()
+        elif field.name not in ("extra", "shift"):
+            atol = 1e-9 if field.name == "position" else 0  # half the spacing of doubles at 2 793 300 m is 2e-10
+            np.testing.assert_allclose(a, b, rtol=rtol, atol=atol, err_msg=field.name)
+
+
+def test_impacts_have_the_columns_of_the_format_in_order(tmp_path):
+    write_impacts(reconstruct(picks(), site="gully").impacts, tmp_path / "impacts.csv")
+    lines = (tmp_path / "impacts.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith(HEADER + ",")
+    assert "sigma" not in lines[0]
+    assert lines[1].startswith("gully,a,1,1691.92,")
+    assert len(lines) == 7
+
+
+def test_impacts_round_trip(tmp_path):
+    impacts = reconstruct(picks(**FULL), site="gully").impacts
+    write_impacts(impacts, tmp_path / "one.csv")
+    again = read_impacts(tmp_path / "one.csv", SHIFT)
+    assert_equal_impacts(again, impacts)
+    write_impacts(again, tmp_path / "two.csv")
+    third = read_impacts(tmp_path / "two.csv", SHIFT)
+    assert_equal_impacts(third, impacts)
+    header = (tmp_path / "one.csv").read_text(encoding="utf-8").splitlines()[0]
+    after = header.removeprefix(HEADER).split(",")[1:]
+    assert after[:3] == ["sigma_v1x_mps", "sigma_v1y_mps", "sigma_v1z_mps"]
+    assert "sigma_theta_dev_deg" in after
+    assert after.index("omega1x_radps") > after.index("sigma_theta_dev_deg")
+
+
+def test_empty_cells_are_undefined_and_unknown_columns_are_kept(tmp_path):
+    table = tmp_path / "impacts.csv"
+    row = "gully,a,1,0,1,2,3,0,0,1,,1,0,-2,,,,,,,,,,,,,,,first;odd,wet"
+    table.write_text(f"{HEADER},soil\n{row}\n", encoding="utf-8")
+    impacts = read_impacts(table)
+    assert np.isnan(impacts.v2).all()
+    assert impacts.flags["first"].tolist() == [True]
+    write_impacts(impacts, table)
+    assert table.read_text(encoding="utf-8").splitlines()[0].endswith("soil")
+    assert table.read_text(encoding="utf-8").splitlines()[1].endswith("wet")
+
+
+def test_a_short_table_of_impacts_gets_its_coefficients_computed(tmp_path):
+    table = tmp_path / "impacts.csv"
+    table.write_text(
+        "trajectory,nx,ny,nz,v1x_mps,v1y_mps,v1z_mps,v2x_mps,v2y_mps,v2z_mps\n"
+        "a,0,0,1,5,0,-3.924,6,2,2.4525\n"
+        "a,0,0,1,8,0,3,8,0,3\n",
+        encoding="utf-8",
+    )
+    impacts = read_impacts(table)
+    assert impacts.rn[0] == pytest.approx(0.625)
+    assert np.degrees(impacts.theta1[0]) == pytest.approx(38.124823, abs=1e-6)
+    assert np.isnan(impacts.rn[1])
+    assert impacts.flag_text() == ["", "departing"]
+
+
+def test_picks_round_trip_without_losing_a_digit_or_a_column(tmp_path):
+    table = tmp_path / "picks.csv"
+    text = (
+        "trajectory,time_s,x_m,y_m,z_m,kind,status,sigma_time_s,video,note\n"
+        "a,1691.92,2793293.57,1180191.09,2307.06,release,ok,0.01,left.mp4,\n"
+        'a,1692.89,2793297.18,1180181.46,2299.46,impact,doubtful,,left.mp4,"near the fir, hidden"\n'
+    )
+    table.write_text(text, encoding="utf-8")
+    read = read_picks(table)
+    assert read.shift == GlobalShift(2_793_300.0, 1_180_200.0, 0.0)
+    assert read.row.tolist() == [2, 3]
+    write_picks(read, table)
+    assert table.read_text(encoding="utf-8") == text
+
+
+def test_all_optional_columns_of_picks_round_trip(tmp_path):
+    one = picks(**FULL, status=["ok", "shattered", "ok", "ok", "discarded", "ok"])
+    write_picks(one, tmp_path / "picks.csv")
+    other = read_picks(tmp_path / "picks.csv", SHIFT)
+    for name in ("trajectory", "time_s", "kind", "status", "sigma_time_s", "angular_velocity"):
+        np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+    np.testing.assert_allclose(other.position, one.position, atol=1e-9)
+    np.testing.assert_allclose(other.normal, one.normal, rtol=1e-15)
+
+
+def test_defaults_blank_lines_blanks_and_a_byte_order_mark(tmp_path):
+    table = tmp_path / "picks.csv"
+    rows = "\n\n a , 1 ,2,3,4,\r\n\na,2,3,3,4,stop\n\n"
+    table.write_text("\ufefftrajectory,time_s,x_m,y_m,z_m,kind" + rows, encoding="utf-8")
+    read = read_picks(table)
+    assert read.kind.tolist() == ["impact", "stop"]
+    assert read.status.tolist() == ["ok", "ok"]
+    assert read.row.tolist() == [3, 5]
+
+
+def test_trajectories_have_the_columns_of_the_format(tmp_path):
+    result = reconstruct(picks())
+    samples = sample_trajectories(result, 0.25)
+    write_trajectories(samples, tmp_path / "trajectories.csv")
+    lines = (tmp_path / "trajectories.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "source,trajectory,run,time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,height_m,kinetic_J"
+    first = lines[1].split(",")
+    assert first[:3] == ["observed", "a", "1"]
+    assert float(first[4]) == pytest.approx(result.picks.position[0, 0] + SHIFT.x, abs=1e-6)
+    assert len(lines) == len(samples) + 1
+
+
+def test_a_million_metres_away_positions_are_exact(tmp_path):
+    survey = np.array([[2_600_000.123456, 1_200_000.654321, 1234.000001], [2_600_001.5, 1_200_001.25, 1230.75]])
+    one = make_picks(["a", "a"], [0, 1], SHIFT.to_local(survey), shift=SHIFT)
+    write_picks(one, tmp_path / "picks.csv")
+    other = read_picks(tmp_path / "picks.csv")
+    np.testing.assert_allclose(other.shift.to_survey(other.position), survey, atol=1e-9)
+
+
+GOOD = "trajectory,time_s,x_m,y_m,z_m\na,0,0,0,0\na,1,3,0,0\n"
+BAD_PICKS = {
+    "empty": ("", None, "empty"),
+    "only blanks": ("\n  \n", None, "empty"),
+    "header only": ("trajectory,time_s,x_m,y_m,z_m\n", None, "no rows"),
+    "missing column": (
+        "trajectory,time,x_m,y_m,z_m\na,0,0,0,0\n",
+        1,
+        "column time_s is missing; found: trajectory, time, ",
+    ),
+    "near match": ("trajectory,time,x_m,y_m,z_m\na,0,0,0,0\n", 1, "Rename time to time_s"),
+    "two missing": ("trajectory,time_s,x,y,z_m\na,0,0,0,0\n", 1, "columns x_m, y_m are missing"),
+    "semicolons": ("trajectory;time_s;x_m;y_m;z_m\na;0;0;0;0\n", 1, "semicolons"),
+    "column twice": ("trajectory,time_s,x_m,y_m,z_m,x_m\na,0,0,0,0,0\n", 1, "x_m is there 2 times"),
+    "unnamed column": ("trajectory,time_s,x_m,y_m,z_m,\na,0,0,0,0,\na,1,0,0,0,hm\n", 3, "Column 6 has no name"),
+    "non-number": (GOOD.replace("a,1,3", "a,1,3o"), 3, "'3o' in column x_m is not a number"),
+    "decimal comma": (GOOD.replace("a,1,3", 'a,1,"3,5"'), 3, "Write decimals with a point"),
+    "underscore": (GOOD.replace("a,1,3", "a,1,1_000"), 3, "'1_000' in column x_m is not a number"),
+    "nan": (GOOD.replace("a,1,3", "a,nan,3"), 3, "'nan' in column time_s is not finite"),
+    "inf": (GOOD.replace("a,1,3", "a,1,-inf"), 3, "not finite"),
+    "empty cell": (GOOD.replace("a,1,3", "a,,3"), 3, "cell of time_s is empty"),
+    "no name": (GOOD.replace("a,1,3", ",1,3"), 3, "no name"),
+    "same time": (GOOD.replace("a,1,3", "a,0,3"), 3, "Two picks at one time, 0.0 s (the other one is in row 2)"),
+    "unsorted": (GOOD + "a,0.5,0,0,0\n", 4, "not sorted: 0.5 s comes after 1.0 s in row 3"),
+    "long row": (GOOD + "a,2,0,0,0,7\n", 4, "6 cells, the header has 5"),
+    "short row": (GOOD + "a,2,0\n", 4, "3 cells, the header has 5"),
+    "open quote": (GOOD + '"a,2,0,0,0\n', 4, "quote"),
+    "kind": ("trajectory,time_s,x_m,y_m,z_m,kind\na,0,0,0,0,imapct\n", 2, "Did you mean impact?"),
+    "status": ("trajectory,time_s,x_m,y_m,z_m,status\na,0,0,0,0,gone\n", 2, "Use one of ok, doubtful"),
+    "zero normal": ("trajectory,time_s,x_m,y_m,z_m,nx,ny,nz\na,0,0,0,0,0,0,0\n", 2, "length zero"),
+    "half a normal": ("trajectory,time_s,x_m,y_m,z_m,nx,ny,nz\na,0,0,0,0,0,,1\n", 2, "part of the terrain normal"),
+    "negative sigma": ("trajectory,time_s,x_m,y_m,z_m,sigma_time_s\na,0,0,0,0,-1\n", 2, "not a standard deviation"),
+    "quoted newline": (
+        'trajectory,time_s,x_m,y_m,z_m,note\na,0,0,0,0,"two\nlines"\na,x,0,0,0,\n',
+        4,
+        "'x' in column time_s",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_PICKS)
+def test_bad_tables_are_refused_with_their_row(tmp_path, case):
+    text, row, message = BAD_PICKS[case]
+    table = tmp_path / "picks.csv"
+    table.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_picks(table)
+    assert caught.value.row == row
+    assert message in str(caught.value)
+    assert str(table) in str(caught.value)
+    assert caught.value.advice
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "binary"),
+        (GOOD.encode("utf-16"), "UTF-16"),
+        (GOOD.replace("a,1", "Bl\u00f6cke,1").encode("latin-1"), "not in UTF-8"),
+    ],
+)
+def test_what_is_not_text_in_utf_8_is_refused(tmp_path, data, message):
+    table = tmp_path / "picks.csv"
+    table.write_bytes(data)
+    with pytest.raises(InputError, match=message):
+        read_picks(table)
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_picks(tmp_path / "none.csv")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_picks(tmp_path)
+
+
+def test_output_appears_whole_and_spares_other_files(tmp_path):
+    out = tmp_path / "deep" / "out"
+    with output_folder(out) as folder:
+        (folder / "a.csv").write_text("1")
+        (folder / "frames").mkdir()
+        (folder / "frames" / "0.png").write_text("2")
+        assert not out.exists()
+    assert (out / "a.csv").read_text() == "1"
+    (out / "mine.txt").write_text("keep")
+    with output_folder(out) as folder:
+        (folder / "a.csv").write_text("3")
+    assert sorted(path.name for path in out.iterdir()) == ["a.csv", "frames", "mine.txt"]
+    assert (out / "a.csv").read_text() == "3"
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+
+
+def write_and_fail(out):
+    with output_folder(out) as folder:
+        (folder / "a.csv").write_text("half")
+        raise ValueError("half way")
+
+
+def test_nothing_is_left_of_output_that_failed(tmp_path):
+    with pytest.raises(ValueError, match="half way"):
+        write_and_fail(tmp_path / "deep" / "out")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "a.csv").write_text("old")
+    with pytest.raises(ValueError, match="half way"):
+        write_and_fail(tmp_path / "out")
+    assert (tmp_path / "out" / "a.csv").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_output_does_not_replace_a_file_or_folder_of_another_kind(tmp_path):
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(InputError, match="not a folder"), output_folder(tmp_path / "out"):
+        pass
+    (tmp_path / "dir" / "a.csv").mkdir(parents=True)
+    with pytest.raises(InputError, match="folder is where a file"), output_folder(tmp_path / "dir") as folder:
+        (folder / "a.csv").write_text("new")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["dir", "out"]

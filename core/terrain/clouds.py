@@ -2,6 +2,7 @@
 """Point clouds: LAS, LAZ and tables of coordinates (XYZ, TXT, CSV)."""
 
 import re
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,15 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     try:
         with laspy.open(path) as reader:
             header = reader.header
-    except (laspy.errors.LaspyException, ValueError, OSError, RuntimeError, IndexError, KeyError, TypeError) as error:
+    except (
+        laspy.errors.LaspyException,
+        ValueError,
+        OSError,
+        RuntimeError,
+        LookupError,
+        TypeError,
+        struct.error,
+    ) as error:
         raise _damaged(path, error) from error
     needed = header.offset_to_point_data + header.point_count * header.point_format.size
     compressed = header.are_points_compressed
@@ -119,7 +128,7 @@ def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray]:
                     points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
                 classes[part] = np.asarray(chunk.classification)
                 at += len(chunk)
-    except (laspy.errors.LaspyException, ValueError, OSError, RuntimeError, IndexError) as error:
+    except (laspy.errors.LaspyException, ValueError, OSError, RuntimeError, LookupError, struct.error) as error:
         raise _damaged(path, error) from error
     except BaseException as error:
         # A panic inside the Rust decoder is no ordinary Exception, and has no importable name.

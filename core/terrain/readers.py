@@ -136,7 +136,7 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     path = Path(path)
     if path.suffix.lower() in LAS_EXTENSIONS:
         _check_path(path)
-        box, count, crs, geographic = clouds.inspect_las(path)
+        box, count, crs, geographic = _guarded(path, lambda: clouds.inspect_las(path))
         source = Source(box, crs=crs, geographic=geographic, notes=(f"Cloud of {count:,} points.",))
     else:
         source = _read(path, None)
@@ -165,19 +165,21 @@ def _check_path(path: Path) -> None:
 def _read(path: Path, ground_only: bool | None) -> Source:
     _check_path(path)
     extension = path.suffix.lower()
-    try:
-        if extension in LAS_EXTENSIONS:
-            return clouds.read_las(path, ground_only)
-        source = READERS[extension](path)
-    except OSError as error:
-        raise InputError(
-            f"The file cannot be read ({error.strerror})", file=path, advice="Check its permissions"
-        ) from error
-    except MemoryError as error:
-        raise InputError("The file is too large for the memory", file=path, advice="Reduce it first") from error
+    if extension in LAS_EXTENSIONS:
+        return _guarded(path, lambda: clouds.read_las(path, ground_only))
     if ground_only:
         raise InputError("Only LAS and LAZ files have a ground class", file=path, advice="Read it without ground_only")
-    return source
+    return _guarded(path, lambda: READERS[extension](path))
+
+
+def _guarded[T](path: Path, read: Callable[[], T]) -> T:
+    """What reading gives; troubles of the system, not of the contents, as InputError too."""
+    try:
+        return read()
+    except OSError as error:
+        raise InputError(f"The file cannot be read ({error})", file=path, advice="Check its permissions") from error
+    except MemoryError as error:
+        raise InputError("The file is too large for the memory", file=path, advice="Reduce it first") from error
 
 
 def _placed(source: Source, up: str, unit_m: float, path: Path) -> Array:

@@ -61,9 +61,7 @@ def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def _version() -> str:
-    from .. import __version__
-
-    return __version__
+    return str(import_module((__package__ or "").removesuffix(".core")).__version__)
 
 
 if __name__ == "__main__":

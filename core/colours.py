@@ -5,8 +5,8 @@ import numpy as np
 
 from .vectors import Array
 
-# Eight evenly spaced sRGB colours after the perceptually uniform map "plasma" (S. van der Walt & N. Smith, CC0), its dark
-# end made brighter so that slow blocks show on a shaded slope.
+# Eight evenly spaced sRGB colours after the perceptually uniform map "plasma" (S. van der Walt & N. Smith, CC0), its
+# dark end made brighter so that slow blocks show on a shaded slope.
 SPEED_SCALE = np.array(
     [
         [0.42, 0.10, 0.80],

@@ -2,26 +2,18 @@
 """The one door to numba: plain Python functions, compiled when first needed.
 
 A module of kernels decorates its functions with `kernel` and is imported *inside* the function that first needs it,
-so that importing `rockfall` compiles nothing. Kernels release the GIL; `in_chunks` spreads rows over the cores.
+so that importing `rockfall` compiles nothing. Compiled code is kept in NUMBA_CACHE_DIR, else where numba likes. Kernels
+release the GIL; `in_chunks` spreads rows over the cores.
 """
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 CHUNK_ROWS = 4096
-
-
-def use_cache_directory(directory: str | Path) -> None:
-    """Keep compiled kernels in a writable directory; to be called before the first kernel module is imported."""
-    from numba import config
-
-    Path(directory).mkdir(parents=True, exist_ok=True)
-    config.CACHE_DIR = str(directory)
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def dot(a: Array, b: Array) -> Array:
+def dot(a: NDArray[np.floating], b: NDArray[np.floating]) -> Array:
     """Row-wise scalar product, (..., 3) · (..., 3) → (...)."""
     return np.einsum("...i,...i->...", a, b)
 
 
-def norm(a: Array) -> Array:
+def norm(a: NDArray[np.floating]) -> Array:
     """Row-wise Euclidean length, (..., 3) → (...)."""
     return np.sqrt(dot(a, a))
 

@@ -71,5 +71,9 @@ def unregister() -> None:
 
 def _keep_kernels_in_user_directory() -> None:
     """The extension's own directory may be read-only, and is replaced when it is updated."""
-    if ADDON_ID.startswith("bl_ext."):
-        os.environ.setdefault("NUMBA_CACHE_DIR", bpy.utils.extension_path_user(ADDON_ID, path="kernels", create=True))
+    if not ADDON_ID.startswith("bl_ext."):
+        return
+    directory = bpy.utils.extension_path_user(ADDON_ID, path="kernels", create=True)
+    os.environ.setdefault("NUMBA_CACHE_DIR", directory)
+    if "numba" in sys.modules:  # another add-on was first: it has read the environment already
+        sys.modules["numba"].config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"]

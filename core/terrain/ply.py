@@ -46,19 +46,19 @@ def read_ply(path: Path) -> Source:
     InputError : not a PLY file, a header that makes no sense, a truncated file, a face without a vertex.
     """
     data = np.memmap(path, dtype=np.uint8, mode="r") if path.stat().st_size else np.empty(0, np.uint8)
-    order, elements, start, header_rows = _header(data, path)
+    order, elements, start, header_rows, crs = _header(data, path)
     if order:
         contents = _read_binary(data, start, elements, order, path)
     else:
         contents = _read_ascii(data[start:].tobytes(), header_rows, elements, path)
     points, faces = contents
     if faces is None:
-        return Source(points)
-    return Source(points, check_face_indices(faces, len(points), path))
+        return Source(points, crs=crs)
+    return Source(points, check_face_indices(faces, len(points), path), crs=crs)
 
 
-def _header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], int, int]:
-    """Byte order ("" when ascii), elements, offset of the data, rows of the header."""
+def _header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], int, int, str]:
+    """Byte order ("" when ascii), elements, offset of the data, rows of the header, coordinate reference system."""
     if not data.size:
         raise InputError("The file is empty", file=path, advice="Export it again")
     beginning = data[: 1 << 16].tobytes()
@@ -71,7 +71,7 @@ def _header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], in
             "The PLY header has no end", file=path, advice="The file is truncated: copy or export it again"
         )
     lines = beginning[:end].decode("ascii", "replace").splitlines()
-    order, elements = None, []
+    order, elements, crs = None, [], ""
     for row, line in enumerate(lines, start=1):
         words = line.split()
         try:
@@ -88,6 +88,8 @@ def _header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], in
                 case ["property", item_type, name]:
                     new = Property(name, TYPES[item_type])
                     elements[-1] = Element(elements[-1].name, elements[-1].rows, (*elements[-1].properties, new))
+                case ["comment", "crs", *name]:  # as `write_ply` leaves it
+                    crs = " ".join(name)
                 case [] | ["ply"] | ["comment" | "obj_info", *_]:
                     pass
                 case _:
@@ -99,7 +101,7 @@ def _header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], in
     vertex = next((e for e in elements if e.name == "vertex"), None)
     if vertex is None or not {"x", "y", "z"} <= {p.name for p in vertex.properties}:
         raise InputError("The PLY file has no vertices with x, y and z", file=path, advice="Export a mesh or a cloud")
-    return order, elements, line_end + 1, len(lines) + 1
+    return order, elements, line_end + 1, len(lines) + 1, crs
 
 
 def _read_binary(

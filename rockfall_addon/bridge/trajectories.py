@@ -41,7 +41,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
 
 
 def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> None:
-    """Sizes at which markers, trails and blocks are seen when the whole slope is: the user may change them afterwards."""
+    """Sizes at which markers, trails and blocks are seen when the whole slope is; to be changed at will."""
     extent = float(np.ptp(result.picks.position, axis=0).max(initial=0.0))
     blocks = [result.block] if isinstance(result.block, Block) else list(result.block.values())
     radius = float(np.mean([block.radius_m for block in blocks]))

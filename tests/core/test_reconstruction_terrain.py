@@ -128,7 +128,7 @@ def test_a_far_pick_may_be_a_pass_or_discarded():
         (lambda survey: survey - SHIFT.vector, "add the terrain's shift"),
         (lambda survey: survey / 0.3048, "feet"),
         (lambda survey: survey * 1000, "millimetres"),
-        (lambda survey: survey + np.array([300.0, 0, 0]), "neighbours"),
+        (lambda survey: np.add(survey, [300.0, 0, 0]), "neighbours"),
         (lambda survey: survey - np.array([2_000_000.0, 1_000_000, 0]), "same coordinate reference system"),
     ],
 )

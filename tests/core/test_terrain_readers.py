@@ -72,9 +72,11 @@ def test_ply_keeps_doubles_exactly(tmp_path, form, extra):
 
 def test_survey_coordinates_survive_write_and_read(tmp_path):
     mesh = hill()
-    surface = read_terrain(write(tmp_path / "a.ply", ply_bytes(mesh, "binary_little_endian")))
+    source = write(tmp_path / "a.ply", ply_bytes(mesh, "binary_little_endian"))
+    surface = read_terrain(source, shift=GlobalShift(2_600_000, 1_200_000, 0, "EPSG:2056"))
     write_ply(surface, tmp_path / "b.ply")
     again = read_terrain(tmp_path / "b.ply")
+    assert again.shift == surface.shift
     np.testing.assert_allclose(again.shift.to_survey(again.vertices), mesh.vertices, rtol=0, atol=1e-6)
     np.testing.assert_array_equal(again.vertices, surface.vertices)
     np.testing.assert_array_equal(again.faces, surface.faces)

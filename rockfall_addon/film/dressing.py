@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Setting a scene up for a film, and taking the set-up away again."""
+
+import bpy
+import numpy as np
+
+from ...core.exchange.project import RenderPreset
+from ...core.film.framing import View, rounded_scale
+from ...core.film.presets import FilmTiming
+from ...core.film.wording import fastest_speed, notes
+from ..bridge import state, timing
+from ..bridge.reconstruction import SITE_KEY
+from . import camera, layout, marks, remembered
+from .engine import use_engine
+from .motions import Motion, motions_of
+
+FILM_ROLE = "film"
+BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 1.6, 2.2  # at least this size, in pixels of a picture 640 wide
+REFERENCE_WIDTH = 640
+
+
+def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
+    """Camera, captions and growing trails for a film of what is in the scene, which is then played frame by frame.
+
+    Raises
+    ------
+    RockfallError : there is nothing to film.
+    """
+    _begin(scene, preset, engine)
+    film = FilmTiming(preset.fps, preset.time_scale)
+    scene.render.fps, scene.render.fps_base = film.base
+    scene.render.frame_map_old, scene.render.frame_map_new = film.remap
+    timing.follow_frame_rate(scene)
+    settings = scene.rockfall
+    playback = "REAL" if preset.stagger_s is None else "TOGETHER"
+    if settings.playback != playback:
+        settings.playback = playback
+    if preset.stagger_s is not None and abs(settings.stagger_s - preset.stagger_s) > 1e-6:
+        settings.stagger_s = preset.stagger_s
+
+    motions = motions_of(scene)
+    view = _view(scene, motions, preset, whole=False)
+    _size_things(scene, motions, view)
+    settings.trail_until_now = True
+    motions = motions_of(scene)
+    last = film.last_frame(max((float(motion.time_s[-1]) for motion in motions), default=0.0))
+    scene.frame_start, scene.frame_end = 0, last
+    moments = np.arange(last + 1) * film.frame_s
+    words = layout.Words(
+        title=_title(scene),
+        subtitle=_count(motions),
+        note=notes(settings.block_scale, preset.time_scale),
+        speed_top_mps=settings.speed_top_mps if motions else None,
+        time_s=moments,
+        fastest_mps=fastest_speed([(motion.time_s, motion.speed_mps) for motion in motions], moments),
+        rate=1.0 / film.frame_s,
+    )
+    _furnish(scene, view, motions, words, preset)
+    pixel = float(view.pixel_m(_median_depth(view, motions), REFERENCE_WIDTH))
+    rings = marks.impact_marks(scene, max(settings.marker_radius_m, MARK_PX * pixel))
+    if rings is not None:
+        _add(scene, rings)
+    for thing in state.with_role(scene, state.PICK_ROLE):
+        thing.hide_render = True
+    scene.frame_set(0)
+
+
+def set_up_picture(scene: bpy.types.Scene, preset: RenderPreset, engine: str, title: str = "", subtitle: str = "") -> None:
+    """Camera and captions for a still picture of the whole slope, with all trajectories and impacts there are.
+
+    Raises
+    ------
+    RockfallError : there is nothing to show.
+    """
+    _begin(scene, preset, engine)
+    motions = motions_of(scene)
+    view = _view(scene, motions, preset, whole=True)
+    _size_things(scene, motions, view)
+    scene.rockfall.trail_until_now = False
+    motions = motions_of(scene)
+    for thing in state.with_role(scene, state.BLOCK_ROLE):
+        thing.hide_render = True
+    words = layout.Words(
+        title=title or _title(scene),
+        subtitle=subtitle or _count(motions),
+        speed_top_mps=scene.rockfall.speed_top_mps if motions else None,
+    )
+    _furnish(scene, view, motions, words, preset)
+    scene.frame_set(scene.frame_end)
+
+
+def remove_film(scene: bpy.types.Scene) -> None:
+    """Take the set-up away: the scene is as it was."""
+    _remove_furniture(scene)
+    for thing in state.with_role(scene, state.PICK_ROLE) + state.with_role(scene, state.BLOCK_ROLE):
+        thing.hide_render = False
+    if remembered.is_set_up(scene):
+        remembered.put_back(scene)
+
+
+def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
+    remembered.remember(scene)
+    _remove_furniture(scene)
+    render = scene.render
+    render.resolution_x, render.resolution_y, render.resolution_percentage = preset.width, preset.height, 100
+    use_engine(scene, engine)
+
+
+def _view(scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, whole: bool) -> View:
+    aspect = preset.width / preset.height
+    if preset.camera is not None:
+        return camera.given_view(scene, preset.camera, aspect)
+    return camera.automatic_view(scene, motions, aspect, whole)
+
+
+def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> None:
+    """Blocks and trails large enough to be seen from the camera."""
+    blocks = state.with_role(scene, state.BLOCK_ROLE)
+    if not motions or not blocks:
+        return
+    settings = scene.rockfall
+    pixel = float(view.pixel_m(_median_depth(view, motions), REFERENCE_WIDTH))
+    diameter = float(np.median([2 * np.mean(thing.scale) for thing in blocks])) / settings.block_scale
+    before = remembered.value(scene, "rockfall.block_scale")
+    scale = max(before, rounded_scale(BLOCK_PX * pixel / diameter))
+    if abs(settings.block_scale - scale) > 1e-6:
+        settings.block_scale = scale
+    settings.trail_radius_m = max(remembered.value(scene, "rockfall.trail_radius_m"), TRAIL_PX * pixel / 2)
+
+
+def _furnish(
+    scene: bpy.types.Scene, view: View, motions: list[Motion], words: layout.Words, preset: RenderPreset
+) -> None:
+    """Camera, backdrop and captions, all moving with the camera."""
+    aspect = preset.width / preset.height
+    eye = camera.add_camera(scene, view, camera.scene_points(scene, motions))
+    _add(scene, eye)
+    scene.camera = eye
+    front = _sheet(scene, "Film captions", eye, 2.5 * eye.data.clip_start, aspect)
+    for thing in layout.lay_out(words, aspect, preset.height):
+        _add(scene, thing)
+        thing.parent = front
+    behind = _sheet(scene, "Film background", eye, 0.98 * eye.data.clip_end, aspect)
+    curtain = layout.backdrop(1.02 * aspect)
+    curtain.scale.y = 1.02
+    _add(scene, curtain)
+    curtain.parent = behind
+    curtain.hide_viewport = True
+
+
+def _sheet(scene: bpy.types.Scene, name: str, eye: bpy.types.Object, distance: float, aspect: float) -> bpy.types.Object:
+    """An empty before the camera in which the picture is one unit high, whatever the focal length becomes."""
+    sheet = bpy.data.objects.new(name, None)
+    sheet.empty_display_size = 0.01
+    _add(scene, sheet)
+    sheet.parent = eye
+    sheet.location = (0.0, 0.0, -distance)
+    for axis in range(3):
+        driver = sheet.driver_add("scale", axis).driver
+        lens = driver.variables.new()
+        lens.name, lens.targets[0].id_type = "lens", "CAMERA"
+        lens.targets[0].id, lens.targets[0].data_path = eye.data, "lens"
+        driver.expression = f"{distance * eye.data.sensor_width / aspect!r} / lens"
+    return sheet
+
+
+def _add(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    thing[state.ROLE_KEY] = FILM_ROLE
+    thing.hide_select = thing.type != "CAMERA"
+    state.collection(scene, "Film").objects.link(thing)
+
+
+def _remove_furniture(scene: bpy.types.Scene) -> None:
+    things = state.with_role(scene, FILM_ROLE)
+    cameras = [thing.data for thing in things if thing.type == "CAMERA"]
+    state.remove_objects(things)
+    for each in cameras:
+        if not each.users:
+            bpy.data.cameras.remove(each)
+
+
+def _median_depth(view: View, motions: list[Motion]) -> float:
+    return float(np.median(view.project(np.vstack([motion.position for motion in motions]))[:, 2]))
+
+
+def _title(scene: bpy.types.Scene) -> str:
+    return str(scene.get(SITE_KEY, "")) or "Rockfall"
+
+
+def _count(motions: list[Motion]) -> str:
+    if not motions:
+        return ""
+    return "1 block" if len(motions) == 1 else f"{len(motions)} blocks"

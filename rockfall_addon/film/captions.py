@@ -51,17 +51,8 @@ def caption(
         "Size": float(size), "Colour": materials.linear_colour(colour),
     }  # fmt: skip
     for key, value in inputs.items():
-        set_input(modifier, key, value)
+        materials.set_input(modifier, key, value)
     return thing
-
-
-def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
-    """Give an input of a modifier's node group its value, in Blender 5.2 and before."""
-    identifier = materials.socket_id(modifier.node_group, name)
-    if hasattr(modifier, "properties"):
-        getattr(modifier.properties.inputs, identifier).value = value
-    else:
-        modifier[identifier] = value
 
 
 def mark_colour(mesh: bpy.types.Mesh, colours: Array) -> None:

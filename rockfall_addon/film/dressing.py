@@ -26,7 +26,7 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     ------
     RockfallError : there is nothing to film.
     """
-    _begin(scene, preset, engine)
+    _begin(scene, preset, engine, still=False)
     film = FilmTiming(preset.fps, preset.time_scale)
     scene.render.fps, scene.render.fps_base = film.base
     scene.render.frame_map_old, scene.render.frame_map_new = film.remap
@@ -72,7 +72,7 @@ def set_up_picture(scene: bpy.types.Scene, preset: RenderPreset, engine: str, ti
     ------
     RockfallError : there is nothing to show.
     """
-    _begin(scene, preset, engine)
+    _begin(scene, preset, engine, still=True)
     motions = motions_of(scene)
     view = _view(scene, motions, preset, whole=True)
     _size_things(scene, motions, view)
@@ -98,12 +98,12 @@ def remove_film(scene: bpy.types.Scene) -> None:
         remembered.put_back(scene)
 
 
-def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
+def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str, still: bool) -> None:
     remembered.remember(scene)
     _remove_furniture(scene)
     render = scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = preset.width, preset.height, 100
-    use_engine(scene, engine)
+    use_engine(scene, engine, still)
 
 
 def _view(scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, whole: bool) -> View:

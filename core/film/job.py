@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What Blender is asked to make."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+Kind = Literal["film", "still", "slope", "terrain"]
+
+
+@dataclass(frozen=True)
+class FilmJob:
+    """One film or picture.
+
+    Attributes
+    ----------
+    kind : "film" (MP4); "still" (one frame of the film, PNG); "slope" (the whole slope with all trajectories, PNG);
+        "terrain" (a terrain file without trajectories, PNG).
+    source : the project, for "terrain" the terrain file.
+    out : the file to write.
+    preset : name of the render preset.
+    engine : "cycles", "workbench" or "eevee".
+    frames : first and last frame, both included; None for all, or for a still the last.
+    up, unit_m : how to read a terrain file.
+    """
+
+    kind: Kind
+    source: Path
+    out: Path
+    engine: str
+    preset: str = "preview"
+    frames: tuple[int, int] | None = None
+    up: str = "auto"
+    unit_m: float = 1.0
+
+    def to_json(self) -> str:
+        values = asdict(self)
+        return json.dumps({key: str(value) if isinstance(value, Path) else value for key, value in values.items()})
+
+    @classmethod
+    def from_json(cls, text: str) -> "FilmJob":
+        values = json.loads(text)
+        frames = values.pop("frames")
+        source, out = Path(values.pop("source")), Path(values.pop("out"))
+        return cls(source=source, out=out, frames=None if frames is None else (frames[0], frames[1]), **values)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the captions of a film say."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..vectors import Array
+
+
+def fastest_speed(motions: Iterable[tuple[Array, Array]], at_s: Array) -> Array:
+    """Speed of the fastest moving block [m/s].
+
+    Parameters
+    ----------
+    motions : (m,) times and (m,) speeds of each block, by time.
+    at_s : (q,) [s].
+
+    Returns
+    -------
+    (q,) 0 where no block moves.
+    """
+    fastest = np.zeros(len(at_s))
+    for time_s, speed in motions:
+        fastest = np.maximum(fastest, np.interp(at_s, time_s, speed, left=0.0, right=0.0))
+    return fastest
+
+
+def scale_note(block_scale: float) -> str:
+    """How large the blocks are drawn; empty when they have their true size."""
+    return "" if abs(block_scale - 1.0) < 1e-6 else f"Blocks drawn {block_scale:g}× their size"
+
+
+def speed_note(time_scale: float) -> str:
+    """Whether the film runs slower or faster than the fall; empty at true speed."""
+    if abs(time_scale - 1.0) < 1e-6:
+        return ""
+    return f"slowed down {1 / time_scale:.3g}×" if time_scale < 1 else f"sped up {time_scale:.3g}×"
+
+
+def notes(block_scale: float, time_scale: float) -> str:
+    """The note under the picture."""
+    text = ", ".join(part for part in (scale_note(block_scale), speed_note(time_scale)) if part)
+    return text[:1].upper() + text[1:]

@@ -20,7 +20,8 @@ RESULT_KEY = "rockfall_result"
 def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
     """Bring the scene's picks, flights and blocks in line with a reconstruction."""
     settings = scene.rockfall
-    if not state.with_role(scene, state.FLIGHTS_ROLE):
+    first = not state.with_role(scene, state.FLIGHTS_ROLE)
+    if first:
         _choose_sizes(settings, result)
     offsets = timing.display_offsets(result.picks, settings.playback == "REAL", settings.stagger_s)
     scene[state.KEYED_RATE_KEY] = timing.frame_rate(scene)
@@ -38,6 +39,8 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
             last = max(last, float(result.flights.end_time_s[which].max()) - offset)
     scene.frame_start = 0
     scene.frame_end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
+    if first:
+        scene.frame_set(0)
 
 
 def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> None:

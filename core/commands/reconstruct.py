@@ -77,8 +77,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..exchange.tables import read_picks, write_impacts, write_trajectories
     from ..reconstruction.drag import Drag
+    from ..reconstruction.sampling import sample_trajectories
     from ..reconstruction.summary import summarise
-    from ..reconstruction.trajectory import reconstruct, sample_trajectories
+    from ..reconstruction.trajectory import reconstruct
 
     with output_folder(arguments.out) as folder, Progress() as progress:
         progress(f"Reading {arguments.picks}")

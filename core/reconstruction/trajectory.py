@@ -12,19 +12,15 @@ from ..errors import RockfallError
 from .block import Block, per_pick
 from .clearance import Clearance
 from .drag import Drag
-from .flight import Flights, flight_states
+from .flight import Flights
 from .impact import DeviationForm, Impacts
 from .impact_rows import find_impacts
 from .motion import solve_motion
 from .picks import Indices, Picks
 from .placement import check_placement
-from .sampling import TrajectorySamples, sample_trajectories
 
 if TYPE_CHECKING:
     from ..terrain.surface import Surface
-
-__all__ = ["Block", "Drag", "Flights", "Picks", "Reconstruction", "TrajectorySamples"]
-__all__ += ["flight_states", "reconstruct", "sample_trajectories"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.reconstruction.trajectory import Flights, flight_states
+from ...core.reconstruction.flight import Flights, flight_states
 from ...core.vectors import Array
 
 DRAG_KEY_STEP_S = 0.1  # with drag the cubic is an approximation: Hermite's error at this step is below 0.1 mm

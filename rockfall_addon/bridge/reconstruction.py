@@ -10,9 +10,9 @@ from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
-from ..properties.settings import double
 from . import picks as pick_objects
 from . import state, terrain, trajectories
+from .state import double
 
 PROBLEM_KEY = "rockfall_problem"
 SITE_KEY, GRAVITY_KEY = "rockfall_site", "rockfall_gravity_mps2"

@@ -19,6 +19,11 @@ BLOCK_ROLE = "block"
 FLIGHTS_ROLE = "flights"
 
 
+def double(value: float) -> float:
+    """The double nearest to what the user typed into a single-precision property (0.35, not 0.3499999940)."""
+    return float(f"{value:.7g}")
+
+
 def has_shift(scene: bpy.types.Scene) -> bool:
     """Whether the project has its global shift already."""
     return SHIFT_KEY in scene or "crs x" in scene

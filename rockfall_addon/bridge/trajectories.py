@@ -9,7 +9,8 @@ import numpy as np
 
 from ...core.colours import rounded_top, scale_colours, srgb_to_linear
 from ...core.reconstruction.block import Block
-from ...core.reconstruction.trajectory import Flights, Reconstruction, flight_states
+from ...core.reconstruction.flight import Flights, flight_states
+from ...core.reconstruction.trajectory import Reconstruction
 from . import materials, motion, picks, state, timing
 
 SAMPLE_STEP_S = 0.02

@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 
 from ...core.exchange.output import output_folder
 from ...core.exchange.tables import write_impacts, write_picks, write_trajectories
-from ...core.reconstruction.trajectory import sample_trajectories
+from ...core.reconstruction.sampling import sample_trajectories
 from ..bridge import reconstruction, state, terrain
 from .reporting import reported
 

@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the scene. A number shown here is single precision: `double` gives back what the user typed."""
+"""Settings of the scene. A number shown here is single precision: `bridge.state.double` gives back what was typed."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ...core.constants import ROCK_DENSITY_KGPM3
-
-
-def double(value: float) -> float:
-    """The double nearest to what the user typed into a single-precision property (0.35, not 0.3499999940)."""
-    return float(f"{value:.7g}")
 
 
 def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:

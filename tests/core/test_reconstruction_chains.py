@@ -7,8 +7,10 @@ from rockfall.core.constants import GRAVITY_MPS2
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
+from rockfall.core.reconstruction.flight import flight_states
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.trajectory import flight_states, reconstruct, sample_trajectories
+from rockfall.core.reconstruction.sampling import sample_trajectories
+from rockfall.core.reconstruction.trajectory import reconstruct
 
 
 def run(*kinds, status=None, trajectory=None, **more):

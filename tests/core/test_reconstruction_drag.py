@@ -7,8 +7,9 @@ from rockfall.core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY
 from rockfall.core.errors import RockfallError
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag, fly
+from rockfall.core.reconstruction.flight import flight_states
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.trajectory import flight_states, reconstruct
+from rockfall.core.reconstruction.trajectory import reconstruct
 from scipy.integrate import solve_bvp, solve_ivp
 
 PEBBLE = Block(0.02, 0.02, 0.02, density=2000)

@@ -8,7 +8,8 @@ from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.trajectory import reconstruct, sample_trajectories
+from rockfall.core.reconstruction.sampling import sample_trajectories
+from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.surface import Surface
 
 SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 1000.0, "EPSG:2056")

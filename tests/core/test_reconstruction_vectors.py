@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rockfall.core.constants import GRAVITY_MPS2
+from rockfall.core.reconstruction.flight import flight_states
 from rockfall.core.reconstruction.impact import apparent
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.trajectory import flight_states, reconstruct
+from rockfall.core.reconstruction.trajectory import reconstruct
 
 SLOPE = np.radians(40)
 VECTORS = {

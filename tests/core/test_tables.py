@@ -17,7 +17,8 @@ from rockfall.core.exchange.tables import (
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.impact import Impacts
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.trajectory import reconstruct, sample_trajectories
+from rockfall.core.reconstruction.sampling import sample_trajectories
+from rockfall.core.reconstruction.trajectory import reconstruct
 
 HEADER = (
     "site,trajectory,impact,time_s,x_m,y_m,z_m,nx,ny,nz,normal_radius_m,v1x_mps,v1y_mps,v1z_mps,v2x_mps,v2y_mps,v2z_mps,"

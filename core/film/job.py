@@ -2,7 +2,7 @@
 """What Blender is asked to make."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +20,7 @@ class FilmJob:
     source : the project, for "terrain" the terrain file.
     out : the file to write.
     preset : name of the render preset.
-    engine : "cycles", "workbench" or "eevee".
+    engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen.
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
     """
@@ -28,11 +28,15 @@ class FilmJob:
     kind: Kind
     source: Path
     out: Path
-    engine: str
+    engine: str = "auto"
     preset: str = "preview"
     frames: tuple[int, int] | None = None
     up: str = "auto"
     unit_m: float = 1.0
+
+    def with_engine(self, engine: str) -> "FilmJob":
+        """The same job for another engine."""
+        return replace(self, engine=engine)
 
     def to_json(self) -> str:
         values = asdict(self)

@@ -13,7 +13,7 @@ from ..bridge import materials
 
 VALUE_ATTRIBUTE, COLOUR_ATTRIBUTE = "caption_value", "colour"
 WHITE, GREY, SHADOW = (0.95, 0.96, 0.97), (0.66, 0.71, 0.76), (0.02, 0.025, 0.03)
-SHADOW_OFFSET = 0.045  # of the text's size
+OUTLINE, BOLD = 0.075, 0.022  # of the text's size
 FONT = "Inter.woff2"
 
 
@@ -63,7 +63,7 @@ def mark_colour(mesh: bpy.types.Mesh, colours: Array) -> None:
 
 
 def caption_group(align: str) -> bpy.types.GeometryNodeTree:
-    """Geometry nodes: a series of numbers → the line of text at the scene's time, with a dark shadow behind it."""
+    """Geometry nodes: a series of numbers → the line of text at the scene's time, with a dark outline."""
     name = f"Rockfall caption {align.lower()}"
     existing = bpy.data.node_groups.get(name)
     if existing is not None:
@@ -90,17 +90,12 @@ def caption_group(align: str) -> bpy.types.GeometryNodeTree:
     real = group.nodes.new("GeometryNodeRealizeInstances")
     link(fill.outputs["Mesh"], real.inputs["Geometry"])
 
-    shift = group.nodes.new("ShaderNodeVectorMath")
-    shift.operation = "SCALE"
-    shift.inputs[0].default_value = (SHADOW_OFFSET, -SHADOW_OFFSET, -0.05)
-    link(source.outputs["Size"], shift.inputs["Scale"])
-    behind = group.nodes.new("GeometryNodeTransform")
-    link(real.outputs[0], behind.inputs["Geometry"])
-    link(shift.outputs[0], behind.inputs["Translation"])
-
     join = group.nodes.new("GeometryNodeJoinGeometry")
-    bright, dark = (_coloured(group, geometry) for geometry in (real.outputs[0], behind.outputs[0]))
+    letters = _moved(group, source, real.outputs[0], [(BOLD, 0.0, 0.0), (-BOLD, 0.0, 0.0)])
+    bright = _coloured(group, letters)
     link(source.outputs["Colour"], bright.inputs["Value"])
+    sides = [(OUTLINE * right, OUTLINE * up, -OUTLINE) for right in (-1, 1) for up in (-1, 1)]
+    dark = _coloured(group, _moved(group, source, real.outputs[0], sides))
     dark.inputs["Value"].default_value = materials.linear_colour(SHADOW)
     material = group.nodes.new("GeometryNodeSetMaterial")
     material.inputs["Material"].default_value = materials.emission_material("Rockfall caption", COLOUR_ATTRIBUTE)
@@ -110,6 +105,26 @@ def caption_group(align: str) -> bpy.types.GeometryNodeTree:
     link(join.outputs[0], material.inputs["Geometry"])
     link(material.outputs[0], result.inputs[0])
     return group
+
+
+def _moved(
+    group: bpy.types.GeometryNodeTree,
+    source: bpy.types.Node,
+    letters: bpy.types.NodeSocket,
+    places: list[tuple[float, float, float]],
+) -> bpy.types.NodeSocket:
+    """Copies of the letters, moved by shares of their size: thin strokes vanish in a small picture."""
+    around = group.nodes.new("GeometryNodeJoinGeometry")
+    for place in places:
+        move = group.nodes.new("ShaderNodeVectorMath")
+        move.operation = "SCALE"
+        move.inputs[0].default_value = place
+        group.links.new(source.outputs["Size"], move.inputs["Scale"])
+        moved = group.nodes.new("GeometryNodeTransform")
+        group.links.new(letters, moved.inputs["Geometry"])
+        group.links.new(move.outputs[0], moved.inputs["Translation"])
+        group.links.new(moved.outputs[0], around.inputs[0])
+    return around.outputs[0]
 
 
 def _text_nodes(group: bpy.types.GeometryNodeTree, source: bpy.types.Node) -> bpy.types.NodeSocket:

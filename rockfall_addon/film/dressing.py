@@ -10,12 +10,12 @@ from ...core.film.presets import FilmTiming
 from ...core.film.wording import fastest_speed, notes
 from ..bridge import state, timing
 from ..bridge.reconstruction import SITE_KEY
-from . import camera, layout, marks, remembered
+from . import camera, layout, marks, presence, remembered
 from .engine import use_engine
 from .motions import Motion, motions_of
 
 FILM_ROLE = "film"
-BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 1.6, 2.2  # at least this size, in pixels of a picture 640 wide
+BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 2.2, 2.4  # at least this size, in pixels of a picture 640 wide
 REFERENCE_WIDTH = 640
 
 
@@ -62,6 +62,7 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
         _add(scene, rings)
     for thing in state.with_role(scene, state.PICK_ROLE):
         thing.hide_render = True
+    presence.show_while_moving(scene, motions)
     scene.frame_set(0)
 
 
@@ -92,6 +93,7 @@ def set_up_picture(scene: bpy.types.Scene, preset: RenderPreset, engine: str, ti
 def remove_film(scene: bpy.types.Scene) -> None:
     """Take the set-up away: the scene is as it was."""
     _remove_furniture(scene)
+    presence.show_always(scene)
     for thing in state.with_role(scene, state.PICK_ROLE) + state.with_role(scene, state.BLOCK_ROLE):
         thing.hide_render = False
     if remembered.is_set_up(scene):
@@ -190,4 +192,4 @@ def _title(scene: bpy.types.Scene) -> str:
 def _count(motions: list[Motion]) -> str:
     if not motions:
         return ""
-    return "1 block" if len(motions) == 1 else f"{len(motions)} blocks"
+    return f"Reconstructed paths of {len(motions)} block{'' if len(motions) == 1 else 's'}"

@@ -4,7 +4,7 @@
 import bpy
 import gpu
 
-FILM_SAMPLES, LARGE_FILM_SAMPLES, PICTURE_SAMPLES = 6, 4, 24
+FILM_SAMPLES, LARGE_FILM_SAMPLES, PICTURE_SAMPLES = 5, 4, 24
 """Per pixel, and only to smooth edges: nothing here is noisy. Large pictures need less of it."""
 LARGE_PX = 1280 * 720
 

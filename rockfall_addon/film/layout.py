@@ -14,7 +14,7 @@ from . import captions
 EDGE = 0.055
 LEGEND_STEPS = 48
 BACKDROP = ((0.075, 0.085, 0.10), (0.175, 0.205, 0.24))  # slate, below and above
-CREDIT = "Rockfall"
+CREDIT = "made with Rockfall"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class Words:
 
 def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Object]:
     """The objects of all captions, around the origin, in shares of the picture's height."""
-    small = 0.038 * min(1.0, (360 / height_px) ** 0.25)  # a large picture needs no large letters
+    small = 0.045 * min(1.0, (360 / height_px) ** 0.25)  # a large picture needs no large letters
     large = 1.55 * small
     left, right, low, high = -aspect / 2 + EDGE, aspect / 2 - EDGE, -0.5 + EDGE, 0.5 - EDGE
     make = captions.caption
@@ -54,11 +54,11 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
             make("Film time", "", (right, high - 0.75 * large), large, align="RIGHT", values=words.time_s,
                  rate=words.rate, unit=" s"),
             make("Film fastest block", "fastest block  ", (right, high - 0.75 * large - 1.45 * small), small,
-                 align="RIGHT", colour=captions.GREY, values=words.fastest_mps, rate=words.rate, unit=" m/s"),
+                 align="RIGHT", values=words.fastest_mps, rate=words.rate, unit=" m/s"),
         ]  # fmt: skip
     if words.speed_top_mps is not None:
         things += _legend(words.speed_top_mps, left, low, small)
-    things.append(make("Film note", words.note, (right, low + 1.45 * small), small, align="RIGHT", colour=captions.GREY))
+    things.append(make("Film note", words.note, (right, low + 1.45 * small), small, align="RIGHT"))
     things.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
     return things
 

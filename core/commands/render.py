@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall render``: a project → its film, through Blender."""
+
+import argparse
+from pathlib import Path
+
+from ..film.engines import ENGINES
+from ..film.presets import parse_frames
+
+FILM, STILL = "rockfall.mp4", "rockfall.png"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("project", metavar="PROJECT", type=Path, help="project.toml")
+    parser.add_argument(
+        "--preset",
+        metavar="NAME",
+        default="preview",
+        help="of the project, or: preview (640×360, the default), hd (1920×1080)",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", default="film", help="folder for the film; made when it is missing (default %(default)s)"
+    )
+    parser.add_argument(
+        "--engine",
+        choices=ENGINES,
+        default=None,
+        help="Blender's render engine (default: the preset's; auto takes the quickest that works here)",
+    )
+    parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
+    parser.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Render the film or the still."""
+    from ..exchange.output import output_folder
+    from ..exchange.project import read_project
+    from ..film.job import FilmJob
+    from ..film.maker import film_maker
+    from ..film.presets import find_preset
+
+    preset = find_preset(read_project(arguments.project), arguments.preset)
+    maker = film_maker()
+    name = STILL if arguments.still else FILM
+    with output_folder(arguments.out) as folder:
+        job = FilmJob(
+            kind="still" if arguments.still else "film",
+            source=arguments.project,
+            out=folder.absolute() / name,
+            engine=arguments.engine or preset.engine,
+            preset=preset.name,
+            frames=arguments.frames,
+        )
+        done = maker.film(job)
+    print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")
+    print(f"Written: {Path(arguments.out) / name}")
+    return 0

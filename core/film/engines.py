@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which render engine works on this machine.
+
+Without a working OpenGL, Workbench and EEVEE do not fail but take the whole process with them, so they are tried in a
+process of their own.
+"""
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..errors import DependencyError
+
+ENGINES = ("auto", "cycles", "workbench", "eevee")
+PROBE_LIMIT_S = 180.0  # EEVEE compiles its shaders when it is first used
+IDENTIFIERS = {"workbench": "BLENDER_WORKBENCH", "eevee": "BLENDER_EEVEE", "cycles": "CYCLES"}
+PASSED = "engine works:"
+
+PROBE = """
+import os, bpy
+scene = bpy.data.scenes.new("probe")
+camera = bpy.data.objects.new("probe", bpy.data.cameras.new("probe"))
+scene.collection.objects.link(camera)
+scene.camera = camera
+scene.render.engine = "{identifier}"
+scene.render.resolution_x = scene.render.resolution_y = 16
+bpy.ops.render.render(scene=scene.name)
+import gpu
+try:
+    kind = gpu.platform.device_type_get()
+except SystemError:
+    kind = "UNKNOWN"
+print("{passed}", kind, flush=True)
+os._exit(0)
+"""
+"""What the other process does; `os._exit` because Blender may crash at the end after work on the graphics card."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Whether an engine works, and whether the processor draws for it because there is no graphics card."""
+
+    works: bool
+    software: bool = False
+
+
+def probe_script(engine: str) -> str:
+    """The Python that tries an engine inside Blender."""
+    return PROBE.format(identifier=IDENTIFIERS[engine], passed=PASSED)
+
+
+def probe(command: Sequence[str], limit_s: float = PROBE_LIMIT_S) -> Probe:
+    """Run a command that tries an engine; a crash or silence means that it does not work."""
+    try:
+        done = subprocess.run(
+            list(command), capture_output=True, text=True, errors="replace", timeout=limit_s, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return Probe(False)
+    said = next((line for line in done.stdout.splitlines() if line.startswith(PASSED)), None)
+    if done.returncode != 0 or said is None:
+        return Probe(False)
+    return Probe(True, software=said.removeprefix(PASSED).strip() == "SOFTWARE")
+
+
+def choose_engine(wanted: str, command: Sequence[str] = (), limit_s: float = PROBE_LIMIT_S) -> str:
+    """The engine to render with: "cycles", "workbench" or "eevee".
+
+    Parameters
+    ----------
+    wanted : one of `ENGINES`. "auto" is Workbench on a graphics card, else Cycles, which then is no slower (Workbench
+        without a graphics card draws on one core) and smooths edges better.
+    command : what tries an engine in another process; ``{probe}`` stands for the Python to run.
+
+    Raises
+    ------
+    DependencyError : the engine that is asked for does not work here.
+    """
+    if wanted == "cycles":
+        return wanted
+    engine = "workbench" if wanted == "auto" else wanted
+    script = probe_script(engine)
+    found = probe([script if part == "{probe}" else part for part in command], limit_s)
+    if wanted == "auto":
+        return "workbench" if found.works and not found.software else "cycles"
+    if not found.works:
+        raise DependencyError(
+            f"The engine {wanted} does not work on this machine: it needs OpenGL. Use --engine cycles or auto, or "
+            "install a graphics driver (on a Debian without a graphics card: libegl1 libgl1-mesa-dri)."
+        )
+    return engine

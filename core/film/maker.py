@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Getting films made: by Blender in another process, or by the Blender we are in."""
+
+import importlib.util
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from ..dependencies import require_blender_libraries
+from ..errors import DependencyError, RockfallError
+from .engines import choose_engine
+from .job import FilmJob
+from .progress import Progress
+
+Report = Callable[[int, int], None]
+"""Called with the frames done and all frames."""
+
+CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try --engine cycles."
+LINES_TOLD = 5
+
+
+@dataclass(frozen=True)
+class FilmMaker:
+    """Who makes films.
+
+    Attributes
+    ----------
+    make : does a job whose engine is chosen.
+    probe : command that runs a Python text, ``{probe}``, in another Blender.
+    """
+
+    make: Callable[[FilmJob, Report], None]
+    probe: tuple[str, ...]
+
+    def film(self, job: FilmJob) -> FilmJob:
+        """Do a job, with progress on standard error; returns it with the engine that was used.
+
+        Raises
+        ------
+        DependencyError : Blender or the engine is not there.
+        RockfallError : what the job says is wrong, or Blender crashed.
+        """
+        require_blender_libraries()
+        chosen = job.with_engine(choose_engine(job.engine, self.probe))
+        progress: Progress | None = None
+
+        def report(done: int, total: int) -> None:
+            nonlocal progress
+            progress = progress or Progress(total)
+            progress.step()
+
+        self.make(chosen, report if job.kind == "film" else _silent)
+        return chosen
+
+
+def film_maker() -> FilmMaker:
+    """Who makes films here.
+
+    Raises
+    ------
+    DependencyError : this Python has no Blender.
+    """
+    inside = inside_blender.get()
+    if inside is not None:
+        return inside
+    if importlib.util.find_spec("bpy") is None:
+        raise DependencyError(
+            "Films are made by Blender, which this Python does not have. Install it with: pip install rockfall[blender]"
+        )
+    return FilmMaker(lambda job, report: run_job(_command(job), job.out.name, report), (sys.executable, "-c", "{probe}"))
+
+
+inside_blender: ContextVar[FilmMaker | None] = ContextVar("inside_blender", default=None)
+"""Set by the add-on while Blender itself runs a command."""
+
+
+def run_job(command: Sequence[str], name: str, report: Report) -> None:
+    """Run a process that makes the file `name`; its standard output tells how far it is (see `film/__main__.py`).
+
+    Raises
+    ------
+    RockfallError : with what the process says is wrong, or the last lines that it printed when it crashed.
+    """
+    problem = ""
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, encoding="utf-8", errors="replace") as child:
+            try:
+                assert child.stdout is not None
+                for line in child.stdout:
+                    word, _, rest = line.strip().partition(" ")
+                    if word == "frame":
+                        done, total = rest.split()
+                        report(int(done), int(total))
+                    elif word == "error":
+                        problem = rest
+                status = child.wait()
+            except BaseException:
+                child.kill()
+                raise
+        if problem:
+            raise RockfallError(problem)
+        if status != 0:
+            log.seek(0)
+            lines = [line.strip() for line in log if line.strip() and "EGL" not in line][-LINES_TOLD:]
+            said = f" It said: {' / '.join(lines)}." if lines else ""
+            raise RockfallError(CRASHED.format(name=name, status=status, said=said))
+
+
+def _command(job: FilmJob) -> list[str]:
+    package = __name__.partition(".core.")[0]
+    return [sys.executable, "-m", f"{package}.rockfall_addon.film", job.to_json()]
+
+
+def _silent(done: int, total: int) -> None:
+    pass

@@ -52,24 +52,25 @@ class TextTable:
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             if cell:
-                values[i] = self._number(name, i)
+                values[i] = self._number(name, i, required)
             elif required:
                 raise self.error(i, f"The cell of {name} is empty", "Give a number")
             else:
                 values[i] = np.nan
         return values
 
-    def _number(self, name: str, i: int) -> float:
+    def _number(self, name: str, i: int, required: bool) -> float:
+        or_empty = "" if required else ", or leave it empty if it is not defined"
         cell = self.columns[name][i]
         try:
             value = float(cell)
         except ValueError:
             value = None
         if value is None or "_" in cell:
-            comma = "Write decimals with a point" if "," in cell else "Correct the cell, or leave it empty if undefined"
-            raise self.error(i, f"'{cell}' in column {name} is not a number", comma)
+            advice = "Write decimals with a point" if "," in cell else f"Correct the cell{or_empty}"
+            raise self.error(i, f"'{cell}' in column {name} is not a number", advice)
         if not np.isfinite(value):
-            raise self.error(i, f"'{cell}' in column {name} is not finite", "Leave the cell empty if it is not defined")
+            raise self.error(i, f"'{cell}' in column {name} is not finite", f"Correct the cell{or_empty}")
         return value
 
     def vectors(self, names: Sequence[str], *, required: bool = False) -> Array:

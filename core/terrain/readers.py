@@ -196,11 +196,11 @@ def _placed(source: Source, up: str, unit_m: float, path: Path) -> Array:
             points = np.where(np.isinf(points), np.nan, points)
     if not finite.all():
         row = int(np.flatnonzero(~finite.all(axis=1))[0])
-        what = "vertex" if source.kind == "mesh" else "point"
+        what, plural = ("vertex", "vertices") if source.kind == "mesh" else ("point", "points")
         raise InputError(
             f"The {what} {row} (counted from 0) is not finite: {points[row].tolist()}",
             file=path,
-            advice=f"Remove {what}s with NaN or infinite coordinates and export again",
+            advice=f"Remove {plural} with NaN or infinite coordinates and export again",
         )
     if unit_m != 1.0:
         points = points * unit_m

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a model's plain Python function to machine code, when it is first needed.
+
+A model is written once, as a plain function of floats, triples of floats and two sequences. `compiled_rebound` compiles
+it and every plain function that it calls; all models have one signature, so that `compiled_driver` compiles one loop,
+which takes the model as a function pointer. A compiled simulation does the same with `rebound_type`.
+"""
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from types import CodeType, FunctionType
+from typing import Any
+
+
+def compiled_rebound(rebound: Callable[..., Any]) -> Any:
+    """The compiled function of a model; other compiled functions can call it or take it as an argument."""
+    return _compiled(rebound, _rebound_signature())
+
+
+def rebound_type() -> Any:
+    """The numba type of every model's compiled function: that of an argument of a compiled caller."""
+    from numba import types
+
+    return types.FunctionType(_rebound_signature())
+
+
+@cache
+def compiled_driver() -> Any:
+    """`driver.drive`, compiled for any model."""
+    from numba import types
+
+    from .driver import drive
+
+    rows, block, numbers = types.float64[:, ::1], types.float64[:, :, ::1], types.float64[::1]
+    follows = types.intp[::1]
+    return _compiled(
+        drive,
+        types.void(rebound_type(), rows, rows, rows, follows, numbers, numbers, numbers, block, block, block, block),
+    )
+
+
+@cache
+def _rebound_signature() -> Any:
+    from numba import types
+
+    numba_types: Any = types  # its annotations stop half-way
+    triple, numbers = numba_types.UniTuple(types.float64, 3), types.float64[::1]
+    return numba_types.UniTuple(triple, 2)(triple, triple, triple, types.float64, types.float64, numbers, numbers)
+
+
+@cache
+def _compiled(function: FunctionType, signature: Any = None) -> Any:
+    """The function and all plain functions that it calls, compiled and kept on disk.
+
+    Notes
+    -----
+    numba's cache looks at the file of a function only, not at the functions it calls: the name under which a function
+    is kept therefore carries a digest of all of them.
+    """
+    from numba import njit
+
+    called = {
+        name: _compiled(value) for name, value in _globals_of(function).items() if isinstance(value, FunctionType)
+    }
+    copy = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
+    copy.__module__ = function.__module__
+    copy.__qualname__ = f"{function.__qualname__}_{_digest(function)}"
+    return njit(signature, cache=True, nogil=True, error_model="numpy")(copy)
+
+
+def _globals_of(function: FunctionType) -> dict[str, Any]:
+    return {name: function.__globals__[name] for name in function.__code__.co_names if name in function.__globals__}
+
+
+def _digest(function: FunctionType) -> str:
+    """Of the code and the constants of a function and of all plain functions that it calls."""
+    code: CodeType = function.__code__
+    parts = [code.co_code.hex(), repr([constant for constant in code.co_consts if not isinstance(constant, CodeType)])]
+    for name, value in sorted(_globals_of(function).items()):
+        parts.append(_digest(value) if isinstance(value, FunctionType) else f"{name}={value!r}")
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:12]

@@ -38,7 +38,13 @@ def speed_note(time_scale: float) -> str:
     return f"slowed down {1 / time_scale:.3g}×" if time_scale < 1 else f"sped up {time_scale:.3g}×"
 
 
-def notes(block_scale: float, time_scale: float) -> str:
-    """The note under the picture."""
-    text = ", ".join(part for part in (scale_note(block_scale), speed_note(time_scale)) if part)
+def notes(block_scale: float = 1.0, time_scale: float = 1.0, rings: bool = False) -> str:
+    """The note under the picture.
+
+    Parameters
+    ----------
+    rings : whether impacts are marked with rings.
+    """
+    parts = (scale_note(block_scale), "rings mark impacts" if rings else "", speed_note(time_scale))
+    text = ", ".join(part for part in parts if part)
     return text[:1].upper() + text[1:]

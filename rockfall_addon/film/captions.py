@@ -13,7 +13,7 @@ from ..bridge import materials
 
 VALUE_ATTRIBUTE, COLOUR_ATTRIBUTE = "caption_value", "colour"
 WHITE, GREY, SHADOW = (0.95, 0.96, 0.97), (0.66, 0.71, 0.76), (0.02, 0.025, 0.03)
-OUTLINE, BOLD = 0.075, 0.022  # of the text's size
+OUTLINE, BOLD = 0.075, 0.022  # of the text's size, in a small picture
 FONT = "Inter.woff2"
 
 
@@ -29,6 +29,7 @@ def caption(
     rate: float = 1.0,
     decimals: int = 1,
     unit: str = "",
+    weight: float = 1.0,
 ) -> bpy.types.Object:
     """A line of text; with values (n,) the number at the scene's time stands between text and unit.
 
@@ -36,6 +37,7 @@ def caption(
     ----------
     align : "LEFT", "CENTER" or "RIGHT" of the place.
     rate : how many values there are for a second.
+    weight : 1 for letters that are legible when they are 15 pixels high, less for large ones.
     """
     series = np.zeros(1) if values is None else np.asarray(values, dtype=np.float64)
     mesh = bpy.data.meshes.new(name)
@@ -48,7 +50,7 @@ def caption(
     group = modifier.node_group = caption_group(align)
     inputs = {
         "Text": text, "Unit": unit, "Number": values is not None, "Decimals": decimals, "Rate": float(rate),
-        "Size": float(size), "Colour": materials.linear_colour(colour),
+        "Size": float(size), "Weight": float(size * weight), "Colour": materials.linear_colour(colour),
     }  # fmt: skip
     for key, value in inputs.items():
         materials.set_input(modifier, key, value)
@@ -72,7 +74,7 @@ def caption_group(align: str) -> bpy.types.GeometryNodeTree:
     group.is_modifier = True
     for socket, kind in (
         ("Geometry", "Geometry"), ("Text", "String"), ("Unit", "String"), ("Number", "Bool"), ("Decimals", "Int"),
-        ("Rate", "Float"), ("Size", "Float"), ("Colour", "Color"),
+        ("Rate", "Float"), ("Size", "Float"), ("Weight", "Float"), ("Colour", "Color"),
     ):  # fmt: skip
         group.interface.new_socket(socket, in_out="INPUT", socket_type=f"NodeSocket{kind}")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
@@ -119,7 +121,7 @@ def _moved(
         move = group.nodes.new("ShaderNodeVectorMath")
         move.operation = "SCALE"
         move.inputs[0].default_value = place
-        group.links.new(source.outputs["Size"], move.inputs["Scale"])
+        group.links.new(source.outputs["Weight"], move.inputs["Scale"])
         moved = group.nodes.new("GeometryNodeTransform")
         group.links.new(letters, moved.inputs["Geometry"])
         group.links.new(move.outputs[0], moved.inputs["Translation"])

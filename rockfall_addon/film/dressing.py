@@ -15,8 +15,9 @@ from .engine import use_engine
 from .motions import Motion, motions_of
 
 FILM_ROLE = "film"
-BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 2.2, 2.4  # at least this size, in pixels of a picture 640 wide
-REFERENCE_WIDTH = 640
+BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 2.2, 2.4
+"""At least this many pixels of a picture 640 wide: a block, the width of a trail, the radius of an impact's ring."""
+SMALL_WIDTH = 640
 
 
 def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
@@ -26,7 +27,7 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     ------
     RockfallError : there is nothing to film.
     """
-    _begin(scene, preset, engine, still=False)
+    _begin(scene, preset)
     film = FilmTiming(preset.fps, preset.time_scale)
     scene.render.fps, scene.render.fps_base = film.base
     scene.render.frame_map_old, scene.render.frame_map_new = film.remap
@@ -49,20 +50,15 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     words = layout.Words(
         title=_title(scene),
         subtitle=_count(motions),
-        note=notes(settings.block_scale, preset.time_scale),
+        note=notes(settings.block_scale, preset.time_scale, rings=bool(motions)),
         speed_top_mps=settings.speed_top_mps if motions else None,
         time_s=moments,
         fastest_mps=fastest_speed([(motion.time_s, motion.speed_mps) for motion in motions], moments),
         rate=1.0 / film.frame_s,
     )
     _furnish(scene, view, motions, words, preset)
-    pixel = float(view.pixel_m(_median_depth(view, motions), REFERENCE_WIDTH))
-    rings = marks.impact_marks(scene, max(settings.marker_radius_m, MARK_PX * pixel))
-    if rings is not None:
-        _add(scene, rings)
-    for thing in state.with_role(scene, state.PICK_ROLE):
-        thing.hide_render = True
     presence.show_while_moving(scene, motions)
+    use_engine(scene, engine)
     scene.frame_set(0)
 
 
@@ -73,7 +69,7 @@ def set_up_picture(scene: bpy.types.Scene, preset: RenderPreset, engine: str, ti
     ------
     RockfallError : there is nothing to show.
     """
-    _begin(scene, preset, engine, still=True)
+    _begin(scene, preset)
     motions = motions_of(scene)
     view = _view(scene, motions, preset, whole=True)
     _size_things(scene, motions, view)
@@ -84,9 +80,11 @@ def set_up_picture(scene: bpy.types.Scene, preset: RenderPreset, engine: str, ti
     words = layout.Words(
         title=title or _title(scene),
         subtitle=subtitle or _count(motions),
+        note=notes(rings=bool(motions)),
         speed_top_mps=scene.rockfall.speed_top_mps if motions else None,
     )
     _furnish(scene, view, motions, words, preset)
+    use_engine(scene, engine, still=True)
     scene.frame_set(scene.frame_end)
 
 
@@ -100,12 +98,11 @@ def remove_film(scene: bpy.types.Scene) -> None:
         remembered.put_back(scene)
 
 
-def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str, still: bool) -> None:
+def _begin(scene: bpy.types.Scene, preset: RenderPreset) -> None:
     remembered.remember(scene)
     _remove_furniture(scene)
     render = scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = preset.width, preset.height, 100
-    use_engine(scene, engine, still)
 
 
 def _view(scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, whole: bool) -> View:
@@ -121,7 +118,7 @@ def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> N
     if not motions or not blocks:
         return
     settings = scene.rockfall
-    pixel = float(view.pixel_m(_median_depth(view, motions), REFERENCE_WIDTH))
+    pixel = _pixel_m(scene, view, motions)
     diameter = float(np.median([2 * np.mean(thing.scale) for thing in blocks])) / settings.block_scale
     before = remembered.value(scene, "rockfall.block_scale")
     scale = max(before, rounded_scale(BLOCK_PX * pixel / diameter))
@@ -133,7 +130,14 @@ def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> N
 def _furnish(
     scene: bpy.types.Scene, view: View, motions: list[Motion], words: layout.Words, preset: RenderPreset
 ) -> None:
-    """Camera, backdrop and captions, all moving with the camera."""
+    """Camera, backdrop and captions, all moving with the camera; rings in place of the marks of the picks."""
+    for thing in state.with_role(scene, state.PICK_ROLE):
+        thing.hide_render = True
+    if motions:
+        radius = max(scene.rockfall.marker_radius_m, MARK_PX * _pixel_m(scene, view, motions))
+        rings = marks.impact_marks(scene, radius)
+        if rings is not None:
+            _add(scene, rings)
     aspect = preset.width / preset.height
     eye = camera.add_camera(scene, view, camera.scene_points(scene, motions))
     _add(scene, eye)
@@ -181,8 +185,10 @@ def _remove_furniture(scene: bpy.types.Scene) -> None:
             bpy.data.cameras.remove(each)
 
 
-def _median_depth(view: View, motions: list[Motion]) -> float:
-    return float(np.median(view.project(np.vstack([motion.position for motion in motions]))[:, 2]))
+def _pixel_m(scene: bpy.types.Scene, view: View, motions: list[Motion]) -> float:
+    """Size of a pixel of a small picture where the blocks are [m]; in a large one, things may be a little finer."""
+    depth = float(np.median(view.project(np.vstack([motion.position for motion in motions]))[:, 2]))
+    return float(view.pixel_m(depth, (SMALL_WIDTH * max(SMALL_WIDTH, scene.render.resolution_x)) ** 0.5))
 
 
 def _title(scene: bpy.types.Scene) -> str:

@@ -10,13 +10,18 @@ LARGE_PX = 1280 * 720
 
 
 def use_engine(scene: bpy.types.Scene, engine: str, still: bool = False) -> None:
-    """Set a scene, whose resolution is set, up for "cycles", "workbench" or "eevee"."""
+    """Set a scene up for "cycles", "workbench" or "eevee", once all its materials and its resolution are there."""
     large = scene.render.resolution_x * scene.render.resolution_y > LARGE_PX
     samples = PICTURE_SAMPLES if still else LARGE_FILM_SAMPLES if large else FILM_SAMPLES
     {"cycles": _cycles, "workbench": _workbench, "eevee": _eevee}[engine](scene, samples)
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.render.film_transparent = False
+
+
+def quickest_engine() -> str:
+    """Of an open Blender with a window, whose OpenGL works; a background process is asked by `core.film.engines`."""
+    return "cycles" if bpy.app.background or _drawn_by_the_processor() else "workbench"
 
 
 def _cycles(scene: bpy.types.Scene, samples: int) -> None:

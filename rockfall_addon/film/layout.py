@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is written where in the picture: title, time, fastest block, colour legend, notes, and the backdrop."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 import numpy as np
@@ -42,7 +44,7 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
     small = 0.045 * min(1.0, (360 / height_px) ** 0.25)  # a large picture needs no large letters
     large = 1.55 * small
     left, right, low, high = -aspect / 2 + EDGE, aspect / 2 - EDGE, -0.5 + EDGE, 0.5 - EDGE
-    make = captions.caption
+    make = partial(captions.caption, weight=_weight(height_px))
     room = 0.62 * aspect / (0.58 * max(len(words.title), 1))  # a letter is about 0.58 of its height wide
     title = min(large, room)
     things = [make("Film title", words.title, (left, high - 0.75 * large), title)]
@@ -57,7 +59,7 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
                  align="RIGHT", values=words.fastest_mps, rate=words.rate, unit=" m/s"),
         ]  # fmt: skip
     if words.speed_top_mps is not None:
-        things += _legend(words.speed_top_mps, left, low, small)
+        things += _legend(make, words.speed_top_mps, left, low, small)
     things.append(make("Film note", words.note, (right, low + 1.45 * small), small, align="RIGHT"))
     things.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
     return things
@@ -75,16 +77,20 @@ def backdrop(aspect: float) -> bpy.types.Object:
     return _shown("Film backdrop", mesh)
 
 
-def _legend(top_mps: float, left: float, low: float, size: float) -> list[bpy.types.Object]:
+def _weight(height_px: int) -> float:
+    return min(1.0, (360 / height_px) ** 0.8)
+
+
+def _legend(make: Callable[..., bpy.types.Object], top_mps: float, left: float, low: float, size: float) -> list[bpy.types.Object]:
     width, height, bottom = 11.0 * size, 0.5 * size, low + 1.15 * size
     across = np.linspace(0.0, 1.0, LEGEND_STEPS + 1)
     corners = [(left + part * width, bottom + up * height, 0.0) for part in across for up in (0, 1)]
     mesh = bpy.data.meshes.new("Film legend")
     mesh.from_pydata(corners, [], [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(LEGEND_STEPS)])
     captions.mark_colour(mesh, _opaque(srgb_to_linear(np.repeat(scale_colours(across, 0.0, 1.0, SPEED_SCALE), 2, axis=0))))
-    title = captions.caption("Film legend title", "Block speed [m/s]", (left, bottom + height + 0.5 * size), size)
+    title = make("Film legend title", "Block speed [m/s]", (left, bottom + height + 0.5 * size), size)
     marks = [
-        captions.caption(
+        make(
             f"Film legend {part:g}", f"{top_mps * part:g}", (left + part * width, low), 0.9 * size,
             align=align, colour=captions.GREY,
         )

@@ -12,6 +12,7 @@ from ...core.film.job import FilmJob
 from ...core.film.presets import HD, FilmTiming, find_preset
 from ..bridge.project import load_project
 from . import dressing
+from .engine import use_engine
 
 Report = Callable[[int, int], None]
 """Called with the frames done and all frames."""
@@ -39,6 +40,7 @@ def make(job: FilmJob, report: Report) -> None:
         render_film(scene, job.out, job.frames, report)
     else:
         if job.kind == "still":
+            use_engine(scene, job.engine, still=True)
             scene.frame_set(min(job.frames[0] if job.frames else scene.frame_end, scene.frame_end))
         render_picture(scene, job.out)
         report(1, 1)
@@ -120,7 +122,7 @@ def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     shading = shade(surface)
     add_terrain(scene, surface, shading)
     size = " × ".join(f"{length:.0f}" for length in surface.bounds[1] - surface.bounds[0])
-    facts = f"{len(surface.faces):,} triangles, {size} m".replace(",", "\u202f")
+    facts = f"{len(surface.faces):,}".replace(",", "\u202f") + f" triangles, {size} m"
     if shading.thin.any():
         facts += f", thin data on {100 * shading.thin.mean():.0f} %"
     dressing.set_up_picture(scene, HD, job.engine, title=job.source.name, subtitle=facts)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Engines that crash, processes that fail: told in words, and nothing is left behind."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from rockfall.core import cli
+from rockfall.core.errors import DependencyError, RockfallError
+from rockfall.core.film import maker as maker_module
+from rockfall.core.film.engines import PASSED, choose_engine, probe, probe_script
+from rockfall.core.film.job import FilmJob
+from rockfall.core.film.maker import FilmMaker, film_maker, inside_blender, run_job
+
+KILL_YOURSELF = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"]
+ANSWER = "print('chatter'); print('{} {}')"
+
+
+def says(kind: str) -> list[str]:
+    return [sys.executable, "-c", ANSWER.format(PASSED, kind)]
+
+
+def test_probe_script_is_python_for_each_engine() -> None:
+    for engine in ("workbench", "eevee", "cycles"):
+        compile(probe_script(engine), engine, "exec")
+
+
+def test_auto_takes_workbench_on_a_graphics_card_only() -> None:
+    assert choose_engine("auto", says("NVIDIA")) == "workbench"
+    assert choose_engine("auto", says("SOFTWARE")) == "cycles"
+
+
+def test_a_probe_that_crashes_or_hangs_means_cycles() -> None:
+    assert choose_engine("auto", KILL_YOURSELF) == "cycles"
+    assert choose_engine("auto", [sys.executable, "-c", "import time; time.sleep(60)"], limit_s=0.3) == "cycles"
+    assert choose_engine("auto", ["/no/such/program"]) == "cycles"
+    assert not probe([sys.executable, "-c", "print('not our words')"]).works
+
+
+def test_an_engine_that_is_asked_for_must_work() -> None:
+    assert choose_engine("cycles", KILL_YOURSELF) == "cycles"
+    assert choose_engine("eevee", says("SOFTWARE")) == "eevee"
+    with pytest.raises(DependencyError, match="workbench does not work on this machine.*--engine cycles"):
+        choose_engine("workbench", KILL_YOURSELF)
+
+
+def test_the_probe_gets_the_script() -> None:
+    command = [sys.executable, "-c", "import sys; assert 'BLENDER_WORKBENCH' in sys.argv[1]; " + ANSWER.format(PASSED, "X"), "{probe}"]
+    assert choose_engine("auto", command) == "workbench"
+
+
+def test_frames_of_a_process_are_reported() -> None:
+    seen = []
+    script = "print('frame 1 2'); print('frame 2 2')"
+    run_job([sys.executable, "-c", script], "x.mp4", lambda done, total: seen.append((done, total)))
+    assert seen == [(1, 2), (2, 2)]
+
+
+def test_what_a_process_says_is_wrong_is_our_error() -> None:
+    script = "import sys; print('error The project names no picks.'); sys.exit(1)"
+    with pytest.raises(RockfallError, match=r"^The project names no picks\.$"):
+        run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None)
+
+
+def test_a_crash_is_told_with_its_last_words() -> None:
+    script = "import os, sys, signal; sys.stderr.write('deep trouble\\n'); sys.stderr.flush(); os.kill(os.getpid(), signal.SIGSEGV)"
+    with pytest.raises(RockfallError, match=r"while it made x\.mp4 \(status -11\)\. It said: deep trouble\. Try"):
+        run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None)
+
+
+def test_without_blender_the_advice_is_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(maker_module.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(DependencyError, match=r"pip install rockfall\[blender\]"):
+        film_maker()
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    (tmp_path / "project.toml").write_text("schema = 1\n", encoding="utf-8")
+    return tmp_path / "project.toml"
+
+
+@pytest.mark.parametrize("failure", [RockfallError("Bad luck."), KeyboardInterrupt()])
+def test_a_film_that_fails_leaves_nothing(
+    project: Path, failure: BaseException, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    def make(job: FilmJob, report: object) -> None:
+        job.out.write_bytes(b"half a film")
+        raise failure
+
+    monkeypatch.setattr(maker_module, "require_blender_libraries", lambda: None)
+    token = inside_blender.set(FilmMaker(make, tuple(KILL_YOURSELF)))
+    try:
+        status = cli.main(["render", str(project), "--preset", "preview", "--out", str(project.parent / "new" / "film")])
+    finally:
+        inside_blender.reset(token)
+    assert status == (1 if isinstance(failure, RockfallError) else 130)
+    assert sorted(path.name for path in project.parent.iterdir()) == ["project.toml"]
+
+
+def test_a_film_that_succeeds_is_moved_into_place(
+    project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    jobs = []
+
+    def make(job: FilmJob, report: object) -> None:
+        jobs.append(job)
+        job.out.write_bytes(b"a film")
+
+    monkeypatch.setattr(maker_module, "require_blender_libraries", lambda: None)
+    out = project.parent / "film"
+    token = inside_blender.set(FilmMaker(make, tuple(KILL_YOURSELF)))
+    try:
+        assert cli.main(["render", str(project), "--preset", "hd", "--out", str(out), "--frames", "5-9"]) == 0
+        assert cli.main(["render", str(project), "--preset", "blue", "--out", str(out)]) == 1
+    finally:
+        inside_blender.reset(token)
+    assert (out / "rockfall.mp4").read_bytes() == b"a film"
+    (job,) = jobs
+    assert (job.kind, job.engine, job.preset, job.frames) == ("film", "cycles", "hd", (5, 9))
+    printed = capsys.readouterr()
+    assert "1920×1080, rendered with Cycles" in printed.out
+    assert "There is no render preset 'blue'" in printed.err

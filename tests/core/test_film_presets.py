@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Presets, frames and words of a film."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rockfall.core.errors import InputError
+from rockfall.core.exchange.project import Project, RenderPreset
+from rockfall.core.film.job import FilmJob
+from rockfall.core.film.presets import AFTERGLOW_S, FilmTiming, find_preset, parse_frames
+from rockfall.core.film.progress import Progress, progress_line
+from rockfall.core.film.wording import fastest_speed, notes
+
+
+def test_presets_that_every_project_has() -> None:
+    preview, hd = (find_preset(Project(), name) for name in ("preview", "hd"))
+    assert (preview.width, preview.height) == (640, 360)
+    assert (hd.width, hd.height) == (1920, 1080)
+    own = RenderPreset("preview", width=320, height=180)
+    assert find_preset(Project(render=(own,)), "preview") is own
+    with pytest.raises(InputError, match="no render preset 'film'.*Known presets: preview, hd, mine"):
+        find_preset(Project(render=(RenderPreset("mine"),)), "film")
+
+
+@pytest.mark.parametrize("fps", [24.0, 25.0, 29.97, 30000 / 1001, 23.976, 12.5])
+def test_blender_gets_the_frame_rate_exactly(fps: float) -> None:
+    whole, base = FilmTiming(fps).base
+    assert isinstance(whole, int)
+    assert whole / base == pytest.approx(fps, rel=1e-12)
+
+
+@pytest.mark.parametrize(("scale", "remap"), [(1.0, (1, 1)), (0.5, (1, 2)), (0.1, (1, 10)), (2.0, (2, 1)), (0.3, (3, 10))])
+def test_slow_motion(scale: float, remap: tuple[int, int]) -> None:
+    timing = FilmTiming(25.0, scale)
+    assert timing.remap == remap
+    assert timing.frame_s == pytest.approx(scale / 25)
+    assert timing.last_frame(10.0) == int(np.ceil(10.0 / scale * 25 - 1e-6)) + round(AFTERGLOW_S * 25)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 0.123456, 1.1, 17.3, 900.0])
+def test_any_time_scale_is_in_blenders_range(scale: float) -> None:
+    old, new = FilmTiming(25.0, scale).remap
+    assert 1 <= old <= 900
+    assert 1 <= new <= 900
+    assert old / new == pytest.approx(scale, rel=0.12)
+
+
+def test_frames_of_the_command_line() -> None:
+    assert parse_frames("3-17") == (3, 17)
+    assert parse_frames("40") == (40, 40)
+    for text in ("", "7-3", "a-b", "-4"):
+        with pytest.raises(ValueError):  # noqa: PT011 - argparse makes the message
+            parse_frames(text)
+
+
+def test_fastest_block() -> None:
+    a = (np.array([0.0, 1.0, 1.0, 2.0]), np.array([0.0, 10.0, 4.0, 6.0]))
+    b = (np.array([1.5, 3.0]), np.array([5.0, 8.0]))
+    found = fastest_speed([a, b], np.array([-1.0, 0.5, 1.5, 2.0, 3.0, 3.1]))
+    np.testing.assert_allclose(found, [0, 5, 5, 6, 8, 0])
+    np.testing.assert_allclose(fastest_speed([], np.zeros(2)), 0)
+
+
+def test_notes() -> None:
+    assert notes() == ""
+    assert notes(4.0) == "Blocks drawn 4× their size"
+    assert notes(1.5, 0.25, rings=True) == "Blocks drawn 1.5× their size, rings mark impacts, slowed down 4×"
+    assert notes(1.0, 2.0) == "Sped up 2×"
+
+
+def test_progress() -> None:
+    assert progress_line(120, 375, 25.2) == "frame 120/375, 0.21 s a frame, 0:54 left"
+    log = io.StringIO()
+    progress = Progress(2, log)
+    progress.step()
+    progress.step()
+    assert log.getvalue().startswith("  frame 2/2, ")
+
+
+def test_job_survives_the_way_to_another_process() -> None:
+    job = FilmJob("film", Path("a b/project.toml"), Path("/tmp/Ωmega.mp4"), "cycles", "hd", frames=(3, 9), unit_m=0.3048)
+    assert FilmJob.from_json(job.to_json()) == job
+    assert FilmJob.from_json(FilmJob("slope", Path("p"), Path("q")).to_json()).frames is None

@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         _write(folder / "accuracy.csv", ("quantity", *columns[1:]), rows)
         _say("How good that is", truth_sentences(deviations))
         if maker is not None:
-            _say("Picture and film", ["Rendered by Blender; on two processor cores the film takes two to three minutes."])
+            _say("Picture and film", ["Rendered by Blender; the film takes two to three minutes on two cores."])
             common = {"source": SITE / "project.toml", "engine": arguments.engine}
             done = maker.film(FilmJob(kind="slope", out=folder.absolute() / "slope.png", preset="hd", **common))
             film = FilmJob(kind="film", out=folder.absolute() / "rockfall.mp4", preset="preview", **common)

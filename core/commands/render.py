@@ -20,7 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the project, or: preview (640×360, the default), hd (1920×1080)",
     )
     parser.add_argument(
-        "--out", metavar="DIR", default="film", help="folder for the film; made when it is missing (default %(default)s)"
+        "--out",
+        metavar="DIR",
+        default="film",
+        help="folder for the film; made when it is missing (default %(default)s)",
     )
     parser.add_argument(
         "--engine",

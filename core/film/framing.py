@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a film's camera stands: opposite the slope and looking up it, near enough that the trajectories fill the picture."""
+"""Where a film's camera stands: opposite the slope, looking up it, so near that the trajectories fill the picture."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -130,7 +130,7 @@ def place_camera(
 
 
 def downhill_direction(starts: Array, ends: Array) -> Array:
-    """(3,) horizontal unit vector from where blocks start (n, 3) to where they end (n, 3); north when they go nowhere."""
+    """(3,) horizontal unit vector from where blocks start to where they end, (n, 3) each; north if nowhere."""
     way = ends.mean(axis=0) - starts.mean(axis=0)
     way[2] = 0.0
     return unit(way) if hypot(way[0], way[1]) > 1e-6 else np.array([0.0, 1.0, 0.0])
@@ -174,4 +174,5 @@ def _facing(position: Array, forward: Array, fov: float, aspect: float) -> View:
     if np.linalg.norm(right) < 1e-9:  # straight down: north is up
         right = np.array([1.0, 0.0, 0.0])
     right = unit(right)
-    return View(position, right, np.cross(right, forward), forward, fov, aspect)
+    up: Array = np.cross(right, forward).astype(np.float64)
+    return View(position, right, up, forward, fov, aspect)

@@ -70,7 +70,7 @@ def film_maker() -> FilmMaker:
         raise DependencyError(
             "Films are made by Blender, which this Python does not have. Install it with: pip install rockfall[blender]"
         )
-    return FilmMaker(lambda job, report: run_job(_command(job), job.out.name, report), (sys.executable, "-c", "{probe}"))
+    return FilmMaker(_make, (sys.executable, "-c", "{probe}"))
 
 
 inside_blender: ContextVar[FilmMaker | None] = ContextVar("inside_blender", default=None)
@@ -109,9 +109,9 @@ def run_job(command: Sequence[str], name: str, report: Report) -> None:
             raise RockfallError(CRASHED.format(name=name, status=status, said=said))
 
 
-def _command(job: FilmJob) -> list[str]:
+def _make(job: FilmJob, report: Report) -> None:
     package = __name__.partition(".core.")[0]
-    return [sys.executable, "-m", f"{package}.rockfall_addon.film", job.to_json()]
+    run_job([sys.executable, "-m", f"{package}.rockfall_addon.film", job.to_json()], job.out.name, report)
 
 
 def _silent(done: int, total: int) -> None:

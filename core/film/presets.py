@@ -18,6 +18,8 @@ AFTERGLOW_S = 1.5
 LARGEST_REMAP = 900
 """Blender's time stretching knows whole numbers up to this."""
 
+LARGEST_RATE = 32767
+
 
 def find_preset(project: Project, name: str) -> RenderPreset:
     """A preset by its name; one of the project wins over a built-in one.
@@ -47,9 +49,12 @@ class FilmTiming:
 
     @property
     def base(self) -> tuple[int, float]:
-        """Blender's two numbers for the frame rate: a whole one, and what it is divided by (24, 1.001)."""
-        whole = ceil(self.fps - 1e-9)
-        return whole, whole / self.fps
+        """Blender's two numbers for the frame rate: a whole one, and what it is divided by (30000, 1001).
+
+        Both are whole, since the writer of films cuts the digits of the second one off.
+        """
+        rate = Fraction(self.fps).limit_denominator(1001 if self.fps <= LARGEST_RATE / 1001 else 1)
+        return rate.numerator, float(rate.denominator)
 
     @property
     def remap(self) -> tuple[int, int]:

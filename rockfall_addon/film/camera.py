@@ -83,7 +83,9 @@ def _visibility(ground: bpy.types.Object, points: Array) -> Seen:
     def seen(position: Array) -> Array:
         eye = inverse @ Vector(position)
         rays = [(start, eye - start) for start in starts]
-        return np.array([tree.ray_cast(start, ray.normalized(), ray.length)[0] is None for start, ray in rays], dtype=float)
+        return np.array(
+            [tree.ray_cast(start, ray.normalized(), ray.length)[0] is None for start, ray in rays], dtype=float
+        )
 
     return seen
 

@@ -47,7 +47,7 @@ def caption(
     thing = bpy.data.objects.new(name, mesh)
     thing.location = (*place, 0.0)
     modifier = thing.modifiers.new("Caption", "NODES")
-    group = modifier.node_group = caption_group(align)
+    modifier.node_group = caption_group(align)
     inputs = {
         "Text": text, "Unit": unit, "Number": values is not None, "Decimals": decimals, "Rate": float(rate),
         "Size": float(size), "Weight": float(size * weight), "Colour": materials.linear_colour(colour),
@@ -156,7 +156,11 @@ def _text_nodes(group: bpy.types.GeometryNodeTree, source: bpy.types.Node) -> bp
     link(source.outputs["Number"], shown.inputs["Switch"])
     link(number.outputs["String"], shown.inputs["True"])
     join = new("GeometryNodeStringJoin")
-    for part in (source.outputs["Unit"], shown.outputs[0], source.outputs["Text"]):  # a multi-input takes the last first
+    for part in (
+        source.outputs["Unit"],
+        shown.outputs[0],
+        source.outputs["Text"],
+    ):  # a multi-input takes the last first
         link(part, join.inputs["Strings"])
     return join.outputs["String"]
 

@@ -62,7 +62,9 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     scene.frame_set(0)
 
 
-def set_up_picture(scene: bpy.types.Scene, preset: RenderPreset, engine: str, title: str = "", subtitle: str = "") -> None:
+def set_up_picture(
+    scene: bpy.types.Scene, preset: RenderPreset, engine: str, title: str = "", subtitle: str = ""
+) -> None:
     """Camera and captions for a still picture of the whole slope, with all trajectories and impacts there are.
 
     Raises
@@ -154,7 +156,9 @@ def _furnish(
     curtain.hide_viewport = True
 
 
-def _sheet(scene: bpy.types.Scene, name: str, eye: bpy.types.Object, distance: float, aspect: float) -> bpy.types.Object:
+def _sheet(
+    scene: bpy.types.Scene, name: str, eye: bpy.types.Object, distance: float, aspect: float
+) -> bpy.types.Object:
     """An empty before the camera in which the picture is one unit high, whatever the focal length becomes."""
     sheet = bpy.data.objects.new(name, None)
     sheet.empty_display_size = 0.01

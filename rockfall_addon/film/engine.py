@@ -36,7 +36,9 @@ def _cycles(scene: bpy.types.Scene, samples: int) -> None:
     cycles.use_auto_tile = False
     for material in bpy.data.materials:
         if material.name.startswith("Rockfall"):
-            material.cycles.emission_sampling = "NONE"  # else each triangle is a lamp, in a tree that is built every frame
+            material.cycles.emission_sampling = (
+                "NONE"  # else each triangle is a lamp, in a tree that is built every frame
+            )
 
 
 def _workbench(scene: bpy.types.Scene, samples: int) -> None:

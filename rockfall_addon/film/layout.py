@@ -81,13 +81,17 @@ def _weight(height_px: int) -> float:
     return min(1.0, (360 / height_px) ** 0.8)
 
 
-def _legend(make: Callable[..., bpy.types.Object], top_mps: float, left: float, low: float, size: float) -> list[bpy.types.Object]:
+def _legend(
+    make: Callable[..., bpy.types.Object], top_mps: float, left: float, low: float, size: float
+) -> list[bpy.types.Object]:
     width, height, bottom = 11.0 * size, 0.5 * size, low + 1.15 * size
     across = np.linspace(0.0, 1.0, LEGEND_STEPS + 1)
     corners = [(left + part * width, bottom + up * height, 0.0) for part in across for up in (0, 1)]
     mesh = bpy.data.meshes.new("Film legend")
     mesh.from_pydata(corners, [], [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(LEGEND_STEPS)])
-    captions.mark_colour(mesh, _opaque(srgb_to_linear(np.repeat(scale_colours(across, 0.0, 1.0, SPEED_SCALE), 2, axis=0))))
+    captions.mark_colour(
+        mesh, _opaque(srgb_to_linear(np.repeat(scale_colours(across, 0.0, 1.0, SPEED_SCALE), 2, axis=0)))
+    )
     title = make("Film legend title", "Block speed [m/s]", (left, bottom + height + 0.5 * size), size)
     marks = [
         make(

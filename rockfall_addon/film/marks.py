@@ -50,7 +50,11 @@ def until_now_group() -> bpy.types.GeometryNodeTree:
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     new, link = group.nodes.new, group.links.new
     source, result = new("NodeGroupInput"), new("NodeGroupOutput")
-    seconds, time, later = new("GeometryNodeInputSceneTime"), new("GeometryNodeInputNamedAttribute"), new("FunctionNodeCompare")
+    seconds, time, later = (
+        new("GeometryNodeInputSceneTime"),
+        new("GeometryNodeInputNamedAttribute"),
+        new("FunctionNodeCompare"),
+    )
     time.data_type = "FLOAT"
     time.inputs["Name"].default_value = materials.TIME_ATTRIBUTE
     later.data_type, later.operation = "FLOAT", "GREATER_THAN"

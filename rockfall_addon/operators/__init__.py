@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import demo, look, picks, share, terrain
+from . import demo, film, look, picks, share, terrain
 
-CLASSES = (*terrain.CLASSES, *picks.CLASSES, *look.CLASSES, *demo.CLASSES, *share.CLASSES)
+CLASSES = (*terrain.CLASSES, *picks.CLASSES, *look.CLASSES, *demo.CLASSES, *film.CLASSES, *share.CLASSES)
 
 
 def register() -> None:

@@ -21,7 +21,7 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
 
     bl_idname = "rockfall.set_up_film"
     bl_label = "Set Up Film"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
     size: EnumProperty(
         name="Size",
@@ -72,7 +72,7 @@ class ROCKFALL_OT_render_film(bpy.types.Operator):
 
     bl_idname = "rockfall.render_film"
     bl_label = "Render Film"
-    bl_options = {"REGISTER"}  # noqa: RUF012
+    bl_options = {"REGISTER"}
 
     filepath: StringProperty(subtype="FILE_PATH", default="rockfall.mp4")
     filter_glob: StringProperty(default="*.mp4", options={"HIDDEN"})
@@ -104,7 +104,7 @@ class ROCKFALL_OT_remove_film(bpy.types.Operator):
 
     bl_idname = "rockfall.remove_film"
     bl_label = "Remove Film Set-up"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

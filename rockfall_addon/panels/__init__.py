@@ -3,9 +3,9 @@
 
 import bpy
 
-from . import impact, picks, playback, share, terrain
+from . import film, impact, picks, playback, share, terrain
 
-CLASSES = (*terrain.CLASSES, *picks.CLASSES, *impact.CLASSES, *playback.CLASSES, *share.CLASSES)
+CLASSES = (*terrain.CLASSES, *picks.CLASSES, *impact.CLASSES, *playback.CLASSES, *film.CLASSES, *share.CLASSES)
 
 
 def register() -> None:

@@ -11,7 +11,7 @@ from .base import RockfallPanel
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
     bl_label = "Film"
     bl_idname = "ROCKFALL_PT_film"
-    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-
 from rockfall.core.film.framing import (
     UP,
     Margins,
@@ -78,6 +77,8 @@ def test_downhill_is_level_and_defined_without_motion() -> None:
     np.testing.assert_allclose(downhill_direction(np.zeros((1, 3)), np.array([[0.0, 0, -9]])), [0, 1, 0])
 
 
-@pytest.mark.parametrize(("wanted", "scale"), [(0.2, 1.0), (1.0, 1.0), (1.2, 1.5), (3.4, 4.0), (6.9, 7.0), (400.0, 100.0)])
+@pytest.mark.parametrize(
+    ("wanted", "scale"), [(0.2, 1.0), (1.0, 1.0), (1.2, 1.5), (3.4, 4.0), (6.9, 7.0), (400.0, 100.0)]
+)
 def test_blocks_are_enlarged_by_a_number_that_reads_well(wanted: float, scale: float) -> None:
     assert rounded_scale(wanted) == scale

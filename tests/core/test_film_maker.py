@@ -5,7 +5,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from rockfall.core import cli
 from rockfall.core.errors import DependencyError, RockfallError
 from rockfall.core.film import maker as maker_module
@@ -41,12 +40,17 @@ def test_a_probe_that_crashes_or_hangs_means_cycles() -> None:
 def test_an_engine_that_is_asked_for_must_work() -> None:
     assert choose_engine("cycles", KILL_YOURSELF) == "cycles"
     assert choose_engine("eevee", says("SOFTWARE")) == "eevee"
-    with pytest.raises(DependencyError, match="workbench does not work on this machine.*--engine cycles"):
+    with pytest.raises(DependencyError, match=r"workbench does not work on this machine.*--engine cycles"):
         choose_engine("workbench", KILL_YOURSELF)
 
 
 def test_the_probe_gets_the_script() -> None:
-    command = [sys.executable, "-c", "import sys; assert 'BLENDER_WORKBENCH' in sys.argv[1]; " + ANSWER.format(PASSED, "X"), "{probe}"]
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; assert 'BLENDER_WORKBENCH' in sys.argv[1]; " + ANSWER.format(PASSED, "X"),
+        "{probe}",
+    ]
     assert choose_engine("auto", command) == "workbench"
 
 
@@ -64,7 +68,7 @@ def test_what_a_process_says_is_wrong_is_our_error() -> None:
 
 
 def test_a_crash_is_told_with_its_last_words() -> None:
-    script = "import os, sys, signal; sys.stderr.write('deep trouble\\n'); sys.stderr.flush(); os.kill(os.getpid(), signal.SIGSEGV)"
+    script = "import os, signal; os.write(2, b'deep trouble'); os.kill(os.getpid(), signal.SIGSEGV)"
     with pytest.raises(RockfallError, match=r"while it made x\.mp4 \(status -11\)\. It said: deep trouble\. Try"):
         run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None)
 
@@ -92,7 +96,9 @@ def test_a_film_that_fails_leaves_nothing(
     monkeypatch.setattr(maker_module, "require_blender_libraries", lambda: None)
     token = inside_blender.set(FilmMaker(make, tuple(KILL_YOURSELF)))
     try:
-        status = cli.main(["render", str(project), "--preset", "preview", "--out", str(project.parent / "new" / "film")])
+        status = cli.main(
+            ["render", str(project), "--preset", "preview", "--out", str(project.parent / "new" / "film")]
+        )
     finally:
         inside_blender.reset(token)
     assert status == (1 if isinstance(failure, RockfallError) else 130)

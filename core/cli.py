@@ -17,6 +17,8 @@ DONE, BAD_INPUT, USAGE, INTERRUPTED = 0, 1, 2, 130
 COMMANDS = {
     "demo": "the whole job on the bundled site: reconstruct, figures, animation",
     "reconstruct": "timed picks → impacts.csv and trajectories.csv",
+    "compare": "impact models on measured impacts → predictions.csv and scores.csv",
+    "models": "the impact models, their parameters, units, ranges, defaults and sources",
     "terrain": "any terrain file → terrain.ply, and what there is to know about it",
     "render": "the animation of a project, through Blender",
 }

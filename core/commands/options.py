@@ -23,6 +23,13 @@ def not_negative(text: str) -> float:
     return value
 
 
+def whole(text: str) -> int:
+    """A whole number of zero or more."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number of zero or more")
+    return int(text)
+
+
 def unit(text: str) -> float:
     """A unit's name, or its length in metres."""
     if text in UNITS_M:

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All models on all measured impacts, with the incident conditions imposed (Noël et al. 2018, § 5)."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..impact_models.base import ImpactModel
+from ..impact_models.parameters import Value
+from ..impact_models.registry import COMPARED, find_model
+from ..reconstruction.impact import Impacts, apparent
+from ..reconstruction.picks import Indices, Names
+from ..vectors import Array
+from .courses import Courses, Spin, find_courses
+
+Parameters = Mapping[str, Mapping[str, object]]
+"""Model → parameter → value, for those that are not to have their default."""
+
+MOST_PREDICTIONS = 20_000_000
+"""A prediction takes about 0.2 kB while it is made."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """What k models make of m impacts, in 1 + R runs each: run 0 is the model's mean, the others are its replicates.
+
+    Attributes
+    ----------
+    models : k names.
+    row : (m,) row of each impact in the table of impacts.
+    site, trajectory, impact : (m,) names and number of the impacts.
+    v2, omega2 : (k, 1 + R, m, 3) restituted velocity [m/s] and angular velocity [rad/s].
+    omega1 : (k, 1 + R, m, 3) incident angular velocity that was imposed [rad/s]; NaN when read from a table.
+    vn2, vt2 : (k, 1 + R, m) norms of the normal and tangential parts of v2 [m/s].
+    rn, rt, r, theta_dev : (k, 1 + R, m) apparent coefficients [-] and deviation angle [rad], as in `Impacts`.
+    into_ground : (k, 1 + R, m) whether v2 points into the ground.
+    settings : model → all its parameters; empty when read from a table.
+    spin, seed : what they were computed with.
+    skipped : (row, reason) of the impacts that could not be compared.
+    """
+
+    models: tuple[str, ...]
+    row: Indices
+    site: Names
+    trajectory: Names
+    impact: Indices
+    v2: Array
+    omega2: Array
+    omega1: Array
+    vn2: Array
+    vt2: Array
+    rn: Array
+    rt: Array
+    r: Array
+    theta_dev: Array
+    into_ground: NDArray[np.bool_]
+    settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    spin: str = ""
+    seed: int = 0
+    skipped: tuple[tuple[int, str], ...] = ()
+
+    @property
+    def replicates(self) -> int:
+        """R, the number of runs with chance."""
+        return self.v2.shape[1] - 1
+
+    def index(self, model: str) -> int:
+        """Place of a model on the first axis.
+
+        Raises
+        ------
+        InputError : it is not among them.
+        """
+        if model not in self.models:
+            raise InputError(f"{model} was not compared", advice=f"There are {', '.join(self.models)}")
+        return self.models.index(model)
+
+
+def compare(
+    impacts: Impacts,
+    models: Sequence[str] = COMPARED,
+    parameters: Parameters | None = None,
+    *,
+    replicates: int = 0,
+    seed: int = 0,
+    spin: Spin = "rolling",
+    radius_m: float | None = None,
+) -> Predictions:
+    """All models on all measured impacts.
+
+    Parameters
+    ----------
+    models : names.
+    replicates : runs with chance, besides the mean.
+    seed : not negative. A trajectory's random numbers depend on it, on the model and on the names of site and
+        trajectory: not on the other models and trajectories, nor on their order, and with more replicates the first
+        ones stay.
+    spin, radius_m : see `find_courses`.
+
+    Raises
+    ------
+    InputError : unknown model or parameter, value out of range, and what `find_courses` refuses.
+    """
+    return predict(impacts, find_courses(impacts, spin, radius_m), models, parameters, replicates=replicates, seed=seed)
+
+
+def predict(
+    impacts: Impacts,
+    courses: Courses,
+    models: Sequence[str] = COMPARED,
+    parameters: Parameters | None = None,
+    *,
+    replicates: int = 0,
+    seed: int = 0,
+) -> Predictions:
+    """As `compare`, for courses that were found once: what a slider or a calibration calls again and again."""
+    if replicates < 0 or seed < 0:
+        raise InputError("The number of replicates and the seed are whole numbers of zero or more")
+    if (1 + replicates) * len(models) * len(courses) > MOST_PREDICTIONS:
+        raise InputError(
+            f"{replicates} replicates of {len(courses)} impacts and {len(models)} models are too many for the memory",
+            advice=f"Stay below {MOST_PREDICTIONS} predictions",
+        )
+    for name in parameters or {}:
+        find_model(name)
+    models = tuple(dict.fromkeys(models))
+    chosen = [find_model(name) for name in models]
+    settings = {model.name: model.settings((parameters or {}).get(model.name)) for model in chosen}
+
+    site, trajectory = impacts.site[courses.row], impacts.trajectory[courses.row]
+    shape = (len(models), 1 + replicates, len(courses))
+    omega1, v2, omega2 = (np.empty((*shape, 3)) for _ in range(3))
+    for i, model in enumerate(chosen):
+        draws = random_numbers(model, courses, site, trajectory, replicates if model.is_random else 0, seed)
+        numbers = model.numbers(settings[model.name])
+        omega1[i], v2[i], omega2[i] = model.chain(courses.incident, courses.follows, numbers, draws)
+
+    state = courses.incident
+    v1, normal = (
+        np.ascontiguousarray(np.broadcast_to(rows, v2.shape)).reshape(-1, 3) for rows in (state.velocity, state.normal)
+    )
+    seen = apparent(v1, v2.reshape(-1, 3), normal)
+    return Predictions(
+        models=models,
+        row=courses.row,
+        site=site,
+        trajectory=trajectory,
+        impact=impacts.impact[courses.row],
+        v2=v2,
+        omega2=omega2,
+        omega1=omega1,
+        vn2=seen.vn2.reshape(shape),
+        vt2=seen.vt2.reshape(shape),
+        rn=seen.rn.reshape(shape),
+        rt=seen.rt.reshape(shape),
+        r=seen.r.reshape(shape),
+        theta_dev=seen.theta_dev.reshape(shape),
+        into_ground=(seen.escape < 0).reshape(shape),
+        settings=settings,
+        spin=courses.spin,
+        seed=seed,
+        skipped=courses.skipped,
+    )
+
+
+def random_numbers(
+    model: ImpactModel, courses: Courses, site: Names, trajectory: Names, replicates: int, seed: int
+) -> Array:
+    """(1 + replicates, m, draws) uniform numbers, one stream for each trajectory; the first run is NaN, the mean."""
+    draws = np.full((1 + replicates, len(courses), model.draws), np.nan)
+    if replicates:
+        for start, stop in zip(courses.first[:-1], courses.first[1:], strict=True):
+            name = "\0".join((model.name, str(site[start]), str(trajectory[start])))
+            words = np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")
+            stream = np.random.default_rng([seed, *words.tolist()])
+            draws[1:, start:stop] = stream.random((replicates, stop - start, model.draws))
+    return draws

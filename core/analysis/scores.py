@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How near a model comes to the measured impacts: on average, in its scatter, and cloud against cloud."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..reconstruction.impact import Impacts
+from ..reconstruction.picks import Indices
+from ..vectors import Array
+from .comparison import Predictions
+
+ABSCISSA = {
+    "vn2_mps": "vn1_mps",
+    "vt2_mps": "vt1_mps",
+    "rn": "theta1_deg",
+    "rt": "theta1_deg",
+    "r": "theta_dev_deg",
+    "theta_dev_deg": "theta1_deg",
+}
+"""Quantity that is scored → what it is plotted against."""
+HALF, MOST = (0.25, 0.75), (0.05, 0.95)
+CLOUD_POINTS = 1000
+"""Of a larger cloud, this many evenly spaced points enter the energy distance, whose cost grows with the square."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """One model and one quantity, over the impacts where it is measured.
+
+    Attributes
+    ----------
+    model, quantity : the latter as a column of predictions.csv, which names its unit.
+    n : impacts.
+    bias, rmse : mean and root mean square of predicted − measured; predicted is the mean of the replicates, or the
+        model's mean run when there are none.
+    median_error : median of |predicted − measured|, which a few outliers do not move.
+    coverage50, coverage90 : share of the measured values between the 25 and 75 %, the 5 and 95 % quantiles of their
+        replicates; NaN without replicates. 0.5 and 0.9 would be right; a model without chance has 0.
+    wasserstein : between the measured and the predicted values, replicates pooled, in the quantity's unit.
+    energy_distance : between the two clouds in the plane of the graph (`ABSCISSA`), axes divided by the interquartile
+        range of the measured values; 0 for the same cloud.
+    """
+
+    model: str
+    quantity: str
+    n: int
+    bias: float
+    rmse: float
+    median_error: float
+    coverage50: float
+    coverage90: float
+    wasserstein: float
+    energy_distance: float
+
+
+def scores(impacts: Impacts, predictions: Predictions) -> tuple[Score, ...]:
+    """All models and all quantities of `ABSCISSA`."""
+    row = predictions.row
+    return tuple(
+        _score(model, i, quantity, impacts, predictions)
+        for i, model in enumerate(predictions.models)
+        for quantity in ABSCISSA
+        if row.size
+    )
+
+
+def measured(impacts: Impacts, row: Indices, name: str) -> Array:
+    """(m,) a column of impacts.csv by its name, with the unit of that name."""
+    values: Array = getattr(impacts, name.removesuffix("_mps").removesuffix("_deg"))[row]
+    return np.degrees(values) if name.endswith("_deg") else values
+
+
+def predicted(predictions: Predictions, model: int, name: str) -> Array:
+    """(1 + R, m) a column of predictions.csv by its name, with the unit of that name."""
+    values: Array = getattr(predictions, name.removesuffix("_mps").removesuffix("_deg"))[model]
+    return np.degrees(values) if name.endswith("_deg") else values
+
+
+def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions) -> Score:
+    from scipy.stats import wasserstein_distance
+
+    against = ABSCISSA[quantity]
+    y, runs = measured(impacts, predictions.row, quantity), predicted(predictions, i, quantity)
+    x = measured(impacts, predictions.row, against)
+    x_runs = predicted(predictions, i, against) if against in ABSCISSA else np.broadcast_to(x, runs.shape)
+    known = np.isfinite(y) & np.isfinite(x) & np.isfinite(runs).all(axis=0) & np.isfinite(x_runs).all(axis=0)
+    n = int(known.sum())
+    if not n:
+        return Score(model, quantity, 0, *[np.nan] * 7)
+    y, runs, x, x_runs = y[known], runs[:, known], x[known], x_runs[:, known]
+    draws, x_draws = (runs[1:], x_runs[1:]) if predictions.replicates else (runs, x_runs)
+    error = draws.mean(axis=0) - y
+    return Score(
+        model,
+        quantity,
+        n,
+        float(error.mean()),
+        float(np.sqrt(np.mean(error**2))),
+        float(np.median(np.abs(error))),
+        _coverage(y, draws, *HALF) if predictions.replicates else np.nan,
+        _coverage(y, draws, *MOST) if predictions.replicates else np.nan,
+        float(wasserstein_distance(y, draws.ravel())),
+        energy_distance(np.stack([x, y], axis=1), np.stack([x_draws.ravel(), draws.ravel()], axis=1)),
+    )
+
+
+def _coverage(y: Array, draws: Array, low: float, high: float) -> float:
+    least, greatest = np.quantile(draws, [low, high], axis=0)
+    return float(np.mean((least <= y) & (y <= greatest)))
+
+
+def energy_distance(one: Array, other: Array) -> float:
+    """√(2E|X−Y| − E|X−X′| − E|Y−Y′|) of two clouds (n, d) and (k, d) (Székely & Rizzo 2013), axes scaled.
+
+    Each axis is divided by the interquartile range of `one`, where that is above zero.
+    """
+    from scipy.spatial.distance import cdist
+
+    first, third = np.quantile(one, [0.25, 0.75], axis=0)
+    scale = np.where(third > first, third - first, 1.0)
+    a, b = (_thinned(cloud) / scale for cloud in (one, other))
+    squared = 2 * cdist(a, b).mean() - cdist(a, a).mean() - cdist(b, b).mean()
+    return float(np.sqrt(max(squared, 0.0)))
+
+
+def _thinned(cloud: Array) -> Array:
+    if len(cloud) <= CLOUD_POINTS:
+        return cloud
+    return cloud[np.linspace(0, len(cloud) - 1, CLOUD_POINTS).round().astype(np.intp)]

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall compare``: what the impact models make of measured impacts → predictions.csv and scores.csv."""
+
+import argparse
+from collections import Counter
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .options import add_out, positive, whole
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..analysis.comparison import Predictions
+    from ..analysis.scores import Score
+
+SHOWN = (("rn", "R_N"), ("rt", "R_T"), ("r", "R"), ("theta_dev_deg", "θ_dev [°]"))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
+    add_out(parser)
+    parser.add_argument(
+        "--model",
+        action="extend",
+        nargs="+",
+        metavar="NAME",
+        help="models to compare (default: the six of Noël et al. 2018; `rockfall models` lists all)",
+    )
+    parser.add_argument(
+        "--set",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="NAME.PARAMETER=VALUE",
+        help="a parameter that is not to have its default",
+    )
+    parser.add_argument(
+        "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
+    )
+    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument(
+        "--spin",
+        choices=("rolling", "zero", "table"),
+        default="rolling",
+        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
+    )
+    parser.add_argument(
+        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Compare, write the tables, print the summary."""
+    from ..analysis.comparison import compare
+    from ..analysis.scores import scores
+    from ..exchange.comparison_tables import write_predictions, write_scores, write_settings
+    from ..exchange.output import output_folder
+    from ..exchange.tables import read_impacts
+    from ..impact_models.registry import COMPARED, find_model, parse_settings
+
+    models = [find_model(name).name for name in arguments.model or COMPARED]
+    parameters = parse_settings(arguments.set)
+    idle = [name for name in parameters if name not in models]
+    if idle:
+        raise InputError(f"--set gives parameters of {idle[0]}, which is not compared", advice=f"Add --model {idle[0]}")
+    with output_folder(arguments.out) as folder, Progress() as progress:
+        progress(f"Reading {arguments.impacts}")
+        impacts = read_impacts(arguments.impacts)
+        progress("Comparing")
+        try:
+            predictions = compare(
+                impacts,
+                models,
+                parameters,
+                replicates=arguments.replicates,
+                seed=arguments.seed,
+                spin=arguments.spin,
+                radius_m=arguments.radius,
+            )
+        except InputError as error:
+            raise InputError(
+                error.problem, file=arguments.impacts, trajectory=error.trajectory, advice=error.advice
+            ) from error
+        marks = scores(impacts, predictions)
+        progress("Writing the tables")
+        write_predictions(predictions, folder / "predictions.csv")
+        write_scores(marks, folder / "scores.csv")
+        write_settings(predictions, folder / "comparison.toml")
+    for line in (*_counts(predictions, len(impacts)), *_table(marks)):
+        print(line)
+    print(f"Written: predictions.csv, scores.csv, comparison.toml in {arguments.out}")
+    return 0
+
+
+def _counts(predictions: "Predictions", impacts: int) -> list[str]:
+    n, replicates = predictions.row.size, predictions.replicates
+    chance = f" and {replicates} replicates with seed {predictions.seed}" if replicates else ""
+    lines = [f"{n} of {impacts} impacts compared: the mean{chance} of {len(predictions.models)} models."]
+    skipped = Counter(reason for _, reason in predictions.skipped)
+    return [*lines, *(f"Skipped: {number} with {reason}." for reason, number in skipped.items())]
+
+
+def _table(marks: "tuple[Score, ...]") -> list[str]:
+    """Bias and RMSE of each model, in columns."""
+    by = {(score.model, score.quantity): score for score in marks}
+    head = f"{'bias ± RMSE':<24}" + "".join(f"{name:>17}" for _, name in SHOWN)
+    lines = [head.rstrip()]
+    for model in dict.fromkeys(score.model for score in marks):
+        cells = [by[model, quantity] for quantity, _ in SHOWN]
+        texts = [f"{cell.bias:+.2f} ± {cell.rmse:.2f}" if cell.n else "–" for cell in cells]
+        lines.append(f"{model:<24}" + "".join(f"{text:>17}" for text in texts))
+    return lines

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""predictions.csv, scores.csv, and comparison.toml with what they were computed with."""
+
+import csv
+from dataclasses import astuple, fields
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from ..analysis.comparison import Predictions
+from ..analysis.scores import Score
+from ..errors import InputError
+from ..reconstruction.impact import Impacts
+from ..vectors import Array
+from .csv_text import TextTable, read_table
+
+V2 = ("v2x_mps", "v2y_mps", "v2z_mps")
+OMEGA2 = ("omega2x_radps", "omega2y_radps", "omega2z_radps")
+SCALARS = ("vn2_mps", "vt2_mps", "rn", "rt", "r", "theta_dev_deg")
+PREDICTIONS_COLUMNS = ("model", "replicate", "trajectory", "impact", *V2, *OMEGA2, *SCALARS, "flags")
+"""The columns of predictions.csv; a table of several sites has one more, site."""
+INTO_GROUND = "into_ground"
+
+
+def write_predictions(predictions: Predictions, path: str | Path) -> None:
+    """Write predictions.csv, model by model and run by run."""
+    several = len(set(predictions.site.tolist())) > 1
+    places = zip(predictions.trajectory.tolist(), predictions.impact.tolist(), predictions.site.tolist(), strict=True)
+    names = [(str(trajectory), str(impact), str(site)) for trajectory, impact, site in places]
+    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow((*PREDICTIONS_COLUMNS, "site") if several else PREDICTIONS_COLUMNS)
+        for i, model in enumerate(predictions.models):
+            for run in range(1 + predictions.replicates):
+                columns = _columns(predictions, i, run)
+                flags = [INTO_GROUND if into else "" for into in predictions.into_ground[i, run].tolist()]
+                for (trajectory, impact, site), cells, flag in zip(
+                    names, zip(*columns, strict=True), flags, strict=True
+                ):
+                    row = (model, run, trajectory, impact, *cells, flag)
+                    writer.writerow((*row, site) if several else row)
+
+
+def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
+    """Read predictions.csv, of these impacts.
+
+    Raises
+    ------
+    InputError : anything that is wrong with the table; a row that belongs to no impact; a model that has not the same
+        runs and impacts as the first.
+    """
+    table = read_table(path, PREDICTIONS_COLUMNS[:4] + V2, (*PREDICTIONS_COLUMNS, "site"))
+    where = _rows_of_impacts(table, impacts)
+    names, replicate = table.text("model"), table.numbers("replicate", required=True).astype(np.intp)
+    models = tuple(dict.fromkeys(names))
+    place = {name: i for i, name in enumerate(models)}
+    model = np.array([place[name] for name in names], dtype=np.intp)
+    rows = where[(model == 0) & (replicate == 0)]
+    shape = (len(models), int(replicate.max()) + 1, rows.size)
+    order = np.lexsort((_rank(where, rows), replicate, model))
+    expected = np.stack([index.ravel() for index in np.indices(shape)])
+    if len(table) != np.prod(shape) or not np.array_equal(
+        np.stack([model, replicate, _rank(where, rows)])[:, order], expected
+    ):
+        raise InputError(
+            f"The {len(table)} rows are not {shape[0]} models with runs 0…{shape[1] - 1} of {shape[2]} impacts",
+            file=path,
+            advice="Every model must have the same runs and impacts, each once",
+        )
+
+    def of(values: Array) -> Array:
+        return values[order].reshape(*shape, *values.shape[1:])
+
+    flags = np.array([INTO_GROUND in cell.split(";") for cell in table.text("flags")], dtype=np.bool_)
+    v2 = of(table.vectors(V2))
+    return Predictions(
+        models=models,
+        row=rows,
+        site=impacts.site[rows],
+        trajectory=impacts.trajectory[rows],
+        impact=impacts.impact[rows],
+        v2=v2,
+        omega2=of(table.vectors(OMEGA2)),
+        omega1=np.full(v2.shape, np.nan),
+        into_ground=flags[order].reshape(shape),
+        vn2=of(table.numbers("vn2_mps")),
+        vt2=of(table.numbers("vt2_mps")),
+        rn=of(table.numbers("rn")),
+        rt=of(table.numbers("rt")),
+        r=of(table.numbers("r")),
+        theta_dev=np.radians(of(table.numbers("theta_dev_deg"))),
+    )
+
+
+def write_scores(scores: tuple[Score, ...], path: str | Path) -> None:
+    """Write scores.csv."""
+    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(field.name for field in fields(Score))
+        for score in scores:
+            writer.writerow("" if value != value else value for value in astuple(score))
+
+
+def read_scores(path: str | Path) -> tuple[Score, ...]:
+    """Read scores.csv.
+
+    Raises
+    ------
+    InputError : anything that is wrong with the table, with the row.
+    """
+    names = [field.name for field in fields(Score)]
+    table = read_table(path, names, names)
+    numbers = {name: table.numbers(name) for name in names[3:]}
+    counts = table.numbers("n", required=True).astype(np.intp)
+    return tuple(
+        Score(model, quantity, int(n), **{name: float(values[i]) for name, values in numbers.items()})
+        for i, (model, quantity, n) in enumerate(zip(table.text("model"), table.text("quantity"), counts, strict=True))
+    )
+
+
+def write_settings(predictions: Predictions, path: str | Path) -> None:
+    """Write comparison.toml: the seed, the spin and all parameters of all models."""
+    models = {name: dict(settings) for name, settings in predictions.settings.items()}
+    content = {
+        "seed": predictions.seed,
+        "replicates": predictions.replicates,
+        "spin": predictions.spin,
+        "impacts": int(predictions.row.size),
+        "models": models,
+    }
+    Path(path).write_text(tomli_w.dumps(content), encoding="utf-8")
+
+
+def _columns(predictions: Predictions, i: int, run: int) -> list[list[str]]:
+    """The number columns of one model and run, as text that reads back as the same number."""
+    vectors = [values[i, run, :, axis] for values in (predictions.v2, predictions.omega2) for axis in range(3)]
+    norms = [getattr(predictions, name)[i, run] for name in ("vn2", "vt2", "rn", "rt", "r")]
+    columns = [*vectors, *norms, np.degrees(predictions.theta_dev[i, run])]
+    return [["" if value != value else repr(value) for value in values.tolist()] for values in columns]
+
+
+def _rows_of_impacts(table: TextTable, impacts: Impacts) -> np.ndarray:
+    """(n,) row of the impact that each row of the table belongs to."""
+    sites = impacts.site.tolist() if "site" in table.columns else [""] * len(impacts)
+    keys = zip(sites, impacts.trajectory.tolist(), impacts.impact.tolist(), strict=True)
+    known = {key: i for i, key in enumerate(keys)}
+    numbers = table.numbers("impact", required=True)
+    where = np.empty(len(table), dtype=np.intp)
+    for i, (site, name) in enumerate(zip(table.text("site"), table.text("trajectory"), strict=True)):
+        key = (site, name, int(numbers[i]))
+        if key not in known:
+            raise table.error(i, f"There is no impact {key[2]} in the table of impacts", "Give the impacts they are of")
+        where[i] = known[key]
+    return where
+
+
+def _rank(where: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """(n,) place of each row among `rows`; −1 where it is not there."""
+    place = np.full(int(where.max()) + 1, -1, dtype=np.intp)
+    place[rows] = np.arange(rows.size)
+    return place[where]

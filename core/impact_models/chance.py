@@ -6,8 +6,8 @@ A uniform number that is NaN asks for the mean of the law. Plain functions that 
 
 from math import erfc, inf, isnan, log, sqrt
 
-SMALLEST = 2.0**-54
-"""Half the spacing of the uniform numbers of numpy: stands for 0."""
+SMALLEST = 2.0**-53
+"""The spacing of the uniform numbers of numpy: stands for 0, and 1 less it for 1."""
 
 # fmt: off
 CENTRE = (

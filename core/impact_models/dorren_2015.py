@@ -10,10 +10,10 @@
 model.
 R_n = 0 (soil type 0) stops the block.
 
-Chance, at every rebound: R_n = mean · U(0.9, 1.1); MOH is Rg70, Rg20 or Rg10 with probability 0.7, 0.2, 0.1; the block
-is deviated sideways by an angle whose class depends on the speed before the rebound, uniform within the class, to the
-left or right (or towards the dip). Off by default: ±10 % on R_t, a slope angle reduced by U(0°, 4°). The mean takes the
-mean R_n and MOH and no deviation.
+Chance, at every rebound: R_n = mean · U(0.9, 1.1), at most 1; MOH is Rg70, Rg20 or Rg10 with probability 0.7, 0.2, 0.1;
+the block is deviated sideways by an angle whose class depends on the speed before the rebound, uniform within the
+class, to the left or right (or towards the dip). Off by default: ±10 % on R_t, a slope angle reduced by U(0°, 4°). The
+mean takes the mean R_n and MOH and no deviation.
 
 The deviation turns v2 and ω2 about the vertical, so that v2 may point into the ground; or about the normal, which
 leaves the apparent R_N as it is; or by the same angle in any direction (cone).
@@ -129,7 +129,7 @@ def rebound(
     deviation, axis, side, rt_spread, reduction, penetration, limit = p[7], p[8], p[9], p[10], p[11], p[12], p[13]
     if reduction > 0.0:
         n = lowered(v1, n, radians(uniform(draws[3], 0.0, reduction)))
-    rn = mean_rn * uniform(draws[0], 1.0 - rn_spread, 1.0 + rn_spread)
+    rn = min(1.0, mean_rn * uniform(draws[0], 1.0 - rn_spread, 1.0 + rn_spread))
     if rn <= 0.0:
         return STOPPED, STOPPED
     approach, tangential, tangential_speed = split(v1, n)

@@ -62,8 +62,8 @@ def shaded_material(name: str, attribute: str) -> bpy.types.Material:
 def trail_group() -> bpy.types.GeometryNodeTree:
     """Geometry nodes: a polyline with times becomes a tube, wholly or up to the current time.
 
-    The polyline itself is joined to the tube because Blender keeps the active colour attribute (which the viewport's
-    solid mode shows) from it alone.
+    The polyline's bare points are joined to the tube because Blender keeps the active colour attribute (which the
+    viewport's solid mode shows) from the original mesh alone; its edges would be drawn black.
     """
     existing = bpy.data.node_groups.get(TRAIL_GROUP)
     if existing is not None:
@@ -111,7 +111,10 @@ def trail_group() -> bpy.types.GeometryNodeTree:
     link(circle.outputs[0], tube.inputs["Profile Curve"])
     link(tube.outputs[0], material.inputs[0])
     link(material.outputs[0], join.inputs[0])
-    link(cut.outputs[0], join.inputs[0])
+    bare = new("GeometryNodeDeleteGeometry")
+    bare.domain, bare.mode = "EDGE", "EDGE_FACE"
+    link(cut.outputs[0], bare.inputs["Geometry"])
+    link(bare.outputs[0], join.inputs[0])
     link(join.outputs[0], result.inputs[0])
     return group
 

@@ -49,9 +49,9 @@ def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> 
     extent = float(np.ptp(result.picks.position, axis=0).max(initial=0.0))
     blocks = [result.block] if isinstance(result.block, Block) else list(result.block.values())
     radius = float(np.mean([block.radius_m for block in blocks]))
-    settings.marker_radius_m = max(radius, 0.005 * extent)
-    settings.trail_radius_m = max(0.2 * radius, 0.002 * extent)
-    settings.block_scale = max(1.0, round(0.006 * extent / radius * 2) / 2)
+    settings.marker_radius_m = max(radius, 0.006 * extent)
+    settings.trail_radius_m = max(0.2 * radius, 0.0025 * extent)
+    settings.block_scale = max(1.0, round(0.008 * extent / radius * 2) / 2)
 
 
 def _show_flights(scene: bpy.types.Scene, name: str, flights: Flights, which: np.ndarray, offset: float) -> None:

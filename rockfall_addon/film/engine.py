@@ -4,15 +4,13 @@
 import bpy
 import gpu
 
-FILM_SAMPLES, LARGE_FILM_SAMPLES, PICTURE_SAMPLES = 5, 4, 24
-"""Per pixel, and only to smooth edges: nothing here is noisy. Large pictures need less of it."""
-LARGE_PX = 1280 * 720
+FILM_SAMPLES, PICTURE_SAMPLES = 4, 24
+"""Per pixel, and only to smooth edges: nothing here is noisy."""
 
 
 def use_engine(scene: bpy.types.Scene, engine: str, still: bool = False) -> None:
-    """Set a scene up for "cycles", "workbench" or "eevee", once all its materials and its resolution are there."""
-    large = scene.render.resolution_x * scene.render.resolution_y > LARGE_PX
-    samples = PICTURE_SAMPLES if still else LARGE_FILM_SAMPLES if large else FILM_SAMPLES
+    """Set a scene up for "cycles", "workbench" or "eevee", once all its materials are there."""
+    samples = PICTURE_SAMPLES if still else FILM_SAMPLES
     {"cycles": _cycles, "workbench": _workbench, "eevee": _eevee}[engine](scene, samples)
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"

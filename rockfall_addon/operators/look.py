@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the 3-D view shows the slope: relief, cavities and trajectories in their own colours, without a render."""
 
+from math import radians
+
 import bpy
 from bpy.props import BoolProperty
 from mathutils import Quaternion, Vector
 
 from ..bridge import state, terrain
+
+AROUND = 1.15  # some air around what is framed
+ASIDE_DEG = 25.0  # so that flights show beside each other and not one behind the other
 
 
 def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
@@ -19,9 +24,8 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
         space = area.spaces.active
         shading = space.shading
         shading.type, shading.light, shading.color_type = "SOLID", "FLAT", "VERTEX"
-        shading.show_cavity, shading.cavity_type = True, "BOTH"
+        shading.show_cavity, shading.cavity_type = True, "WORLD"  # the other kind breaks thin trails into dots
         shading.cavity_ridge_factor, shading.cavity_valley_factor = 0.2, 0.6
-        shading.curvature_ridge_factor, shading.curvature_valley_factor = 0.2, 0.4
         shading.show_object_outline = False
         shading.background_type, shading.background_color = "VIEWPORT", (0.055, 0.065, 0.08)
         space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
@@ -36,14 +40,16 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
 
 def _ours(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     terrain, flights = (state.with_role(scene, role) for role in (state.TERRAIN_ROLE, state.FLIGHTS_ROLE))
-    return terrain or flights
+    return flights or terrain
 
 
 def _up_the_slope(scene: bpy.types.Scene) -> Quaternion:
-    """View rotation of somebody who stands below the slope and looks up at it."""
+    """View rotation of somebody who stands below the slope, somewhat to the side, and looks up at it."""
     ground = terrain.active_terrain(scene)
     fall = terrain.downhill(ground) if ground is not None else Vector((0.0, -1.0, 0.0))
-    towards_viewer = Vector((fall.x, fall.y, 0.0)).normalized() + Vector((0.0, 0.0, 0.45))
+    towards_viewer = Vector((fall.x, fall.y, 0.0)).normalized()
+    towards_viewer.rotate(Quaternion((0.0, 0.0, 1.0), radians(ASIDE_DEG)))
+    towards_viewer.z = 0.4
     return towards_viewer.to_track_quat("Z", "Y")
 
 
@@ -56,6 +62,7 @@ def _frame(context: bpy.types.Context, area: bpy.types.Area, things: list[bpy.ty
     smooth, context.preferences.view.smooth_view = context.preferences.view.smooth_view, 0
     with context.temp_override(area=area, region=region):
         bpy.ops.view3d.view_selected()
+    area.spaces.active.region_3d.view_distance *= AROUND
     context.preferences.view.smooth_view = smooth
     for thing in context.view_layer.objects:
         thing.select_set(thing in selected)

@@ -97,8 +97,7 @@ def find_courses(impacts: Impacts, spin: Spin = "rolling", radius_m: float | Non
         known = linked & np.isfinite(after[0]).all(axis=1)
         omega = np.where(known[:, None], _rolling(*after, radius), _rolling(normal, v1, radius))
 
-    mass = np.where(np.isfinite(impacts.mass_kg), impacts.mass_kg, np.nan)[order]
-    sphere = 4 / 3 * np.pi * radius**3 * ROCK_DENSITY_KGPM3
+    mass, sphere = impacts.mass_kg[order], 4 / 3 * np.pi * radius**3 * ROCK_DENSITY_KGPM3
     place = np.cumsum(used) - 1
     group = np.cumsum(~same)[used]
     return Courses(

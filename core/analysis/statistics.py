@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The statistics of a table of impacts that Noël et al. 2018 print, and their published values beside them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from ..errors import InputError
 from ..reconstruction.impact import Impacts
+from ..reconstruction.picks import Mask
 from ..vectors import Array, norm
 
 PUBLISHED_RT_SLOPE = 0.66
@@ -136,15 +138,20 @@ class ImpactStatistics:
         ]
 
 
-def impact_statistics(impacts: Impacts) -> ImpactStatistics:
+def impact_statistics(impacts: Impacts, among: Mask | None = None) -> ImpactStatistics:
     """The statistics of all impacts whose coefficients are defined.
+
+    Parameters
+    ----------
+    among : (n,) which impacts to take; None for all.
 
     Notes
     -----
     First, last and departing impacts have no coefficients and drop out by themselves. Doubtful picks count like the
     others. Angles enter the fits in degrees, as in the paper's figures.
     """
-    used = impacts.complete & np.isfinite(impacts.theta1) & np.isfinite(impacts.theta_dev)
+    among = np.ones(len(impacts), dtype=np.bool_) if among is None else among
+    used = among & impacts.complete & np.isfinite(impacts.theta1) & np.isfinite(impacts.theta_dev)
     vt1, vt2 = impacts.vt1[used], impacts.vt2[used]
     rn, r = impacts.rn[used], impacts.r[used]
     theta1_deg, deviation_deg = np.degrees(impacts.theta1[used]), np.degrees(impacts.theta_dev[used])
@@ -159,7 +166,7 @@ def impact_statistics(impacts: Impacts) -> ImpactStatistics:
         ("theta_dev", "deg"): deviation_deg,
     }
     return ImpactStatistics(
-        impacts=len(impacts),
+        impacts=int(among.sum()),
         used=int(used.sum()),
         rt=line_through_origin(vt1, vt2),
         rt_free=line(vt1, vt2),
@@ -170,6 +177,28 @@ def impact_statistics(impacts: Impacts) -> ImpactStatistics:
         grazing=int(grazing.sum()),
         spreads={key: _spread(values) for key, values in quantities.items()},
     )
+
+
+def group_statistics(impacts: Impacts, column: str) -> dict[str, ImpactStatistics]:
+    """The statistics of each group of impacts, by the text in a column.
+
+    Parameters
+    ----------
+    column : "site", "trajectory", a number of the table ("diameter_m", "impact", …), a flag ("doubtful": the groups
+        are "yes" and "no"), or one of the further columns of the table that was read.
+
+    Raises
+    ------
+    InputError : there is no such column; those that there are, are named.
+    """
+    plain = {one.name: getattr(impacts, one.name) for one in fields(Impacts)}
+    groups = {name: values for name, values in plain.items() if np.ndim(values) == 1}
+    groups |= {name: np.where(marked, "yes", "no") for name, marked in impacts.flags.items()}
+    groups |= dict(impacts.extra)
+    if column not in groups:
+        raise InputError(f"There is no column {column!r} to group by", advice=f"There are {', '.join(groups)}")
+    texts = np.array([f"{value:g}" if isinstance(value, float) else str(value) for value in groups[column].tolist()])
+    return {str(text): impact_statistics(impacts, texts == text) for text in dict.fromkeys(texts.tolist())}
 
 
 def line_through_origin(x: Array, y: Array) -> LineFit:

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The graphs in print: one figure per model, and all models on one sheet as in Noël et al. 2018, Fig. 8.
+
+Text stays text in SVG and PDF. The two series differ in colour (Okabe & Ito's vermilion against black), in brightness
+and in shape, so that they are told apart without colour too.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..impact_models.registry import find_model
+from .curves import Curve
+from .extras import FIGURES, demand
+from .graphs import Graph
+from .variables import Variable, find_variable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS = ("svg", "png", "pdf")
+DPI = 300
+COLUMN_IN, PAGE_IN = 3.54, 7.48
+"""Widths of one column (90 mm) and of a page (190 mm)."""
+MEASURED, MODELLED, LINK = "#20262e", "#d55e00", "#b4b9c1"
+INK, MUTED = "#20262e", "#5b6470"
+LISTED = 3
+"""So many points beyond the axes are listed, the others are counted."""
+
+STYLE: Any = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Arial", "Helvetica", "Liberation Sans", "DejaVu Sans"],
+    "mathtext.fontset": "dejavusans",
+    "font.size": 7.0,
+    "axes.labelsize": 7.0,
+    "axes.linewidth": 0.5,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.labelpad": 2.5,
+    "text.color": INK,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "rockfall",
+}
+
+
+def model_figure(graphs: Sequence[Graph]) -> "Figure":
+    """The graphs of one model, two beside each other.
+
+    Raises
+    ------
+    DependencyError : Matplotlib is not installed.
+    """
+    demand(FIGURES)
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    rows = (len(graphs) + 1) // 2
+    with rc_context(STYLE):
+        places = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06)
+        figure = Figure(figsize=(PAGE_IN, 0.35 + 2.55 * rows), layout=places)
+        axes = figure.subplots(rows, 2, squeeze=False).ravel()
+        for each, graph in zip(axes, graphs, strict=False):
+            _draw(each, graph, size=1.0)
+            _labels(each, graph, x=True, short=False)
+        for each in axes[len(graphs) :]:
+            each.set_axis_off()
+        figure.text(0.012, 0.988, _title(graphs[0]), fontsize=8.5, fontweight="bold", ha="left", va="top")
+        _legend(figure, graphs[0])
+        return _laid_out(figure)
+
+
+def sheet_figure(sheet: Sequence[Sequence[Graph]]) -> "Figure":
+    """Models (rows) × graphs (columns) on one page.
+
+    Raises
+    ------
+    DependencyError : Matplotlib is not installed.
+    """
+    demand(FIGURES)
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    with rc_context(STYLE):
+        places = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.02, hspace=0.02, wspace=0.02)
+        figure = Figure(figsize=(PAGE_IN, 0.5 + 1.52 * len(sheet)), layout=places)
+        grid = figure.subplots(len(sheet), len(sheet[0]), squeeze=False, sharex="col", sharey="col")
+        for i, (row, graphs) in enumerate(zip(grid, sheet, strict=True)):
+            for each, graph in zip(row, graphs, strict=True):
+                _draw(each, graph, size=0.62)
+                _labels(each, graph, x=i == len(sheet) - 1, short=True)
+            row[0].set_title(_title(graphs[0]), fontsize=7.5, fontweight="bold", loc="left", pad=7.0)
+        _legend(figure, sheet[0][0])
+        return _laid_out(figure)
+
+
+def save_figures(
+    sheet: Sequence[Sequence[Graph]], folder: str | Path, formats: Sequence[str] = FORMATS
+) -> tuple[Path, ...]:
+    """Write the sheet (all_models) and one figure per model into a folder; returns the files.
+
+    Raises
+    ------
+    DependencyError : Matplotlib is not installed.
+    """
+    demand(FIGURES)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name, figure in (
+        ("all_models", sheet_figure(sheet)),
+        *((graphs[0].model, model_figure(graphs)) for graphs in sheet),
+    ):
+        for kind in formats:
+            written.append(folder / f"{name}.{kind}")
+            save_figure(figure, written[-1])
+    return tuple(written)
+
+
+def save_figure(figure: "Figure", path: str | Path) -> None:
+    """Write one figure; the file's ending says the format. The same figure makes the same file."""
+    from matplotlib import rc_context
+
+    undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
+    with rc_context(STYLE):
+        figure.savefig(path, dpi=DPI, facecolor="white", metadata=undated)
+
+
+def _laid_out(figure: "Figure") -> "Figure":
+    """The figure with its places fixed, which takes longer than to draw it."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    return figure
+
+
+def _draw(axes: "Axes", graph: Graph, size: float) -> None:
+    from matplotlib.collections import LineCollection
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_xscale("log" if graph.spec.x_log else "linear")
+    axes.set_yscale("log" if graph.spec.y_log else "linear")
+    if not graph.spec.y_log:
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    if not graph.spec.x_log:
+        axes.xaxis.set_major_locator(MaxNLocator(7 if size == 1.0 else 5, steps=[1, 2, 5, 10]))
+    axes.set_xlim(graph.x_limits)
+    axes.set_ylim(graph.y_limits)
+    axes.add_collection(LineCollection(list(graph.links), colors=LINK, linewidths=0.6 * size, zorder=1), autolim=False)
+    axes.scatter(
+        graph.modelled[:, 0],
+        graph.modelled[:, 1],
+        s=13 * size,
+        c=MODELLED,
+        marker="D",
+        linewidths=0,
+        alpha=0.85,
+        zorder=2,
+    )
+    axes.scatter(
+        graph.measured[:, 0], graph.measured[:, 1], s=11 * size, c=MEASURED, linewidths=0, alpha=0.85, zorder=3
+    )
+    notes = []
+    for curve, colour in ((graph.measured_curve, MEASURED), (graph.modelled_curve, MODELLED)):
+        if curve is not None:
+            axes.plot(curve.x, curve.y, color="white", linewidth=1.9 * size, zorder=4)
+            axes.plot(curve.x, curve.y, color=colour, linewidth=1.2 * size, zorder=5)
+            notes.append((curve_text(curve, graph), colour))
+    notes += [(line, MUTED) for line in beyond_lines(graph)]
+    font = 6.0 if size == 1.0 else 5.0
+    rising = graph.spec.trend == "origin"  # which leaves the upper left corner free
+    for i, (text, colour) in enumerate(notes):
+        axes.annotate(
+            text,
+            (0.02 if rising else 1.0, 1.0),
+            (0.0, (font + 1.8) * (0.35 - i)),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            ha="left" if rising else "right",
+            va="top",
+            color=colour,
+            fontsize=font,
+            zorder=6,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
+        )
+
+
+def curve_text(curve: Curve, graph: Graph) -> str:
+    """Equation and R² of a graph's curve, in TeX."""
+    slope = r"$R_T$" if (graph.spec.x, graph.spec.y) == ("vt1_mps", "vt2_mps") else ""
+    return curve.text(find_variable(graph.spec.y).tex, find_variable(graph.spec.x).tex, slope, "$^{{{}}}$")
+
+
+def beyond_lines(graph: Graph) -> list[str]:
+    """What the axes cut off, for the corner of a graph: the farthest points, and how many there are besides."""
+    x, y = find_variable(graph.spec.x), find_variable(graph.spec.y)
+    lines = []
+    for series, word in (("measured", "measured"), ("model", "model")):
+        points = [point for point in graph.beyond if point.series == series]
+        if points:
+            listed = "; ".join(
+                f"{point.y:.3g} at {point.x:.3g}{x.unit if x.unit == '°' else ''}" for point in points[:LISTED]
+            )
+            more = f" and {len(points) - LISTED} more" if len(points) > LISTED else ""
+            lines.append(f"Beyond, {word}: {y.tex} {listed}{more}")
+    return lines
+
+
+def _labels(axes: "Axes", graph: Graph, *, x: bool, short: bool) -> None:
+    def text(variable: Variable) -> str:
+        return f"{variable.tex or variable.title} [{variable.unit or '–'}]" if short else variable.tex_label
+
+    axes.set_ylabel(text(find_variable(graph.spec.y)))
+    if x:
+        axes.set_xlabel(find_variable(graph.spec.x).tex_label)
+
+
+def _title(graph: Graph) -> str:
+    return find_model(graph.model).title if graph.model else "Measured impacts"
+
+
+def _legend(figure: "Figure", graph: Graph) -> None:
+    from matplotlib.lines import Line2D
+
+    common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0}
+    kind = "model, one draw per impact" if graph.run else "model, mean"
+    handles = [
+        Line2D([], [], marker="o", markersize=3.6, color=MEASURED, label="measured", **common),
+        Line2D([], [], marker="D", markersize=3.4, color=MODELLED, label=kind, **common),
+        Line2D([], [], color=LINK, linewidth=0.9, label="same impact"),
+    ]
+    figure.legend(
+        handles=handles,
+        loc="outside upper right",
+        ncols=3,
+        frameon=False,
+        fontsize=6.5,
+        handletextpad=0.3,
+        columnspacing=1.4,
+        borderaxespad=0.2,
+    )

@@ -133,7 +133,7 @@ end_header
 
 def project(observed: list[campaign.Observed], folder: Path) -> Project:
     """Everything that ``rockfall reconstruct`` and ``rockfall render`` need."""
-    film = {"stagger_s": 0.35, "engine": "auto"}
+    film = {"stagger_s": 0.25, "engine": "auto"}
     return Project(
         site=Site(
             "Synthetic gully", "Made by a script after the Riou Bourdoux gully of Noël et al. 2018; no real place"

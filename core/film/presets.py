@@ -8,11 +8,11 @@ from math import ceil
 from ..errors import InputError
 from ..exchange.project import Project, RenderPreset
 
-PREVIEW = RenderPreset("preview", width=640, height=360, fps=25.0, stagger_s=0.35)
-HD = RenderPreset("hd", width=1920, height=1080, fps=25.0, stagger_s=0.35)
+PREVIEW = RenderPreset("preview", width=640, height=360, fps=25.0, stagger_s=0.25)
+HD = RenderPreset("hd", width=1920, height=1080, fps=25.0, stagger_s=0.25)
 BUILT_IN = (PREVIEW, HD)
 
-AFTERGLOW_S = 1.5
+AFTERGLOW_S = 1.0
 """How long the film stays on the finished picture."""
 
 LARGEST_REMAP = 900

@@ -13,6 +13,7 @@ from ..bridge import materials
 
 VALUE_ATTRIBUTE, COLOUR_ATTRIBUTE = "caption_value", "colour"
 WHITE, GREY, SHADOW = (0.95, 0.96, 0.97), (0.66, 0.71, 0.76), (0.02, 0.025, 0.03)
+ROUNDNESS = 3  # segments of a letter's curve: all letters are drawn six times over, and anew for every frame
 OUTLINE, BOLD = 0.075, 0.022  # of the text's size, in a small picture
 FONT = "Inter.woff2"
 
@@ -47,9 +48,9 @@ def caption(
     thing = bpy.data.objects.new(name, mesh)
     thing.location = (*place, 0.0)
     modifier = thing.modifiers.new("Caption", "NODES")
-    modifier.node_group = caption_group(align)
+    modifier.node_group = caption_group(align, values is not None)
     inputs = {
-        "Text": text, "Unit": unit, "Number": values is not None, "Decimals": decimals, "Rate": float(rate),
+        "Text": text, "Unit": unit, "Decimals": decimals, "Rate": float(rate),
         "Size": float(size), "Weight": float(size * weight), "Colour": materials.linear_colour(colour),
     }  # fmt: skip
     for key, value in inputs.items():
@@ -64,16 +65,19 @@ def mark_colour(mesh: bpy.types.Mesh, colours: Array) -> None:
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = COLOUR_ATTRIBUTE
 
 
-def caption_group(align: str) -> bpy.types.GeometryNodeTree:
-    """Geometry nodes: a series of numbers → the line of text at the scene's time, with a dark outline."""
-    name = f"Rockfall caption {align.lower()}"
+def caption_group(align: str, with_number: bool) -> bpy.types.GeometryNodeTree:
+    """Geometry nodes: a series of numbers → the line of text at the scene's time, with a dark outline.
+
+    A text without a number has a group of its own, which does not look at the time and so is not made anew.
+    """
+    name = f"Rockfall caption {align.lower()}{' number' if with_number else ''}"
     existing = bpy.data.node_groups.get(name)
     if existing is not None:
         return existing
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group.is_modifier = True
     for socket, kind in (
-        ("Geometry", "Geometry"), ("Text", "String"), ("Unit", "String"), ("Number", "Bool"), ("Decimals", "Int"),
+        ("Geometry", "Geometry"), ("Text", "String"), ("Unit", "String"), ("Decimals", "Int"),
         ("Rate", "Float"), ("Size", "Float"), ("Weight", "Float"), ("Colour", "Color"),
     ):  # fmt: skip
         group.interface.new_socket(socket, in_out="INPUT", socket_type=f"NodeSocket{kind}")
@@ -81,14 +85,17 @@ def caption_group(align: str) -> bpy.types.GeometryNodeTree:
     source, result = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
     link = group.links.new
 
-    text = _text_nodes(group, source)
+    text = _text_with_number(group, source) if with_number else source.outputs["Text"]
     curves = group.nodes.new("GeometryNodeStringToCurves")
     _set_font(curves)
     curves.inputs["Align X"].default_value = {"LEFT": "Left", "CENTER": "Center", "RIGHT": "Right"}[align]
     link(text, curves.inputs["String"])
     link(source.outputs["Size"], curves.inputs["Size"])
+    coarse = group.nodes.new("GeometryNodeSetSplineResolution")
+    coarse.inputs["Resolution"].default_value = ROUNDNESS
+    link(curves.outputs[0], coarse.inputs[0])
     fill = group.nodes.new("GeometryNodeFillCurve")
-    link(curves.outputs[0], fill.inputs["Curve"])
+    link(coarse.outputs[0], fill.inputs["Curve"])
     real = group.nodes.new("GeometryNodeRealizeInstances")
     link(fill.outputs["Mesh"], real.inputs["Geometry"])
 
@@ -129,7 +136,7 @@ def _moved(
     return around.outputs[0]
 
 
-def _text_nodes(group: bpy.types.GeometryNodeTree, source: bpy.types.Node) -> bpy.types.NodeSocket:
+def _text_with_number(group: bpy.types.GeometryNodeTree, source: bpy.types.Node) -> bpy.types.NodeSocket:
     """Text, number at the scene's time, unit → one string."""
     new, link = group.nodes.new, group.links.new
     seconds = new("GeometryNodeInputSceneTime")
@@ -151,16 +158,9 @@ def _text_nodes(group: bpy.types.GeometryNodeTree, source: bpy.types.Node) -> bp
     number = new("FunctionNodeValueToString")
     link(sample.outputs["Value"], number.inputs["Value"])
     link(source.outputs["Decimals"], number.inputs["Decimals"])
-    shown = new("GeometryNodeSwitch")
-    shown.input_type = "STRING"
-    link(source.outputs["Number"], shown.inputs["Switch"])
-    link(number.outputs["String"], shown.inputs["True"])
     join = new("GeometryNodeStringJoin")
-    for part in (
-        source.outputs["Unit"],
-        shown.outputs[0],
-        source.outputs["Text"],
-    ):  # a multi-input takes the last first
+    # the input that takes many has the last one first
+    for part in (source.outputs["Unit"], number.outputs["String"], source.outputs["Text"]):
         link(part, join.inputs["Strings"])
     return join.outputs["String"]
 

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from ...core.exchange.project import RenderPreset
+from ...core.film.engines import IDENTIFIERS
 from ...core.film.framing import View, rounded_scale
 from ...core.film.presets import FilmTiming
 from ...core.film.wording import fastest_speed, notes
@@ -27,7 +28,7 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     ------
     RockfallError : there is nothing to film.
     """
-    _begin(scene, preset)
+    _begin(scene, preset, engine)
     film = FilmTiming(preset.fps, preset.time_scale)
     scene.render.fps, scene.render.fps_base = film.base
     scene.render.frame_map_old, scene.render.frame_map_new = film.remap
@@ -71,7 +72,7 @@ def set_up_picture(
     ------
     RockfallError : there is nothing to show.
     """
-    _begin(scene, preset)
+    _begin(scene, preset, engine)
     motions = motions_of(scene)
     view = _view(scene, motions, preset, whole=True)
     _size_things(scene, motions, view)
@@ -100,10 +101,11 @@ def remove_film(scene: bpy.types.Scene) -> None:
         remembered.put_back(scene)
 
 
-def _begin(scene: bpy.types.Scene, preset: RenderPreset) -> None:
+def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
     remembered.remember(scene)
     _remove_furniture(scene)
     render = scene.render
+    render.engine = IDENTIFIERS[engine]
     render.resolution_x, render.resolution_y, render.resolution_percentage = preset.width, preset.height, 100
 
 
@@ -154,6 +156,22 @@ def _furnish(
     _add(scene, curtain)
     curtain.parent = behind
     curtain.hide_viewport = True
+    if scene.render.engine == "CYCLES":
+        _keep_search_tree(scene, eye)
+
+
+def _keep_search_tree(scene: bpy.types.Scene, eye: bpy.types.Object) -> None:
+    """A tiny second user of the terrain's mesh behind the camera.
+
+    Cycles puts all meshes that are used once into one search tree, which it builds anew when a block moves. A mesh that
+    is used twice keeps a tree of its own.
+    """
+    for ground in state.with_role(scene, state.TERRAIN_ROLE):
+        twin = bpy.data.objects.new("Film twin of the terrain", ground.data)
+        twin.scale, twin.location = (1e-4, 1e-4, 1e-4), (0.0, 0.0, 1.0)
+        _add(scene, twin)
+        twin.parent = eye
+        twin.hide_viewport = True
 
 
 def _sheet(

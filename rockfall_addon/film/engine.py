@@ -34,9 +34,8 @@ def _cycles(scene: bpy.types.Scene, samples: int) -> None:
     cycles.use_auto_tile = False
     for material in bpy.data.materials:
         if material.name.startswith("Rockfall"):
-            material.cycles.emission_sampling = (
-                "NONE"  # else each triangle is a lamp, in a tree that is built every frame
-            )
+            # else each triangle is a lamp, and the tree of all lamps is built anew for every frame
+            material.cycles.emission_sampling = "NONE"
 
 
 def _workbench(scene: bpy.types.Scene, samples: int) -> None:

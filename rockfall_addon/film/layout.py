@@ -48,9 +48,9 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
     room = 0.62 * aspect / (0.58 * max(len(words.title), 1))  # a letter is about 0.58 of its height wide
     title = min(large, room)
     things = [make("Film title", words.title, (left, high - 0.75 * large), title)]
-    things.append(
-        make("Film subtitle", words.subtitle, (left, high - 0.75 * large - 1.45 * small), small, colour=captions.GREY)
-    )
+    for i, (name, text) in enumerate((("Film subtitle", words.subtitle), ("Film note", words.note))):
+        line = high - 0.75 * large - 1.45 * small * (i + 1)
+        things.append(make(name, text, (left, line), small, colour=captions.GREY))
     if words.time_s is not None and words.fastest_mps is not None:
         things += [
             make("Film time", "", (right, high - 0.75 * large), large, align="RIGHT", values=words.time_s,
@@ -60,7 +60,6 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
         ]  # fmt: skip
     if words.speed_top_mps is not None:
         things += _legend(make, words.speed_top_mps, left, low, small)
-    things.append(make("Film note", words.note, (right, low + 1.45 * small), small, align="RIGHT"))
     things.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
     return things
 

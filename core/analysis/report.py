@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One page with everything of a comparison: linked graphs, scores, provenance. It needs no network and no server."""
+
+import platform
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from html import escape
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from ..impact_models.registry import find_model
+from ..reconstruction.impact import Impacts
+from .comparison import Predictions
+from .extras import PAGES, demand
+from .figures import LINK, MEASURED, MODELLED
+from .linked_graphs import SHEET, WEB, curve_tables, link_graphs, model_columns, symbol_html
+from .scores import Score
+from .variables import VARIABLES
+
+SHOWN = ("rn", "rt", "r", "theta_dev_deg")
+DECIMALS = {"theta_dev_deg": 1}
+SHOW_MODEL = """
+const shown = store[`${model.value} ${run.active}`];
+for (const [name, table] of Object.entries(shown.curves)) curves[name].data = table;
+source.data = {...source.data, ...shown.columns};
+"""
+
+
+def write_report(
+    impacts: Impacts, predictions: Predictions, scores: Sequence[Score], path: str | Path, origin: str = ""
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    origin : name of the table of impacts, for the heading and the provenance.
+
+    Raises
+    ------
+    DependencyError : Bokeh is not installed.
+    """
+    demand(PAGES)
+    from bokeh.document import Document
+    from bokeh.embed import file_html
+    from bokeh.resources import Resources
+
+    first = _nearest_model(scores) or predictions.models[0]
+    run = min(1, predictions.replicates)
+    linked = link_graphs(impacts, predictions, first, run)
+    document = Document()
+    document.title = f"Rockfall: {origin or 'impact models'}"
+    for root in (_controls(impacts, predictions, first, run, linked), linked.layout, linked.selection):
+        document.add_root(root)
+    document.template_variables.update(
+        heading="Impact models against measured impacts",
+        summary=summary(predictions, len(impacts), origin),
+        after=score_table(scores) + provenance(predictions, origin),
+        **looks(),
+    )
+    html = file_html(
+        document,
+        Resources(mode="inline"),
+        template=template(),
+        template_variables=dict(document.template_variables),
+        _always_new=True,
+    )
+    Path(path).write_text(html, encoding="utf-8")
+
+
+def template() -> str:
+    """The page's frame, for a file and for a server alike."""
+    text = (WEB / "page.html").read_text(encoding="utf-8")
+    return text.split("{% extends base %}", 1)[1]
+
+
+def looks() -> dict[str, Any]:
+    """What the frame needs besides its text."""
+    return {
+        "style": (WEB / "page.css").read_text(encoding="utf-8"),
+        "colours": {"measured": MEASURED, "modelled": MODELLED, "link": LINK},
+    }
+
+
+def summary(predictions: Predictions, total: int, origin: str = "") -> str:
+    """One sentence on what is compared."""
+    chance = f", and {predictions.replicates} replicates" if predictions.replicates else ""
+    runs = len(set(zip(predictions.site.tolist(), predictions.trajectory.tolist(), strict=True)))
+    of = f" of {origin}" if origin else ""
+    models = len(predictions.models)
+    return (
+        f"{predictions.row.size} of {total} impacts{of}, {runs} trajectories; "
+        f"{models} model{'s' if models > 1 else ''} with the measured incident velocities imposed{chance}."
+    )
+
+
+def score_table(scores: Sequence[Score], title: str = "Scores", mark_best: bool = True) -> str:
+    """Bias, root mean square error and energy distance of each model, as HTML; the least of a column stands out."""
+    by = {(score.model, score.quantity): score for score in scores}
+    models = list(dict.fromkeys(score.model for score in scores))
+    parts = (("bias", "bias"), ("rmse", "RMSE"), ("energy_distance", "distance"))
+    best = {
+        (quantity, part): min((abs(getattr(by[model, quantity], part)) for model in models), default=0.0)
+        for quantity in SHOWN
+        for part, _ in parts
+    }
+    head = "".join(
+        f'<th class="group" colspan="3">{symbol_html(VARIABLES[name])} [{VARIABLES[name].unit or "–"}]</th>'
+        for name in SHOWN
+    )
+    names = "".join(f"<th>{name}</th>" for _ in SHOWN for _, name in parts)
+    rows = []
+    for model in models:
+        cells = []
+        for quantity in SHOWN:
+            for part, _ in parts:
+                value = getattr(by[model, quantity], part)
+                digits = 2 if part == "energy_distance" else DECIMALS.get(quantity, 2)
+                text = "–" if value != value else f"{value:{'+' if part == 'bias' else ''}.{digits}f}".replace("-", "−")
+                is_best = mark_best and len(models) > 1 and abs(value) == best[quantity, part]
+                cells.append(f"<td{' class=best' if is_best else ''}>{text}</td>")
+        rows.append(f"<tr><td>{escape(find_model(model).title)}</td>{''.join(cells)}</tr>")
+    return (
+        f'<h2>{title}</h2><div class="scroll"><table>'
+        f"<thead><tr><th></th>{head}</tr><tr><th>model</th>{names}</tr></thead>"
+        f"<tbody>{''.join(rows)}</tbody></table></div>"
+        '<p class="note">Bias and root mean square error of model − measured. Distance: energy distance between the '
+        "two clouds of points in the plane of the graph, 0 for the same cloud; it counts the scatter too.</p>"
+    )
+
+
+def provenance(predictions: Predictions, origin: str = "") -> str:
+    """Versions, seed and all parameters, as HTML."""
+    package = import_module((__package__ or "").partition(".core")[0])
+    lines = {
+        "Rockfall": str(package.__version__),
+        "Python, NumPy, Bokeh": f"{platform.python_version()}, {version('numpy')}, {version('bokeh')}",
+        "Written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "Impacts": origin or "–",
+        "Spin before the first impact": predictions.spin or "–",
+        "Replicates, seed": f"{predictions.replicates}, {predictions.seed}",
+    }
+    facts = "".join(f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in lines.items())
+    rows = "".join(_settings_row(model, settings) for model, settings in predictions.settings.items())
+    return (
+        f"<details><summary>Provenance</summary><table>{facts}</table>"
+        f"<h2>Parameters</h2><table>{rows}</table></details>"
+    )
+
+
+def _settings_row(model: str, settings: Mapping[str, Any]) -> str:
+    found = find_model(model)
+    values = ", ".join(
+        f"{name} = {value:g}" if isinstance(value, float) else f"{name} = {value}" for name, value in settings.items()
+    )
+    return (
+        f"<tr><td title='{escape(found.reference, quote=True)}'>{escape(found.title)}</td>"
+        f"<td style='text-align:left; white-space:normal'>{escape(values)}</td></tr>"
+    )
+
+
+def _controls(impacts: Impacts, predictions: Predictions, first: str, run: int, linked: Any) -> Any:
+    from bokeh.layouts import column
+    from bokeh.models import CustomJS, InlineStyleSheet, RadioButtonGroup, Select
+
+    sheet = InlineStyleSheet(css=SHEET)
+    runs = ["Mean", "One draw per impact"][: min(predictions.replicates, 1) + 1]
+    model = Select(
+        title="Model",
+        value=first,
+        options=[(name, find_model(name).title) for name in predictions.models],
+        name="model",
+        stylesheets=[sheet],
+        sizing_mode="stretch_width",
+    )
+    choose = RadioButtonGroup(labels=runs, active=run, stylesheets=[sheet], sizing_mode="stretch_width")
+    store = {
+        f"{name} {i}": {
+            "columns": model_columns(impacts, predictions, name, i),
+            "curves": curve_tables(impacts, predictions, name, i),
+        }
+        for name in predictions.models
+        for i in range(len(runs))
+    }
+    show = CustomJS(
+        args={
+            "store": store,
+            "model": model,
+            "run": choose,
+            "source": linked.source,
+            "curves": dict(linked.curves),
+        },
+        code=SHOW_MODEL,
+    )
+    model.js_on_change("value", show)
+    choose.js_on_change("active", show)
+    return column(*([model, choose] if len(runs) > 1 else [model]), name="controls", sizing_mode="stretch_width")
+
+
+def _nearest_model(scores: Sequence[Score]) -> str:
+    """The model whose clouds are nearest to the measured ones, over all graphs."""
+    total: dict[str, float] = {}
+    for score in scores:
+        if score.quantity in SHOWN and score.n:
+            total[score.model] = total.get(score.model, 0.0) + score.energy_distance
+    return min(total, key=lambda name: total[name]) if total else ""

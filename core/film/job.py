@@ -23,6 +23,7 @@ class FilmJob:
     engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen.
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
+    title : written into the picture of a terrain; empty for the name of its file.
     """
 
     kind: Kind
@@ -33,6 +34,7 @@ class FilmJob:
     frames: tuple[int, int] | None = None
     up: str = "auto"
     unit_m: float = 1.0
+    title: str = ""
 
     def with_engine(self, engine: str) -> "FilmJob":
         """The same job for another engine."""

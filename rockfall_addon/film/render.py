@@ -125,7 +125,7 @@ def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     facts = f"{len(surface.faces):,}".replace(",", "\u202f") + f" triangles, {size} m"
     if shading.thin.any():
         facts += f", thin data on {100 * shading.thin.mean():.0f} %"
-    dressing.set_up_picture(scene, HD, job.engine, title=job.source.name, subtitle=facts)
+    dressing.set_up_picture(scene, HD, job.engine, title=job.title or job.source.name, subtitle=facts)
 
 
 def _check(path: Path) -> None:

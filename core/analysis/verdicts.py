@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the numbers of a fit mean, in plain words; above all when the data cannot tell."""
+
+from collections.abc import Sequence
+
+from ..impact_models.parameters import ParameterSpec
+
+AT_LIMIT = 2e-3
+"""Of the range: a value so near to its end is at the end."""
+TOO_WIDE = 0.5
+"""Of the range: an interval that covers more says nothing."""
+TIGHT, FAIR = 0.10, 0.30
+"""Half the interval, relative to the value."""
+TOGETHER = 0.9
+"""Correlation from which two parameters cannot be told apart."""
+EXACT = 1e-5
+"""Of the range: an interval that is narrower is no more than the rounding of the descent."""
+CLEAR = 2.0
+"""Standard errors from which a difference counts."""
+
+
+def number_verdict(
+    spec: ParameterSpec,
+    default: float,
+    value: float,
+    ends: tuple[float, float],
+    places: tuple[float, float, float],
+    idle: bool,
+    correlations: Sequence[tuple[str, float]],
+) -> str:
+    """About one fitted number.
+
+    Parameters
+    ----------
+    ends : the 95 % interval, in the parameter's unit.
+    places : the value and its interval as parts of the range, 0…1.
+    idle : whether the parameter has no effect on any of these impacts.
+    correlations : (other parameter, correlation).
+    """
+    if idle:
+        return "The data cannot tell: it has no effect on these impacts with these settings; left at its default."
+    place, low, high = places
+    parts = [_width(value, ends, high - low)]
+    if place < AT_LIMIT or place > 1 - AT_LIMIT:
+        which = "lower" if place < AT_LIMIT else "upper"
+        parts.append(f"It ended at the {which} limit of its range, {value:g}: the best value may lie beyond.")
+    for name, correlation in correlations if high - low > EXACT else ():
+        if abs(correlation) >= TOGETHER:
+            parts.append(f"It moves with {name} (correlation {correlation:+.2f}): only the pair is determined.")
+    if high - low <= TOO_WIDE:
+        same = ends[0] <= default <= ends[1]
+        parts.append(
+            f"Not clearly different from the default {default:g}." if same else f"The default {default:g} lies outside."
+        )
+    return " ".join(parts)
+
+
+def _width(value: float, ends: tuple[float, float], covered: float) -> str:
+    if covered > TOO_WIDE:
+        return f"The data cannot tell: the interval covers {100 * covered:.0f} % of the range."
+    if covered <= EXACT:
+        return "Determined exactly, as by outcomes without any scatter."
+    half = (ends[1] - ends[0]) / 2
+    relative = half / abs(value) if value else float("inf")
+    if relative <= TIGHT:
+        return f"Well determined, to ±{100 * relative:.2g} %."
+    if relative <= FAIR:
+        return f"Fairly determined, to ±{100 * relative:.0f} %."
+    return f"Only roughly determined: anything from {ends[0]:.3g} to {ends[1]:.3g} fits about as well."
+
+
+def choice_verdict(value: str, rival: str, gain: float, error: float) -> str:
+    """About the choice that won over the best of the others by a mean score, with its standard error."""
+    if abs(gain) < 1e-12:
+        return f"The data cannot tell: {rival} fits exactly as well."
+    if gain < CLEAR * error:
+        return f"The data cannot tell: {rival} fits about as well (score {gain:.3f} ± {error:.3f} more)."
+    return f"{value} fits clearly better than {rival} (score {gain:.3f} ± {error:.3f} less)."
+
+
+def holdout_verdict(default: float, held_out: float, gain: float, error: float, better: int, clusters: int) -> str:
+    """Whether the fit helps on what it has not seen."""
+    where = f"better in {better} of {clusters}"
+    if not default:
+        return "The defaults already agree exactly."
+    share = f"{100 * abs(gain) / default:.0f} %"
+    if gain > CLEAR * error:
+        return f"On impacts it was not fitted to, the model is {share} nearer than with its defaults ({where})."
+    if gain < -CLEAR * error:
+        return (
+            f"On impacts it was not fitted to, the model is {share} farther than with its defaults: keep the defaults."
+        )
+    return (
+        f"On impacts it was not fitted to, the fit is not clearly better than the defaults "
+        f"(score {held_out:.3f} against {default:.3f}, {where})."
+    )
+
+
+def use_verdict(score: float, blind: float, *, chance: bool) -> str:
+    """Whether the model knows anything at all about these impacts."""
+    guess = "drawing one of the measured outcomes at random" if chance else "one and the same outcome for all impacts"
+    if score >= blind:
+        return f"Beware: with a score of {score:.3f} the model is no better than {guess} ({blind:.3f})."
+    return (
+        f"The model is {100 * (1 - score / blind):.0f} % nearer than {guess} (score {score:.3f} against {blind:.3f})."
+    )
+
+
+def likeness_verdict(distance: float, scatter: float, rms: tuple[float, float, float]) -> str:
+    """How alike two models get: their distance beside the scatter of outcomes from impact to impact (both scaled)."""
+    amounts = f"v_N2 to {rms[0]:.2g} m/s, v_T2 to {rms[1]:.2g} m/s, deviation to {rms[2]:.2g}° on average"
+    share = distance / scatter if scatter else float(distance > 0)
+    if share < 0.01:
+        return f"The two behave the same on these impacts ({amounts})."
+    if share < 0.1:
+        return f"The two behave nearly alike ({amounts})."
+    if share < 0.4:
+        return f"The two behave somewhat alike ({amounts}): similar trends, visible differences."
+    return f"The two stay different ({amounts}): no parameters among those fitted make one stand for the other."

@@ -17,7 +17,11 @@ DONE, BAD_INPUT, USAGE, INTERRUPTED = 0, 1, 2, 130
 COMMANDS = {
     "demo": "the whole job on the bundled site: reconstruct, figures, animation",
     "reconstruct": "timed picks → impacts.csv and trajectories.csv",
-    "compare": "impact models on measured impacts → predictions.csv and scores.csv",
+    "compare": "impact models on measured impacts → predictions.csv, scores.csv, figures and a page",
+    "explore": "a live page on this machine: a slider for every parameter of every model",
+    "calibrate": "parameters of an impact model that fit measured impacts → calibration.csv, parameters.toml",
+    "equivalent": "parameters with which one model behaves like another → equivalent.csv, parameters.toml",
+    "merge": "impact tables of several sites → one table with its sources, impacts.csv and datapackage.json",
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
     "terrain": "any terrain file → terrain.ply, and what there is to know about it",
     "render": "the animation of a project, through Blender",

@@ -6,7 +6,7 @@ assets/report/graphs.js; whoever shows another model only replaces columns of th
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', A
 INK, MUTED, GRID = "#20262e", "#5b6470", "#eceef1"
 SHEET = f"""
 :host {{ font-family: {FONT}; font-size: 13px; color: {INK}; }}
-.bk-input, .bk-btn {{ font-family: inherit; font-size: 13px; border-radius: 6px; }}
+.bk-input, .bk-btn {{ font-family: inherit !important; font-size: 13px; border-radius: 6px; }}
 select.bk-input {{ padding-top: 3px; padding-bottom: 3px; height: 30px; }}
 .bk-input-group > label, .bk-slider-title {{ color: {MUTED}; font-size: 12px; }}
 """
@@ -66,13 +66,14 @@ def link_graphs(
 
     sheet = InlineStyleSheet(css=SHEET)
     source = ColumnDataSource(
-        {**measured_columns(impacts, predictions), **model_columns(impacts, predictions, model, run)}
+        {**measured_columns(impacts, predictions), **model_columns(impacts, predictions, model, run)},
+        name="points",
     )
     fitted = curve_tables(impacts, predictions, model, run, specs)
     curves = {name: ColumnDataSource(table) for name, table in fitted.items()}
-    blocks = [_block(spec, source, curves[spec.name], sheet) for spec in specs]
-    selection = Div(text="", name="selection", stylesheets=[sheet], sizing_mode="stretch_width")
     variables = {name: _facts(variable, impacts, predictions) for name, variable in VARIABLES.items()}
+    blocks = [_block(spec, variables, source, curves[spec.name], sheet) for spec in specs]
+    selection = Div(text="", name="selection", stylesheets=[sheet], sizing_mode="stretch_width")
     update = CustomJS(
         args={
             "source": source,
@@ -166,7 +167,7 @@ def _facts(variable: Variable, impacts: Impacts, predictions: Predictions) -> di
     }
 
 
-def _block(spec: GraphSpec, source: Any, curves: Any, sheet: Any) -> dict[str, Any]:
+def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: Any, sheet: Any) -> dict[str, Any]:
     """One graph with its controls."""
     from bokeh.models import (
         BasicTicker,
@@ -181,12 +182,13 @@ def _block(spec: GraphSpec, source: Any, curves: Any, sheet: Any) -> dict[str, A
     )
     from bokeh.plotting import figure
 
-    plain = replace(spec, x_log=False, y_log=False)
     plot = figure(
         height=300,
         sizing_mode="stretch_width",
-        x_range=Range1d(0, 1),
-        y_range=Range1d(0, 1),
+        x_range=Range1d(*variables[spec.x]["linear"]),
+        y_range=Range1d(*variables[spec.y]["linear"]),
+        x_axis_label=variables[spec.x]["label"],
+        y_axis_label=variables[spec.y]["label"],
         tools="box_select,lasso_select,tap,pan,wheel_zoom,reset,save",
         active_drag="box_select",
         toolbar_location="above",
@@ -194,7 +196,7 @@ def _block(spec: GraphSpec, source: Any, curves: Any, sheet: Any) -> dict[str, A
         border_fill_color="white",
         outline_line_color=None,
         output_backend="canvas",
-        name=plain.name,
+        name=spec.name,
     )
     plot.toolbar.logo = None
     plot.toolbar.autohide = True

@@ -20,6 +20,7 @@ from .scores import Score
 from .variables import VARIABLES
 
 SHOWN = ("rn", "rt", "r", "theta_dev_deg")
+PARTS = {"bias": "bias", "rmse": "RMSE", "energy_distance": "distance"}
 DECIMALS = {"theta_dev_deg": 1}
 SHOW_MODEL = """
 const shown = store[`${model.value} ${run.active}`];
@@ -56,7 +57,8 @@ def write_report(
     document.template_variables.update(
         heading="Impact models against measured impacts",
         summary=summary(predictions, len(impacts), origin),
-        after=score_table(scores) + provenance(predictions, origin),
+        after=score_table(by_model(scores)) + provenance(predictions, origin),
+        live=False,
         **looks(),
     )
     html = file_html(
@@ -95,39 +97,49 @@ def summary(predictions: Predictions, total: int, origin: str = "") -> str:
     )
 
 
-def score_table(scores: Sequence[Score], title: str = "Scores", mark_best: bool = True) -> str:
-    """Bias, root mean square error and energy distance of each model, as HTML; the least of a column stands out."""
-    by = {(score.model, score.quantity): score for score in scores}
-    models = list(dict.fromkeys(score.model for score in scores))
-    parts = (("bias", "bias"), ("rmse", "RMSE"), ("energy_distance", "distance"))
+def score_table(scores: Mapping[str, Sequence[Score]], title: str = "Scores") -> str:
+    """Bias, root mean square error and energy distance, as HTML; the least of a column stands out.
+
+    Parameters
+    ----------
+    scores : heading of a row → the scores of one model.
+    """
+    rows = {label: {score.quantity: score for score in these} for label, these in scores.items()}
     best = {
-        (quantity, part): min((abs(getattr(by[model, quantity], part)) for model in models), default=0.0)
+        (quantity, part): min((abs(getattr(row[quantity], part)) for row in rows.values()), default=0.0)
         for quantity in SHOWN
-        for part, _ in parts
+        for part in PARTS
     }
-    head = "".join(
+    groups = "".join(
         f'<th class="group" colspan="3">{symbol_html(VARIABLES[name])} [{VARIABLES[name].unit or "–"}]</th>'
         for name in SHOWN
     )
-    names = "".join(f"<th>{name}</th>" for _ in SHOWN for _, name in parts)
-    rows = []
-    for model in models:
+    names = "".join(f"<th>{name}</th>" for _ in SHOWN for name in PARTS.values())
+    lines = []
+    for label, row in rows.items():
         cells = []
-        for quantity in SHOWN:
-            for part, _ in parts:
-                value = getattr(by[model, quantity], part)
-                digits = 2 if part == "energy_distance" else DECIMALS.get(quantity, 2)
-                text = "–" if value != value else f"{value:{'+' if part == 'bias' else ''}.{digits}f}".replace("-", "−")
-                is_best = mark_best and len(models) > 1 and abs(value) == best[quantity, part]
-                cells.append(f"<td{' class=best' if is_best else ''}>{text}</td>")
-        rows.append(f"<tr><td>{escape(find_model(model).title)}</td>{''.join(cells)}</tr>")
+        for quantity, part in best:
+            value = getattr(row[quantity], part)
+            digits = 2 if part == "energy_distance" else DECIMALS.get(quantity, 2)
+            text = "–" if value != value else f"{value:{'+' if part == 'bias' else ''}.{digits}f}".replace("-", "−")
+            mark = " class=best" if len(rows) > 1 and abs(value) == best[quantity, part] else ""
+            cells.append(f"<td{mark}>{text}</td>")
+        lines.append(f"<tr><td>{escape(label)}</td>{''.join(cells)}</tr>")
     return (
-        f'<h2>{title}</h2><div class="scroll"><table>'
-        f"<thead><tr><th></th>{head}</tr><tr><th>model</th>{names}</tr></thead>"
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
+        f'<h2>{escape(title)}</h2><div class="scroll"><table>'
+        f"<thead><tr><th></th>{groups}</tr><tr><th>model</th>{names}</tr></thead>"
+        f"<tbody>{''.join(lines)}</tbody></table></div>"
         '<p class="note">Bias and root mean square error of model − measured. Distance: energy distance between the '
         "two clouds of points in the plane of the graph, 0 for the same cloud; it counts the scatter too.</p>"
     )
+
+
+def by_model(scores: Sequence[Score]) -> dict[str, list[Score]]:
+    """Title of each model → its scores."""
+    rows: dict[str, list[Score]] = {}
+    for score in scores:
+        rows.setdefault(find_model(score.model).title, []).append(score)
+    return rows
 
 
 def provenance(predictions: Predictions, origin: str = "") -> str:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``rockfall compare``: what the impact models make of measured impacts → predictions.csv and scores.csv."""
+"""``rockfall compare``: what the impact models make of measured impacts → tables, figures and a page."""
 
 import argparse
 from collections import Counter
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
@@ -12,7 +13,9 @@ from .progress import Progress
 if TYPE_CHECKING:
     from ..analysis.comparison import Predictions
     from ..analysis.scores import Score
+    from ..reconstruction.impact import Impacts
 
+FILES = ("predictions.csv", "scores.csv", "comparison.toml", "figures", "report.html")
 SHOWN = (("rn", "R_N"), ("rt", "R_T"), ("r", "R"), ("theta_dev_deg", "θ_dev [°]"))
 
 
@@ -35,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME.PARAMETER=VALUE",
         help="a parameter that is not to have its default",
     )
+    parser.add_argument("--parameters", metavar="FILE", help="parameters as saved by explore; --set goes before them")
     parser.add_argument(
         "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
     )
@@ -48,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
     )
+    parser.add_argument("--tables-only", action="store_true", help="neither figures nor the page")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -56,11 +61,16 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.scores import scores
     from ..exchange.comparison_tables import write_predictions, write_scores, write_settings
     from ..exchange.output import output_folder
+    from ..exchange.parameters import read_parameters
     from ..exchange.tables import read_impacts
     from ..impact_models.registry import COMPARED, find_model, parse_settings
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
     parameters = parse_settings(arguments.set)
+    if arguments.parameters:
+        for name, values in read_parameters(arguments.parameters).items():
+            if name in models:
+                parameters[name] = {**values, **parameters.get(name, {})}
     idle = [name for name in parameters if name not in models]
     if idle:
         raise InputError(f"--set gives parameters of {idle[0]}, which is not compared", advice=f"Add --model {idle[0]}")
@@ -87,10 +97,40 @@ def run(arguments: argparse.Namespace) -> int:
         write_predictions(predictions, folder / "predictions.csv")
         write_scores(marks, folder / "scores.csv")
         write_settings(predictions, folder / "comparison.toml")
-    for line in (*_counts(predictions, len(impacts)), *_table(marks)):
+        notes = [] if arguments.tables_only else _draw(impacts, predictions, marks, folder, arguments.impacts, progress)
+        written = [name for name in FILES if (folder / name).exists()]
+    for line in (*_counts(predictions, len(impacts)), *_table(marks), *notes):
         print(line)
-    print(f"Written: predictions.csv, scores.csv, comparison.toml in {arguments.out}")
+    print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _draw(
+    impacts: "Impacts",
+    predictions: "Predictions",
+    marks: "tuple[Score, ...]",
+    folder: Path,
+    origin: str,
+    progress: Progress,
+) -> list[str]:
+    """The figures and the page, as far as their libraries are there; returns what to install for the others."""
+    from ..analysis.extras import FIGURES, PAGES, install_command, is_there
+    from ..analysis.figures import save_figures
+    from ..analysis.graphs import make_sheet
+    from ..analysis.report import write_report
+
+    notes = []
+    if is_there(FIGURES):
+        progress("Drawing the figures")
+        save_figures(make_sheet(impacts, predictions), folder / "figures")
+    else:
+        notes.append(f"No figures without Matplotlib. Install it: {install_command(FIGURES)}")
+    if is_there(PAGES):
+        progress("Writing the page")
+        write_report(impacts, predictions, marks, folder / "report.html", Path(origin).name)
+    else:
+        notes.append(f"No report.html without Bokeh. Install it: {install_command(PAGES)}")
+    return notes
 
 
 def _counts(predictions: "Predictions", impacts: int) -> list[str]:

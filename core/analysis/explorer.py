@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The live page: move a parameter, and the model's points, links, curves and scores follow (Bokeh server).
+
+It listens on this machine only, and answers only pages that it served itself.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+from ..errors import RockfallError
+from ..impact_models.parameters import Value
+from ..impact_models.registry import find_model
+from ..reconstruction.impact import Impacts
+from .background import Job
+from .comparison import predict
+from .courses import Courses
+from .extras import PAGES, demand
+from .linked_graphs import SHEET, WEB, LinkedGraphs, curve_tables, link_graphs, model_columns
+from .parameter_inputs import ParameterInputs, parameter_inputs
+from .report import looks, score_table, summary, template
+from .scores import Score, scores
+
+ADDRESS = "127.0.0.1"
+REPLICATES = 6
+"""Draws of a random model that its scores are computed with: few, so that they keep pace with the slider."""
+
+Settings = dict[str, dict[str, Value]]
+"""Model → parameter → value, of what is not at its default."""
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """What a page starts with.
+
+    Attributes
+    ----------
+    impacts, courses : the measured impacts, and those of them that can be compared.
+    models : names.
+    given : parameters that are not to start at their default.
+    seed : of the random numbers.
+    origin : name of the table of impacts.
+    save : writes model → all parameters, and returns where.
+    """
+
+    impacts: Impacts
+    courses: Courses
+    models: Sequence[str]
+    save: Callable[[Mapping[str, Mapping[str, Value]]], str]
+    given: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    seed: int = 0
+    origin: str = ""
+
+
+def serve(exploration: Exploration, port: int = 0, ready: Callable[[str], None] | None = None) -> None:
+    """Serve the page until the process is interrupted.
+
+    Parameters
+    ----------
+    port : 0 for any that is free.
+    ready : told the address as soon as the page can be opened.
+
+    Raises
+    ------
+    DependencyError : Bokeh is not installed.
+    RockfallError : the port is taken.
+    """
+    demand(PAGES)
+    from bokeh.server.server import Server
+
+    hosts = [f"{ADDRESS}:{port or '*'}", f"localhost:{port or '*'}"]
+    try:
+        server = Server(
+            {"/": lambda document: open_page(document, exploration)},
+            port=port,
+            address=ADDRESS,
+            allow_websocket_origin=hosts,
+        )
+    except OSError as error:
+        raise RockfallError(
+            f"Port {port} cannot be used ({error.strerror}). Leave --port out to take a free one."
+        ) from error
+    server.start()
+    if ready is not None:
+        server.io_loop.add_callback(ready, f"http://{ADDRESS}:{server.port}/")
+    try:
+        server.io_loop.start()
+    finally:
+        server.stop()
+
+
+def open_page(document: Any, exploration: Exploration) -> None:
+    """Put the page into a document of the server."""
+    page = _Page(document, exploration)
+    for root in page.roots():
+        document.add_root(root)
+    document.title = "Rockfall: explore impact models"
+    document.template = template()
+    document.template_variables.update(
+        heading="Explore impact models",
+        summary=summary(page.first, len(exploration.impacts), exploration.origin),
+        after="",
+        live=True,
+        **looks(),
+    )
+    document.on_session_destroyed(lambda _context: page.job.cancel())
+
+
+class _Page:
+    """The state of one open page: the chosen model, its parameters, and the widgets that show them."""
+
+    def __init__(self, document: Any, exploration: Exploration) -> None:
+        from bokeh.models import Div, InlineStyleSheet
+
+        self.document, self.start = document, exploration
+        self.given: Settings = {name: dict(exploration.given.get(name, {})) for name in exploration.models}
+        self.model, self.run, self.seed = exploration.models[0], 0, exploration.seed
+        self.sheet = InlineStyleSheet(css=SHEET)
+        self.job = Job(document, self._say)
+        self.first = predict(
+            exploration.impacts, exploration.courses, exploration.models, self.given, replicates=1, seed=self.seed
+        )
+        self.linked: LinkedGraphs = link_graphs(exploration.impacts, self.first, self.model, self.run)
+        css = InlineStyleSheet(css=(WEB / "page.css").read_text(encoding="utf-8"))
+        self.scores = Div(name="scores", stylesheets=[self.sheet, css], sizing_mode="stretch_width")
+        self.status = Div(text="", name="status", stylesheets=[self.sheet], sizing_mode="stretch_width")
+        self.defaults = {name: self._scores_of(name, {}) for name in exploration.models}
+        self.inputs = {name: self._inputs(name) for name in exploration.models}
+        self._show()
+
+    def roots(self) -> tuple[Any, ...]:
+        """What the page's frame asks for."""
+        from bokeh.layouts import column, row
+        from bokeh.models import Button, MultiChoice, RadioButtonGroup, Select
+
+        common: dict[str, Any] = {"stylesheets": [self.sheet], "sizing_mode": "stretch_width"}
+        titles = [(name, find_model(name).title) for name in self.start.models]
+        self.select = Select(title="Model", value=self.model, options=titles, name="model", **common)
+        self.select.on_change("value", lambda _attribute, _old, new: self._choose(new))
+        runs = RadioButtonGroup(labels=["Mean", "One draw per impact"], active=0, name="run", **common)
+        runs.on_change("active", lambda _attribute, _old, new: self._draw(new))
+        again = Button(label="Draw again", name="again", **common)
+        again.on_click(self._draw_again)
+        save, reset = Button(label="Save", name="save", **common), Button(label="Reset", name="reset", **common)
+        save.on_click(self._save)
+        reset.on_click(self._reset)
+        self.fit = MultiChoice(title="Fit", value=[], options=[], name="fit", **common)
+        self.calibrate = Button(label="Calibrate", button_type="primary", name="calibrate", **common)
+        self.calibrate.on_click(self._calibrate)
+        self._offer()
+        controls = column(
+            self.select,
+            runs,
+            again,
+            *(inputs.layout for inputs in self.inputs.values()),
+            row(reset, save, sizing_mode="stretch_width"),
+            self.fit,
+            self.calibrate,
+            self.status,
+            name="controls",
+            sizing_mode="stretch_width",
+            spacing=10,
+        )
+        return controls, self.linked.layout, self.linked.selection, self.scores
+
+    def _inputs(self, name: str) -> ParameterInputs:
+        model = find_model(name)
+        inputs = parameter_inputs(model, model.settings(self.given[name]), lambda key, value: self._set(key, value))
+        inputs.layout.visible = name == self.model
+        return inputs
+
+    def _set(self, key: str, value: Value) -> None:
+        model, given = find_model(self.model), self.given[self.model]
+        given[key] = value
+        followers = [spec.name for spec in model.parameters if spec.follows and spec.follows[0] == key]
+        for name in followers:
+            given.pop(name, None)
+        if followers:
+            self.inputs[self.model].show(model.settings(given))
+        self._show()
+
+    def _choose(self, name: str) -> None:
+        self.inputs[self.model].layout.visible = False
+        self.model = name
+        self.inputs[name].layout.visible = True
+        self._offer()
+        self._show()
+
+    def _draw(self, run: int) -> None:
+        self.run = run
+        self._show()
+
+    def _draw_again(self) -> None:
+        self.seed += 1
+        self._show()
+
+    def _reset(self) -> None:
+        self.given[self.model].clear()
+        self.inputs[self.model].show(find_model(self.model).settings())
+        self._show()
+        self._say("")
+
+    def _save(self) -> None:
+        settings = {name: find_model(name).settings(self.given[name]) for name in self.start.models}
+        try:
+            self._say(f"Saved to {escape(self.start.save(settings))}")
+        except RockfallError as error:
+            self._say(escape(str(error)))
+
+    def _offer(self) -> None:
+        """The parameters that can be fitted, and a sensible choice of them."""
+        specs = find_model(self.model).parameters
+        self.fit.options = [spec.name for spec in specs]
+        usual = [spec.name for spec in specs if spec.name in ("rn", "rt", "rn_exponent")]
+        self.fit.value = usual or [specs[0].name]
+
+    def _calibrate(self) -> None:
+        if self.job.is_running:
+            self.job.cancel()
+            return
+        from .calibration import Calibration, calibrate
+
+        name, fitted = self.model, tuple(self.fit.value)
+        if not fitted:
+            self._say("Choose the parameters to fit.")
+            return
+        fixed = {key: value for key, value in self.given[name].items() if key not in fitted}
+
+        def work(progress: Callable[[str], None], cancelled: Callable[[], bool]) -> Calibration:
+            return calibrate(
+                self.start.impacts,
+                name,
+                fitted,
+                fixed=fixed,
+                seed=self.start.seed,
+                spin=self.start.courses.spin,
+                progress=progress,
+                cancelled=cancelled,
+            )
+
+        def done(result: Calibration | None) -> None:
+            self.calibrate.update(label="Calibrate", button_type="primary")
+            if result is not None:
+                self.given[name].update({key: result.settings[key] for key in fitted})
+                self.inputs[name].show(result.settings)
+                self._show()
+                self._say("<br>".join(escape(sentence) for sentence in result.verdict))
+
+        self.calibrate.update(label="Cancel", button_type="default")
+        self.job.begin(work, done)
+
+    def _scores_of(self, name: str, given: Mapping[str, Value]) -> list[Score]:
+        replicates = REPLICATES if find_model(name).is_random else 0
+        found = predict(
+            self.start.impacts, self.start.courses, [name], {name: given}, replicates=replicates, seed=self.seed
+        )
+        return list(scores(self.start.impacts, found))
+
+    def _show(self) -> None:
+        """Bring the page in line with the parameters."""
+        impacts, name = self.start.impacts, self.model
+        replicates = REPLICATES if find_model(name).is_random else 0
+        run = min(self.run, replicates)
+        found = predict(impacts, self.start.courses, [name], self.given, replicates=replicates, seed=self.seed)
+        for graph, table in curve_tables(impacts, found, name, run).items():
+            self.linked.curves[graph].data = table
+        data = {**self.linked.source.data, **model_columns(impacts, found, name, run)}
+        self.linked.source.data = data
+        rows = {"Now": list(scores(impacts, found)), "Defaults": self.defaults[name]}
+        self.scores.text = score_table(rows, find_model(name).title)
+
+    def _say(self, text: str) -> None:
+        self.status.text = text

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sliders, fields and menus for the parameters of an impact model, made from its specifications (Bokeh)."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from html import escape
+from math import floor, log10
+from typing import Any
+
+from ..impact_models.base import ImpactModel
+from ..impact_models.parameters import ParameterSpec, Value
+from .linked_graphs import MUTED, SHEET
+
+Changed = Callable[[str, Value], None]
+"""Called with the parameter's name and its new value."""
+MANY_TIMES = 20.0
+"""Where the range goes beyond this many times the default, the slider does not; the field beside it does."""
+ALL_OF = 2.0
+"""A range that is not longer than this is on the slider as a whole."""
+LITTLE = 0.01
+"""Part of a range that the slider spans where the default is at its lower end."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterInputs:
+    """The inputs of one model.
+
+    Attributes
+    ----------
+    layout : all of them.
+    show : shows values without reporting them as changes.
+    """
+
+    layout: Any
+    show: Callable[[Mapping[str, Value]], None]
+
+
+def parameter_inputs(model: ImpactModel, values: Mapping[str, Value], changed: Changed) -> ParameterInputs:
+    """Inputs that show `values` and report what is changed."""
+    from bokeh.layouts import column
+
+    quiet = [False]  # while values are shown, not entered
+
+    def report(name: str, value: Value) -> None:
+        if not quiet[0]:
+            changed(name, value)
+
+    parts = {spec.name: _input(spec, values[spec.name], report, quiet) for spec in model.parameters}
+
+    def show(values: Mapping[str, Value]) -> None:
+        quiet[0] = True
+        try:
+            for name, (_, setter) in parts.items():
+                setter(values[name])
+        finally:
+            quiet[0] = False
+
+    layout = column(*(part for part, _ in parts.values()), sizing_mode="stretch_width", spacing=4)
+    return ParameterInputs(layout, show)
+
+
+def slider_range(spec: ParameterSpec) -> tuple[float, float, float]:
+    """Start, end and step of a slider: the whole range, or the part of a very wide one in which the default lies."""
+    reach = float(spec.default) - spec.minimum
+    end = spec.maximum
+    if end - spec.minimum > max(MANY_TIMES * reach, ALL_OF):
+        end = spec.minimum + (4 * reach if reach > 0 else max(LITTLE * (end - spec.minimum), min(1.0, end)))
+    step = 10.0 ** floor(log10((end - spec.minimum) / 100))
+    return spec.minimum, end, step
+
+
+def _input(
+    spec: ParameterSpec, value: Value, report: Changed, quiet: list[bool]
+) -> tuple[Any, Callable[[Value], None]]:
+    from bokeh.layouts import column, row
+    from bokeh.models import Div, InlineStyleSheet, Select, Slider, Spinner
+
+    sheet = InlineStyleSheet(css=SHEET)
+    label = Div(text=_label(spec), stylesheets=[sheet], sizing_mode="stretch_width", styles={"margin-bottom": "-6px"})
+    if spec.choices:
+        menu = Select(
+            value=str(value),
+            options=list(spec.choices),
+            name=spec.name,
+            stylesheets=[sheet],
+            sizing_mode="stretch_width",
+        )
+        menu.on_change("value", lambda _attribute, _old, new: report(spec.name, str(new)))
+        return column(label, menu, sizing_mode="stretch_width"), lambda new: menu.update(value=str(new))
+
+    start, end, step = slider_range(spec)
+    slider = Slider(
+        start=start,
+        end=end,
+        step=step,
+        value=min(max(float(value), start), end),
+        show_value=False,
+        name=spec.name,
+        stylesheets=[sheet],
+        sizing_mode="stretch_width",
+        bar_color=MUTED,
+    )
+    field = Spinner(
+        value=float(value),
+        low=spec.minimum,
+        high=spec.maximum,
+        step=step,
+        width=82,
+        name=f"{spec.name}_field",
+        stylesheets=[sheet],
+    )
+
+    def show(new: Value) -> None:
+        field.value = float(new)
+        slider.value = min(max(float(new), start), end)
+
+    def moved(new: Any) -> None:
+        if quiet[0] or new is None:
+            return
+        quiet[0] = True
+        show(round(float(new), 12))
+        quiet[0] = False
+        report(spec.name, float(field.value))
+
+    slider.on_change("value", lambda _attribute, _old, new: moved(new))
+    field.on_change("value", lambda _attribute, _old, new: moved(new))
+    return column(label, row(slider, field, sizing_mode="stretch_width"), sizing_mode="stretch_width"), show
+
+
+def _label(spec: ParameterSpec) -> str:
+    notes = [spec.description, f"Range {spec.range_text}", f"Default {spec.default}", f"Source: {spec.source or '–'}"]
+    if not spec.verified:
+        notes.append("Not checked against the primary text")
+    unit = f" [{escape(spec.unit)}]" if spec.unit else ""
+    symbol = f' <i style="color:{MUTED}">{escape(spec.symbol)}</i>' if spec.symbol else ""
+    hint = escape(". ".join(note for note in notes if note), quote=True)
+    return f'<span title="{hint}">{spec.name}{symbol}{unit}</span>'

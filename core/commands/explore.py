@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall explore``: the live page on this machine, with a slider for every parameter."""
+
+import argparse
+import webbrowser
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .options import positive, whole
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..impact_models.parameters import Value
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
+    parser.add_argument(
+        "--model",
+        action="extend",
+        nargs="+",
+        metavar="NAME",
+        help="models to offer (default: the six of Noël et al. 2018; `rockfall models` lists all)",
+    )
+    parser.add_argument("--parameters", metavar="FILE", help="parameters to start with, as saved by this command")
+    parser.add_argument(
+        "--save", metavar="FILE", help="where Save writes the parameters (default: parameters.toml beside IMPACTS)"
+    )
+    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument(
+        "--spin",
+        choices=("rolling", "zero", "table"),
+        default="rolling",
+        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
+    )
+    parser.add_argument(
+        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
+    )
+    parser.add_argument(
+        "--port", type=whole, default=0, metavar="N", help="on this machine (default: one that is free)"
+    )
+    parser.add_argument("--no-browser", action="store_true", help="only print the address")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve the page until interrupted."""
+    from ..analysis.courses import find_courses
+    from ..analysis.explorer import Exploration, serve
+    from ..analysis.extras import PAGES, demand
+    from ..exchange.parameters import read_parameters, write_parameters
+    from ..exchange.tables import read_impacts
+    from ..impact_models.registry import COMPARED, find_model
+
+    demand(PAGES)
+    if arguments.port > 65535:
+        raise InputError(f"There is no port {arguments.port}", advice="Take one up to 65535, or leave --port out")
+    given = read_parameters(arguments.parameters) if arguments.parameters else {}
+    names = arguments.model or tuple(dict.fromkeys((*COMPARED, *given)))
+    models = tuple(dict.fromkeys(find_model(name).name for name in names))
+    target = Path(arguments.save or Path(arguments.impacts).with_name("parameters.toml")).absolute()
+
+    def save(settings: "Mapping[str, Mapping[str, Value]]") -> str:
+        write_parameters(settings, target)
+        return str(target)
+
+    def ready(address: str) -> None:
+        print(f"Explore the impact models at {address}\nStop with Ctrl-C.", flush=True)
+        if not arguments.no_browser:
+            webbrowser.open(address)
+
+    with Progress() as progress:
+        progress(f"Reading {arguments.impacts}")
+        impacts = read_impacts(arguments.impacts)
+        try:
+            courses = find_courses(impacts, arguments.spin, arguments.radius)
+        except InputError as error:
+            raise InputError(
+                error.problem, file=arguments.impacts, trajectory=error.trajectory, advice=error.advice
+            ) from error
+    try:
+        serve(
+            Exploration(impacts, courses, models, save, given, arguments.seed, Path(arguments.impacts).name),
+            arguments.port,
+            ready,
+        )
+    except KeyboardInterrupt:
+        print("\nStopped.")
+    return 0

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``rockfall terrain``: any terrain file → terrain.ply, and what there is to know about it."""
+"""``rockfall terrain``: any terrain file → terrain.ply, a shaded picture, and what there is to know about it."""
 
 import argparse
+from pathlib import Path
 
+from ..errors import DependencyError
 from .options import add_out, add_terrain_options
 from .progress import Progress
 
@@ -13,10 +15,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help=formats)
     add_out(parser)
     add_terrain_options(parser)
+    parser.add_argument("--no-picture", action="store_true", help="do not ask Blender for terrain.png")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, mesh where needed, write a binary PLY in survey coordinates."""
+    """Read, mesh where needed, write a binary PLY in survey coordinates, and picture it where Blender is at hand."""
     from ..exchange.output import output_folder
     from ..terrain.readers import read_terrain
     from ..terrain.writers import write_ply
@@ -32,7 +35,27 @@ def run(arguments: argparse.Namespace) -> int:
         )
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")
+        written = ["terrain.ply"]
+        no_picture = ""
+        if not arguments.no_picture:
+            progress("Shading terrain.png")
+            no_picture = _picture(folder, surface.name)
+            written += [] if no_picture else ["terrain.png"]
     for sentence in surface.summary:
         print(sentence)
-    print(f"Written: terrain.ply in {arguments.out}")
+    if no_picture:
+        print(f"No picture: {no_picture}")
+    print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _picture(folder: Path, title: str) -> str:
+    """Make terrain.png of terrain.ply; returns why not where there is no Blender, since the terrain is of use without."""
+    from ..film.job import FilmJob
+    from ..film.maker import film_maker
+
+    try:
+        film_maker().film(FilmJob("terrain", folder / "terrain.ply", folder / "terrain.png", title=title))
+    except DependencyError as error:
+        return str(error)
+    return ""

@@ -40,15 +40,19 @@ def number_verdict(
     if idle:
         return "The data cannot tell: it has no effect on these impacts with these settings; left at its default."
     place, low, high = places
-    parts = [_width(value, ends, high - low)]
+    wide, exact = high - low > TOO_WIDE, high - low <= EXACT
+    parts = []
     if place < AT_LIMIT or place > 1 - AT_LIMIT:
         which = "lower" if place < AT_LIMIT else "upper"
         parts.append(f"It ended at the {which} limit of its range, {value:g}: the best value may lie beyond.")
-    for name, correlation in correlations if high - low > EXACT else ():
+    if wide or not parts:
+        parts.insert(0, _width(value, ends, high - low))
+    for name, correlation in correlations if not exact else ():
         if abs(correlation) >= TOGETHER:
             parts.append(f"It moves with {name} (correlation {correlation:+.2f}): only the pair is determined.")
-    if high - low <= TOO_WIDE:
-        same = ends[0] <= default <= ends[1]
+    if not wide:
+        slack = EXACT * (spec.maximum - spec.minimum)
+        same = ends[0] - slack <= default <= ends[1] + slack
         parts.append(
             f"Not clearly different from the default {default:g}." if same else f"The default {default:g} lies outside."
         )

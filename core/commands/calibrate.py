@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall calibrate``: parameters that fit measured impacts → calibration.csv, parameters.toml."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from .fitting_options import add_fit_arguments, naming, parameter_names, parameter_values, table_of, wrapped
+from .options import add_out
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..analysis.calibration import Calibration
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
+    add_out(parser)
+    parser.add_argument("--model", required=True, metavar="NAME", help="of the model (`rockfall models` lists them)")
+    add_fit_arguments(parser, resamples=200)
+    parser.add_argument(
+        "--set",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="PARAMETER=VALUE",
+        help="a parameter that is not fitted and is not to have its default",
+    )
+    parser.add_argument(
+        "--no-holdout", action="store_true", help="do not predict each fifth of the trajectories from the others"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fit, write the tables, print the summary."""
+    from ..analysis.calibration import calibrate
+    from ..exchange.calibration_tables import write_estimates, write_folds
+    from ..exchange.output import output_folder
+    from ..exchange.parameters import write_parameters
+    from ..exchange.tables import read_impacts
+    from ..impact_models.registry import find_model
+
+    model = find_model(arguments.model)
+    names, fixed = parameter_names(model, arguments.fit), parameter_values(model, arguments.set)
+    with output_folder(arguments.out) as folder, Progress() as progress:
+        progress(f"Reading {arguments.impacts}")
+        impacts = read_impacts(arguments.impacts)
+        with naming(arguments.impacts):
+            result = calibrate(
+                impacts,
+                model.name,
+                names,
+                fixed=fixed,
+                seed=arguments.seed,
+                replicates=arguments.replicates,
+                resamples=arguments.resamples,
+                holdout="none" if arguments.no_holdout else "trajectory",
+                spin=arguments.spin,
+                radius_m=arguments.radius,
+                progress=progress,
+            )
+        write_estimates(model.name, result.estimates, folder / "calibration.csv")
+        write_parameters({model.name: result.settings}, folder / "parameters.toml")
+        if result.folds:
+            write_folds(result.folds, folder / "holdout.csv")
+    for line in _summary(result):
+        print(line)
+    written = "calibration.csv, parameters.toml" + (", holdout.csv" if result.folds else "")
+    print(f"Written: {written} in {arguments.out}")
+    return 0
+
+
+def _summary(result: "Calibration") -> list[str]:
+    held = f", {result.held_out_score:.3f} on trajectories held out" if result.folds else ""
+    return [
+        f"{result.model} fitted to {result.impacts} impacts of {result.trajectories} trajectories.",
+        *table_of(result.estimates),
+        f"Score (0 is perfect): {result.default_score:.3f} before, {result.fitted_score:.3f} fitted{held}.",
+        *wrapped(f"It is the {result.objective}."),
+        *(line for sentence in result.verdict for line in wrapped(sentence)),
+    ]

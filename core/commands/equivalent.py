@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall equivalent``: parameters with which one model behaves like another → equivalent.csv, parameters.toml."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+from .fitting_options import add_fit_arguments, naming, parameter_names, parameter_values, table_of, wrapped
+from .options import add_out
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..analysis.equivalence import Equivalence
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv; only the state before each impact is used")
+    add_out(parser)
+    parser.add_argument("--from", dest="source", required=True, metavar="NAME", help="the model to be imitated")
+    parser.add_argument("--to", dest="target", required=True, metavar="NAME", help="the model that is to imitate it")
+    add_fit_arguments(parser, resamples=100)
+    parser.add_argument(
+        "--set",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="[NAME.]PARAMETER=VALUE",
+        help="a parameter that is not to have its default, of the model to be imitated unless NAME says otherwise",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Find the parameters, write the tables, print the summary."""
+    from ..analysis.equivalence import equivalent
+    from ..exchange.calibration_tables import write_estimates
+    from ..exchange.output import output_folder
+    from ..exchange.parameters import write_parameters
+    from ..exchange.tables import read_impacts
+    from ..impact_models.registry import find_model
+
+    a, b = find_model(arguments.source), find_model(arguments.target)
+    names = parameter_names(b, arguments.fit)
+    of_b = [text for text in arguments.set if text.startswith(f"{b.name}.") and a is not b]
+    given = parameter_values(a, [text for text in arguments.set if text not in of_b])
+    with output_folder(arguments.out) as folder, Progress() as progress:
+        progress(f"Reading {arguments.impacts}")
+        impacts = read_impacts(arguments.impacts)
+        with naming(arguments.impacts):
+            result = equivalent(
+                impacts,
+                a.name,
+                given,
+                b.name,
+                names,
+                fixed=parameter_values(b, of_b),
+                seed=arguments.seed,
+                replicates=arguments.replicates,
+                resamples=arguments.resamples,
+                spin=arguments.spin,
+                radius_m=arguments.radius,
+                progress=progress,
+            )
+        write_estimates(b.name, result.estimates, folder / "equivalent.csv")
+        write_parameters({a.name: result.settings, b.name: result.other_settings}, folder / "parameters.toml")
+    for line in _summary(result):
+        print(line)
+    print(f"Written: equivalent.csv, parameters.toml in {arguments.out}")
+    return 0
+
+
+def _summary(result: "Equivalence") -> list[str]:
+    return [
+        f"{result.other} made like {result.model}, on {result.impacts} impacts of {result.trajectories} trajectories.",
+        *table_of(result.estimates),
+        f"Energy distance (0 is the same): {result.default_distance:.3f} before, {result.distance:.3f} fitted.",
+        *(line for sentence in result.verdict for line in wrapped(sentence)),
+    ]

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What ``rockfall calibrate`` and ``rockfall equivalent`` share: arguments, and the summary of fitted parameters."""
+
+import argparse
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .options import positive, whole
+
+if TYPE_CHECKING:
+    from ..analysis.estimation import Estimate
+    from ..impact_models.base import ImpactModel
+
+WIDTH = 100
+
+
+def add_fit_arguments(parser: argparse.ArgumentParser, resamples: int) -> None:
+    """What is fitted, and how."""
+    parser.add_argument(
+        "--fit",
+        action="extend",
+        nargs="+",
+        required=True,
+        metavar="PARAMETER",
+        help="parameters to fit; choices and switches by trying all (`rockfall models NAME` lists them)",
+    )
+    parser.add_argument(
+        "--replicates", type=whole, default=20, metavar="N", help="draws of a random model per impact (default 20)"
+    )
+    parser.add_argument(
+        "--resamples",
+        type=whole,
+        default=resamples,
+        metavar="N",
+        help="of the trajectories, for the intervals (default %(default)s)",
+    )
+    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument(
+        "--spin",
+        choices=("rolling", "zero", "table"),
+        default="rolling",
+        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
+    )
+    parser.add_argument(
+        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
+    )
+
+
+def parameter_names(model: "ImpactModel", texts: Iterable[str]) -> list[str]:
+    """``PARAMETER`` or ``NAME.PARAMETER`` texts as names of parameters.
+
+    Raises
+    ------
+    InputError : the model has none of this name.
+    """
+    return [model.parameter(text.removeprefix(f"{model.name}.")).name for text in texts]
+
+
+def parameter_values(model: "ImpactModel", texts: Iterable[str]) -> dict[str, object]:
+    """``PARAMETER=VALUE`` or ``NAME.PARAMETER=VALUE`` texts as parameter → checked value.
+
+    Raises
+    ------
+    InputError : another form, unknown parameter, value out of range.
+    """
+    from ..impact_models.registry import parse_settings
+
+    full = [text if text.startswith(f"{model.name}.") else f"{model.name}.{text}" for text in texts]
+    return parse_settings(full).get(model.name, {})
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Errors about the impacts name the file that they are from."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is not None:
+            raise
+        raise InputError(error.problem, file=file, trajectory=error.trajectory, advice=error.advice) from error
+
+
+def table_of(estimates: "Sequence[Estimate]") -> list[str]:
+    """Fitted parameters for people: a line of numbers and the verdict below."""
+    lines = [f"{'parameter':<22}{'default':>12}{'fitted':>12}   95 % interval"]
+    for one in estimates:
+        unit = f" {one.unit}" if one.unit else ""
+        interval = "" if one.low != one.low else f"   {one.low:.4g} … {one.high:.4g}{unit}"
+        lines.append(f"{one.name:<22}{_short(one.default):>12}{_short(one.value):>12}{interval}")
+        lines += wrapped(one.verdict, "    ")
+    return lines
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Lines of at most `WIDTH`."""
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent)
+
+
+def _short(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"

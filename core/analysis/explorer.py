@@ -99,7 +99,7 @@ def open_page(document: Any, exploration: Exploration) -> None:
     document.template = template()
     document.template_variables.update(
         heading="Explore impact models",
-        summary=summary(page.first, len(exploration.impacts), exploration.origin),
+        summary=summary(page.first, len(exploration.impacts), exploration.origin, chance=False),
         after="",
         live=True,
         **looks(),
@@ -138,10 +138,10 @@ class _Page:
         titles = [(name, find_model(name).title) for name in self.start.models]
         self.select = Select(title="Model", value=self.model, options=titles, name="model", **common)
         self.select.on_change("value", lambda _attribute, _old, new: self._choose(new))
-        runs = RadioButtonGroup(labels=["Mean", "One draw per impact"], active=0, name="run", **common)
-        runs.on_change("active", lambda _attribute, _old, new: self._draw(new))
-        again = Button(label="Draw again", name="again", **common)
-        again.on_click(self._draw_again)
+        self.runs = RadioButtonGroup(labels=["Mean", "One draw per impact"], active=0, name="run", **common)
+        self.runs.on_change("active", lambda _attribute, _old, new: self._draw(new))
+        self.again = Button(label="Draw again", name="again", **common)
+        self.again.on_click(self._draw_again)
         save, reset = Button(label="Save", name="save", **common), Button(label="Reset", name="reset", **common)
         save.on_click(self._save)
         reset.on_click(self._reset)
@@ -151,8 +151,8 @@ class _Page:
         self._offer()
         controls = column(
             self.select,
-            runs,
-            again,
+            self.runs,
+            self.again,
             *(inputs.layout for inputs in self.inputs.values()),
             row(reset, save, sizing_mode="stretch_width"),
             self.fit,
@@ -189,6 +189,7 @@ class _Page:
 
     def _draw(self, run: int) -> None:
         self.run = run
+        self._offer_draws()
         self._show()
 
     def _draw_again(self) -> None:
@@ -209,11 +210,16 @@ class _Page:
             self._say(escape(str(error)))
 
     def _offer(self) -> None:
-        """The parameters that can be fitted, and a sensible choice of them."""
+        """What suits the chosen model: draws if it has chance in it, and parameters that can be fitted."""
+        self._offer_draws()
         specs = find_model(self.model).parameters
         self.fit.options = [spec.name for spec in specs]
         usual = [spec.name for spec in specs if spec.name in ("rn", "rt", "rn_exponent")]
         self.fit.value = usual or [specs[0].name]
+
+    def _offer_draws(self) -> None:
+        self.runs.visible = find_model(self.model).is_random
+        self.again.visible = self.runs.visible and bool(self.run)
 
     def _calibrate(self) -> None:
         if self.job.is_running:

@@ -157,19 +157,10 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> None:
     axes.set_xlim(graph.x_limits)
     axes.set_ylim(graph.y_limits)
     axes.add_collection(LineCollection(list(graph.links), colors=LINK, linewidths=0.6 * size, zorder=1), autolim=False)
-    axes.scatter(
-        graph.modelled[:, 0],
-        graph.modelled[:, 1],
-        s=13 * size,
-        c=MODELLED,
-        marker="D",
-        linewidths=0,
-        alpha=0.85,
-        zorder=2,
-    )
-    axes.scatter(
-        graph.measured[:, 0], graph.measured[:, 1], s=11 * size, c=MEASURED, linewidths=0, alpha=0.85, zorder=3
-    )
+    common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "alpha": 0.85}
+    scale = size**0.5
+    axes.plot(*graph.modelled.T, marker="D", markersize=3.5 * scale, color=MODELLED, zorder=2, **common)
+    axes.plot(*graph.measured.T, marker="o", markersize=3.3 * scale, color=MEASURED, zorder=3, **common)
     notes = []
     for curve, colour in ((graph.measured_curve, MEASURED), (graph.modelled_curve, MODELLED)):
         if curve is not None:

@@ -191,6 +191,7 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
         y_axis_label=variables[spec.y]["label"],
         tools="box_select,lasso_select,tap,pan,wheel_zoom,reset,save",
         active_drag="box_select",
+        active_scroll=None,
         toolbar_location="above",
         background_fill_color="white",
         border_fill_color="white",
@@ -241,7 +242,9 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
     common: dict[str, Any] = {"options": names, "stylesheets": [sheet], "sizing_mode": "stretch_width"}
     y, x = Select(value=spec.y, name=f"{spec.name}_y", **common), Select(value=spec.x, name=f"{spec.name}_x", **common)
     active = [i for i, log in enumerate((spec.x_log, spec.y_log)) if log]
-    log = CheckboxButtonGroup(labels=["log x", "log y"], active=active, width=96, stylesheets=[sheet])
+    log = CheckboxButtonGroup(
+        labels=["log x", "log y"], active=active, width=96, name=f"{spec.name}_log", stylesheets=[sheet]
+    )
     against = Div(text="against", stylesheets=[sheet], styles={"color": MUTED, "line-height": "30px"})
     return {
         "plot": plot,

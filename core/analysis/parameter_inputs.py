@@ -132,6 +132,8 @@ def _label(spec: ParameterSpec) -> str:
     if not spec.verified:
         notes.append("Not checked against the primary text")
     unit = f" [{escape(spec.unit)}]" if spec.unit else ""
-    symbol = f' <i style="color:{MUTED}">{escape(spec.symbol)}</i>' if spec.symbol else ""
+    letter, _, index = escape(spec.symbol).partition("_")
+    low = f"<sub>{index}</sub>" if index else ""
+    symbol = f' <i style="color:{MUTED}">{letter}{low}</i>' if letter else ""
     hint = escape(". ".join(note for note in notes if note), quote=True)
     return f'<span title="{hint}">{spec.name}{symbol}{unit}</span>'

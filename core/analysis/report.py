@@ -85,15 +85,15 @@ def looks() -> dict[str, Any]:
     }
 
 
-def summary(predictions: Predictions, total: int, origin: str = "") -> str:
-    """One sentence on what is compared."""
-    chance = f", and {predictions.replicates} replicates" if predictions.replicates else ""
+def summary(predictions: Predictions, total: int, origin: str = "", chance: bool = True) -> str:
+    """One sentence on what is compared; with the number of replicates, if `chance`."""
+    drawn = f", and {predictions.replicates} replicates" if chance and predictions.replicates else ""
     runs = len(set(zip(predictions.site.tolist(), predictions.trajectory.tolist(), strict=True)))
     of = f" of {origin}" if origin else ""
     models = len(predictions.models)
     return (
         f"{predictions.row.size} of {total} impacts{of}, {runs} trajectories; "
-        f"{models} model{'s' if models > 1 else ''} with the measured incident velocities imposed{chance}."
+        f"{models} model{'s' if models > 1 else ''} with the measured incident velocities imposed{drawn}."
     )
 
 

@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report and the live page in a real browser: what is drawn, selected, moved and said on the console.
+
+    apt-get install -y --no-install-recommends chromium chromium-driver fonts-inter-variable
+    python3.13 scripts/run.py setup                          # brings Bokeh, Matplotlib and Selenium
+    .venv/bin/python -m pytest tests/browser
+
+Skipped where Chromium, its driver or one of the libraries is missing. Screenshots are left in out/screenshots.
+"""
+
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rockfall
+from rockfall.core.cli import main
+
+for library in ("bokeh", "matplotlib", "selenium"):
+    pytest.importorskip(library, reason=f"{library} is not installed: pip install 'rockfall[figures,explore,dev]'")
+
+from selenium import webdriver  # noqa: E402
+from selenium.webdriver import ActionChains, Keys  # noqa: E402
+from selenium.webdriver.chrome.service import Service  # noqa: E402
+from selenium.webdriver.support.ui import Select, WebDriverWait  # noqa: E402
+
+ROOT = Path(rockfall.__file__).resolve().parent
+SHOTS = ROOT / "out" / "screenshots"
+GRAPHS = ("rn_theta1", "rn_vn1", "vt2_vt1", "r_theta_dev")
+ARGUMENTS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--window-size=1440,1000",
+)
+PATIENCE_S = 60
+
+MODEL = "return Bokeh.documents[0].get_model_by_name(arguments[0])"
+ELEMENT = """
+const model = Bokeh.documents[0].get_model_by_name(arguments[0]);
+const element = Bokeh.index.find_one(model).el;
+return arguments[1] ? element.shadowRoot.querySelector(arguments[1]) : element;
+"""
+INK = """
+// drawn pixels of one graph that are far from white, and those that are faint
+const element = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name(arguments[0]));
+let strong = 0, faint = 0;
+for (const canvas of element.canvas.el.shadowRoot.querySelectorAll("canvas")) {
+  if (!canvas.width || canvas.classList.contains("bk-events")) continue;
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  for (let i = 0; i < data.length; i += 4) {
+    const dark = (255 - Math.min(data[i], data[i + 1], data[i + 2])) * data[i + 3] / 255;
+    if (dark > 150) strong++; else if (dark > 4) faint++;
+  }
+}
+return [strong, faint];
+"""
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
+    chromium, driver = shutil.which("chromium") or shutil.which("google-chrome"), shutil.which("chromedriver")
+    if not (chromium and driver):
+        pytest.skip("no chromium and chromedriver on this machine; the top of this file says how to install them")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (*ARGUMENTS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    chrome = webdriver.Chrome(options=options, service=Service(driver))
+    SHOTS.mkdir(parents=True, exist_ok=True)
+    yield chrome
+    chrome.quit()
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The impacts of the demo site, and their comparison."""
+    folder, demo = tmp_path_factory.mktemp("tables"), ROOT / "assets" / "demo"
+    picks, terrain = str(demo / "picks.csv"), str(demo / "terrain.ply")
+    assert main(["reconstruct", picks, "--terrain", terrain, "--out", str(folder)]) == 0
+    assert main(["compare", str(folder / "impacts.csv"), "--replicates", "4", "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def address(tables: Path) -> Iterator[str]:
+    """Of the live page."""
+    command = [sys.executable, "-m", "rockfall.core.cli", "explore", str(tables / "impacts.csv"), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tables) as process:
+        yield process.stdout.readline().split()[-1]
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE_S) == 0
+
+
+def opened(browser: webdriver.Chrome, url: str) -> None:
+    browser.get_log("browser")
+    browser.get(url)
+    until(browser, lambda: "R² =" in text(browser, "rn_theta1_note"))
+
+
+def until(browser: webdriver.Chrome, condition) -> None:
+    WebDriverWait(browser, PATIENCE_S, 0.1, ignored_exceptions=[Exception]).until(lambda _browser: condition())
+
+
+def text(browser: webdriver.Chrome, name: str) -> str:
+    return browser.execute_script(MODEL + "?.text ?? ''", name)
+
+
+def values(browser: webdriver.Chrome, column: str) -> list:
+    return browser.execute_script(MODEL + f".data['{column}'].length ? Array.from({_data(column)}) : []", "points")
+
+
+def _data(column: str) -> str:
+    return f"Bokeh.documents[0].get_model_by_name('points').data['{column}']"
+
+
+def selected(browser: webdriver.Chrome) -> list[int]:
+    return browser.execute_script(MODEL + ".selected.indices", "points")
+
+
+def element(browser: webdriver.Chrome, name: str, inside: str = ""):
+    return browser.execute_script(ELEMENT, name, inside)
+
+
+def choose(browser: webdriver.Chrome, name: str, value: str) -> None:
+    names = [option for option, _ in browser.execute_script(MODEL + ".options", name)]
+    Select(element(browser, name, "select")).select_by_index(names.index(value))
+
+
+def ink(browser: webdriver.Chrome, graph: str) -> tuple[int, int]:
+    return tuple(browser.execute_script(INK, graph))
+
+
+def drag(browser: webdriver.Chrome, graph: str) -> None:
+    """A box over the lower left quarter of a graph."""
+    plot = element(browser, graph)
+    width, height = plot.size["width"], plot.size["height"]
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
+    time.sleep(0.3)
+    chain = ActionChains(browser).move_to_element_with_offset(plot, -int(0.35 * width), int(0.25 * height))
+    chain.click_and_hold().move_by_offset(40, -30).move_by_offset(int(0.2 * width), -int(0.2 * height))
+    chain.release().perform()
+
+
+def assert_quiet_console(browser: webdriver.Chrome) -> None:
+    assert [entry["message"] for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def test_the_report_draws_four_graphs_and_selects_in_all(browser, tables) -> None:
+    opened(browser, (tables / "report.html").as_uri())
+    before = {graph: ink(browser, graph) for graph in GRAPHS}
+    assert min(strong for strong, _ in before.values()) > 1000
+    browser.save_screenshot(str(SHOTS / "report.png"))
+
+    drag(browser, "vt2_vt1")
+    until(browser, lambda: 0 < len(selected(browser)) < len(values(browser, "m_rn")))
+    until(browser, lambda: f"{len(selected(browser))} selected" in text(browser, "selection"))
+    until(browser, lambda: all(ink(browser, graph)[0] < before[graph][0] for graph in GRAPHS))
+    browser.save_screenshot(str(SHOTS / "report_selection.png"))
+    assert_quiet_console(browser)
+
+
+def test_the_report_shows_another_model_and_other_variables(browser, tables) -> None:
+    opened(browser, (tables / "report.html").as_uri())
+    choose(browser, "model", "azimi_desvarreux_1977")
+    until(browser, lambda: {round(value, 9) for value in values(browser, "p_rn")} == {0.35})
+    choose(browser, "rn_vn1_y", "kinetic2_j")
+    until(browser, lambda: "kinetic energy" in browser.execute_script(MODEL + ".left[0].axis_label", "rn_vn1"))
+    assert ink(browser, "rn_vn1")[0] > 1000
+    element(browser, "rn_theta1_log", "button:nth-child(2)").click()
+    until(browser, lambda: browser.execute_script(MODEL + ".y_range.start", "rn_theta1") > 0)
+    assert ink(browser, "rn_theta1")[0] > 1000
+    browser.save_screenshot(str(SHOTS / "report_variables.png"))
+    assert_quiet_console(browser)
+
+
+def test_what_lies_beyond_is_listed(browser, tables) -> None:
+    opened(browser, (tables / "report.html").as_uri())
+    browser.execute_script(
+        "const points = Bokeh.documents[0].get_model_by_name('points');"
+        "const rn = Array.from(points.data.m_rn); rn[5] = 24.4; points.data = {...points.data, m_rn: rn}"
+    )
+    until(browser, lambda: "24.4 at" in text(browser, "rn_theta1_note") and "24.4 at" in text(browser, "rn_vn1_note"))
+
+
+def test_moving_a_slider_moves_the_model(browser, address) -> None:
+    opened(browser, address)
+    scores, curve = text(browser, "scores"), text(browser, "rn_theta1_note")
+    handle = element(browser, "rn", ".noUi-handle")
+    handle.send_keys(Keys.ARROW_RIGHT * 10)
+    until(browser, lambda: {round(value, 6) for value in values(browser, "p_rn")} == {0.45})
+    until(browser, lambda: text(browser, "scores") != scores and text(browser, "rn_theta1_note") != curve)
+    browser.save_screenshot(str(SHOTS / "explore.png"))
+    element(browser, "reset", "button").click()
+    until(browser, lambda: {round(value, 6) for value in values(browser, "p_rn")} == {0.35})
+    until(browser, lambda: text(browser, "scores") == scores)
+    assert_quiet_console(browser)
+
+
+def test_another_model_a_draw_and_saved_parameters(browser, address, tables) -> None:
+    from rockfall.core.exchange.parameters import read_parameters
+
+    opened(browser, address)
+    choose(browser, "model", "noel_2017")
+    until(browser, lambda: max(value for value in values(browser, "p_rn") if value is not None) > 1)
+    mean = values(browser, "p_rn")
+    element(browser, "run", "button:nth-child(2)").click()
+    until(browser, lambda: values(browser, "p_rn") != mean)
+    field = element(browser, "rt_field", "input")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("0.5", Keys.ENTER)
+    until(browser, lambda: browser.execute_script(MODEL + ".value", "rt_field") is not None)
+    element(browser, "save", "button").click()
+    until(browser, lambda: "Saved to" in text(browser, "status"))
+    assert read_parameters(tables / "parameters.toml")["noel_2017"]["transfer"] == 0.2
+    browser.save_screenshot(str(SHOTS / "explore_draw.png"))
+    assert_quiet_console(browser)
+
+
+def test_calibrate(browser, address) -> None:
+    opened(browser, address)
+    choose(browser, "model", "pfeiffer_bowen_1989")
+    time.sleep(0.5)
+    scores = text(browser, "scores")
+    element(browser, "calibrate", "button").click()
+    until(browser, lambda: element(browser, "calibrate", "button").text == "Cancel")
+    until(browser, lambda: element(browser, "calibrate", "button").text == "Calibrate")
+    assert text(browser, "scores") != scores
+    assert len(text(browser, "status")) > 40
+    browser.execute_script("window.scrollTo(0, 0)")
+    browser.save_screenshot(str(SHOTS / "explore_calibrated.png"))
+    assert_quiet_console(browser)

@@ -6,16 +6,18 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..constants import GRAVITY_MPS2
 from ..errors import InputError
-from .options import add_out, positive, whole
+from .options import add_out, add_terrain_options, not_negative, positive, whole
 from .progress import Progress
 
 if TYPE_CHECKING:
     from ..analysis.comparison import Predictions
     from ..analysis.scores import Score
+    from ..analysis.twins import Twins
     from ..reconstruction.impact import Impacts
 
-FILES = ("predictions.csv", "scores.csv", "comparison.toml", "figures", "report.html")
+FILES = ("predictions.csv", "scores.csv", "comparison.toml", "twins.csv", "figures", "report.html")
 SHOWN = (("rn", "R_N"), ("rt", "R_T"), ("r", "R"), ("theta_dev_deg", "θ_dev [°]"))
 
 
@@ -53,6 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
     )
     parser.add_argument("--tables-only", action="store_true", help="neither figures nor the page")
+    twins = parser.add_argument_group("twins: the blocks that leave each impact as a model says, and where they land")
+    twins.add_argument("--terrain", metavar="MESH", help="the terrain on which they land → twins.csv")
+    twins.add_argument(
+        "--gravity", type=not_negative, default=GRAVITY_MPS2, metavar="G", help="[m/s²] (default %(default)s)"
+    )
+    twins.add_argument("--drag", action="store_true", help="fly with the drag of air")
+    add_terrain_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -63,6 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..exchange.parameters import read_parameters
     from ..exchange.tables import read_impacts
+    from ..exchange.twin_tables import write_twins
     from ..impact_models.registry import COMPARED, find_model, parse_settings
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
@@ -93,16 +103,53 @@ def run(arguments: argparse.Namespace) -> int:
                 error.problem, file=arguments.impacts, trajectory=error.trajectory, advice=error.advice
             ) from error
         marks = scores(impacts, predictions)
+        twins = _twins(arguments, impacts, predictions, progress) if arguments.terrain else None
         progress("Writing the tables")
         write_predictions(predictions, folder / "predictions.csv")
         write_scores(marks, folder / "scores.csv")
         write_settings(predictions, folder / "comparison.toml")
+        if twins is not None:
+            write_twins(twins, folder / "twins.csv")
         notes = [] if arguments.tables_only else _draw(impacts, predictions, marks, folder, arguments.impacts, progress)
         written = [name for name in FILES if (folder / name).exists()]
-    for line in (*_counts(predictions, len(impacts)), *_table(marks), *notes):
+    for line in (*_counts(predictions, len(impacts)), *_table(marks), *_landings(twins), *notes):
         print(line)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _twins(
+    arguments: argparse.Namespace, impacts: "Impacts", predictions: "Predictions", progress: Progress
+) -> "Twins":
+    from ..analysis.twins import fly_twins
+    from ..reconstruction.drag import Drag
+    from ..terrain.readers import read_terrain
+
+    progress(f"Reading {arguments.terrain}")
+    surface = read_terrain(
+        arguments.terrain,
+        up=arguments.up,
+        unit_m=arguments.unit,
+        max_edge_m=arguments.max_edge,
+        ground_only=arguments.ground_only,
+        progress=progress,
+    )
+    progress("Flying the twins")
+    drag = Drag() if arguments.drag else None
+    return fly_twins(impacts, predictions, surface, gravity_mps2=arguments.gravity, drag=drag, runs=None)
+
+
+def _landings(twins: "Twins | None") -> list[str]:
+    """Where the twins of each model's mean land, seen from the real blocks."""
+    from ..analysis.twins import score_twins
+
+    marks = () if twins is None else score_twins(twins)
+    lines = ["Where the blocks would land, from where they did:"] if marks else []
+    for mark in marks:
+        text = f"median {mark.median_offset_m:.2f} m, 90 % within {mark.p90_offset_m:.1f} m of {mark.n} flights"
+        lost = f"; {mark.left_terrain} left the terrain" if mark.left_terrain else ""
+        lines.append(f"{mark.model:<24}{text if mark.n else 'no flight is measured'}{lost}")
+    return lines
 
 
 def _draw(

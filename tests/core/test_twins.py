@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Twins land where the parabola meets the terrain: analytic planes, real flights, border and ground."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.twins import fly_twins, score_twins
+from rockfall.core.cli import main
+from rockfall.core.commands.demo import SITE, _reconstruct
+from rockfall.core.constants import GRAVITY_MPS2 as G
+from rockfall.core.errors import InputError, RockfallError
+from rockfall.core.exchange.project import read_project
+from rockfall.core.exchange.tables import read_impacts, write_impacts
+from rockfall.core.exchange.twin_tables import read_twins, write_twins
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.impact_models.registry import COMPARED
+from rockfall.core.reconstruction.block import Block
+from rockfall.core.reconstruction.drag import Drag, fly
+from rockfall.core.reconstruction.landing import Launches, find_landings, greatest_heights
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.terrain.surface import Surface
+
+
+def plane(slope_deg: float, half_m: float = 60.0, cells: int = 24) -> Surface:
+    """Falls towards +x, through the origin."""
+    side = np.linspace(-half_m, half_m, cells + 1)
+    x, y = (values.ravel() for values in np.meshgrid(side, side, indexing="ij"))
+    first = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    ring = np.column_stack([first, first + cells + 1, first + cells + 2, first + 1])
+    faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
+    vertices = np.column_stack([x, y, -x * np.tan(np.radians(slope_deg))])
+    return Surface(vertices, faces, GlobalShift(), "plane", ())
+
+
+def launches(position, velocity, drag_per_m=0.0) -> Launches:
+    velocity = np.atleast_2d(np.asarray(velocity, dtype=float))
+    position = np.broadcast_to(np.asarray(position, dtype=float), velocity.shape).copy()
+    return Launches(position, velocity, np.full(len(velocity), drag_per_m), G)
+
+
+VELOCITIES = np.array([[4.0, 1.0, 3.0], [7.0, -2.0, 0.4], [0.5, 0.2, 9.0], [11.0, 0.0, 0.03]])
+
+
+@pytest.mark.parametrize("slope_deg", [0.0, 25.0, 40.0])
+def test_landing_on_a_plane_is_the_analytic_one(slope_deg):
+    slope = np.radians(slope_deg)
+    normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
+    found = find_landings(launches([0, 0, 0], VELOCITIES), plane(slope_deg), 0.175)
+    expected = 2 * VELOCITIES @ normal / (G * np.cos(slope))
+    np.testing.assert_allclose(found.duration_s, expected, atol=1e-9)
+    assert not found.into_ground.any()
+    assert not found.left_terrain.any()
+    ends = VELOCITIES * expected[:, None] - [[0, 0, G / 2]] * expected[:, None] ** 2
+    np.testing.assert_allclose(found.position, ends, atol=1e-8)
+    np.testing.assert_allclose(found.velocity, VELOCITIES - np.outer(expected, [0, 0, G]), atol=1e-8)
+
+
+@pytest.mark.parametrize("above", [-0.04, 0.04])
+def test_a_start_beside_the_surface_does_not_stop_the_flight(above):
+    found = find_landings(launches([0, 0, above], VELOCITIES[:3]), plane(0.0), 0.175)
+    upward = VELOCITIES[:3, 2]
+    rises = upward**2 / (2 * G) > -above
+    expected = np.where(rises, (upward + np.sqrt(np.maximum(upward**2 + 2 * G * above, 0))) / G, 0.0)
+    np.testing.assert_allclose(found.duration_s, expected, atol=1e-9)
+    np.testing.assert_array_equal(found.into_ground, ~rises)
+
+
+def test_the_chord_does_not_matter():
+    surface = plane(30.0)
+    start = launches([-20, 0.3, 20 * np.tan(np.radians(30))], VELOCITIES)
+    found = [find_landings(start, surface, 0.175, step_s=step).position for step in (0.02, 0.005, 0.001)]
+    np.testing.assert_allclose(found[0], found[2], atol=1e-8)
+    np.testing.assert_allclose(found[1], found[2], atol=1e-8)
+
+
+def test_drag_is_the_equation_of_motion():
+    surface, drag = plane(35.0), 0.02
+    start = launches([0, 0, 0], VELOCITIES[:3], drag)
+    found = find_landings(start, surface, 0.175)
+    moved, velocity = fly(VELOCITIES[:3], found.duration_s, G, np.full(3, drag))
+    np.testing.assert_allclose(found.position, moved, atol=1e-8)
+    np.testing.assert_allclose(found.velocity, velocity, atol=1e-8)
+    np.testing.assert_allclose(moved[:, 2], -moved[:, 0] * np.tan(np.radians(35)), atol=1e-7)
+    free = find_landings(launches([0, 0, 0], VELOCITIES[:3]), surface, 0.175)
+    assert (found.duration_s < free.duration_s).all()
+
+
+def test_into_the_ground_and_over_the_border():
+    found = find_landings(launches([0, 0, 0], [[1.0, 0, -2.0], [0, 40.0, 20.0], [0, -40.0, 20.0]]), plane(20.0), 0.175)
+    assert found.into_ground.tolist() == [True, False, False]
+    assert found.left_terrain.tolist() == [False, True, True]
+    assert found.duration_s[0] == 0.0
+    lowest = -60 * np.tan(np.radians(20))
+    np.testing.assert_allclose(found.position[1:, 2], lowest, atol=1e-8)
+    upwards = replace(launches([0, 0, 0], [[0, 0, 5.0]]), gravity_mps2=0.0)
+    up = find_landings(upwards, plane(0.0), limit_s=2.0)
+    assert up.left_terrain[0]
+    assert up.duration_s[0] == pytest.approx(2.0)
+    assert find_landings(launches([0, 0, 0], np.empty((0, 3))), plane(0.0)).duration_s.size == 0
+    with pytest.raises(RockfallError, match="positive"):
+        find_landings(upwards, plane(0.0), step_s=0.0)
+
+
+def test_greatest_height_over_a_plane():
+    start, flat = launches([0, 0, 0], VELOCITIES[:1]), plane(0.0)
+    assert greatest_heights(start, np.array([2 * 3.0 / G]), flat)[0] == pytest.approx(9 / (2 * G), rel=1e-9)
+    assert np.isnan(greatest_heights(start, np.array([np.nan]), flat)[0])
+
+
+def bounces(shift: GlobalShift | None = None) -> tuple:
+    """Exact picks of a block that bounces down a plane."""
+    surface = plane(35.0)
+    normal = np.array([np.sin(np.radians(35)), 0, np.cos(np.radians(35))])
+    places, times, velocity = [np.array([-50.0, 0, 50 * np.tan(np.radians(35))])], [3.0], np.array([4.0, 0.3, 2.0])
+    for _ in range(5):
+        duration = 2 * velocity @ normal / (G * normal[2])
+        places.append(places[-1] + velocity * duration - [0, 0, G / 2 * duration**2])
+        times.append(times[-1] + duration)
+        velocity = velocity - [0, 0, G * duration]
+        velocity = 0.8 * (velocity - 2 * (velocity @ normal) * normal)
+    n = len(places)
+    picks = make_picks(["A"] * n, times, np.array(places), kind=["release"] + ["impact"] * (n - 1))
+    return surface, reconstruct(picks, surface=surface, block=Block(), site="slope").impacts
+
+
+def as_model(impacts, velocity=None):
+    """Predictions of a model that is always right (or says `velocity`)."""
+    mean = compare(impacts, ["azimi_desvarreux_1977"])
+    keep = np.isfinite(impacts.v2[mean.row]).all(axis=1)
+    row = mean.row[keep]
+    v2 = impacts.v2[row] if velocity is None else np.tile(velocity, (row.size, 1))
+    fields = {name: getattr(mean, name)[keep] for name in ("site", "trajectory", "impact")}
+    into = impacts.flags["into_ground"][row][None, None]
+    return replace(mean, models=("measured",), row=row, v2=v2[None, None], into_ground=into, **fields)
+
+
+def test_the_real_velocity_lands_on_the_next_impact():
+    surface, impacts = bounces()
+    twins = fly_twins(impacts, as_model(impacts), surface)
+    assert len(twins) == 4
+    assert np.nanmax(twins.landing_offset_m) < 1e-6
+    for values in (twins.duration_difference_s, twins.length_difference_m, twins.height_difference_m):
+        assert np.nanmax(np.abs(values)) < 1e-6
+    halfway = twins.time_s + twins.duration_s / 2
+    position, velocity = twins.states(np.arange(4), halfway)
+    expected = twins.launches.position + (twins.launches.velocity + velocity) / 2 * (twins.duration_s / 2)[:, None]
+    np.testing.assert_allclose(position, expected, atol=1e-9)
+
+
+def test_the_real_velocity_lands_on_the_next_impact_of_the_demo_within_the_noise():
+    surface, result = _reconstruct(read_project(SITE / "project.toml"))
+    twins = fly_twins(result.impacts, as_model(result.impacts), surface)
+    assert np.isfinite(twins.landing_offset_m).sum() > 60
+    assert np.nanmedian(twins.landing_offset_m) < 0.005
+    assert np.nanmax(twins.landing_offset_m) < 0.05
+    models = fly_twins(result.impacts, compare(result.impacts), surface)
+    finer = fly_twins(result.impacts, compare(result.impacts), surface, step_s=0.004)
+    assert np.linalg.norm(models.landing - finer.landing, axis=1).max() < 1e-3
+    marks = {mark.model: mark for mark in score_twins(models)}
+    assert tuple(marks) == COMPARED
+    assert marks["pfeiffer_bowen_1989"].median_offset_m == pytest.approx(marks["stevens_1998"].median_offset_m)
+    assert all(1.0 < mark.median_offset_m < 10.0 for mark in marks.values())
+
+
+def test_a_model_into_the_ground_flies_nowhere():
+    surface, impacts = bounces()
+    predictions = as_model(impacts, velocity=[1.0, 0.0, -5.0])
+    twins = fly_twins(impacts, replace(predictions, into_ground=np.ones_like(predictions.into_ground)), surface)
+    assert twins.into_ground.all()
+    np.testing.assert_array_equal(twins.length_m, 0.0)
+    real = np.linalg.norm(twins.measured_landing - twins.launches.position, axis=1)
+    np.testing.assert_allclose(twins.landing_offset_m, real)
+
+
+def test_runs_are_flown_model_by_model():
+    surface, impacts = bounces()
+    predictions = compare(impacts, ["noel_2017", "stevens_1998"], replicates=3, seed=5)
+    twins = fly_twins(impacts, predictions, surface, runs=None)
+    m = predictions.row.size
+    assert len(twins) == 2 * 4 * m
+    assert twins.model[4 * m] == "stevens_1998"
+    np.testing.assert_array_equal(twins.replicate[: 4 * m], np.repeat(np.arange(4), m))
+    np.testing.assert_array_equal(twins.launches.velocity, predictions.v2.reshape(-1, 3))
+    mean = fly_twins(impacts, predictions, surface)
+    np.testing.assert_array_equal(mean.landing[:m], twins.landing[:m])
+
+
+def test_drag_needs_the_block():
+    surface, impacts = bounces()
+    drag = Drag()
+    twins = fly_twins(impacts, as_model(impacts), surface, drag=drag)
+    np.testing.assert_allclose(twins.launches.drag_per_m, drag.per_metre(Block()), rtol=1e-12)
+    with pytest.raises(InputError, match="Diameter and mass"):
+        fly_twins(replace(impacts, mass_kg=np.full(len(impacts), np.nan)), as_model(impacts), surface, drag=drag)
+    with pytest.raises(InputError, match="position of impact"):
+        fly_twins(replace(impacts, position=np.full_like(impacts.position, np.nan)), as_model(impacts), surface)
+
+
+def test_table_round_trip(tmp_path):
+    surface, impacts = bounces()
+    shift = GlobalShift(2600000.0, 1200000.0, 500.0)
+    surface = Surface(surface.vertices, surface.faces, shift, "plane", ())
+    impacts = replace(impacts, shift=shift)
+    twins = fly_twins(impacts, compare(impacts, replicates=1), surface, runs=None)
+    write_twins(twins, tmp_path / "twins.csv")
+    back = read_twins(tmp_path / "twins.csv", shift)
+    for name, value in vars(twins).items():
+        if isinstance(value, np.ndarray):
+            if value.dtype.kind == "f":
+                np.testing.assert_allclose(getattr(back, name), value, atol=1e-8, err_msg=name)
+            else:
+                np.testing.assert_array_equal(getattr(back, name), value, err_msg=name)
+    np.testing.assert_allclose(back.launches.velocity, twins.launches.velocity, atol=0)
+    np.testing.assert_allclose(back.landing_offset_m, twins.landing_offset_m, atol=1e-8)
+
+
+def test_compare_with_a_terrain_leaves_twins(tmp_path, capsys):
+    _, result = _reconstruct(read_project(SITE / "project.toml"))
+    write_impacts(result.impacts, tmp_path / "impacts.csv")
+    options = ["--model", "noel_2017", "wyllie_2014", "--tables-only", "--terrain", str(SITE / "terrain.ply")]
+    out = tmp_path / "out"
+    status = main(["compare", str(tmp_path / "impacts.csv"), *options, "--out", str(out)])
+    said = capsys.readouterr()
+    assert status == 0, said.err
+    assert "twins.csv" in said.out
+    assert "Where the blocks would land" in said.out
+    twins = read_twins(out / "twins.csv")
+    assert twins.models == ("noel_2017", "wyllie_2014")
+    impacts = read_impacts(tmp_path / "impacts.csv")
+    assert set(twins.trajectory.tolist()) <= set(impacts.trajectory.tolist())
+    assert np.nanmedian(twins.landing_offset_m[twins.model == "noel_2017"]) < 4.0

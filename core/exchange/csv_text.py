@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading comma-separated text into columns, with every mistake located."""
 
+import codecs
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,7 +14,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..vectors import Array
+from .cells import Cells, split_cells
 
+LARGE_BYTES = 2_000_000
+"""Tables above this are split by compiled code, which takes a moment to load."""
 EXPORT_ADVICE = "Export it as comma-separated text in UTF-8, with . decimals"
 
 
@@ -29,15 +33,18 @@ class TextTable:
     """
 
     source: Path
-    columns: dict[str, list[str]]
-    row: list[int]
+    columns: Mapping[str, Sequence[str]]
+    row: Sequence[int]
 
     def __len__(self) -> int:
         return len(self.row)
 
     def text(self, name: str, default: str = "") -> list[str]:
         """(n,) cells; `default` where the column is missing or the cell is empty."""
-        return [cell or default for cell in self.columns.get(name, [""] * len(self))]
+        cells = self.columns.get(name)
+        if cells is None:
+            return [default] * len(self)
+        return [cell or default for cell in (cells.texts() if isinstance(cells, Cells) else cells)]
 
     def numbers(self, name: str, *, required: bool = False) -> Array:
         """(n,) a column of numbers; NaN where it is missing or empty.
@@ -50,8 +57,12 @@ class TextTable:
         if cells is None:
             return np.full(len(self), np.nan)
         values = np.empty(len(cells))
-        for i, cell in enumerate(cells):
-            if cell:
+        rows: Iterable[int] = range(len(cells))
+        if isinstance(cells, Cells):
+            values, found = cells.numbers(empty=required)
+            rows = found.tolist()
+        for i in rows:
+            if cells[i]:
                 values[i] = self._number(name, i, required)
             elif required:
                 raise self.error(i, f"The cell of {name} is empty", "Give a number")
@@ -79,8 +90,8 @@ class TextTable:
 
     def rest(self, known: Sequence[str]) -> dict[str, NDArray[np.str_]]:
         """The columns that are not among `known`."""
-        left = {name: cells for name, cells in self.columns.items() if name not in known}
-        return {name: np.array(cells, dtype=np.str_) for name, cells in left.items()}
+        left = [name for name in self.columns if name not in known]
+        return {name: np.array(self.text(name), dtype=np.str_) for name in left}
 
     def error(self, i: int, problem: str, advice: str) -> InputError:
         """An `InputError` that points at one row."""
@@ -102,7 +113,11 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         row with too many or too few cells, no rows.
     """
     path = Path(path)
-    reader = csv.reader(io.StringIO(_read_text(path), newline=""), strict=True)
+    data = _read_bytes(path)
+    text = _decoded(path, data)
+    if len(data) >= LARGE_BYTES and (large := _large_table(path, data, required, known)) is not None:
+        return large
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     header: list[str] | None = None
     rows: list[list[str]] = []
     numbers: list[int] = []
@@ -147,13 +162,27 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     return TextTable(path, columns, numbers)
 
 
-def _read_text(path: Path) -> str:
+def _large_table(path: Path, data: bytes, required: Sequence[str], known: Sequence[str]) -> TextTable | None:
+    """The same table, quickly; None when there is anything unusual about it."""
+    begin = len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0
+    end = data.find(b"\n")
+    header = [cell.strip() for cell in data[begin:end].decode().split(",")]
+    if end < 0 or not all(header) or (columns := split_cells(data, end + 1, len(header))) is None:
+        return None
+    _check_header(path, header, required, known, 1)
+    return TextTable(path, dict(zip(header, columns, strict=True)), range(2, len(columns[0]) + 2))
+
+
+def _read_bytes(path: Path) -> bytes:
     try:
-        data = path.read_bytes()
+        return path.read_bytes()
     except FileNotFoundError as error:
         raise InputError("There is no such file", file=path, advice="Check the name and the folder") from error
     except OSError as error:
         raise InputError(f"The file cannot be read ({error.strerror})", file=path, advice="Check the path") from error
+
+
+def _decoded(path: Path, data: bytes) -> str:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("The file is in UTF-16, not UTF-8", file=path, advice=EXPORT_ADVICE)
     if b"\0" in data:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..georeference import GlobalShift
 from ..reconstruction.impact import FLAGS, Impacts, apparent
-from ..reconstruction.picks import Picks, make_picks
+from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
 from ..vectors import Array, dot
 from .csv_text import read_table
@@ -20,6 +20,11 @@ NORMAL = ("nx", "ny", "nz")
 SPIN = ("omega1x_radps", "omega1y_radps", "omega1z_radps")
 PICKS_REQUIRED = ("trajectory", "time_s", *POSITION)
 PICKS_KNOWN = (*PICKS_REQUIRED, "kind", "status", *NORMAL, "sigma_time_s", "sigma_position_m", *SPIN)
+
+Cells = Array | Names | Indices | Sequence[str]
+Columns = dict[str, Cells]
+"""Name → (n,) cells: numbers, or text as it is written."""
+WRITTEN_ROWS = 20_000
 
 Column = tuple[str, str, int | None, bool]
 """Name in the file, attribute of `Impacts`, component of a vector, whether it is an angle in degrees."""
@@ -89,9 +94,9 @@ def read_picks(path: str | Path, shift: GlobalShift | None = None) -> Picks:
 
 def write_picks(picks: Picks, path: str | Path) -> None:
     """Write picks.csv: optional columns only where one has a value, unknown columns at the end."""
-    columns: dict[str, Sequence[str]] = {
+    columns: Columns = {
         "trajectory": picks.trajectory.tolist(),
-        "time_s": _numbers(picks.time_s),
+        "time_s": picks.time_s,
         **_vectors(POSITION, picks.shift.to_survey(picks.position)),
         "kind": picks.kind.tolist(),
         "status": picks.status.tolist(),
@@ -100,32 +105,28 @@ def write_picks(picks: Picks, path: str | Path) -> None:
         columns |= _vectors(NORMAL, picks.normal)
     for name, values in (("sigma_time_s", picks.sigma_time_s), ("sigma_position_m", picks.sigma_position_m)):
         if np.isfinite(values).any():
-            columns[name] = _numbers(values)
+            columns[name] = values
     if np.isfinite(picks.angular_velocity).any():
         columns |= _vectors(SPIN, picks.angular_velocity)
-    columns |= {name: cells.tolist() for name, cells in picks.extra.items()}
+    columns |= picks.extra
     _write(path, columns)
 
 
 def write_impacts(impacts: Impacts, path: str | Path) -> None:
     """Write impacts.csv: the fixed columns, then standard deviations, spin, energies and heights if any."""
-    columns: dict[str, Sequence[str]] = {
-        "site": impacts.site.tolist(),
-        "trajectory": impacts.trajectory.tolist(),
-        "impact": [str(number) for number in impacts.impact.tolist()],
-    }
-    columns |= {column[0]: _numbers(_of(impacts, column)) for column in _NUMBERS}
+    columns: Columns = {"site": impacts.site, "trajectory": impacts.trajectory, "impact": impacts.impact}
+    columns |= {column[0]: _of(impacts, column) for column in _NUMBERS}
     columns["flags"] = impacts.flag_text()
     for name, attribute, component, degrees in _DERIVED:
         if attribute in impacts.sigma:
             sigma = impacts.sigma[attribute]
             values = sigma if component is None else sigma[:, component]
-            columns[f"sigma_{name}"] = _numbers(np.degrees(values) if degrees else values)
+            columns[f"sigma_{name}"] = np.degrees(values) if degrees else values
     for column in (*_SPIN, *_ENERGY):
         values = _of(impacts, column)
         if np.isfinite(values).any():
-            columns[column[0]] = _numbers(values)
-    columns |= {name: cells.tolist() for name, cells in impacts.extra.items()}
+            columns[column[0]] = values
+    columns |= impacts.extra
     _write(path, columns)
 
 
@@ -166,8 +167,7 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     if shift is None:
         shift = GlobalShift.proposed(finite.min(axis=0), finite.max(axis=0)) if len(finite) else GlobalShift()
     arrays["position"] = shift.to_local(survey)
-    flags = [{flag.strip() for flag in cell.split(";")} for cell in table.text("flags")]
-    marks = {name: np.array([name in here for here in flags], dtype=np.bool_) for name in FLAGS}
+    marks = _marks(table.text("flags"))
 
     computed = apparent(arrays["v1"], arrays["v2"], arrays["normal"])
     judged = ("rn", "rt", "r", "theta1", "theta_dev")
@@ -198,7 +198,7 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
 def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
     """Write trajectories.csv, to the micrometre and microsecond."""
     survey = samples.shift.to_survey(samples.position)
-    columns: dict[str, Sequence[str]] = {
+    columns: Columns = {
         "source": samples.source.tolist(),
         "trajectory": samples.trajectory.tolist(),
         "run": [str(run) for run in samples.run.tolist()],
@@ -210,6 +210,14 @@ def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
     _write(path, columns)
 
 
+def _marks(cells: Sequence[str]) -> dict[str, Mask]:
+    """Flag → (n,) whether the cell has it; there are few different cells."""
+    code: dict[str, int] = {}
+    which = np.array([code.setdefault(cell, len(code)) for cell in cells], dtype=np.intp)
+    flags = [{flag.strip() for flag in cell.split(";")} for cell in code]
+    return {name: np.array([name in here for here in flags], dtype=np.bool_)[which] for name in FLAGS}
+
+
 def _of(impacts: Impacts, column: Column) -> Array:
     _, attribute, component, degrees = column
     values: Array = getattr(impacts, attribute)
@@ -219,21 +227,27 @@ def _of(impacts: Impacts, column: Column) -> Array:
     return np.degrees(values) if degrees else values
 
 
-def _numbers(values: Array) -> list[str]:
-    """The shortest text that reads back as the same number; empty when undefined."""
-    return ["" if value != value else repr(value) for value in values.tolist()]
+def _texts(cells: Cells) -> list[object]:
+    """As they are written: the shortest text that reads back as the same number; empty when undefined."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
+        return ["" if value != value else repr(value) for value in cells.tolist()]
+    return cells.tolist() if isinstance(cells, np.ndarray) else list(cells)
 
 
 def _rounded(values: Array) -> list[str]:
     return ["" if value != value else f"{value:.6f}" for value in values.tolist()]
 
 
-def _vectors(names: Iterable[str], values: Array) -> dict[str, Sequence[str]]:
-    return {name: _numbers(values[:, i]) for i, name in enumerate(names)}
+def _vectors(names: Iterable[str], values: Array) -> Columns:
+    return {name: values[:, i] for i, name in enumerate(names)}
 
 
-def _write(path: str | Path, columns: dict[str, Sequence[str]]) -> None:
+def _write(path: str | Path, columns: Columns) -> None:
+    """Some rows at a time: their text takes many times the memory of the numbers."""
+    rows = min(map(len, columns.values()))
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+        for start in range(0, rows, WRITTEN_ROWS):
+            part = (_texts(cells[start : start + WRITTEN_ROWS]) for cells in columns.values())
+            writer.writerows(zip(*part, strict=True))

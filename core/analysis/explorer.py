@@ -4,6 +4,7 @@
 It listens on this machine only, and answers only pages that it served itself.
 """
 
+import socket
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -69,13 +70,13 @@ def serve(exploration: Exploration, port: int = 0, ready: Callable[[str], None] 
     demand(PAGES)
     from bokeh.server.server import Server
 
-    hosts = [f"{ADDRESS}:{port or '*'}", f"localhost:{port or '*'}"]
     try:
+        port = port or free_port()
         server = Server(
             {"/": lambda document: open_page(document, exploration)},
             port=port,
             address=ADDRESS,
-            allow_websocket_origin=hosts,
+            allow_websocket_origin=[f"{ADDRESS}:{port}", f"localhost:{port}"],
         )
     except OSError as error:
         raise RockfallError(
@@ -88,6 +89,12 @@ def serve(exploration: Exploration, port: int = 0, ready: Callable[[str], None] 
         server.io_loop.start()
     finally:
         server.stop()
+
+
+def free_port() -> int:
+    """A port of this machine that nobody listens to."""
+    with socket.create_server((ADDRESS, 0)) as probe:
+        return int(probe.getsockname()[1])
 
 
 def open_page(document: Any, exploration: Exploration) -> None:

@@ -45,7 +45,10 @@ def parameter_inputs(model: ImpactModel, values: Mapping[str, Value], changed: C
         if not quiet[0]:
             changed(name, value)
 
-    parts = {spec.name: _input(spec, values[spec.name], report, quiet) for spec in model.parameters}
+    parts = {
+        spec.name: _input(spec, values[spec.name], f"{model.name}.{spec.name}", report, quiet)
+        for spec in model.parameters
+    }
 
     def show(values: Mapping[str, Value]) -> None:
         quiet[0] = True
@@ -70,7 +73,7 @@ def slider_range(spec: ParameterSpec) -> tuple[float, float, float]:
 
 
 def _input(
-    spec: ParameterSpec, value: Value, report: Changed, quiet: list[bool]
+    spec: ParameterSpec, value: Value, name: str, report: Changed, quiet: list[bool]
 ) -> tuple[Any, Callable[[Value], None]]:
     from bokeh.layouts import column, row
     from bokeh.models import Div, InlineStyleSheet, Select, Slider, Spinner
@@ -81,7 +84,7 @@ def _input(
         menu = Select(
             value=str(value),
             options=list(spec.choices),
-            name=spec.name,
+            name=name,
             stylesheets=[sheet],
             sizing_mode="stretch_width",
         )
@@ -95,7 +98,7 @@ def _input(
         step=step,
         value=min(max(float(value), start), end),
         show_value=False,
-        name=spec.name,
+        name=name,
         stylesheets=[sheet],
         sizing_mode="stretch_width",
         bar_color=MUTED,
@@ -106,7 +109,7 @@ def _input(
         high=spec.maximum,
         step=step,
         width=82,
-        name=f"{spec.name}_field",
+        name=f"{name}.field",
         stylesheets=[sheet],
     )
 

@@ -196,7 +196,7 @@ def test_what_lies_beyond_is_listed(browser, tables) -> None:
 def test_moving_a_slider_moves_the_model(browser, address) -> None:
     opened(browser, address)
     scores, curve = text(browser, "scores"), text(browser, "rn_theta1_note")
-    handle = element(browser, "rn", ".noUi-handle")
+    handle = element(browser, "azimi_desvarreux_1977.rn", ".noUi-handle")
     handle.send_keys(Keys.ARROW_RIGHT * 10)
     until(browser, lambda: {round(value, 6) for value in values(browser, "p_rn")} == {0.45})
     until(browser, lambda: text(browser, "scores") != scores and text(browser, "rn_theta1_note") != curve)
@@ -216,13 +216,13 @@ def test_another_model_a_draw_and_saved_parameters(browser, address, tables) -> 
     mean = values(browser, "p_rn")
     element(browser, "run", "button:nth-child(2)").click()
     until(browser, lambda: values(browser, "p_rn") != mean)
-    field = element(browser, "rt_field", "input")
+    field = element(browser, "noel_2017.rt.field", "input")
     field.send_keys(Keys.CONTROL, "a")
     field.send_keys("0.5", Keys.ENTER)
-    until(browser, lambda: browser.execute_script(MODEL + ".value", "rt_field") is not None)
+    until(browser, lambda: browser.execute_script(MODEL + ".value", "noel_2017.rt") == 0.5)
     element(browser, "save", "button").click()
     until(browser, lambda: "Saved to" in text(browser, "status"))
-    assert read_parameters(tables / "parameters.toml")["noel_2017"]["transfer"] == 0.2
+    assert read_parameters(tables / "parameters.toml")["noel_2017"]["rt"] == 0.5
     browser.save_screenshot(str(SHOTS / "explore_draw.png"))
     assert_quiet_console(browser)
 

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Figures in print and the page of a comparison: what the files hold, and what is said when a library is missing."""
+
+import re
+import struct
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from rockfall.core.analysis import extras
+from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.graphs import GraphSpec, make_graph, make_sheet
+from rockfall.core.analysis.scores import scores
+from rockfall.core.analysis.statistics import group_statistics, impact_statistics
+from rockfall.core.cli import main
+from rockfall.core.errors import DependencyError, InputError
+from rockfall.core.exchange.parameters import read_parameters, write_parameters
+from rockfall.core.exchange.tables import write_impacts
+from rockfall.core.impact_models.registry import MODELS, find_model
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct
+
+MODELS_SHOWN = ("noel_2017", "wyllie_2014")
+
+
+@pytest.fixture(scope="module")
+def impacts():
+    """Impacts down a slope of 35°, one of them at R_N = 24.4."""
+    rng = np.random.default_rng(5)
+    step = rng.uniform(0.4, 1.2, 16)
+    position = np.cumsum(step[:, None] * [6.0, 0.0, -4.2] + rng.normal(size=(16, 3)) * 0.3, axis=0)
+    normal = np.tile([0.57, 0, 0.82], (16, 1))
+    names = np.repeat(["a<b>&", "b"], 8)
+    found = reconstruct(make_picks(names, np.cumsum(step), position, normal=normal)).impacts
+    rn = found.rn.copy()
+    rn[3] = 24.4
+    return replace(found, rn=rn)
+
+
+@pytest.fixture(scope="module")
+def predictions(impacts):
+    return compare(impacts, MODELS_SHOWN, replicates=1)
+
+
+@pytest.fixture(scope="module")
+def figures(impacts, predictions, tmp_path_factory):
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from rockfall.core.analysis.figures import save_figures
+
+    folder = tmp_path_factory.mktemp("figures")
+    save_figures(make_sheet(impacts, predictions), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(impacts, predictions, tmp_path_factory):
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    from rockfall.core.analysis.report import write_report
+
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_report(impacts, predictions, scores(impacts, predictions), path, "impacts <1>.csv")
+    return path.read_text(encoding="utf-8")
+
+
+def test_one_figure_for_each_model_and_the_sheet(figures) -> None:
+    names = {"all_models", *MODELS_SHOWN}
+    assert {path.name for path in figures.iterdir()} == {f"{n}.{kind}" for n in names for kind in ("svg", "png", "pdf")}
+    for path in figures.glob("*.pdf"):
+        assert path.read_bytes().startswith(b"%PDF-")
+
+
+def test_print_quality(figures) -> None:
+    """A page of 190 mm at 300 points per inch."""
+    for path in figures.glob("*.png"):
+        width, height = struct.unpack(">II", path.read_bytes()[16:24])
+        assert width == round(7.48 * 300)
+        assert 1000 < height < 3500
+
+
+def test_text_stays_text_with_units_fits_and_outliers(figures) -> None:
+    svg = (figures / "wyllie_2014.svg").read_text(encoding="utf-8")
+    text = re.sub(r"\s+", "", re.sub(r"<[^>]+>", "", svg))  # letters of a formula stand one by one
+    for part in ("Incident angle", "Normal restitution", "Restituted tangential speed", "[m/s]", "[°]", "Wyllie 2014"):
+        assert part.replace(" ", "") in text
+    assert text.count("R²") == 6
+    assert "Beyond,measured:" in text
+    assert "24.4" in text
+
+
+def test_the_same_figure_is_the_same_file(figures, impacts, predictions, tmp_path) -> None:
+    from rockfall.core.analysis.figures import model_figure, save_figure
+
+    graphs = make_sheet(impacts, predictions)[0]
+    save_figure(model_figure(graphs), tmp_path / "again.svg")
+    assert (tmp_path / "again.svg").read_bytes() == (figures / "noel_2017.svg").read_bytes()
+
+
+def test_a_logarithmic_graph_of_measured_impacts(impacts, tmp_path) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from rockfall.core.analysis.figures import model_figure, save_figure
+
+    graph = make_graph(impacts, GraphSpec("energy", "kinetic1_j", "kinetic2_j", x_log=True, y_log=True))
+    save_figure(model_figure([graph]), tmp_path / "energy.svg")
+    assert "Incident kinetic energy" in (tmp_path / "energy.svg").read_text(encoding="utf-8")
+
+
+class Links(HTMLParser):
+    """What a page would load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag, attrs) -> None:
+        self.found += [value for name, value in attrs if name in ("src", "href") and value]
+
+
+def test_the_page_loads_nothing(page) -> None:
+    links = Links()
+    links.feed(page)
+    assert [link for link in links.found if not link.startswith("data:")] == []
+    assert "cdn.bokeh.org" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert len(page) < 10e6
+
+
+def test_the_page_says_what_and_how(page, predictions) -> None:
+    assert "Noël et al. 2017" in page
+    assert "rn_exponent = -1.08" in page
+    assert "Provenance" in page
+    assert "impacts &lt;1&gt;.csv" in page
+    body = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert "<1>" not in body
+    assert "<b>&" not in body
+
+
+def test_what_is_missing_is_named_with_its_command(monkeypatch, impacts, predictions, tmp_path, capsys) -> None:
+    from rockfall.core.analysis.figures import save_figures
+    from rockfall.core.analysis.report import write_report
+
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    with pytest.raises(DependencyError, match=r'pip install "rockfall\[figures\]"'):
+        save_figures(make_sheet(impacts, predictions), tmp_path)
+    with pytest.raises(DependencyError, match=r'pip install "rockfall\[explore\]"'):
+        write_report(impacts, predictions, (), tmp_path / "report.html")
+    assert list(tmp_path.iterdir()) == []
+    write_impacts(impacts, tmp_path / "impacts.csv")
+    assert main(["explore", str(tmp_path / "impacts.csv"), "--no-browser"]) == 1
+    assert main(["compare", str(tmp_path / "impacts.csv"), "--out", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"predictions.csv", "scores.csv"}
+    output = capsys.readouterr()
+    assert 'Install it: pip install "rockfall[explore]"' in output.err
+    assert 'Install it: pip install "rockfall[figures]"' in output.out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--model", "noel_2071"], "Did you mean noel_2017"),
+        (["--port", "70000"], "65535"),
+        (["--parameters", "missing.toml"], "missing.toml"),
+    ],
+)
+def test_explore_refuses_bad_input(impacts, tmp_path, capsys, options, words) -> None:
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    write_impacts(impacts, tmp_path / "impacts.csv")
+    assert main(["explore", str(tmp_path / "impacts.csv"), "--no-browser", *options]) == 1
+    assert words in capsys.readouterr().err
+
+
+def test_parameters_come_back_from_their_file(tmp_path) -> None:
+    settings = {name: model.settings() for name, model in MODELS.items()}
+    write_parameters(settings, tmp_path / "parameters.toml")
+    assert read_parameters(tmp_path / "parameters.toml") == settings
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("rn = ", "no TOML"),
+        ("seed = 1", "no parameters"),
+        ("[models.noel_2017]\nrn_limit = 1000", "outside its range"),
+        ("[models.noel_2017]\nrn_limits = 1", "Did you mean rn_limit"),
+        ("[models.noel]\nrt = 1", "Did you mean noel_2017"),
+    ],
+)
+def test_a_wrong_parameter_file_is_refused(tmp_path, content, words) -> None:
+    (tmp_path / "wrong.toml").write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=words) as caught:
+        read_parameters(tmp_path / "wrong.toml")
+    assert "wrong.toml" in str(caught.value)
+
+
+def test_sliders_hold_the_default_and_stay_in_range() -> None:
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    from rockfall.core.analysis.parameter_inputs import slider_range
+
+    for name in MODELS:
+        for spec in find_model(name).parameters:
+            if not spec.choices:
+                start, end, step = slider_range(spec)
+                assert spec.minimum == start <= spec.default <= end <= spec.maximum, (name, spec.name)
+                assert (end - start) / 1000 <= step <= (end - start) / 100
+
+
+def test_statistics_by_group(impacts) -> None:
+    groups = group_statistics(impacts, "trajectory")
+    assert list(groups) == ["a<b>&", "b"]
+    assert sum(one.impacts for one in groups.values()) == len(impacts)
+    of_b = impacts.trajectory == "b"
+    assert groups["b"].rt == impact_statistics(impacts, of_b).rt
+    assert groups["b"].rt.slope != groups["a<b>&"].rt.slope
+    assert sum(one.impacts for one in group_statistics(impacts, "last").values()) == len(impacts)
+    with pytest.raises(InputError, match="trajectory"):
+        group_statistics(impacts, "soil")

@@ -108,7 +108,8 @@ def _input(
         low=spec.minimum,
         high=spec.maximum,
         step=step,
-        width=82,
+        width=88,
+        format="0.[000]",
         name=f"{name}.field",
         stylesheets=[sheet],
     )

@@ -26,7 +26,8 @@ def impacts(tmp_path):
 
 def test_compare_writes_tables_and_a_summary(impacts, tmp_path, capsys):
     out = tmp_path / "out"
-    argv = ["compare", impacts, "--replicates", 4, "--seed", 2, "--set", "azimi_desvarreux_1977.rn=0.5", "--out", out]
+    argv = ["compare", impacts, "--replicates", 4, "--seed", 2, "--set", "azimi_desvarreux_1977.rn=0.5"]
+    argv += ["--tables-only", "--out", out]
     assert main([str(word) for word in argv]) == 0
     said = capsys.readouterr().out
     assert "2 of 3 impacts compared: the mean and 4 replicates with seed 2 of 6 models." in said
@@ -47,7 +48,17 @@ def test_compare_writes_tables_and_a_summary(impacts, tmp_path, capsys):
 
 def test_chosen_models_spin_and_radius(impacts, tmp_path):
     out = tmp_path / "out"
-    argv = ["compare", str(impacts), "--model", "noel_2017", "--model", "bourrier_hungr", "--out", str(out)]
+    argv = [
+        "compare",
+        str(impacts),
+        "--model",
+        "noel_2017",
+        "--model",
+        "bourrier_hungr",
+        "--out",
+        str(out),
+        "--tables-only",
+    ]
     assert main([*argv, "--spin", "zero", "--radius", "0.175"]) == 0
     predictions = read_predictions(out / "predictions.csv", read_impacts(impacts))
     assert predictions.models == ("noel_2017", "bourrier_hungr")

@@ -153,6 +153,18 @@ def test_what_is_missing_is_named_with_its_command(monkeypatch, impacts, predict
     assert 'Install it: pip install "rockfall[figures]"' in output.out
 
 
+def test_compare_leaves_figures_and_the_page(impacts, tmp_path, capsys) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    write_impacts(impacts, tmp_path / "impacts.csv")
+    write_parameters({"wyllie_2014": {"inertia": "sphere"}}, tmp_path / "parameters.toml")
+    argv = ["compare", str(tmp_path / "impacts.csv"), "--model", "wyllie_2014", "--out", str(tmp_path / "out")]
+    assert main([*argv, "--parameters", str(tmp_path / "parameters.toml")]) == 0
+    assert len(list((tmp_path / "out" / "figures").iterdir())) == 6
+    assert "inertia = sphere" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "figures, report.html" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

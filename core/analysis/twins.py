@@ -232,7 +232,7 @@ def _measured_flights(impacts: Impacts) -> tuple[Array, Indices]:
     duration, follower = np.full(n, np.nan), np.full(n, -1, dtype=np.intp)
     keys = zip(impacts.site.tolist(), impacts.trajectory.tolist(), impacts.impact.tolist(), strict=True)
     place = {key: i for i, key in enumerate(keys)}
-    known1, known2 = (np.isfinite(values).all(axis=1) for values in (impacts.v1, impacts.v2))
+    known1, known2 = (np.isfinite(norm(values)) for values in (impacts.v1, impacts.v2))
     gap = impacts.flags["gap"]
     for (site, trajectory, number), i in place.items():
         j = place.get((site, trajectory, number + 1), -1)
@@ -242,7 +242,7 @@ def _measured_flights(impacts: Impacts) -> tuple[Array, Indices]:
 
 
 def _check_positions(impacts: Impacts, row: Indices) -> None:
-    missing = row[~np.isfinite(impacts.position[row]).all(axis=1)]
+    missing = row[np.isnan(norm(impacts.position[row]))]
     if missing.size:
         raise InputError(
             f"The position of impact {impacts.impact[missing[0]]} is not known",
@@ -254,7 +254,7 @@ def _check_positions(impacts: Impacts, row: Indices) -> None:
 def _drag_per_m(impacts: Impacts, row: Indices, drag: Drag) -> Array:
     """(n,) as `Drag.per_metre`, from diameter and mass."""
     result: Array = 0.5 * drag.air_density * drag.coefficient * np.pi / 4 * impacts.diameter_m**2 / impacts.mass_kg
-    unknown: Indices = row[~np.isfinite(result.take(row))]
+    unknown = row[np.isnan(result[row])]
     if unknown.size:
         raise InputError(
             f"Diameter and mass of the block are not known at impact {impacts.impact[unknown[0]]}",

@@ -31,6 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="Blender's render engine (default: the preset's; auto takes the quickest that works here)",
     )
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="show beside the real blocks those of an impact model, from the same impacts; may be given several times",
+    )
     parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
     parser.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
 
@@ -42,7 +49,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..film.job import FilmJob
     from ..film.maker import film_maker
     from ..film.presets import find_preset
+    from ..impact_models.registry import find_model
 
+    models = tuple(dict.fromkeys(find_model(name).name for name in arguments.model))
     preset = find_preset(read_project(arguments.project), arguments.preset)
     maker = film_maker()
     name = STILL if arguments.still else FILM
@@ -54,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
             engine=arguments.engine or preset.engine,
             preset=preset.name,
             frames=arguments.frames,
+            models=models,
         )
         done = maker.film(job)
     print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")

@@ -23,6 +23,7 @@ class FilmJob:
     engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen.
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
+    models : impact models whose blocks are shown beside the real ones.
     title : written into the picture of a terrain; empty for the name of its file.
     """
 
@@ -35,6 +36,7 @@ class FilmJob:
     up: str = "auto"
     unit_m: float = 1.0
     title: str = ""
+    models: tuple[str, ...] = ()
 
     def with_engine(self, engine: str) -> "FilmJob":
         """The same job for another engine."""
@@ -47,6 +49,7 @@ class FilmJob:
     @classmethod
     def from_json(cls, text: str) -> "FilmJob":
         values = json.loads(text)
-        frames = values.pop("frames")
+        frames, models = values.pop("frames"), tuple(values.pop("models"))
         source, out = Path(values.pop("source")), Path(values.pop("out"))
-        return cls(source=source, out=out, frames=None if frames is None else (frames[0], frames[1]), **values)
+        span = None if frames is None else (frames[0], frames[1])
+        return cls(source=source, out=out, frames=span, models=models, **values)

@@ -38,6 +38,14 @@ def speed_note(time_scale: float) -> str:
     return f"slowed down {1 / time_scale:.3g}×" if time_scale < 1 else f"sped up {time_scale:.3g}×"
 
 
+def compared_lines(models: int) -> tuple[str, str]:
+    """Two lines that say what is seen when the blocks of models are shown beside the real ones."""
+    return (
+        f"Observed, and calculated by {models} impact models" if models > 1 else "Observed, and calculated by a model",
+        "from the same velocity before each impact",
+    )
+
+
 def notes(block_scale: float = 1.0, time_scale: float = 1.0, rings: bool = False) -> str:
     """The note under the picture.
 

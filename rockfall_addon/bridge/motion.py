@@ -6,6 +6,7 @@ handles lie at the thirds represents them exactly. So a key at each impact (at i
 velocities gives the exact parabola at every frame and at any frame rate.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -93,6 +94,22 @@ def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float) -> Non
         points.foreach_set("handle_right", right.ravel())
         for index in np.flatnonzero(keys.held):
             points[int(index)].interpolation = "CONSTANT"
+        curve.update()
+
+
+def write_visibility_keys(thing: bpy.types.Object, spans_s: Sequence[tuple[float, float]], rate: float) -> None:
+    """Hide an object except from the start to the end of each span [s]; the spans follow each other."""
+    bag = _channelbag(thing)
+    changes = [(-1.0, 1.0)] + [change for start, end in spans_s for change in ((start, 0.0), (end, 1.0))]
+    changes[0] = (min(-1.0, changes[1][0] - 1.0) if spans_s else -1.0, 1.0)
+    for name in ("hide_viewport", "hide_render"):
+        curve = bag.fcurves.find(name) or bag.fcurves.new(name)
+        points = curve.keyframe_points
+        points.clear()
+        points.add(len(changes))
+        points.foreach_set("co", [value for time, hidden in changes for value in (time * rate, hidden)])
+        for point in points:
+            point.interpolation = "CONSTANT"
         curve.update()
 
 

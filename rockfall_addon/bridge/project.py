@@ -9,7 +9,7 @@ from ...core.exchange.tables import read_picks
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.readers import read_terrain
 from ...core.terrain.shading import shade
-from . import reconstruction, state, terrain, trajectories
+from . import reconstruction, state, terrain
 
 
 def load_project(scene: bpy.types.Scene, project: Project) -> Reconstruction:
@@ -32,5 +32,5 @@ def load_project(scene: bpy.types.Scene, project: Project) -> Reconstruction:
     if surface is not None and shading is not None:
         terrain.add_terrain(scene, surface, shading)
     result = reconstruction.reconstruct_scene(scene, picks)
-    trajectories.show_reconstruction(scene, result)
+    reconstruction.show(scene, result)
     return result

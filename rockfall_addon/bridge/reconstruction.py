@@ -11,7 +11,7 @@ from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from . import picks as pick_objects
-from . import state, terrain, trajectories
+from . import state, terrain, trajectories, twins
 from .state import double
 
 PROBLEM_KEY = "rockfall_problem"
@@ -37,12 +37,23 @@ def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Rec
     )
 
 
+def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
+    """Bring everything that is shown in line with a reconstruction, the models' twins included.
+
+    Raises
+    ------
+    RockfallError : the twins that were shown cannot be had any more; they are gone, the rest is shown.
+    """
+    trajectories.show_reconstruction(scene, result)
+    twins.follow(scene, result)
+
+
 def refresh(scene: bpy.types.Scene) -> Reconstruction | None:
     """Reconstruct and show again what is in the scene; None when it has no picks."""
     if not state.with_role(scene, state.PICK_ROLE):
         return None
     result = reconstruct_scene(scene)
-    trajectories.show_reconstruction(scene, result)
+    show(scene, result)
     scene[PROBLEM_KEY] = ""
     return result
 

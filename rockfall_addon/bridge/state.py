@@ -17,6 +17,8 @@ TERRAIN_ROLE = "terrain"
 PICK_ROLE = "pick"
 BLOCK_ROLE = "block"
 FLIGHTS_ROLE = "flights"
+TWIN_ROLE = "twin"
+TWIN_FLIGHTS_ROLE = "twin_flights"
 
 
 def double(value: float) -> float:
@@ -64,6 +66,16 @@ def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
             parent.children.link(child)
         parent = child
     return parent
+
+
+def remove_collection(scene: bpy.types.Scene, name: str) -> None:
+    """Remove a collection below "Rockfall" with those in it; their objects must be gone."""
+    ours = next((c for c in scene.collection.children if c.get("rockfall_name") == "Rockfall"), None)
+    for child in ours.children if ours is not None else ():
+        if child.get("rockfall_name") == name:
+            for each in (*child.children_recursive, child):
+                bpy.data.collections.remove(each)
+            return
 
 
 def remove_objects(objects: list[bpy.types.Object]) -> None:

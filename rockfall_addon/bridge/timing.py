@@ -34,7 +34,8 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
     if not keyed or abs(rate - keyed) < 1e-9:
         return False
     factor = rate / keyed
-    objects = state.with_role(scene, state.BLOCK_ROLE) + state.with_role(scene, state.PICK_ROLE)
+    roles = (state.BLOCK_ROLE, state.PICK_ROLE, state.TWIN_ROLE)
+    objects = [thing for role in roles for thing in state.with_role(scene, role)]
     actions = {o.animation_data.action for o in objects if o.animation_data and o.animation_data.action}
     for action in actions:
         for layer in action.layers:

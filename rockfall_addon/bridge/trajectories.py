@@ -7,14 +7,12 @@ Of each trajectory: its picks, one polyline of its flights coloured by speed, an
 import bpy
 import numpy as np
 
-from ...core.colours import rounded_top, scale_colours, srgb_to_linear
+from ...core.colours import OBSERVED_COLOUR, rounded_top
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.flight import Flights, flight_states
 from ...core.reconstruction.trajectory import Reconstruction
-from . import materials, motion, picks, state, timing
+from . import materials, motion, picks, state, timing, trails
 
-SAMPLE_STEP_S = 0.02
-BLOCK_COLOUR = (0.86, 0.16, 0.10)
 RESULT_KEY = "rockfall_result"
 
 
@@ -38,6 +36,8 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction) -> None:
             _show_flights(scene, name, result.flights, which, offset)
             _show_block(scene, name, result, which, offset)
             last = max(last, float(result.flights.end_time_s[which].max()) - offset)
+    trails.paint_observed(scene)
+    trails.set_trails(scene)
     scene.frame_start = 0
     scene.frame_end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
     if first:
@@ -55,49 +55,14 @@ def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> 
 
 
 def _show_flights(scene: bpy.types.Scene, name: str, flights: Flights, which: np.ndarray, offset: float) -> None:
-    times, positions, speeds, edges = [], [], [], []
-    count = 0
+    pieces = []
     for index in which:
-        start, end = flights.start_time_s[index], flights.end_time_s[index]
-        clock = np.linspace(start, end, max(2, int(np.ceil((end - start) / SAMPLE_STEP_S)) + 1))
+        clock = trails.moments(flights.start_time_s[index], flights.end_time_s[index])
         position, velocity = flight_states(flights, np.full(len(clock), index), clock)
-        times.append(clock - offset)
-        positions.append(position)
-        speeds.append(np.linalg.norm(velocity, axis=1))
-        first = np.arange(count, count + len(clock) - 1)
-        edges.append(np.column_stack([first, first + 1]))
-        count += len(clock)
-    speed = np.concatenate(speeds)
-    mesh = bpy.data.meshes.new(f"{name} flights")
-    mesh.vertices.add(count)
-    mesh.vertices.foreach_set("co", np.vstack(positions).astype(np.float32).ravel())
-    pairs = np.vstack(edges).astype(np.int32)
-    mesh.edges.add(len(pairs))
-    mesh.edges.foreach_set("vertices", pairs.ravel())
-    for attribute, values in ((materials.TIME_ATTRIBUTE, np.concatenate(times)), (materials.SPEED_ATTRIBUTE, speed)):
-        mesh.attributes.new(attribute, "FLOAT", "POINT").data.foreach_set("value", values.astype(np.float32))
-    colours = np.ones((count, 4), dtype=np.float32)
-    colours[:, :3] = srgb_to_linear(scale_colours(speed, 0.0, scene.rockfall.speed_top_mps))
-    mesh.attributes.new(materials.SPEED_COLOUR, "FLOAT_COLOR", "POINT").data.foreach_set("color", colours.ravel())
-    mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.SPEED_COLOUR
-    mesh.update()
-
-    thing = bpy.data.objects.new(f"{name} flights", mesh)
-    thing[state.ROLE_KEY], thing["rockfall_trajectory"] = state.FLIGHTS_ROLE, name
-    modifier = thing.modifiers.new("Trail", "NODES")
-    modifier.node_group = materials.trail_group()
+        pieces.append((clock - offset, position, np.linalg.norm(velocity, axis=1)))
+    thing = trails.trail(f"{name} flights", state.FLIGHTS_ROLE, pieces)
+    thing["rockfall_trajectory"] = name
     state.collection(scene, "Trajectories", name).objects.link(thing)
-    set_trails(scene, [thing])
-
-
-def set_trails(scene: bpy.types.Scene, things: list[bpy.types.Object] | None = None) -> None:
-    """Apply the trail's radius and whether it ends at the current time."""
-    for thing in state.with_role(scene, state.FLIGHTS_ROLE) if things is None else things:
-        modifier = thing.modifiers.get("Trail")
-        if modifier is not None:
-            materials.set_input(modifier, "Radius", scene.rockfall.trail_radius_m)
-            materials.set_input(modifier, "Up to now", scene.rockfall.trail_until_now)
-            thing.update_tag()
 
 
 def _show_block(scene: bpy.types.Scene, name: str, result: Reconstruction, which: np.ndarray, offset: float) -> None:
@@ -153,9 +118,9 @@ def _store_results(scene: bpy.types.Scene, result: Reconstruction) -> None:
         }
 
 
-def block_mesh() -> bpy.types.Mesh:
-    """An angular block of radius 1 (convex hull of seeded directions), shared by all blocks."""
-    existing = bpy.data.meshes.get("Rockfall block")
+def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] = OBSERVED_COLOUR) -> bpy.types.Mesh:
+    """An angular block of radius 1 (convex hull of seeded directions), shared by all blocks of one colour."""
+    existing = bpy.data.meshes.get(name)
     if existing is not None:
         return existing
     import bmesh
@@ -168,13 +133,11 @@ def block_mesh() -> bpy.types.Mesh:
     for corner in corners:
         shape.verts.new(corner)
     bmesh.ops.convex_hull(shape, input=shape.verts)
-    mesh = bpy.data.meshes.new("Rockfall block")
+    mesh = bpy.data.meshes.new(name)
     shape.to_mesh(mesh)
     shape.free()
-    colour = mesh.attributes.new("colour", "FLOAT_COLOR", "POINT")
-    colour.data.foreach_set(
-        "color", np.tile(materials.linear_colour(BLOCK_COLOUR), len(mesh.vertices)).astype(np.float32)
-    )
+    colours = np.tile(materials.linear_colour(colour), len(mesh.vertices)).astype(np.float32)
+    mesh.attributes.new("colour", "FLOAT_COLOR", "POINT").data.foreach_set("color", colours)
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
     mesh.materials.append(materials.shaded_material("Rockfall block", "colour"))
     return mesh

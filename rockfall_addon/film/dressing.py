@@ -4,12 +4,14 @@
 import bpy
 import numpy as np
 
+from ...core.colours import OBSERVED_COLOUR, model_colour
 from ...core.exchange.project import RenderPreset
 from ...core.film.engines import IDENTIFIERS
 from ...core.film.framing import View, rounded_scale
 from ...core.film.presets import FilmTiming
-from ...core.film.wording import fastest_speed, notes
-from ..bridge import state, timing
+from ...core.film.wording import compared_lines, fastest_speed, notes
+from ...core.impact_models.registry import find_model
+from ..bridge import state, timing, twins
 from ..bridge.reconstruction import SITE_KEY
 from . import camera, layout, marks, presence, remembered
 from .engine import use_engine
@@ -48,11 +50,15 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     last = film.last_frame(max((float(motion.time_s[-1]) for motion in motions), default=0.0))
     scene.frame_start, scene.frame_end = 0, last
     moments = np.arange(last + 1) * film.frame_s
+    models = twins.shown_models(scene)
+    remarks = notes(settings.block_scale, preset.time_scale, rings=bool(motions))
+    subtitle, more = compared_lines(len(models)) if models else (_count(motions), "")
     words = layout.Words(
         title=_title(scene),
-        subtitle=_count(motions),
-        note=notes(settings.block_scale, preset.time_scale, rings=bool(motions)),
-        speed_top_mps=settings.speed_top_mps if motions else None,
+        subtitle=subtitle,
+        note="\n".join(filter(None, (more, remarks))),
+        speed_top_mps=settings.speed_top_mps if motions and not models else None,
+        sources=_sources(models),
         time_s=moments,
         fastest_mps=fastest_speed([(motion.time_s, motion.speed_mps) for motion in motions], moments),
         rate=1.0 / film.frame_s,
@@ -84,7 +90,8 @@ def set_up_picture(
         title=title or _title(scene),
         subtitle=subtitle or _count(motions),
         note=notes(rings=bool(motions)),
-        speed_top_mps=scene.rockfall.speed_top_mps if motions else None,
+        speed_top_mps=scene.rockfall.speed_top_mps if motions and not twins.shown_models(scene) else None,
+        sources=_sources(twins.shown_models(scene)),
     )
     _furnish(scene, view, motions, words, preset)
     use_engine(scene, engine, still=True)
@@ -211,6 +218,13 @@ def _pixel_m(scene: bpy.types.Scene, view: View, motions: list[Motion]) -> float
     """Size of a pixel of a small picture where the blocks are [m]; in a large one, things may be a little finer."""
     depth = float(np.median(view.project(np.vstack([motion.position for motion in motions]))[:, 2]))
     return float(view.pixel_m(depth, (SMALL_WIDTH * max(SMALL_WIDTH, scene.render.resolution_x)) ** 0.5))
+
+
+def _sources(models: tuple[str, ...]) -> tuple[layout.Source, ...]:
+    """Whose blocks there are, when there are others than the real ones."""
+    if not models:
+        return ()
+    return ("observed", OBSERVED_COLOUR), *((find_model(name).title, model_colour(name)) for name in models)
 
 
 def _title(scene: bpy.types.Scene) -> str:

@@ -16,6 +16,8 @@ from . import captions
 EDGE = 0.055
 LEGEND_STEPS = 48
 BACKDROP = ((0.075, 0.085, 0.10), (0.175, 0.205, 0.24))  # slate, below and above
+Source = tuple[str, tuple[float, float, float]]
+"""Whose blocks they are, and their sRGB colour."""
 CREDIT = "made with Rockfall"
 
 
@@ -25,7 +27,8 @@ class Words:
 
     Attributes
     ----------
-    title, subtitle, note : may be empty.
+    title, subtitle, note : may be empty; the note may have several lines.
+    sources : whose blocks have which colour; the legend when there is no scale of speeds.
     speed_top_mps : at the upper end of the legend; None without a legend.
     time_s, fastest_mps : (n,) the numbers for each moment, `rate` of them for a second; None for a still picture.
     """
@@ -34,6 +37,7 @@ class Words:
     subtitle: str = ""
     note: str = ""
     speed_top_mps: float | None = None
+    sources: tuple[Source, ...] = ()
     time_s: Array | None = None
     fastest_mps: Array | None = None
     rate: float = 1.0
@@ -48,7 +52,8 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
     room = 0.62 * aspect / (0.58 * max(len(words.title), 1))  # a letter is about 0.58 of its height wide
     title = min(large, room)
     things = [make("Film title", words.title, (left, high - 0.75 * large), title)]
-    for i, (name, text) in enumerate((("Film subtitle", words.subtitle), ("Film note", words.note))):
+    remarks = [(f"Film note{f' {i + 1}' if i else ''}", text) for i, text in enumerate(words.note.split("\n"))]
+    for i, (name, text) in enumerate((("Film subtitle", words.subtitle), *remarks)):
         line = high - 0.75 * large - 1.45 * small * (i + 1)
         things.append(make(name, text, (left, line), small, colour=captions.GREY))
     if words.time_s is not None and words.fastest_mps is not None:
@@ -60,6 +65,7 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
         ]  # fmt: skip
     if words.speed_top_mps is not None:
         things += _legend(make, words.speed_top_mps, left, low, small)
+    things += _sources(make, words.sources, left, low, small)
     things.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
     return things
 
@@ -100,6 +106,27 @@ def _legend(
         for part, align in ((0.0, "LEFT"), (0.5, "CENTER"), (1.0, "RIGHT"))
     ]  # fmt: skip
     return [_shown("Film legend", mesh), title, *marks]
+
+
+def _sources(
+    make: Callable[..., bpy.types.Object], sources: tuple[Source, ...], left: float, low: float, size: float
+) -> list[bpy.types.Object]:
+    """A swatch and a name for each, the first on top."""
+    things = []
+    for i, (name, colour) in enumerate(reversed(sources)):
+        bottom, side = low + 1.5 * size * i, 0.8 * size
+        mesh = bpy.data.meshes.new("Film source")
+        corners = [
+            (left, bottom),
+            (left + 1.6 * side, bottom),
+            (left + 1.6 * side, bottom + side),
+            (left, bottom + side),
+        ]
+        mesh.from_pydata([(*corner, 0.0) for corner in corners], [], [(0, 1, 2, 3)])
+        captions.mark_colour(mesh, _opaque(srgb_to_linear(np.tile(colour, (4, 1)))))
+        place = (left + 2.1 * side, bottom)
+        things += [_shown(f"Film swatch {name}", mesh), make(f"Film source {name}", name, place, size)]
+    return things
 
 
 def _shown(name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:

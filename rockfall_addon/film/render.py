@@ -10,6 +10,8 @@ from ...core.errors import InputError, RockfallError
 from ...core.exchange.project import Project, RenderPreset, read_project
 from ...core.film.job import FilmJob
 from ...core.film.presets import HD, FilmTiming, find_preset
+from ...core.reconstruction.trajectory import Reconstruction
+from ..bridge import twins
 from ..bridge.project import load_project
 from . import dressing
 from .engine import use_engine
@@ -31,7 +33,9 @@ def make(job: FilmJob, report: Report) -> None:
     else:
         project = read_project(job.source)
         preset = find_preset(project, job.preset)
-        _load(scene, project, preset)
+        result = _load(scene, project, preset)
+        if job.models:
+            twins.show_twins(scene, result, job.models)
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:
@@ -105,12 +109,12 @@ def render_picture(scene: bpy.types.Scene, path: Path) -> None:
     _check(path)
 
 
-def _load(scene: bpy.types.Scene, project: Project, preset: RenderPreset) -> None:
+def _load(scene: bpy.types.Scene, project: Project, preset: RenderPreset) -> Reconstruction:
     film, settings = FilmTiming(preset.fps, preset.time_scale), scene.rockfall
     scene.render.fps, scene.render.fps_base = film.base
     settings.playback = "REAL" if preset.stagger_s is None else "TOGETHER"
     settings.stagger_s = preset.stagger_s or 0.0
-    load_project(scene, project)
+    return load_project(scene, project)
 
 
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:

@@ -3,9 +3,17 @@
 
 import bpy
 
-from . import demo, film, look, picks, share, terrain
+from . import demo, film, look, models, picks, share, terrain
 
-CLASSES = (*terrain.CLASSES, *picks.CLASSES, *look.CLASSES, *demo.CLASSES, *film.CLASSES, *share.CLASSES)
+CLASSES = (
+    *terrain.CLASSES,
+    *picks.CLASSES,
+    *look.CLASSES,
+    *models.CLASSES,
+    *demo.CLASSES,
+    *film.CLASSES,
+    *share.CLASSES,
+)
 
 
 def register() -> None:

@@ -6,7 +6,7 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.exchange.tables import read_picks
-from ..bridge import reconstruction, state, trajectories
+from ..bridge import reconstruction, state
 from . import look
 from .reporting import reported
 
@@ -31,7 +31,7 @@ class ROCKFALL_OT_import_picks(bpy.types.Operator, ImportHelper):
         result = reconstruction.reconstruct_scene(scene, picks)
         if not state.has_shift(scene):
             state.write_shift(scene, picks.shift)
-        trajectories.show_reconstruction(scene, result)
+        reconstruction.show(scene, result)
         look.show_relief(context, frame_all=True)
         count = len(set(picks.trajectory.tolist()))
         self.report({"INFO"}, f"{len(picks.time_s)} picks: {count} trajectories, {len(result.impacts.rn)} impacts.")

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour scale of the flights, in the lower left corner of the 3-D view."""
+"""What the colours of the flights mean, in the lower left corner of the 3-D view: speeds, or whose block it is."""
 
 import blf
 import bpy
 import gpu
 from gpu_extras.batch import batch_for_shader
 
-from ...core.colours import SPEED_SCALE
-from ..bridge import state
+from ...core.colours import OBSERVED_COLOUR, SPEED_SCALE, model_colour
+from ...core.impact_models.registry import MODELS
+from ..bridge import state, twins
 
 _handles: list[object] = []
 
@@ -34,6 +35,33 @@ def _draw() -> None:
         return
     scale = context.preferences.system.ui_scale
     left = MARGIN * scale + _covered_left(context.area)
+    blf.size(0, TEXT * scale)
+    blf.color(0, 0.95, 0.95, 0.95, 1.0)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+    shown = twins.shown_models(scene)
+    if shown:
+        _draw_models(shown, left, scale)
+    else:
+        _draw_speeds(settings, left, scale)
+    blf.disable(0, blf.SHADOW)
+
+
+def _draw_models(shown: tuple[str, ...], left: float, scale: float) -> None:
+    """A swatch and a name for the real blocks, and for each model."""
+    rows = [("Observed", OBSERVED_COLOUR), *((MODELS[name].title, model_colour(name)) for name in shown)]
+    size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    for i, (name, colour) in enumerate(reversed(rows)):
+        low = bottom + i * step
+        corners = [(left, low), (left + size, low), (left, low + size), (left + size, low + size)]
+        shader.uniform_float("color", (*colour, 1.0))
+        batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
+        _text(left + 1.6 * size, low + 0.1 * size, name)
+    _text(left, bottom + (len(rows) + 0.2) * step, "Blocks, from the same impacts and incident velocities")
+
+
+def _draw_speeds(settings: bpy.types.PropertyGroup, left: float, scale: float) -> None:
     bottom, width, height = (MARGIN + TEXT) * scale, WIDTH * scale, HEIGHT * scale
     steps = len(SPEED_SCALE)
     places, colours = [], []
@@ -43,17 +71,12 @@ def _draw() -> None:
         colours += [(*colour, 1.0)] * 2
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     batch_for_shader(shader, "TRI_STRIP", {"pos": places, "color": colours}).draw(shader)
-    blf.size(0, TEXT * scale)
-    blf.color(0, 0.95, 0.95, 0.95, 1.0)
-    blf.enable(0, blf.SHADOW)
-    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
     top = settings.speed_top_mps
     for part in (0.0, 0.5, 1.0):
         text = f"{top * part:g}"
         _text(left + width * part - blf.dimensions(0, text)[0] / 2, bottom - (TEXT + 4) * scale, text)
     size = f", blocks drawn {settings.block_scale:g}× their size" if settings.block_scale != 1 else ""
     _text(left, bottom + height + 6 * scale, f"Block speed [m/s]{size}")
-    blf.disable(0, blf.SHADOW)
 
 
 def _text(x: float, y: float, text: str) -> None:

@@ -3,9 +3,17 @@
 
 import bpy
 
-from . import film, impact, picks, playback, share, terrain
+from . import film, impact, models, picks, playback, share, terrain
 
-CLASSES = (*terrain.CLASSES, *picks.CLASSES, *impact.CLASSES, *playback.CLASSES, *film.CLASSES, *share.CLASSES)
+CLASSES = (
+    *terrain.CLASSES,
+    *picks.CLASSES,
+    *impact.CLASSES,
+    *models.CLASSES,
+    *playback.CLASSES,
+    *film.CLASSES,
+    *share.CLASSES,
+)
 
 
 def register() -> None:

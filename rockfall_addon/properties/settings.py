@@ -14,9 +14,9 @@ def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
 
 
 def _trails_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ..bridge import trajectories
+    from ..bridge import trails
 
-    trajectories.set_trails(self.id_data)
+    trails.set_trails(self.id_data)
 
 
 class SceneSettings(bpy.types.PropertyGroup):

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which impact models are shown beside the real blocks."""
+
+import bpy
+
+from ...core.impact_models.registry import COMPARED, MODELS
+from ..bridge import state, twins
+from .base import RockfallPanel, paragraph
+
+QUESTION = "Where would the blocks fly if a model were right? Same impacts, same incident velocity."
+
+
+class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
+    bl_label = "Models"
+    bl_idname = "ROCKFALL_PT_models"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = context.scene
+        return bool(state.with_role(scene, state.FLIGHTS_ROLE) and state.with_role(scene, state.TERRAIN_ROLE))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, shown = self.layout, twins.shown_models(context.scene)
+        paragraph(context, layout, QUESTION)
+        column = layout.column(align=True)
+        for name in (*COMPARED, *(other for other in MODELS if other not in COMPARED)):
+            on = name in shown
+            button = column.operator(
+                "rockfall.show_twins",
+                text=MODELS[name].title,
+                icon="CHECKBOX_HLT" if on else "CHECKBOX_DEHLT",
+                depress=on,
+            )
+            button.models = set(shown) ^ {name}
+        if shown:
+            layout.operator("rockfall.remove_twins", icon="X")
+
+
+CLASSES = (ROCKFALL_PT_models,)

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The models' blocks fly their parabolas at every frame, are hidden between them, and leave nothing behind."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+HEADER = "trajectory,time_s,x_m,y_m,z_m,kind,status\n"
+TIMES = (10.0, 10.7312, 11.90017, 12.4)
+X = (0.0, 4.1, 11.3, 13.9)
+SLOPE = 0.7
+MODELS = ("noel_2017", "wyllie_2014")
+
+
+@pytest.fixture
+def scene(part, tmp_path: Path) -> bpy.types.Scene:
+    """An inclined plane and two runs over it, the second 3 m beside and 30 s later."""
+    scene = bpy.context.scene
+    side = np.linspace(-30.0, 60.0, 31)
+    x, y = (values.ravel() for values in np.meshgrid(side, side, indexing="ij"))
+    corner = (np.arange(30)[:, None] * 31 + np.arange(30)).ravel()
+    ring = np.column_stack([corner, corner + 31, corner + 32, corner + 1])
+    faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
+    shift = part("core.georeference").GlobalShift()
+    vertices = np.column_stack([x, y, -SLOPE * x])
+    surface = part("core.terrain.surface").Surface(vertices, faces, shift, "plane", ())
+    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    rows = [
+        f"{name},{time + later!r},{x!r},{aside!r},{-SLOPE * x!r},{kind},ok"
+        for name, later, aside in (("A", 0.0, 0.0), ("B", 30.0, 3.0))
+        for time, x, kind in zip(TIMES, X, ("release", "impact", "impact", "impact"), strict=True)
+    ]
+    path = tmp_path / "picks.csv"
+    path.write_text(HEADER + "\n".join(rows) + "\n", encoding="utf-8")
+    assert bpy.ops.rockfall.import_picks(filepath=str(path)) == {"FINISHED"}
+    return scene
+
+
+@pytest.fixture
+def shown(scene: bpy.types.Scene) -> bpy.types.Scene:
+    assert bpy.ops.rockfall.show_twins(models=set(MODELS)) == {"FINISHED"}
+    return scene
+
+
+def of_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
+    return [thing for thing in scene.objects if thing.get("rockfall_role") == role]
+
+
+def expected(part, scene: bpy.types.Scene):
+    bridge = part("rockfall_addon.bridge.twins")
+    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(scene)
+    return bridge.find_twins(scene, result, MODELS)
+
+
+def check_motion(part, scene: bpy.types.Scene) -> None:
+    """Every flight of every twin is flown, by a block of its own that is hidden when it does not fly."""
+    twins = expected(part, scene)
+    linger = part("rockfall_addon.bridge.twins").LINGER_S
+    rate = scene.render.fps / scene.render.fps_base
+    begin = twins.time_s - np.where(twins.trajectory == "A", TIMES[0], TIMES[0] + 30.0 - scene.rockfall.stagger_s)
+    end = begin + twins.duration_s
+    blocks, seen = of_role(scene, "twin"), 0
+    for frame in range(int(5 * rate)):
+        scene.frame_set(frame)
+        now = frame / rate
+        for model in MODELS:
+            for name in "AB":
+                own = (twins.model == model) & (twins.trajectory == name)
+                flying = np.flatnonzero(own & (begin + 1e-3 < now) & (now < end - 1e-3))
+                where, _ = twins.launches.states(flying, now - begin[flying])
+                visible = [
+                    block
+                    for block in blocks
+                    if (block["rockfall_model"], block["rockfall_trajectory"]) == (model, name)
+                    and not block.hide_render
+                ]
+                assert all(not block.hide_viewport for block in visible)
+                places = np.array([block.matrix_world.translation for block in visible]).reshape(-1, 3)
+                for place in where:
+                    assert np.linalg.norm(places - place, axis=1).min() < 1e-4
+                    seen += 1
+                if not (own & (begin - 1e-3 < now) & (now < end + linger + 1e-3)).any():
+                    assert not visible
+    assert seen > rate
+
+
+def test_blocks_fly_the_parabolas_and_hide_between_them(shown: bpy.types.Scene, part) -> None:
+    check_motion(part, shown)
+
+
+def test_they_follow_the_frame_rate(shown: bpy.types.Scene, part) -> None:
+    shown.render.fps, shown.render.fps_base = 30000, 1001.0
+    check_motion(part, shown)
+
+
+def test_one_block_for_each_run_and_model_unless_flights_overlap(shown: bpy.types.Scene, part) -> None:
+    twins = expected(part, shown)
+    for model in MODELS:
+        count = 0
+        for name in "AB":
+            own = np.flatnonzero((twins.model == model) & (twins.trajectory == name) & (twins.duration_s > 0))
+            ends = twins.time_s[own] + twins.duration_s[own]
+            together = [int(((twins.time_s[own] <= t) & (t < ends)).sum()) for t in twins.time_s[own]]
+            count += max(together)
+        assert len([b for b in of_role(shown, "twin") if b["rockfall_model"] == model]) == count
+    assert len(of_role(shown, "twin_flights")) == len(MODELS)
+
+
+def test_curves_land_on_the_terrain_in_the_models_colour(shown: bpy.types.Scene, part) -> None:
+    colours = part("core.colours")
+    for thing in of_role(shown, "twin_flights"):
+        heights = [vertex.co.z + SLOPE * vertex.co.x for vertex in thing.data.vertices]
+        assert min(heights) > -1e-3
+        ends = [v.index for v in thing.data.vertices if abs(v.co.z + SLOPE * v.co.x) < 1e-3]
+        assert len(ends) >= 4
+        colour = colours.srgb_to_linear(np.array(colours.model_colour(thing["rockfall_model"])))
+        np.testing.assert_allclose(thing.data.attributes["speed_colour"].data[0].color[:3], colour, atol=1e-6)
+    red = colours.srgb_to_linear(np.array(colours.OBSERVED_COLOUR))
+    for thing in of_role(shown, "flights"):
+        np.testing.assert_allclose(thing.data.attributes["speed_colour"].data[0].color[:3], red, atol=1e-6)
+
+
+def names() -> set[str]:
+    kinds = (bpy.data.objects, bpy.data.meshes, bpy.data.actions, bpy.data.collections)
+    return {f"{type(each).__name__} {each.name}" for kind in kinds for each in kind}
+
+
+def test_removal_leaves_nothing(scene: bpy.types.Scene) -> None:
+    def colours() -> list[tuple[float, ...]]:
+        data = of_role(scene, "flights")[0].data.attributes["speed_colour"].data
+        return [tuple(each.color) for each in data]
+
+    before, painted = names(), colours()
+    bpy.ops.rockfall.show_twins(models=set(MODELS))
+    assert names() > before
+    assert colours() != painted
+    assert bpy.ops.rockfall.remove_twins() == {"FINISHED"}
+    assert names() == before
+    assert colours() == painted
+    assert "rockfall_twin_models" not in scene
+
+
+def test_showing_others_replaces_them_and_none_removes_them(shown: bpy.types.Scene) -> None:
+    bpy.ops.rockfall.show_twins(models={"dorren_2015"})
+    assert {thing["rockfall_model"] for thing in of_role(shown, "twin")} == {"dorren_2015"}
+    bpy.ops.rockfall.show_twins(models=set())
+    assert not of_role(shown, "twin")
+
+
+def test_they_follow_a_moved_pick_and_a_changed_setting(shown: bpy.types.Scene, part) -> None:
+    shown.rockfall.stagger_s = 1.25
+    check_motion(part, shown)
+    shown.rockfall.block_scale = 3.0
+    for thing in of_role(shown, "twin"):
+        assert thing.scale.x == pytest.approx(3 * 0.35 / 2, rel=1e-5)
+    shown.rockfall.use_drag = True
+    shown.rockfall.block_scale = 1.0
+    check_motion(part, shown)
+
+
+def test_without_terrain_there_are_none(scene: bpy.types.Scene) -> None:
+    for thing in of_role(scene, "terrain"):
+        bpy.data.objects.remove(thing)
+    with pytest.raises(RuntimeError, match="poll"):
+        bpy.ops.rockfall.show_twins(models=set(MODELS))
+
+
+def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None:
+    preset = part("core.exchange.project").RenderPreset("tiny", width=64, height=36, fps=25.0, engine="cycles")
+    film = part("rockfall_addon.film.dressing")
+    film.set_up_film(shown, preset, "cycles")
+    captions = {thing.name for thing in of_role(shown, "film")}
+    assert {"Film source observed", "Film source Noël et al. 2017", "Film source Wyllie 2014"} <= captions
+    assert "Film legend" not in captions
+    film.remove_film(shown)
+    assert len(of_role(shown, "twin_flights")) == 2
+    assert not of_role(shown, "film")

@@ -210,6 +210,24 @@ def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
     _write(path, columns)
 
 
+def impact_columns(impacts: Impacts) -> tuple[str, ...]:
+    """The names of all columns that a table of impacts can be asked for."""
+    return (*IMPACTS_COLUMNS, *(column[0] for column in (*_SPIN, *_ENERGY)), *impacts.extra)
+
+
+def impact_column(impacts: Impacts, name: str) -> Array | Names | Indices | None:
+    """(n,) a column by its name in impacts.csv, with the unit of that name; None when there is none."""
+    if name in ("site", "trajectory", "impact"):
+        values: Array | Names | Indices = getattr(impacts, name)
+        return values
+    if name == "flags":
+        return np.array(impacts.flag_text(), dtype=np.str_)
+    for column in (*_NUMBERS, *_SPIN, *_ENERGY):
+        if column[0] == name:
+            return _of(impacts, column)
+    return impacts.extra.get(name)
+
+
 def _marks(cells: Sequence[str]) -> dict[str, Mask]:
     """Flag → (n,) whether the cell has it; there are few different cells."""
     code: dict[str, int] = {}

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall merge``: impact tables of several sites → one table with its sources."""
+
+import argparse
+import csv
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .options import add_out
+from .progress import Progress
+
+if TYPE_CHECKING:
+    from ..exchange.database import Database, Merged
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "tables", nargs="+", metavar="TABLE", help="impacts.csv, or the folder of a package that was merged before"
+    )
+    add_out(parser)
+    parser.add_argument(
+        "--site", action="extend", nargs="+", default=[], metavar="NAME", help="of each table whose rows name none"
+    )
+    parser.add_argument(
+        "--licence",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="of each table, or one for all, for example CC-BY-4.0",
+    )
+    parser.add_argument(
+        "--duplicates",
+        choices=("drop", "keep", "refuse"),
+        default="drop",
+        help="impacts that are there twice: keep the first (default), keep all, or refuse",
+    )
+    parser.add_argument(
+        "--where",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="CONDITION",
+        help="only rows such as 'theta1_deg<20', 'site=Gully', 'flags!=doubtful'; all must hold",
+    )
+    parser.add_argument(
+        "--group", nargs="+", default=[], metavar="COLUMN", help="medians for each value of these columns → groups.csv"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, merge, filter, write, print the summary."""
+    from ..exchange.database import merge
+    from ..exchange.datapackage import write_package
+    from ..exchange.output import output_folder
+    from ..exchange.selection import column_of, group_medians, matching
+
+    sites = _for_each(arguments.site, arguments.tables, "--site")
+    licences = _for_each(arguments.licence, arguments.tables, "--licence")
+    with output_folder(arguments.out) as folder, Progress() as progress:
+        parts = []
+        for path, site, licence in zip(arguments.tables, sites, licences, strict=True):
+            progress(f"Reading {path}")
+            parts.append(_read(path, site, licence))
+        progress("Looking for duplicates")
+        merged = merge(parts, arguments.duplicates)
+        database = merged.database
+        if arguments.where:
+            database = database.rows(matching(database.impacts, arguments.where))
+        if not len(database):
+            raise InputError("No impact is left", advice="Check --where")
+        for name in arguments.group:
+            column_of(database.impacts, name)
+        progress("Writing the table")
+        write_package(database, folder)
+        written = ["impacts.csv", "datapackage.json"]
+        if len(merged.duplicates):
+            _write_duplicates(merged, folder / "duplicates.csv")
+            written.append("duplicates.csv")
+        if arguments.group:
+            _write_rows(group_medians(database.impacts, arguments.group), folder / "groups.csv")
+            written.append("groups.csv")
+    for line in _summary(merged, database, arguments.duplicates):
+        print(line)
+    print(f"Written: {', '.join(written)} in {arguments.out}")
+    return 0
+
+
+def _read(path: str, site: str, licence: str) -> "Database":
+    from ..exchange.database import read_source
+    from ..exchange.datapackage import read_package
+
+    if Path(path).is_dir() or Path(path).suffix == ".json":
+        return read_package(path)
+    return read_source(path, site, licence)
+
+
+def _for_each(values: list[str], tables: list[str], option: str) -> list[str]:
+    if len(values) not in (0, 1, len(tables)):
+        raise InputError(
+            f"{option} is given {len(values)} times for {len(tables)} tables", advice="Give one, or one each"
+        )
+    return (values or [""]) * len(tables) if len(values) < 2 else values
+
+
+def _write_duplicates(merged: "Merged", path: Path) -> None:
+    everything, found = merged.everything, merged.duplicates
+    impacts = everything.impacts
+    rows = []
+    for row, first, renamed in zip(found.row.tolist(), found.first.tolist(), found.renamed.tolist(), strict=True):
+        entry: dict[str, object] = {}
+        for prefix, i in (("", row), ("same_as_", first)):
+            entry[f"{prefix}file"] = everything.sources[int(everything.source[i])].file
+            for name in ("site", "trajectory", "impact"):
+                entry[f"{prefix}{name}"] = getattr(impacts, name)[i]
+        rows.append({**entry, "other_name": "yes" if renamed else "no"})
+    _write_rows(rows, path)
+
+
+def _write_rows(rows: list[dict[str, object]], path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _summary(merged: "Merged", database: "Database", duplicates: str) -> list[str]:
+    found, everything = merged.duplicates, merged.everything
+    lines = [f"{len(database)} impacts of {len(everything)} that were read, from {len(everything.sources)} tables:"]
+    for source in database.sources:
+        licence = source.licence or "no licence stated"
+        lines.append(f"  {source.file}: {source.impacts} impacts, {', '.join(source.sites)} ({licence})")
+        lines += [f"    Doubtful: {doubt}" for doubt in source.doubts]
+    if len(found):
+        what = {"drop": "left out", "keep": "kept"}[duplicates]
+        renamed = int(found.renamed.sum())
+        lines.append(f"{len(found)} impacts were there twice, {renamed} of them under another name; they are {what}.")
+    if not all(source.licence for source in everything.sources):
+        lines.append("Without a licence others may not use the data: give --licence.")
+    return lines

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of a table of impacts: taken, filtered by conditions, grouped by a column, joined."""
+
+import re
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import fields, replace
+from operator import eq, ge, gt, le, lt, ne
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..georeference import GlobalShift
+from ..impact_models.parameters import suggestion
+from ..reconstruction.impact import FLAGS, Impacts
+from ..reconstruction.picks import Indices, Mask, Names
+from ..vectors import Array
+from .tables import impact_column, impact_columns
+
+COMPARISONS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "<=": le,
+    ">=": ge,
+    "!=": ne,
+    "==": eq,
+    "=": eq,
+    "<": lt,
+    ">": gt,
+}
+CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=|!=|==|=|<|>)\s*(.*?)\s*")
+MEDIANS = ("theta1_deg", "rn", "rt", "r", "theta_dev_deg")
+
+
+def rows_of(impacts: Impacts, rows: Indices | Mask | slice) -> Impacts:
+    """Some rows, in the order given."""
+    taken: dict[str, Any] = {}
+    for one in fields(Impacts):
+        value = getattr(impacts, one.name)
+        if one.name in ("flags", "sigma", "extra"):
+            taken[one.name] = {name: column[rows] for name, column in value.items()}
+        elif one.name != "shift":
+            taken[one.name] = value[rows]
+    return replace(impacts, **taken)
+
+
+def joined(tables: Sequence[Impacts]) -> Impacts:
+    """All rows of several tables, in one local frame; what a table does not have is undefined there."""
+    survey = [table.shift.to_survey(table.position) for table in tables]
+    finite = np.concatenate([places[np.isfinite(places).all(axis=1)] for places in survey])
+    shift = GlobalShift.proposed(finite.min(axis=0), finite.max(axis=0)) if len(finite) else GlobalShift()
+    made: dict[str, Any] = {"shift": shift, "position": shift.to_local(np.concatenate(survey))}
+    for one in fields(Impacts):
+        if one.name == "flags":
+            made["flags"] = {name: np.concatenate([table.flags[name] for table in tables]) for name in FLAGS}
+        elif one.name == "sigma":
+            names = dict.fromkeys(name for table in tables for name in table.sigma)
+            made["sigma"] = {name: np.concatenate([_sigma(table, name) for table in tables]) for name in names}
+        elif one.name == "extra":
+            names = dict.fromkeys(name for table in tables for name in table.extra)
+            made["extra"] = {name: np.concatenate([_extra(table, name) for table in tables]) for name in names}
+        elif one.name not in made:
+            made[one.name] = np.concatenate([getattr(table, one.name) for table in tables])
+    return Impacts(**made)
+
+
+def matching(impacts: Impacts, conditions: Iterable[str]) -> Mask:
+    """(n,) rows for which all conditions hold; an undefined number meets none.
+
+    Parameters
+    ----------
+    conditions : texts such as ``theta1_deg<20``, ``site=Gully``, ``flags!=doubtful``, on columns as in impacts.csv.
+
+    Raises
+    ------
+    InputError : another form, an unknown column, a text compared by size, no number beside a column of numbers.
+    """
+    result = np.ones(len(impacts), dtype=np.bool_)
+    for condition in conditions:
+        parts = CONDITION.fullmatch(condition)
+        if parts is None or not parts[3]:
+            raise InputError(f"{condition!r} is no condition", advice="Write one like 'theta1_deg<20' or 'site=Gully'")
+        name, sign, value = parts.groups()
+        if name == "flags":
+            result &= _flagged(impacts, sign, value, condition)
+            continue
+        column = column_of(impacts, name)
+        if column.dtype.kind != "U":
+            result &= np.isfinite(column) & COMPARISONS[sign](column, _number(value, condition))
+        elif sign in ("=", "==", "!="):
+            result &= COMPARISONS[sign](column, value)
+        else:
+            raise InputError(f"{condition!r} compares texts by size", advice="Use = or !=")
+    return result
+
+
+def column_of(impacts: Impacts, name: str) -> Array | Names | Indices:
+    """(n,) a column by its name in impacts.csv, with the unit of that name.
+
+    Raises
+    ------
+    InputError : there is none; the nearest is suggested.
+    """
+    column = impact_column(impacts, name)
+    if column is None:
+        raise InputError(f"There is no column {name!r}", advice=suggestion(name, impact_columns(impacts)))
+    return column
+
+
+def grouped(impacts: Impacts, *columns: str) -> dict[tuple[Hashable, ...], Indices]:
+    """Values of some columns → rows that have them, in the order of first appearance."""
+    values = [column_of(impacts, name) for name in columns]
+    keys, code = codes(*values)
+    order = np.argsort(code, kind="stable")
+    ends = np.cumsum(np.bincount(code, minlength=len(keys)))
+    return dict(zip(keys, np.split(order, ends[:-1]), strict=True))
+
+
+def codes(*columns: Array | Names | Indices) -> tuple[list[tuple[Hashable, ...]], Indices]:
+    """The different rows of some columns, and (n,) which of them each row is."""
+    seen: dict[tuple[Hashable, ...], int] = {}
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    code = np.array([seen.setdefault(row, len(seen)) for row in rows], dtype=np.intp)
+    return list(seen), code
+
+
+def group_medians(impacts: Impacts, columns: Sequence[str]) -> list[dict[str, object]]:
+    """One row for each group: its values, how many impacts, and the medians of `MEDIANS` where defined."""
+    table = []
+    numbers = {name: column_of(impacts, name) for name in MEDIANS}
+    for values, rows in grouped(impacts, *columns).items():
+        row: dict[str, object] = {**dict(zip(columns, values, strict=True)), "impacts": rows.size}
+        for name, column in numbers.items():
+            known = column[rows][np.isfinite(column[rows])]
+            row[f"median_{name}"] = float(np.median(known)) if known.size else ""
+        table.append(row)
+    return table
+
+
+def _flagged(impacts: Impacts, sign: str, value: str, condition: str) -> Mask:
+    if value not in FLAGS or sign not in ("=", "==", "!="):
+        raise InputError(f"{condition!r} asks for no flag", advice=f"Use = or != and one of {', '.join(FLAGS)}")
+    return impacts.flags[value] if sign != "!=" else ~impacts.flags[value]
+
+
+def _number(value: str, condition: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise InputError(f"{condition!r} compares numbers with {value!r}", advice="Give a number") from None
+
+
+def _sigma(table: Impacts, name: str) -> Array:
+    return table.sigma[name] if name in table.sigma else np.full_like(getattr(table, name), np.nan)
+
+
+def _extra(table: Impacts, name: str) -> Names:
+    return table.extra[name] if name in table.extra else np.zeros(len(table), dtype="U1")

@@ -131,7 +131,9 @@ class _Page:
         self.linked: LinkedGraphs = link_graphs(exploration.impacts, self.first, self.model, self.run)
         css = InlineStyleSheet(css=(WEB / "page.css").read_text(encoding="utf-8"))
         self.scores = Div(name="scores", stylesheets=[self.sheet, css], sizing_mode="stretch_width")
-        self.status = Div(text="", name="status", stylesheets=[self.sheet], sizing_mode="stretch_width")
+        self.status = Div(
+            text="", name="status", disable_math=True, stylesheets=[self.sheet], sizing_mode="stretch_width"
+        )
         self.defaults = {name: self._scores_of(name, {}) for name in exploration.models}
         self.inputs = {name: self._inputs(name) for name in exploration.models}
         self._show()

@@ -73,7 +73,7 @@ def link_graphs(
     curves = {name: ColumnDataSource(table) for name, table in fitted.items()}
     variables = {name: _facts(variable, impacts, predictions) for name, variable in VARIABLES.items()}
     blocks = [_block(spec, variables, source, curves[spec.name], sheet) for spec in specs]
-    selection = Div(text="", name="selection", stylesheets=[sheet], sizing_mode="stretch_width")
+    selection = Div(text="", name="selection", disable_math=True, stylesheets=[sheet], sizing_mode="stretch_width")
     update = CustomJS(
         args={
             "source": source,
@@ -257,7 +257,9 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
         "x": x,
         "y": y,
         "log": log,
-        "note": Div(text="", name=f"{spec.name}_note", stylesheets=[sheet], sizing_mode="stretch_width"),
+        "note": Div(
+            text="", name=f"{spec.name}_note", disable_math=True, stylesheets=[sheet], sizing_mode="stretch_width"
+        ),
         "scales": [[LinearScale(), LogScale()], [LinearScale(), LogScale()]],
         "tickers": [[BasicTicker(), LogTicker()], [BasicTicker(), LogTicker()]],
         "top": (y, against, x, log),

@@ -2,7 +2,7 @@
 """Set everything up in .venv, then run something.
 
     python3.13 scripts/run.py demo [rockfall arguments]            # the whole job on the bundled site, into out/demo
-    python3.13 scripts/run.py test [core|blender] [pytest arguments]
+    python3.13 scripts/run.py test [core|blender|browser] [pytest arguments]
     python3.13 scripts/run.py rockfall COMMAND ...                 # any command of Rockfall
     python3.13 scripts/run.py lint                                 # ruff and mypy
     python3.13 scripts/run.py extension [arguments]                # the zips for Blender, see build_extension.py
@@ -152,17 +152,23 @@ def demo(arguments: list[str]) -> int:
 
 
 def test(arguments: list[str]) -> int:
-    """Both levels, each in a process of its own: the core is tested without Blender in it."""
+    """All levels, each in a process of its own: the core is tested without Blender in it."""
     levels = {
         "core": [PYTHON, "-m", "pytest", "tests/core"],
         "blender": [PYTHON, "scripts/blender_tests.py"],
+        "browser": [PYTHON, "-m", "pytest", "tests/browser"],
+    }
+    purposes = {
+        "core": "tests of the core",
+        "blender": "tests of the add-on, in Blender as a module",
+        "browser": "tests of the pages, in Chromium (skipped where there is none)",
     }
     chosen = [arguments[0]] if arguments and arguments[0] in levels else list(levels)
     options = arguments[1:] if chosen == arguments[:1] else arguments
     closing_line = re.compile(r"\b\d+ (passed|failed|errors?|skipped|deselected)\b.* in [\d.]+s")
     closing_lines, failed = [], False
     for level in chosen:
-        say({"core": "tests of the core", "blender": "tests of the add-on, in Blender as a module"}[level])
+        say(purposes[level])
         code, line = start(*levels[level], *options, show=closing_line)
         nothing_selected = code == 5 and options and len(chosen) > 1
         failed |= bool(code) and not nothing_selected

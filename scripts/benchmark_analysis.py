@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long calibration takes on a table of the usual size, and reading, merging, filtering and grouping on a large one."""
+"""How long calibration takes on a table of the usual size, and reading, merging, filtering, grouping on a large one."""
 
 import argparse
 import os

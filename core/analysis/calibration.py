@@ -16,7 +16,7 @@ from ..vectors import Array
 from .clouds import OBJECTIVE, Contest, Target, make_contest, measured_target
 from .courses import Spin, find_courses
 from .estimation import Estimate, Estimation, Question, ask, estimate, paired_gain
-from .fitting import Report, Stop, descend_from_best
+from .fitting import COARSE, Report, Stop, descend_from_best
 from .verdicts import holdout_verdict, use_verdict
 
 HoldOut = Literal["trajectory", "none"]
@@ -185,7 +185,7 @@ def _hold_out(
         best, least = found.sums, np.inf
         for i, one in enumerate(found.fits):
             sums = question.sums(contest, i, cancelled)
-            place = descend_from_best(sums, counts, weights, one.scanned, one.scanned_sums, 2)
+            place = descend_from_best(sums, counts, weights, one.scanned, one.scanned_sums, 2, COARSE)
             here = sums(place)
             if weights @ here < least:
                 best, least = here, float(weights @ here)

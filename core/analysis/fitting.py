@@ -97,16 +97,18 @@ def fit(sums: Sums, counts: Array, default: Array, starts: int, seed: int) -> Fi
     return Fit(place, sums(place), places, scanned)
 
 
-def descend_from_best(sums: Sums, counts: Array, weights: Array, places: Array, scanned: Array, starts: int) -> Array:
-    """The least score with weights (clusters,), from the best scanned places."""
+def descend_from_best(
+    sums: Sums, counts: Array, weights: Array, places: Array, scanned: Array, starts: int, near: float = FINE
+) -> Array:
+    """The least score with weights (clusters,), from the best scanned places, to `near` of its place."""
     if not places.shape[1]:
         return places[0]
     objective = _weighted(sums, counts, weights)
     order = np.argsort(_means(scanned, counts, weights), kind="stable")[:starts]
     ends = [_descend(objective, places[i], 0.1, COARSE) for i in order]
     best = min(ends, key=objective)
-    for step in (0.02, 0.002):
-        best = _descend(objective, best, step, FINE)
+    for step in (0.02, 0.002) if near < COARSE else ():
+        best = _descend(objective, best, step, near)
     return best
 
 

@@ -124,15 +124,28 @@ def codes(*columns: Array | Names | Indices) -> tuple[list[tuple[Hashable, ...]]
 
 def group_medians(impacts: Impacts, columns: Sequence[str]) -> list[dict[str, object]]:
     """One row for each group: its values, how many impacts, and the medians of `MEDIANS` where defined."""
-    table = []
-    numbers = {name: column_of(impacts, name) for name in MEDIANS}
-    for values, rows in grouped(impacts, *columns).items():
-        row: dict[str, object] = {**dict(zip(columns, values, strict=True)), "impacts": rows.size}
-        for name, column in numbers.items():
-            known = column[rows][np.isfinite(column[rows])]
-            row[f"median_{name}"] = float(np.median(known)) if known.size else ""
-        table.append(row)
+    keys, code = codes(*(column_of(impacts, name) for name in columns))
+    table: list[dict[str, object]] = [dict(zip(columns, key, strict=True)) for key in keys]
+    for row, count in zip(table, np.bincount(code, minlength=len(keys)).tolist(), strict=True):
+        row["impacts"] = count
+    for name in MEDIANS:
+        medians = _medians(np.asarray(column_of(impacts, name), dtype=np.float64), code, len(keys))
+        for row, value in zip(table, medians.tolist(), strict=True):
+            row[f"median_{name}"] = value if value == value else ""
     return table
+
+
+def _medians(values: Array, code: Indices, groups: int) -> Array:
+    """(groups,) of the defined values; NaN where there is none."""
+    known = np.isfinite(values)
+    values, code = values[known], code[known]
+    counts = np.bincount(code, minlength=groups)
+    medians, some = np.full(groups, np.nan), counts > 0
+    if some.any():
+        ordered, first = values[np.lexsort((values, code))], np.cumsum(counts) - counts
+        lower, upper = (first + (counts - 1) // 2)[some], (first + counts // 2)[some]
+        medians[some] = (ordered[lower] + ordered[upper]) / 2
+    return medians
 
 
 def _flagged(impacts: Impacts, sign: str, value: str, condition: str) -> Mask:

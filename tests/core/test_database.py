@@ -14,7 +14,7 @@ from rockfall.core.exchange.database import digest, merge, read_source
 from rockfall.core.exchange.datapackage import read_package, write_package
 from rockfall.core.exchange.duplicates import find_duplicates
 from rockfall.core.exchange.impact_fields import FIELDS
-from rockfall.core.exchange.selection import grouped, joined, matching, rows_of
+from rockfall.core.exchange.selection import group_medians, grouped, joined, matching, rows_of
 from rockfall.core.exchange.tables import IMPACTS_COLUMNS, impact_columns, read_impacts, write_impacts
 from rockfall.core.exchange.unit_checks import check_units
 from rockfall.core.reconstruction.impact import Impacts
@@ -170,6 +170,12 @@ def test_conditions_and_groups():
     groups = grouped(impacts, "site", "trajectory")
     assert list(groups) == [("gully", "a"), ("gully", "b"), ("quarry", "c"), ("quarry", "d")]
     assert groups["quarry", "c"].tolist() == list(range(14, 21))
+    for row, rows in zip(group_medians(impacts, ["site", "trajectory"]), groups.values(), strict=True):
+        assert row["impacts"] == 7
+        for name in ("rn", "r"):
+            assert row[f"median_{name}"] == pytest.approx(np.nanmedian(getattr(impacts, name)[rows]), rel=1e-12)
+    (first,) = group_medians(rows_of(impacts, [0]), ["site"])
+    assert (first["impacts"], first["median_rn"]) == (1, "")
 
 
 @pytest.mark.parametrize(

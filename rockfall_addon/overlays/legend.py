@@ -49,7 +49,7 @@ def _draw() -> None:
 
 def _draw_models(shown: tuple[str, ...], left: float, scale: float) -> None:
     """A swatch and a name for the real blocks, and for each model."""
-    rows = [("Observed", OBSERVED_COLOUR), *((MODELS[name].title, model_colour(name)) for name in shown)]
+    rows = [("observed", OBSERVED_COLOUR), *((MODELS[name].title, model_colour(name)) for name in shown)]
     size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for i, (name, colour) in enumerate(reversed(rows)):
@@ -58,7 +58,7 @@ def _draw_models(shown: tuple[str, ...], left: float, scale: float) -> None:
         shader.uniform_float("color", (*colour, 1.0))
         batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
         _text(left + 1.6 * size, low + 0.1 * size, name)
-    _text(left, bottom + (len(rows) + 0.2) * step, "Blocks, from the same impacts and incident velocities")
+    _text(left, bottom + (len(rows) + 0.2) * step, "Real blocks, and where models send them from the same impacts")
 
 
 def _draw_speeds(settings: bpy.types.PropertyGroup, left: float, scale: float) -> None:

@@ -21,7 +21,7 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, shown = self.layout, twins.shown_models(context.scene)
-        paragraph(context, layout, QUESTION)
+        paragraph(context, layout, QUESTION, "QUESTION")
         column = layout.column(align=True)
         for name in (*COMPARED, *(other for other in MODELS if other not in COMPARED)):
             on = name in shown

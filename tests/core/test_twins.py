@@ -8,14 +8,17 @@ import pytest
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.twins import fly_twins, score_twins
 from rockfall.core.cli import main
+from rockfall.core.colours import OBSERVED_COLOUR, model_colour
 from rockfall.core.commands.demo import SITE, _reconstruct
 from rockfall.core.constants import GRAVITY_MPS2 as G
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_impacts, write_impacts
 from rockfall.core.exchange.twin_tables import read_twins, write_twins
+from rockfall.core.film.job import FilmJob
+from rockfall.core.film.wording import compared_lines
 from rockfall.core.georeference import GlobalShift
-from rockfall.core.impact_models.registry import COMPARED
+from rockfall.core.impact_models.registry import COMPARED, MODELS
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag, fly
 from rockfall.core.reconstruction.landing import Launches, find_landings, greatest_heights
@@ -197,6 +200,21 @@ def test_drag_needs_the_block():
         fly_twins(replace(impacts, mass_kg=np.full(len(impacts), np.nan)), as_model(impacts), surface, drag=drag)
     with pytest.raises(InputError, match="position of impact"):
         fly_twins(replace(impacts, position=np.full_like(impacts.position, np.nan)), as_model(impacts), surface)
+
+
+def test_a_film_of_models(tmp_path, capsys):
+    job = FilmJob("film", tmp_path / "project.toml", tmp_path / "film.mp4", models=("noel_2017", "wyllie_2014"))
+    assert FilmJob.from_json(job.to_json()) == job
+    assert main(["render", str(SITE / "project.toml"), "--model", "noel", "--out", str(tmp_path / "film")]) == 1
+    assert "Did you mean noel_2017?" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+    assert compared_lines(2)[0] == "Observed, and calculated by 2 impact models"
+
+
+def test_model_colours_are_told_apart():
+    colours = np.array([OBSERVED_COLOUR, *(model_colour(name) for name in MODELS)])
+    apart = np.linalg.norm(colours[:, None] - colours, axis=-1)[np.triu_indices(len(colours), 1)]
+    assert apart.min() > 0.3
 
 
 def test_table_round_trip(tmp_path):

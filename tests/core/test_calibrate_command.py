@@ -68,6 +68,7 @@ def test_calibrate_writes_what_compare_takes(impacts, tmp_path, capsys):
         model,
         "--parameters",
         str(out / "parameters.toml"),
+        "--tables-only",
         "--out",
         str(compared),
     ]

@@ -144,7 +144,7 @@ def _landings(twins: "Twins | None") -> list[str]:
     from ..analysis.twins import score_twins
 
     marks = () if twins is None else score_twins(twins)
-    lines = ["Where the blocks would land, from where they did:"] if marks else []
+    lines = ["Landings with each model's mean, and how far they are from the real ones:"] if marks else []
     for mark in marks:
         text = f"median {mark.median_offset_m:.2f} m, 90 % within {mark.p90_offset_m:.1f} m of {mark.n} flights"
         lost = f"; {mark.left_terrain} left the terrain" if mark.left_terrain else ""

@@ -17,8 +17,7 @@ CHOICES = [
 
 
 class ROCKFALL_OT_show_twins(bpy.types.Operator):
-    """Show the blocks of impact models beside the real ones: each leaves the measured impacts, from the same incident
-    velocity, as its model says, and flies to where it meets the terrain"""
+    """Show beside the real blocks those that leave the same impacts as a model says, flown to where they land"""
 
     bl_idname = "rockfall.show_twins"
     bl_label = "Show Models"

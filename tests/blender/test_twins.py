@@ -177,3 +177,19 @@ def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None
     film.remove_film(shown)
     assert len(of_role(shown, "twin_flights")) == 2
     assert not of_role(shown, "film")
+
+
+def test_the_models_colours_are_in_a_rendered_film(shown: bpy.types.Scene, part, tmp_path: Path) -> None:
+    preset = part("core.exchange.project").RenderPreset("tiny", width=192, height=108, fps=25.0, engine="cycles")
+    part("rockfall_addon.film.dressing").set_up_film(shown, preset, "cycles")
+    render = part("rockfall_addon.film.render")
+    done: list[tuple[int, int]] = []
+    render.render_film(shown, tmp_path / "film.mp4", (60, 61), lambda *count: done.append(count))
+    assert done == [(1, 2), (2, 2)]
+    shown.frame_set(60)
+    render.render_picture(shown, tmp_path / "still.png")
+    image = bpy.data.images.load(str(tmp_path / "still.png"))
+    pixels = np.array(image.pixels[:]).reshape(108, 192, 4)[:, 24:, :3]  # right of the legend's swatches
+    colours = part("core.colours")
+    for colour in (colours.OBSERVED_COLOUR, *(colours.model_colour(name) for name in MODELS)):
+        assert (np.abs(pixels - colour).max(axis=2) < 0.15).sum() >= 2, colour

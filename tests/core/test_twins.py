@@ -208,7 +208,7 @@ def test_a_film_of_models(tmp_path, capsys):
     assert main(["render", str(SITE / "project.toml"), "--model", "noel", "--out", str(tmp_path / "film")]) == 1
     assert "Did you mean noel_2017?" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-    assert compared_lines(2)[0] == "Observed, and calculated by 2 impact models"
+    assert compared_lines(2)[0] == "Observed (red), and calculated by 2 models"
 
 
 def test_model_colours_are_told_apart():
@@ -244,7 +244,7 @@ def test_compare_with_a_terrain_leaves_twins(tmp_path, capsys):
     said = capsys.readouterr()
     assert status == 0, said.err
     assert "twins.csv" in said.out
-    assert "Where the blocks would land" in said.out
+    assert "Landings with each model's mean" in said.out
     twins = read_twins(out / "twins.csv")
     assert twins.models == ("noel_2017", "wyllie_2014")
     impacts = read_impacts(tmp_path / "impacts.csv")

@@ -88,7 +88,7 @@ def calibrate(
     fixed: Mapping[str, object] | None = None,
     starts: int = 4,
     seed: int = 0,
-    replicates: int = 20,
+    replicates: int = 16,
     resamples: int = 200,
     holdout: HoldOut = "trajectory",
     spin: Spin = "rolling",
@@ -213,7 +213,9 @@ def _verdict(target: Target, found: Estimation, held: Array | None, chance: bool
     sentences, blind = [], target.blind_score(chance=chance)
     unsure = [one.name for one in found.estimates if one.verdict.startswith("The data cannot tell")]
     if unsure:
-        sentences.append(f"These impacts cannot tell {', '.join(unsure)}: set a value, or fit fewer parameters together.")
+        sentences.append(
+            f"These impacts cannot tell {', '.join(unsure)}: set a value, or fit fewer parameters together."
+        )
     if held is not None:
         gain, error = paired_gain(found.default_sums, held, counts)
         default, score = float(found.default_sums.sum()) / total, float(held.sum()) / total

@@ -74,7 +74,7 @@ def equivalent(
     fixed: Mapping[str, object] | None = None,
     starts: int = 4,
     seed: int = 0,
-    replicates: int = 20,
+    replicates: int = 16,
     resamples: int = 100,
     spin: Spin = "rolling",
     radius_m: float | None = None,

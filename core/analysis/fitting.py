@@ -27,7 +27,7 @@ SCAN_PER_PARAMETER = 64
 MOST_SCANNED = 512
 WIDE = 20.0
 """A range that is this many times the default is scanned finely near its low end."""
-FINE, COARSE = 1e-6, 1e-3
+FINE, COARSE = 1e-6, 2e-3
 """How near the descent goes to the minimum, in the unit cube: for the fit, for a resample."""
 CONFIDENCE = 0.95
 

@@ -28,7 +28,7 @@ def add_fit_arguments(parser: argparse.ArgumentParser, resamples: int) -> None:
         help="parameters to fit; choices and switches by trying all (`rockfall models NAME` lists them)",
     )
     parser.add_argument(
-        "--replicates", type=whole, default=20, metavar="N", help="draws of a random model per impact (default 20)"
+        "--replicates", type=whole, default=16, metavar="N", help="draws of a random model per impact (default 16)"
     )
     parser.add_argument(
         "--resamples",

@@ -2,6 +2,7 @@
 """picks.csv, impacts.csv and trajectories.csv. Positions in files are survey coordinates."""
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ Cells = Array | Names | Indices | Sequence[str]
 Columns = dict[str, Cells]
 """Name → (n,) cells: numbers, or text as it is written."""
 WRITTEN_ROWS = 20_000
+QUOTED = re.compile('[",\r\n]')
+"""What a cell must be quoted for."""
 
 Column = tuple[str, str, int | None, bool]
 """Name in the file, attribute of `Impacts`, component of a vector, whether it is an angle in degrees."""
@@ -245,11 +248,11 @@ def _of(impacts: Impacts, column: Column) -> Array:
     return np.degrees(values) if degrees else values
 
 
-def _texts(cells: Cells) -> list[object]:
+def _texts(cells: Cells) -> list[str]:
     """As they are written: the shortest text that reads back as the same number; empty when undefined."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
         return ["" if value != value else repr(value) for value in cells.tolist()]
-    return cells.tolist() if isinstance(cells, np.ndarray) else list(cells)
+    return list(map(str, cells.tolist())) if isinstance(cells, np.ndarray) else list(cells)
 
 
 def _rounded(values: Array) -> list[str]:
@@ -267,5 +270,9 @@ def _write(path: str | Path, columns: Columns) -> None:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
         for start in range(0, rows, WRITTEN_ROWS):
-            part = (_texts(cells[start : start + WRITTEN_ROWS]) for cells in columns.values())
-            writer.writerows(zip(*part, strict=True))
+            part = [_texts(cells[start : start + WRITTEN_ROWS]) for cells in columns.values()]
+            lines = zip(*part, strict=True)
+            if any(QUOTED.search("".join(cells)) for cells in part):
+                writer.writerows(lines)
+            else:  # six times quicker
+                stream.writelines(f"{line}\n" for line in map(",".join, lines))

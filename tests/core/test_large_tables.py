@@ -9,6 +9,9 @@ from rockfall.core.errors import InputError
 from rockfall.core.exchange import csv_text
 from rockfall.core.exchange.cells import Cells, split_cells
 from rockfall.core.exchange.csv_text import read_table
+from rockfall.core.exchange.tables import write_trajectories
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.sampling import TrajectorySamples
 
 
 @pytest.fixture
@@ -142,3 +145,25 @@ def test_blank_rows_and_quotes_are_read_with_care(tmp_path):
     table = read_table(path, ("trajectory", "a"), ())
     assert table.text("trajectory") == ["x", "y, z"]
     assert list(table.row) == [3, 4]
+
+
+def test_names_with_commas_and_quotes_are_written_so_that_they_are_read(tmp_path):
+    """Rows that need no quotes are written without the csv module; one that does takes the others with it."""
+    names = np.array(["plain", 'the "big" one', "a, b", "new\nline"])
+    n = names.size
+    samples = TrajectorySamples(
+        source=np.full(n, "observed"),
+        trajectory=names,
+        run=np.arange(n),
+        time_s=np.arange(n) * 0.1,
+        position=np.ones((n, 3)),
+        velocity=np.ones((n, 3)),
+        height_m=np.full(n, np.nan),
+        kinetic_j=np.ones(n),
+        shift=GlobalShift(),
+    )
+    write_trajectories(samples, tmp_path / "t.csv")
+    table = read_table(tmp_path / "t.csv", ("trajectory",), ())
+    assert table.text("trajectory") == names.tolist()
+    assert np.isnan(table.numbers("height_m")).all()
+    assert table.numbers("run").tolist() == [0, 1, 2, 3]

@@ -15,7 +15,7 @@ from ..reconstruction.picks import Indices
 from ..vectors import Array
 from .clouds import OBJECTIVE, Contest, Target, make_contest, measured_target
 from .courses import Spin, find_courses
-from .estimation import Estimate, Estimation, Question, ask, estimate, paired_gain
+from .estimation import Estimate, Estimation, Question, ask, check_effort, estimate, paired_gain
 from .fitting import COARSE, Report, Stop, descend_from_best
 from .verdicts import holdout_verdict, use_verdict
 
@@ -126,7 +126,8 @@ def calibrate(
     """
     chosen = find_model(model)
     question = ask(chosen, fit, fixed)
-    _check(starts, seed, replicates, resamples, holdout)
+    check_effort(starts, seed, replicates, resamples)
+    _check(holdout)
     courses = find_courses(impacts, spin, radius_m)
     target = measured_target(impacts, courses)
     contest = make_contest(chosen, impacts, target, replicates, seed)
@@ -232,8 +233,6 @@ def _verdict(target: Target, found: Estimation, held: Array | None, chance: bool
     return tuple(sentences)
 
 
-def _check(starts: int, seed: int, replicates: int, resamples: int, holdout: str) -> None:
-    if starts < 1 or seed < 0 or replicates < 2 or resamples < 20:
-        raise InputError("A fit needs a start or more, 2 replicates or more, 20 resamples or more, and a seed from 0")
+def _check(holdout: str) -> None:
     if holdout not in get_args(HoldOut):
         raise InputError(f"There is no hold-out {holdout!r}", advice=f"Choose one of {', '.join(get_args(HoldOut))}")

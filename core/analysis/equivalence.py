@@ -18,7 +18,7 @@ from ..reconstruction.impact import Impacts
 from ..vectors import Array
 from .clouds import Target, cloud_of, make_contest, make_target
 from .courses import Spin, find_courses
-from .estimation import Estimate, ask, estimate
+from .estimation import Estimate, ask, check_effort, estimate
 from .fitting import Report, Stop
 from .verdicts import likeness_verdict
 
@@ -99,6 +99,7 @@ def equivalent(
     a, b = find_model(model_a), find_model(model_b)
     settings = a.settings(parameters_a)
     question = ask(b, fit, fixed)
+    check_effort(starts, seed, replicates, resamples)
     courses = find_courses(impacts, spin, radius_m)
     cloud = cloud_of(a, impacts, courses, settings, replicates, seed)
     target = make_target(courses, cloud, np.asarray(np.isfinite(cloud).all(axis=(0, 2))))

@@ -146,6 +146,17 @@ def ask(model: ImpactModel, names: Sequence[str], fixed: Mapping[str, object] | 
     return Question(model, numbers, choices, tuple(Axis.of(spec) for spec in numbers), tuple(combinations))
 
 
+def check_effort(starts: int, seed: int, replicates: int, resamples: int) -> None:
+    """Refuse a fit with too few of anything.
+
+    Raises
+    ------
+    InputError : says what is needed.
+    """
+    if starts < 1 or seed < 0 or replicates < 2 or resamples < 20:
+        raise InputError("A fit needs a start or more, 2 replicates or more, 20 resamples or more, and a seed from 0")
+
+
 def estimate(
     question: Question,
     contest: Contest,

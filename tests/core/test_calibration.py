@@ -246,6 +246,13 @@ def test_bad_questions_are_refused(case):
         calibrate(slope(5), "stevens_1998", names, **options)
 
 
+def test_bad_questions_about_equivalence_are_refused():
+    with pytest.raises(InputError, match="20 resamples or more"):
+        equivalent(slope(3), "noel_2017", None, "stevens_1998", ["rn"], resamples=0)
+    with pytest.raises(InputError, match=r"noel_2017\.rt is 4, outside its range"):
+        equivalent(slope(3), "noel_2017", {"rt": 4}, "stevens_1998", ["rn"])
+
+
 def test_bad_impacts_are_refused():
     few = slope(1, 6)
     with pytest.raises(InputError, match=r"4 impacts can be used, which is too few to fit 2 .*at least 10"):

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _picture(folder: Path, title: str) -> str:
-    """Make terrain.png of terrain.ply; returns why not where there is no Blender, since the terrain is of use without."""
+    """Make terrain.png of terrain.ply; returns why not, where there is no Blender to do it."""
     from ..film.job import FilmJob
     from ..film.maker import film_maker
 

@@ -21,7 +21,8 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
             return
         if problem := scene.get("rockfall_problem"):
             paragraph(context, layout, problem, "ERROR")
-        advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {'trajectory' if len(flights) == 1 else 'trajectories'}.")
+        runs = "trajectory" if len(flights) == 1 else "trajectories"
+        advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
         layout.use_property_split = True
         settings = scene.rockfall
         column = layout.column(align=True)

@@ -13,10 +13,10 @@ from mathutils import Vector
 from ...core.reconstruction.picks import Picks, make_picks
 from . import materials, motion, state, timing
 
-MARKER_COLOURS = {  # sRGB, told apart also by colour-blind people (Okabe & Ito 2008)
+MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler than any model's colour
     "impact": (0.95, 0.95, 0.95),
     "release": (0.00, 0.62, 0.45),
-    "pass": (0.34, 0.71, 0.91),
+    "pass": (0.62, 0.70, 0.78),
     "contact": (0.00, 0.45, 0.70),
     "stop": (0.84, 0.37, 0.00),
 }

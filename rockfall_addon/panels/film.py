@@ -9,7 +9,7 @@ from .base import RockfallPanel
 
 
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
-    bl_label = "Film"
+    bl_label = "5  Film"
     bl_idname = "ROCKFALL_PT_film"
     bl_options = {"DEFAULT_CLOSED"}
 

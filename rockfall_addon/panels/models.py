@@ -11,7 +11,7 @@ QUESTION = "Where would the blocks fly if a model were right? Same impacts, same
 
 
 class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
-    bl_label = "Models"
+    bl_label = "3  Models"
     bl_idname = "ROCKFALL_PT_models"
 
     @classmethod

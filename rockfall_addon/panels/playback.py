@@ -8,7 +8,7 @@ from .base import RockfallPanel
 
 
 class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
-    bl_label = "3  Playback and Look"
+    bl_label = "4  Playback and Look"
     bl_idname = "ROCKFALL_PT_playback"
 
     @classmethod

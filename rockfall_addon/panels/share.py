@@ -8,7 +8,7 @@ from .base import RockfallPanel, advise
 
 
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
-    bl_label = "4  Share"
+    bl_label = "6  Share"
     bl_idname = "ROCKFALL_PT_share"
 
     @classmethod

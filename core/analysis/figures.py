@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The graphs in print: one figure per model, and all models on one sheet as in Noël et al. 2018, Fig. 8.
 
-Text stays text in SVG and PDF. The two series differ in colour (Okabe & Ito's vermilion against black), in brightness
+Text stays text in SVG and PDF. The two series differ in colour (the paper's red against black), in brightness
 and in shape, so that they are told apart without colour too.
 """
 
@@ -23,7 +23,7 @@ FORMATS = ("svg", "png", "pdf")
 DPI = 300
 COLUMN_IN, PAGE_IN = 3.54, 7.48
 """Widths of one column (90 mm) and of a page (190 mm)."""
-MEASURED, MODELLED, LINK = "#20262e", "#d55e00", "#b4b9c1"
+MEASURED, MODELLED, LINK = "#20262e", "#d7301f", "#b4b9c1"
 INK, MUTED = "#20262e", "#5b6470"
 LISTED = 3
 """So many points beyond the axes are listed, the others are counted."""

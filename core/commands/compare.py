@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
-from .options import add_out, add_terrain_options, not_negative, positive, whole
+from .options import (
+    add_out,
+    add_parameter_options,
+    add_terrain_options,
+    model_parameters,
+    not_negative,
+    positive,
+    whole,
+)
 from .progress import Progress
 
 if TYPE_CHECKING:
@@ -32,15 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="models to compare (default: the six of Noël et al. 2018; `rockfall models` lists all)",
     )
-    parser.add_argument(
-        "--set",
-        action="extend",
-        nargs="+",
-        default=[],
-        metavar="NAME.PARAMETER=VALUE",
-        help="a parameter that is not to have its default",
-    )
-    parser.add_argument("--parameters", metavar="FILE", help="parameters as saved by explore; --set goes before them")
+    add_parameter_options(parser)
     parser.add_argument(
         "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
     )
@@ -70,20 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.scores import scores
     from ..exchange.comparison_tables import write_predictions, write_scores, write_settings
     from ..exchange.output import output_folder
-    from ..exchange.parameters import read_parameters
     from ..exchange.tables import read_impacts
     from ..exchange.twin_tables import write_twins
-    from ..impact_models.registry import COMPARED, find_model, parse_settings
+    from ..impact_models.registry import COMPARED, find_model
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
-    parameters = parse_settings(arguments.set)
-    if arguments.parameters:
-        for name, values in read_parameters(arguments.parameters).items():
-            if name in models:
-                parameters[name] = {**values, **parameters.get(name, {})}
-    idle = [name for name in parameters if name not in models]
-    if idle:
-        raise InputError(f"--set gives parameters of {idle[0]}, which is not compared", advice=f"Add --model {idle[0]}")
+    parameters = model_parameters(arguments, models)
     with output_folder(arguments.out) as folder, Progress() as progress:
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)

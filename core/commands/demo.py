@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from ..film.engines import ENGINES
 
 if TYPE_CHECKING:
-    from ..exchange.project import Project
     from ..reconstruction.trajectory import Reconstruction
     from ..terrain.surface import Surface
 
@@ -45,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Do it all, say what comes out, and list the files."""
     from ..analysis.statistics import impact_statistics
     from ..analysis.truth import compare_with_truth, read_truth, truth_sentences
+    from ..exchange.opening import open_project
     from ..exchange.output import output_folder
     from ..exchange.project import read_project
     from ..film.job import FilmJob
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     project = read_project(SITE / "project.toml")
     with output_folder(arguments.out) as folder:
         _say("The site", [f"{project.site.name}. {project.site.description}."])
-        surface, result = _reconstruct(project)
+        surface, result = open_project(project)
         _write_tables(result, surface, folder)
         _say("From timed picks to impacts", summarise(result)[:2])
         statistics = impact_statistics(result.impacts)
@@ -79,29 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _reconstruct(project: "Project") -> "tuple[Surface, Reconstruction]":
-    from ..exchange.tables import read_picks
-    from ..reconstruction.block import Block
-    from ..reconstruction.trajectory import reconstruct
-    from ..terrain.readers import read_terrain
-
-    source, how = project.terrain, project.reconstruction
-    assert source is not None
-    assert project.picks is not None
-    surface = read_terrain(source.file, shift=source.global_shift, up=source.up, unit_m=source.unit_m)
-    picks = read_picks(project.picks, surface.shift)
-    entries = {name: project.block_of(name) for name in dict.fromkeys(picks.trajectory.tolist())}
-    return surface, reconstruct(
-        picks,
-        surface=surface,
-        block={name: Block(b.d1_m, b.d2_m, b.d3_m, b.density_kgpm3) for name, b in entries.items()},
-        gravity_mps2=how.gravity_mps2,
-        normal_radius_m=how.normal_radius_m,
-        site=project.site.name,
-    )
-
-
-def _write_tables(result: "Reconstruction", surface: "Surface", folder: Path) -> None:
+def _write_tables(result: "Reconstruction", surface: "Surface | None", folder: Path) -> None:
     from ..exchange.tables import write_impacts, write_trajectories
     from ..reconstruction.sampling import sample_trajectories
 

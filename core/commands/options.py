@@ -2,7 +2,14 @@
 """Arguments that several commands share."""
 
 import argparse
+from collections.abc import Mapping, Sequence
 from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..impact_models.parameters import Value
 
 UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
@@ -71,3 +78,43 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
         help="use the points that are classified as ground (default: when there are any)",
     )
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
+
+
+def add_parameter_options(parser: argparse.ArgumentParser) -> None:
+    """``--set`` and ``--parameters``."""
+    parser.add_argument(
+        "--set",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="NAME.PARAMETER=VALUE",
+        help="a parameter that is not to have its default",
+    )
+    parser.add_argument(
+        "--parameters", metavar="FILE", help="parameters as saved by explore and calibrate; --set goes before them"
+    )
+
+
+def model_parameters(
+    arguments: argparse.Namespace, models: Sequence[str], known: "Mapping[str, Mapping[str, Value]] | None" = None
+) -> dict[str, dict[str, Any]]:
+    """Parameters of the models: from ``--set``, else from ``--parameters``, else those already known.
+
+    Raises
+    ------
+    InputError : a parameter that is wrong, or of a model that is not among the models.
+    """
+    from ..exchange.parameters import read_parameters
+    from ..impact_models.registry import parse_settings
+
+    typed = parse_settings(arguments.set)
+    idle = [name for name in typed if name not in models]
+    if idle:
+        raise InputError(f"--set gives parameters of {idle[0]}, which is not used", advice=f"Add --model {idle[0]}")
+    read = read_parameters(arguments.parameters) if arguments.parameters else {}
+    merged: dict[str, dict[str, Any]] = {}
+    for layer in (known or {}, read, typed):
+        for name in models:
+            if name in layer:
+                merged.setdefault(name, {}).update(layer[name])
+    return merged

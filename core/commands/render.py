@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ..film.engines import ENGINES
 from ..film.presets import parse_frames
+from .options import add_parameter_options, model_parameters
 
 FILM, STILL = "rockfall.mp4", "rockfall.png"
 
@@ -38,13 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="show beside the real blocks those of an impact model, from the same impacts; may be given several times",
     )
+    add_parameter_options(parser)
     parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
     parser.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Render the film or the still."""
+    """Render the film or the still; the models have the project's parameters where the command line gives none."""
     from ..exchange.output import output_folder
+    from ..exchange.parameters import checked_parameters
     from ..exchange.project import read_project
     from ..film.job import FilmJob
     from ..film.maker import film_maker
@@ -52,7 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ..impact_models.registry import find_model
 
     models = tuple(dict.fromkeys(find_model(name).name for name in arguments.model))
-    preset = find_preset(read_project(arguments.project), arguments.preset)
+    project = read_project(arguments.project)
+    known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
+    parameters = model_parameters(arguments, models, known)
+    preset = find_preset(project, arguments.preset)
     maker = film_maker()
     name = STILL if arguments.still else FILM
     with output_folder(arguments.out) as folder:
@@ -64,6 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
             preset=preset.name,
             frames=arguments.frames,
             models=models,
+            parameters=parameters,
         )
         done = maker.film(job)
     print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")

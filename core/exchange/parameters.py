@@ -44,7 +44,16 @@ def read_parameters(path: str | Path) -> dict[str, dict[str, Value]]:
         ) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"This is no TOML file ({error})", file=path, advice="Correct the line") from error
-    models = content.get("models")
+    return checked_parameters(content.get("models"), path)
+
+
+def checked_parameters(models: object, path: str | Path) -> dict[str, dict[str, Value]]:
+    """The tables [models.NAME] of a file, each value checked.
+
+    Raises
+    ------
+    InputError : no such tables, an unknown model or parameter, a value out of range.
+    """
     if not (isinstance(models, dict) and models and all(isinstance(table, dict) for table in models.values())):
         raise InputError("The file has no parameters", file=path, advice="It needs tables like [models.noel_2017]")
     try:

@@ -2,9 +2,12 @@
 """What Blender is asked to make."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Literal
+
+from ..impact_models.parameters import Value
 
 Kind = Literal["film", "still", "slope", "terrain"]
 
@@ -24,6 +27,7 @@ class FilmJob:
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
     models : impact models whose blocks are shown beside the real ones.
+    parameters : model → parameter → value, where it is not the default.
     title : written into the picture of a terrain; empty for the name of its file.
     """
 
@@ -37,6 +41,7 @@ class FilmJob:
     unit_m: float = 1.0
     title: str = ""
     models: tuple[str, ...] = ()
+    parameters: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
     def with_engine(self, engine: str) -> "FilmJob":
         """The same job for another engine."""

@@ -5,7 +5,8 @@ Of each model: its flight curves, and for each trajectory a block that appears a
 after it has landed. Where a twin still flies when the next one starts, a second block takes over.
 """
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -14,11 +15,13 @@ from ...core.analysis.comparison import compare
 from ...core.analysis.twins import Twins, fly_twins
 from ...core.colours import model_colour
 from ...core.errors import RockfallError
+from ...core.impact_models.parameters import Value
 from ...core.impact_models.registry import find_model
 from ...core.reconstruction.trajectory import Reconstruction
 from . import motion, state, terrain, timing, trails, trajectories
 
 MODELS_KEY = "rockfall_twin_models"
+PARAMETERS_KEY = "rockfall_model_parameters"
 MODEL_KEY = "rockfall_model"
 LINGER_S = 0.2
 """How long a twin lies where it has landed."""
@@ -29,13 +32,30 @@ def shown_models(scene: bpy.types.Scene) -> tuple[str, ...]:
     return tuple(filter(None, str(scene.get(MODELS_KEY, "")).split(" ")))
 
 
-def show_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> Twins:
-    """Show the twins of these models, and of no others.
+def parameters_of(scene: bpy.types.Scene) -> dict[str, dict[str, Value]]:
+    """Model → parameter → value, where the scene has another than the default."""
+    return json.loads(scene.get(PARAMETERS_KEY, "{}"))
+
+
+def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]]) -> None:
+    """Store parameters with the scene: as text, which keeps every digit."""
+    scene[PARAMETERS_KEY] = json.dumps({name: dict(values) for name, values in parameters.items()})
+
+
+def show_twins(
+    scene: bpy.types.Scene,
+    result: Reconstruction,
+    models: Sequence[str],
+    parameters: Mapping[str, Mapping[str, Value]] | None = None,
+) -> Twins:
+    """Show the twins of these models, and of no others; with these parameters, which are kept, or those of the scene.
 
     Raises
     ------
     RockfallError : there is no terrain for them to land on, or no impact that a model can be asked about.
     """
+    if parameters is not None:
+        keep_parameters(scene, parameters)
     twins = find_twins(scene, result, models)
     _remove_objects(scene)
     scene[MODELS_KEY] = " ".join(twins.models)
@@ -61,7 +81,8 @@ def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[
     ground = terrain.active_terrain(scene)
     if ground is None:
         raise RockfallError("The blocks of the models land on the terrain: import one first.")
-    predictions = compare(result.impacts, models)
+    own = {name: values for name, values in parameters_of(scene).items() if name in models}
+    predictions = compare(result.impacts, models, own)
     surface = terrain.surface_of(ground)
     return fly_twins(result.impacts, predictions, surface, gravity_mps2=result.gravity_mps2, drag=result.drag)
 

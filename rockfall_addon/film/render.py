@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import InputError, RockfallError
-from ...core.exchange.project import Project, RenderPreset, read_project
+from ...core.exchange.project import RenderPreset, read_project
 from ...core.film.job import FilmJob
 from ...core.film.presets import HD, FilmTiming, find_preset
 from ...core.reconstruction.trajectory import Reconstruction
@@ -33,9 +33,9 @@ def make(job: FilmJob, report: Report) -> None:
     else:
         project = read_project(job.source)
         preset = find_preset(project, job.preset)
-        result = _load(scene, project, preset)
+        result = _load(scene, job.source, preset)
         if job.models:
-            twins.show_twins(scene, result, job.models)
+            twins.show_twins(scene, result, job.models, job.parameters)
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:
@@ -109,7 +109,7 @@ def render_picture(scene: bpy.types.Scene, path: Path) -> None:
     _check(path)
 
 
-def _load(scene: bpy.types.Scene, project: Project, preset: RenderPreset) -> Reconstruction:
+def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Reconstruction:
     film, settings = FilmTiming(preset.fps, preset.time_scale), scene.rockfall
     scene.render.fps, scene.render.fps_base = film.base
     settings.playback = "REAL" if preset.stagger_s is None else "TOGETHER"

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import bpy
 
-from ...core.exchange.project import read_project
 from ..bridge import project as project_bridge
 from ..bridge import state
 from . import look
@@ -34,7 +33,7 @@ class ROCKFALL_OT_load_demo(bpy.types.Operator):
         for thing in [o for o in scene.objects if o.name in ("Cube", "Light")]:  # of Blender's own start-up scene
             thing.hide_set(True)
             thing.hide_render = True
-        result = project_bridge.load_project(scene, read_project(DEMO))
+        result = project_bridge.load_project(scene, DEMO)
         look.show_relief(context, frame_all=True)
         self.report({"INFO"}, f"{len(result.impacts.rn)} impacts on the demo site. Press play to see the blocks fall.")
         return {"FINISHED"}

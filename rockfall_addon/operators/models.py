@@ -3,9 +3,11 @@
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
 
 from ...core.analysis.twins import score_twins
+from ...core.exchange.parameters import read_parameters
 from ...core.impact_models.registry import COMPARED, MODELS
 from ..bridge import reconstruction, state, twins
 from .reporting import reported
@@ -55,6 +57,24 @@ class ROCKFALL_OT_show_twins(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_load_parameters(bpy.types.Operator, ImportHelper):
+    """Give the models the parameters of a file that rockfall explore or rockfall calibrate has saved"""
+
+    bl_idname = "rockfall.load_parameters"
+    bl_label = "Load Parameters"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        twins.keep_parameters(scene, read_parameters(self.filepath))
+        if twins.shown_models(scene):
+            twins.follow(scene, reconstruction.reconstruct_scene(scene))
+        return {"FINISHED"}
+
+
 class ROCKFALL_OT_remove_twins(bpy.types.Operator):
     """Show the real blocks only"""
 
@@ -71,4 +91,4 @@ class ROCKFALL_OT_remove_twins(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_show_twins, ROCKFALL_OT_remove_twins)
+CLASSES = (ROCKFALL_OT_show_twins, ROCKFALL_OT_load_parameters, ROCKFALL_OT_remove_twins)

@@ -107,7 +107,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
             ground_only={"AUTO": None, "GROUND": True, "ALL": False}[self.ground],
         )
         terrain.add_terrain(context.scene, surface, shade(surface))
-        reconstruction.refresh(context.scene)
+        reconstruction.refresh_or_tell(context.scene)
         look.show_relief(context, frame_all=True)
         self.report({"INFO"}, " ".join(surface.summary))
         return {"FINISHED"}

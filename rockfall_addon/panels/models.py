@@ -32,6 +32,10 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
                 depress=on,
             )
             button.models = set(shown) ^ {name}
+        own = twins.parameters_of(context.scene)
+        if own:
+            paragraph(context, layout, f"Own parameters: {', '.join(MODELS[name].title for name in own)}", "INFO")
+        layout.operator("rockfall.load_parameters", icon="IMPORT")
         if shown:
             layout.operator("rockfall.remove_twins", icon="X")
 

@@ -160,6 +160,34 @@ def test_they_follow_a_moved_pick_and_a_changed_setting(shown: bpy.types.Scene, 
     check_motion(part, shown)
 
 
+def test_parameters_of_a_file_are_used_and_kept(scene: bpy.types.Scene, part, tmp_path: Path) -> None:
+    own = {"azimi_desvarreux_1977": {"rn": 0.9, "rt": 0.4}}
+    part("core.exchange.parameters").write_parameters(own, tmp_path / "parameters.toml")
+    assert bpy.ops.rockfall.load_parameters(filepath=str(tmp_path / "parameters.toml")) == {"FINISHED"}
+    assert bpy.ops.rockfall.show_twins(models={"azimi_desvarreux_1977"}) == {"FINISHED"}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"), load_ui=False)
+    scene = bpy.context.scene
+    bridge = part("rockfall_addon.bridge.twins")
+    assert bridge.parameters_of(scene) == own
+    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(scene)
+    twins = bridge.find_twins(scene, result, bridge.shown_models(scene))
+    impacts = result.impacts
+    normal = np.sum(impacts.v1 * impacts.normal, axis=1)[:, None] * impacts.normal
+    rebound = -0.9 * normal + 0.4 * (impacts.v1 - normal)
+    of_row = {key: i for i, key in enumerate(zip(impacts.trajectory.tolist(), impacts.impact.tolist(), strict=True))}
+    rows = [of_row[key] for key in zip(twins.trajectory.tolist(), twins.impact.tolist(), strict=True)]
+    _, velocity = twins.launches.states(np.arange(len(rows)), np.zeros(len(rows)))
+    np.testing.assert_allclose(velocity, rebound[rows], atol=1e-9)
+
+
+def test_bad_parameters_are_told(scene: bpy.types.Scene, tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text("[models.noel_2017]\nrtt = 1.0\n", encoding="utf-8")
+    with pytest.raises(RuntimeError, match=r"bad\.toml.*rtt"):
+        bpy.ops.rockfall.load_parameters(filepath=str(tmp_path / "bad.toml"))
+
+
 def test_without_terrain_there_are_none(scene: bpy.types.Scene) -> None:
     for thing in of_role(scene, "terrain"):
         bpy.data.objects.remove(thing)

@@ -76,7 +76,7 @@ BAD = {
     "model": (ROWS, ["--model", "wylie"], "no impact model 'wylie'. Did you mean wyllie_2014?"),
     "parameter": (ROWS, ["--set", "noel_2017.rm_limit=1"], "no parameter 'rm_limit'. Did you mean rn_limit?"),
     "range": (ROWS, ["--set", "noel_2017.rn_limit=-1"], "outside its range 0…10"),
-    "idle": (ROWS, ["--set", "bourrier_hungr.rt=1"], "bourrier_hungr, which is not compared. Add --model"),
+    "idle": (ROWS, ["--set", "bourrier_hungr.rt=1"], "bourrier_hungr, which is not used. Add --model"),
     "too many": (ROWS, ["--replicates", "100000000"], "too many for the memory"),
 }
 

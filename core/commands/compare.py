@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
 from .options import (
+    add_incident_options,
     add_out,
     add_parameter_options,
     add_terrain_options,
     model_parameters,
     not_negative,
-    positive,
+    terrain_as_told,
     whole,
 )
 from .progress import Progress
@@ -44,16 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
     )
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
-    parser.add_argument(
-        "--spin",
-        choices=("rolling", "zero", "table"),
-        default="rolling",
-        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
-    )
-    parser.add_argument(
-        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
-    )
+    add_incident_options(parser)
     parser.add_argument("--tables-only", action="store_true", help="neither figures nor the page")
     twins = parser.add_argument_group("twins: the blocks that leave each impact as a model says, and where they land")
     twins.add_argument("--terrain", metavar="MESH", help="the terrain on which they land → twins.csv")
@@ -115,17 +107,8 @@ def _twins(
 ) -> "Twins":
     from ..analysis.twins import fly_twins
     from ..reconstruction.drag import Drag
-    from ..terrain.readers import read_terrain
 
-    progress(f"Reading {arguments.terrain}")
-    surface = read_terrain(
-        arguments.terrain,
-        up=arguments.up,
-        unit_m=arguments.unit,
-        max_edge_m=arguments.max_edge,
-        ground_only=arguments.ground_only,
-        progress=progress,
-    )
+    surface = terrain_as_told(arguments, arguments.terrain, progress)
     progress("Flying the twins")
     drag = Drag() if arguments.drag else None
     return fly_twins(impacts, predictions, surface, gravity_mps2=arguments.gravity, drag=drag, runs=None)

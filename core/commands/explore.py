@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import positive, whole
+from .options import add_incident_options, whole
 from .progress import Progress
 
 if TYPE_CHECKING:
@@ -29,16 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save", metavar="FILE", help="where Save writes the parameters (default: parameters.toml beside IMPACTS)"
     )
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
-    parser.add_argument(
-        "--spin",
-        choices=("rolling", "zero", "table"),
-        default="rolling",
-        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
-    )
-    parser.add_argument(
-        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
-    )
+    add_incident_options(parser)
     parser.add_argument(
         "--port", type=whole, default=0, metavar="N", help="on this machine (default: one that is free)"
     )

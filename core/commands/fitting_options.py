@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import positive, whole
+from .options import add_incident_options, whole
 
 if TYPE_CHECKING:
     from ..analysis.estimation import Estimate
@@ -37,16 +37,7 @@ def add_fit_arguments(parser: argparse.ArgumentParser, resamples: int) -> None:
         metavar="N",
         help="of the trajectories, for the intervals (default %(default)s)",
     )
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
-    parser.add_argument(
-        "--spin",
-        choices=("rolling", "zero", "table"),
-        default="rolling",
-        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
-    )
-    parser.add_argument(
-        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
-    )
+    add_incident_options(parser)
 
 
 def parameter_names(model: "ImpactModel", texts: Iterable[str]) -> list[str]:

@@ -10,6 +10,8 @@ from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..impact_models.parameters import Value
+    from ..terrain.surface import Surface
+    from .progress import Progress
 
 UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
@@ -78,6 +80,40 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
         help="use the points that are classified as ground (default: when there are any)",
     )
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
+
+
+def terrain_as_told(arguments: argparse.Namespace, file: str, progress: "Progress") -> "Surface":
+    """Read a terrain with the options of `add_terrain_options`.
+
+    Raises
+    ------
+    InputError : see `read_terrain`.
+    """
+    from ..terrain.readers import read_terrain
+
+    progress(f"Reading {file}")
+    return read_terrain(
+        file,
+        up=arguments.up,
+        unit_m=arguments.unit,
+        max_edge_m=arguments.max_edge,
+        ground_only=arguments.ground_only,
+        progress=progress,
+    )
+
+
+def add_incident_options(parser: argparse.ArgumentParser) -> None:
+    """What the models are told of the incident block, and the seed of their chance."""
+    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument(
+        "--spin",
+        choices=("rolling", "zero", "table"),
+        default="rolling",
+        help="of a block before its first impact: rolling (default) or none; table: measured at every impact",
+    )
+    parser.add_argument(
+        "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
+    )
 
 
 def add_parameter_options(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
-from .options import add_out, add_terrain_options, not_negative, positive
+from .options import add_out, add_terrain_options, not_negative, positive, terrain_as_told
 from .progress import Progress
 
 if TYPE_CHECKING:
@@ -84,19 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     with output_folder(arguments.out) as folder, Progress() as progress:
         progress(f"Reading {arguments.picks}")
         picks = read_picks(arguments.picks)
-        surface = None
-        if arguments.terrain:
-            from ..terrain.readers import read_terrain
-
-            progress(f"Reading {arguments.terrain}")
-            surface = read_terrain(
-                arguments.terrain,
-                up=arguments.up,
-                unit_m=arguments.unit,
-                max_edge_m=arguments.max_edge,
-                ground_only=arguments.ground_only,
-                progress=progress,
-            )
+        surface = terrain_as_told(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress("Reconstructing")
         reconstruction = reconstruct(
             picks,

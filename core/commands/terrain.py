@@ -5,7 +5,7 @@ import argparse
 from pathlib import Path
 
 from ..errors import DependencyError
-from .options import add_out, add_terrain_options
+from .options import add_out, add_terrain_options, terrain_as_told
 from .progress import Progress
 
 
@@ -21,18 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, mesh where needed, write a binary PLY in survey coordinates, and picture it where Blender is at hand."""
     from ..exchange.output import output_folder
-    from ..terrain.readers import read_terrain
     from ..terrain.writers import write_ply
 
     with output_folder(arguments.out) as folder, Progress() as progress:
-        surface = read_terrain(
-            arguments.file,
-            up=arguments.up,
-            unit_m=arguments.unit,
-            max_edge_m=arguments.max_edge,
-            ground_only=arguments.ground_only,
-            progress=progress,
-        )
+        surface = terrain_as_told(arguments, arguments.file, progress)
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")
         written = ["terrain.ply"]

@@ -9,9 +9,10 @@ from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.twins import fly_twins, score_twins
 from rockfall.core.cli import main
 from rockfall.core.colours import OBSERVED_COLOUR, model_colour
-from rockfall.core.commands.demo import SITE, _reconstruct
+from rockfall.core.commands.demo import SITE
 from rockfall.core.constants import GRAVITY_MPS2 as G
 from rockfall.core.errors import InputError, RockfallError
+from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_impacts, write_impacts
 from rockfall.core.exchange.twin_tables import read_twins, write_twins
@@ -154,7 +155,7 @@ def test_the_real_velocity_lands_on_the_next_impact():
 
 
 def test_the_real_velocity_lands_on_the_next_impact_of_the_demo_within_the_noise():
-    surface, result = _reconstruct(read_project(SITE / "project.toml"))
+    surface, result = open_project(read_project(SITE / "project.toml"))
     twins = fly_twins(result.impacts, as_model(result.impacts), surface)
     assert np.isfinite(twins.landing_offset_m).sum() > 60
     assert np.nanmedian(twins.landing_offset_m) < 0.005
@@ -236,7 +237,7 @@ def test_table_round_trip(tmp_path):
 
 
 def test_compare_with_a_terrain_leaves_twins(tmp_path, capsys):
-    _, result = _reconstruct(read_project(SITE / "project.toml"))
+    _, result = open_project(read_project(SITE / "project.toml"))
     write_impacts(result.impacts, tmp_path / "impacts.csv")
     options = ["--model", "noel_2017", "wyllie_2014", "--tables-only", "--terrain", str(SITE / "terrain.ply")]
     out = tmp_path / "out"

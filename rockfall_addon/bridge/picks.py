@@ -26,24 +26,28 @@ MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the ro
 def show_picks(
     scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offsets: dict[str, float], radius_m: float
 ) -> None:
-    """Make the objects of all picks anew.
+    """Bring the picks' objects in line; a pick that is there already (by trajectory and time) keeps its object and id.
 
     normals : (n, 3) directions of the discs, NaN rows lie flat.
     offsets : from `timing.display_offsets`.
     """
-    state.remove_objects(state.with_role(scene, state.PICK_ROLE))
+    there = {(o["rockfall_trajectory"], o["rockfall_time_s"]): o for o in state.with_role(scene, state.PICK_ROLE)}
     rate = timing.frame_rate(scene)
     for i in range(len(picks.time_s)):
         trajectory, kind = str(picks.trajectory[i]), str(picks.kind[i])
-        number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
-        thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
+        thing = there.pop((trajectory, float(picks.time_s[i])), None)
+        if thing is None:
+            number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
+            thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
+            thing["rockfall_id"] = uuid.uuid4().hex
+            state.collection(scene, "Trajectories", trajectory).objects.link(thing)
+        thing.data = _marker(kind)
         normal = Vector(normals[i]) if np.isfinite(normals[i]).all() else Vector((0.0, 0.0, 1.0))
         thing.rotation_mode = "QUATERNION"
         thing.rotation_quaternion = normal.to_track_quat("Z", "Y")
         thing.scale = (radius_m, radius_m, radius_m)
         thing.location = picks.position[i]
         thing[state.ROLE_KEY] = state.PICK_ROLE
-        thing["rockfall_id"] = uuid.uuid4().hex
         thing["rockfall_trajectory"] = trajectory
         thing["rockfall_time_s"] = float(picks.time_s[i])
         thing["rockfall_position_m"] = picks.position[i].tolist()
@@ -57,9 +61,11 @@ def show_picks(
         ):
             if np.isfinite(value).all():
                 thing[key] = value.tolist()
+            elif key in thing:
+                del thing[key]
         thing["rockfall_extra"] = {name: str(values[i]) for name, values in picks.extra.items()}
-        state.collection(scene, "Trajectories", trajectory).objects.link(thing)
         motion.key_location_once(thing, (float(picks.time_s[i]) - offsets[trajectory]) * rate)
+    state.remove_objects(list(there.values()))
     scene["rockfall_picks_source"] = picks.source
 
 

@@ -102,6 +102,7 @@ def _store_results(scene: bpy.types.Scene, result: Reconstruction) -> None:
     for thing in state.with_role(scene, state.PICK_ROLE):
         i = of_pick.get((thing["rockfall_trajectory"], thing["rockfall_time_s"]))
         if i is None or thing["rockfall_kind"] != "impact":
+            thing.pop(RESULT_KEY, None)
             continue
         values = {
             "incident_mps": impacts.v1[i],

@@ -96,6 +96,39 @@ def test_a_moved_pick_moves_the_trajectory(scene: bpy.types.Scene, part) -> None
     np.testing.assert_allclose(scene.objects["A block"].matrix_world.translation, PLACES[1] + [0.5, 0, 0], atol=1e-3)
 
 
+def test_picks_keep_their_objects_and_selection(scene: bpy.types.Scene) -> None:
+    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    before = {o.name: o["rockfall_id"] for o in scene.objects if o.get("rockfall_role") == "pick"}
+    pick.select_set(True)
+    bpy.context.view_layer.objects.active = pick
+    scene.rockfall.block_diameter_m = 0.5
+    assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
+    assert bpy.context.view_layer.objects.active == pick
+    assert pick.select_get()
+    assert {o.name: o["rockfall_id"] for o in scene.objects if o.get("rockfall_role") == "pick"} == before
+    assert len(set(before.values())) == 8
+
+
+def test_imported_again_a_pick_is_what_the_table_says(scene: bpy.types.Scene, table: Path) -> None:
+    text = table.read_text(encoding="utf-8").replace(",impact,ok,0.5,0.0,0.8660254037844386,", ",pass,ok,,,,", 1)
+    table.write_text(text, encoding="utf-8")
+    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    assert {"rockfall_normal", "rockfall_result"} <= set(pick.keys())
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    assert pick["rockfall_kind"] == "pass"
+    assert pick.data.name == "Rockfall pass"
+    assert not {"rockfall_normal", "rockfall_result"} & set(pick.keys())
+
+
+def test_a_deleted_pick_is_gone(scene: bpy.types.Scene, part) -> None:
+    bpy.data.objects.remove(next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 03 " in o.name))
+    assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
+    assert len(part("rockfall_addon.bridge.picks").picks_of(scene)) == 7
+    direct = (PLACES[3] - PLACES[1]) / (TIMES[3] - TIMES[1]) + [0, 0, GRAVITY * (TIMES[3] - TIMES[1]) / 2]
+    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    np.testing.assert_allclose(pick["rockfall_result"]["restituted_mps"], direct, atol=1e-9)
+
+
 def test_flight_curve_lies_on_the_parabola_and_ends_now(scene: bpy.types.Scene) -> None:
     curve = scene.objects["A flights"]
     coordinates = np.empty(3 * len(curve.data.vertices), dtype=np.float32)

@@ -21,6 +21,7 @@ REASONS = (
     "no incident velocity",
     "no terrain normal",
     "departing from the ground",
+    "the flag departing or discarded",
     "no measured angular velocity",
 )
 
@@ -75,7 +76,8 @@ def find_courses(impacts: Impacts, spin: Spin = "rolling", radius_m: float | Non
     order, same = _in_time(impacts)
     v1, v2 = impacts.v1[order], impacts.v2[order]
     normal = _unit_normals(impacts)[order]
-    reasons = _reasons(v1, normal, impacts.angular_velocity[order] if spin == "table" else None)
+    flagged = (impacts.flags["departing"] | impacts.flags["discarded"])[order]
+    reasons = _reasons(v1, normal, flagged, impacts.angular_velocity[order] if spin == "table" else None)
     used = reasons < 0
     skipped = tuple((int(row), REASONS[reason]) for row, reason in zip(order[~used], reasons[~used], strict=True))
     if not used.any():
@@ -133,9 +135,9 @@ def _unit_normals(impacts: Impacts) -> Array:
     return unit(impacts.normal)
 
 
-def _reasons(v1: Array, normal: Array, omega: Array | None) -> Indices:
+def _reasons(v1: Array, normal: Array, flagged: Mask, omega: Array | None) -> Indices:
     """(n,) index into `REASONS` of what forbids a comparison, −1 for none; the first that holds."""
-    holds = [~np.isfinite(v1).all(axis=1), ~np.isfinite(normal).all(axis=1), ~(dot(v1, normal) < 0.0)]
+    holds = [~np.isfinite(v1).all(axis=1), ~np.isfinite(normal).all(axis=1), ~(dot(v1, normal) < 0.0), flagged]
     if omega is not None:
         holds.append(~np.isfinite(omega).all(axis=1))
     return np.select(holds, list(range(len(holds))), -1).astype(np.intp)

@@ -10,8 +10,8 @@ from rockfall.core.exchange.comparison_tables import read_predictions, read_scor
 from rockfall.core.exchange.tables import read_impacts
 from rockfall.core.impact_models.registry import COMPARED, MODELS
 
-HEADER = "trajectory,impact,nx,ny,nz,v1x_mps,v1y_mps,v1z_mps,v2x_mps,v2y_mps,v2z_mps,diameter_m"
-ROWS = ("a,1,0,0,1,8,0,-6,6,1,3,0.35", "a,2,0,0,1,6,0,-5,5,0,2,0.35", "a,3,0,0,1,,,,4,0,2,0.35")
+HEADER = "trajectory,impact,nx,ny,nz,v1x_mps,v1y_mps,v1z_mps,v2x_mps,v2y_mps,v2z_mps,diameter_m,flags"
+ROWS = ("a,1,0,0,1,8,0,-6,6,1,3,0.35,", "a,2,0,0,1,6,0,-5,5,0,2,0.35,", "a,3,0,0,1,,,,4,0,2,0.35,")
 
 
 def table(path, rows=ROWS, header=HEADER):
@@ -70,6 +70,7 @@ BAD = {
     "no normals": ([row.replace(",0,0,1,", ",,,,") for row in ROWS], [], "2 with no terrain normal"),
     "zero normal": ([ROWS[0].replace(",0,0,1,", ",0,0,0,")], [], "trajectory a: The normal of impact 1 has the length"),
     "departing": ([row.replace(",0,0,1,", ",0,0,-1,") for row in ROWS], [], "2 with departing from the ground"),
+    "flagged": ([f"{row}departing" for row in ROWS], [], "2 with the flag departing or discarded"),
     "nan": ([ROWS[0].replace(",8,", ",nan,")], [], "row 2, trajectory a: 'nan' in column v1x_mps is not finite"),
     "no radius": ([row.replace("0.35", "") for row in ROWS], [], "--radius"),
     "no spin": (ROWS, ["--spin", "table"], "no measured angular velocity"),

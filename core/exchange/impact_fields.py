@@ -56,6 +56,7 @@ FIELDS: dict[str, Field] = {
     "mass_kg": Field("number", "kg", "Mass of the block", 0),
     "flags": Field("string", "", f"Joined by ';', of: {', '.join(FLAGS)}"),
     **_axes("omega1", "rad/s", "_radps", "Angular velocity just before the impact, right-handed"),
+    "normal_spread_deg": Field("number", "°", "Root mean square angle between the terrain there and its plane", 0),
     "kinetic1_J": Field("number", "J", "Translational energy before the impact", 0),
     "kinetic2_J": Field("number", "J", "Translational energy after the impact", 0),
     "rotational1_J": Field("number", "J", "Rotational energy before the impact", 0),

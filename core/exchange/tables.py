@@ -55,9 +55,12 @@ _BEFORE: tuple[Column, ...] = (
 )
 _BLOCK: tuple[Column, ...] = (("diameter_m", "diameter_m", None, False), ("mass_kg", "mass_kg", None, False))
 _SPIN: tuple[Column, ...] = tuple((name, "angular_velocity", i, False) for i, name in enumerate(SPIN))
-_ENERGY: tuple[Column, ...] = tuple(
-    (f"{name[:-2]}_{name[-1].upper()}" if name.endswith("_j") else name, name, None, False)
-    for name in ("kinetic1_j", "kinetic2_j", "rotational1_j", "rotational2_j", "bounce_height_m", "chord_height_m")
+_MORE: tuple[Column, ...] = (
+    ("normal_spread_deg", "normal_spread", None, True),
+    *(
+        (f"{name[:-2]}_{name[-1].upper()}" if name.endswith("_j") else name, name, None, False)
+        for name in ("kinetic1_j", "kinetic2_j", "rotational1_j", "rotational2_j", "bounce_height_m", "chord_height_m")
+    ),
 )
 _NUMBERS = (*_BEFORE, *_DERIVED, *_BLOCK)
 IMPACTS_COLUMNS = ("site", "trajectory", "impact", *(column[0] for column in _NUMBERS), "flags")
@@ -116,7 +119,7 @@ def write_picks(picks: Picks, path: str | Path) -> None:
 
 
 def write_impacts(impacts: Impacts, path: str | Path) -> None:
-    """Write impacts.csv: the fixed columns, then standard deviations, spin, energies and heights if any."""
+    """Write impacts.csv: the fixed columns, then standard deviations, spin, spread of the normal, energies, heights if any."""
     columns: Columns = {"site": impacts.site, "trajectory": impacts.trajectory, "impact": impacts.impact}
     columns |= {column[0]: _of(impacts, column) for column in _NUMBERS}
     columns["flags"] = impacts.flag_text()
@@ -125,7 +128,7 @@ def write_impacts(impacts: Impacts, path: str | Path) -> None:
             sigma = impacts.sigma[attribute]
             values = sigma if component is None else sigma[:, component]
             columns[f"sigma_{name}"] = np.degrees(values) if degrees else values
-    for column in (*_SPIN, *_ENERGY):
+    for column in (*_SPIN, *_MORE):
         values = _of(impacts, column)
         if np.isfinite(values).any():
             columns[column[0]] = values
@@ -144,11 +147,11 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     InputError : anything that is wrong with the table, with the row.
     """
     sigma_names = [f"sigma_{column[0]}" for column in _DERIVED]
-    known = (*IMPACTS_COLUMNS, *sigma_names, *SPIN, *(column[0] for column in _ENERGY))
+    known = (*IMPACTS_COLUMNS, *sigma_names, *SPIN, *(column[0] for column in _MORE))
     table = read_table(path, ("trajectory", *NORMAL, *V1, *V2), known)
     n = len(table)
     arrays: dict[str, Any] = {}
-    for columns, of in ((_NUMBERS, arrays), ((*_SPIN, *_ENERGY), arrays)):
+    for columns, of in ((_NUMBERS, arrays), ((*_SPIN, *_MORE), arrays)):
         for name, attribute, component, degrees in columns:
             values = np.radians(table.numbers(name)) if degrees else table.numbers(name)
             if component is None:
@@ -215,7 +218,7 @@ def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
 
 def impact_columns(impacts: Impacts) -> tuple[str, ...]:
     """The names of all columns that a table of impacts can be asked for."""
-    return (*IMPACTS_COLUMNS, *(column[0] for column in (*_SPIN, *_ENERGY)), *impacts.extra)
+    return (*IMPACTS_COLUMNS, *(column[0] for column in (*_SPIN, *_MORE)), *impacts.extra)
 
 
 def impact_column(impacts: Impacts, name: str) -> Array | Names | Indices | None:
@@ -225,7 +228,7 @@ def impact_column(impacts: Impacts, name: str) -> Array | Names | Indices | None
         return values
     if name == "flags":
         return np.array(impacts.flag_text(), dtype=np.str_)
-    for column in (*_NUMBERS, *_SPIN, *_ENERGY):
+    for column in (*_NUMBERS, *_SPIN, *_MORE):
         if column[0] == name:
             return _of(impacts, column)
     return impacts.extra.get(name)

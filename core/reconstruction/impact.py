@@ -115,6 +115,8 @@ class Impacts:
     position : (n, 3) of the pick, local [m].
     normal : (n, 3) unit, out of the ground; NaN where unknown.
     normal_radius_m : (n,) radius over which the terrain normal was fitted [m]; NaN where the normal was given.
+    normal_spread : (n,) root mean square angle between the terrain's faces there and the fitted plane [rad]; NaN where
+        the normal was given.
     v1, v2 : (n, 3) incident and restituted velocity [m/s]; NaN where undefined.
     vn1, vt1, vn2, vt2 : (n,) norms of their normal and tangential parts [m/s].
     rn, rt, r : (n,) apparent coefficients of restitution [-]; NaN for a departing "impact".
@@ -140,6 +142,7 @@ class Impacts:
     position: Array
     normal: Array
     normal_radius_m: Array
+    normal_spread: Array
     v1: Array
     v2: Array
     vn1: Array

@@ -43,11 +43,11 @@ def find_impacts(
     v1 = _rows(flights.end_velocity, incident)
     v2 = _rows(flights.start_velocity, restituted)
 
-    normal, radius = here(picks.normal), np.full(own.size, np.nan)
+    normal, radius, spread = here(picks.normal), np.full(own.size, np.nan), np.full(own.size, np.nan)
     bare = np.isnan(normal[:, 0])
     if surface is not None and bare.any():
         normal = normal.copy()
-        normal[bare], radius[bare] = terrain_normals(
+        normal[bare], radius[bare], spread[bare] = terrain_normals(
             surface, picks.position[own[bare]], diameter[own[bare]], normal_radius_m
         )
     values = apparent(v1, v2, normal, eq10)
@@ -87,6 +87,7 @@ def find_impacts(
         position=here(picks.position),
         normal=normal,
         normal_radius_m=radius,
+        normal_spread=spread,
         v1=v1,
         v2=v2,
         vn1=values.vn1,

@@ -99,7 +99,7 @@ def _box(low: Array, high: Array) -> str:
 
 def terrain_normals(
     surface: "Surface", points: Array, diameter_m: Array, radius_m: float | None
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Normals of the terrain at block scale.
 
     Parameters
@@ -112,19 +112,22 @@ def terrain_normals(
     -------
     normal : (n, 3) unit, out of the ground.
     radius : (n,) that was used [m].
+    spread : (n,) root mean square angle between the terrain's faces there and its fitted plane [rad].
     """
     from ..terrain.orientation import block_scale_normals, default_normal_radius
     from ..terrain.raycast import closest_points
 
     normal = np.full_like(points, np.nan)
     radius = np.full(len(points), np.nan if radius_m is None else radius_m)
+    spread = np.full(len(points), np.nan)
     if not len(points):
-        return normal, radius
+        return normal, radius, spread
     on_terrain = closest_points(surface, points).point
     if radius_m is None:
         for diameter in np.unique(diameter_m):
             radius[diameter_m == diameter] = default_normal_radius(surface, float(diameter))
     for used in np.unique(radius):
         rows = radius == used
-        normal[rows] = block_scale_normals(surface, on_terrain[rows], float(used)).normal
-    return normal, radius
+        fitted = block_scale_normals(surface, on_terrain[rows], float(used))
+        normal[rows], spread[rows] = fitted.normal, np.radians(fitted.spread_deg)
+    return normal, radius, spread

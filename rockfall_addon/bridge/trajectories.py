@@ -112,6 +112,7 @@ def _store_results(scene: bpy.types.Scene, result: Reconstruction) -> None:
             "r": impacts.r[i],
             "theta1_deg": np.degrees(impacts.theta1[i]),
             "theta_dev_deg": np.degrees(impacts.theta_dev[i]),
+            "normal_spread_deg": np.degrees(impacts.normal_spread[i]),
         }
         thing[RESULT_KEY] = {key: np.atleast_1d(value).tolist() for key, value in values.items()} | {
             "number": int(impacts.impact[i]),

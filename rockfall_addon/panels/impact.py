@@ -48,6 +48,7 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
                 ("R_T", _number(result["rt"])),
                 ("Impact angle θ₁", _number(result["theta1_deg"], "°", 1)),
                 ("Deviation", _number(result["theta_dev_deg"], "°", 1)),
+                ("Spread of normal", _number(result["normal_spread_deg"], "°", 1)),
             ]
         facts(layout, rows)
         for flag in filter(None, result["flags"].split(";") if result is not None else ()):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from rockfall.core.constants import GRAVITY_MPS2
 from rockfall.core.errors import InputError
+from rockfall.core.exchange.tables import read_impacts, write_impacts
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
@@ -62,6 +63,23 @@ def test_a_normal_in_the_table_comes_first():
     np.testing.assert_array_equal(impacts.normal[1], [0, 0, 1])
     np.testing.assert_allclose(impacts.normal[2], OUT, atol=1e-9)
     np.testing.assert_array_equal(impacts.normal_radius_m, [3, np.nan, 3, 3])
+    np.testing.assert_allclose(impacts.normal_spread, [0, np.nan, 0, 0], atol=1e-6)
+
+
+def test_the_normals_spread_is_in_the_table(tmp_path):
+    """Long roofs of 10° to either side of the level: every face is 10° off the plane through them."""
+    rise = 0.1 * np.tan(np.radians(10.0))
+    x, y = (values.ravel() for values in np.meshgrid(np.arange(-40, 41) * 0.1, np.arange(-4.0, 4.1), indexing="ij"))
+    z = np.where(np.round(x / 0.1) % 2 == 0, 0.0, rise)
+    corner = (np.arange(80)[:, None] * 9 + np.arange(8)).ravel()
+    ring = np.column_stack([corner, corner + 9, corner + 10, corner + 1])
+    faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
+    roofs = Surface(np.column_stack([x, y, z]), faces, SHIFT, "roofs")
+    position = np.array([[-1.0, 0, rise], [0.0, 0, 0], [1.0, 0, rise]])
+    impacts = reconstruct(picks_at(position), surface=roofs, normal_radius_m=1.0).impacts
+    np.testing.assert_allclose(np.degrees(impacts.normal_spread), 10.0, atol=0.3)
+    write_impacts(impacts, tmp_path / "impacts.csv")
+    np.testing.assert_allclose(read_impacts(tmp_path / "impacts.csv").normal_spread, impacts.normal_spread, rtol=1e-12)
 
 
 def test_bounce_heights_above_a_plane():

@@ -119,7 +119,7 @@ def write_picks(picks: Picks, path: str | Path) -> None:
 
 
 def write_impacts(impacts: Impacts, path: str | Path) -> None:
-    """Write impacts.csv: the fixed columns, then standard deviations, spin, spread of the normal, energies, heights if any."""
+    """Write impacts.csv: the fixed columns, then deviations, spin, normal's spread, energies and heights, if any."""
     columns: Columns = {"site": impacts.site, "trajectory": impacts.trajectory, "impact": impacts.impact}
     columns |= {column[0]: _of(impacts, column) for column in _NUMBERS}
     columns["flags"] = impacts.flag_text()

@@ -37,7 +37,7 @@ SYSTEMS = {
         "manylinux2014_x86_64",
     ),
     "windows-x64": ("win_amd64",),
-    "macos-arm64": ("macosx_12_0_arm64", "macosx_11_0_arm64"),
+    "macos-arm64": ("macosx_13_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
 }
 BLENDER_PYTHON = "3.13"
 LARGEST_ZIP_BYTES = 200_000_000

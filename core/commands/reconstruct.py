@@ -43,6 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="signed",
         help="deviation angle: 0–180° (default), or 0–90° as eq. 10 of Noël et al. 2018 is printed",
     )
+    parser.add_argument(
+        "--flights",
+        choices=("contacts", "centres"),
+        default="contacts",
+        help="what the flights join: the marked contact points (default), or the block's centre at each contact",
+    )
     block = parser.add_argument_group("the block")
     size = block.add_mutually_exclusive_group()
     size.add_argument(
@@ -95,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
             normal_radius_m=arguments.normal_radius,
             site=arguments.site,
             eq10=arguments.eq10,
+            flights=arguments.flights,
         )
         progress("Writing the tables")
         write_impacts(reconstruction.impacts, folder / "impacts.csv")

@@ -33,8 +33,13 @@ class Clearance:
     above_chord_m: Array
 
 
-def clearances(flights: Flights, surface: "Surface | None") -> Clearance:
-    """Heights of all segments above the terrain (where a ray up or down meets it) and above their chords."""
+def clearances(flights: Flights, surface: "Surface | None", radius_m: Array | None = None) -> Clearance:
+    """Heights of all segments above the terrain (where a ray up or down meets it) and above their chords.
+
+    Parameters
+    ----------
+    radius_m : (k,) of the block [m] where the flights are those of its centre; heights are those of its underside.
+    """
     k = len(flights)
     above, below = np.full(k, np.nan), np.full(k, np.nan)
     chord = _above_chord(flights)
@@ -42,6 +47,8 @@ def clearances(flights: Flights, surface: "Surface | None") -> Clearance:
         from ..terrain.raycast import heights_above
 
         height = heights_above(surface, _samples(flights, np.arange(k)).reshape(-1, 3)).reshape(k, SAMPLES)
+        if radius_m is not None:
+            height = height - radius_m[:, None]
         over = np.isfinite(height).any(axis=1)
         above[over] = np.nanmax(height[over], axis=1)
         below[over] = np.maximum(0.0, -np.nanmin(height[over], axis=1))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From the motion to the rows of impacts.csv."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +11,10 @@ from .block import per_pick
 from .impact import DeviationForm, Impacts, apparent
 from .motion import Motion
 from .picks import Indices, Mask, Picks
-from .placement import terrain_normals
 from .uncertainty import propagate
 
-if TYPE_CHECKING:
-    from ..terrain.surface import Surface
 
-
-def find_impacts(
-    motion: Motion,
-    *,
-    surface: "Surface | None",
-    normal_radius_m: float | None,
-    site: str,
-    eq10: DeviationForm,
-) -> Impacts:
+def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
     """One row per `impact` pick, with the flags; see `reconstruct`."""
     picks, flights, clearance = motion.picks, motion.flights, motion.clearance
     own = np.flatnonzero(picks.kind == "impact")
@@ -43,13 +32,8 @@ def find_impacts(
     v1 = _rows(flights.end_velocity, incident)
     v2 = _rows(flights.start_velocity, restituted)
 
-    normal, radius, spread = here(picks.normal), np.full(own.size, np.nan), np.full(own.size, np.nan)
-    bare = np.isnan(normal[:, 0])
-    if surface is not None and bare.any():
-        normal = normal.copy()
-        normal[bare], radius[bare], spread[bare] = terrain_normals(
-            surface, picks.position[own[bare]], diameter[own[bare]], normal_radius_m
-        )
+    ground = motion.normals.take(own)
+    normal = ground.normal
     values = apparent(v1, v2, normal, eq10)
     departing = values.approach >= 0
     deep = clearance.below_terrain_m > diameter[flights.first_pick] / 2
@@ -86,8 +70,8 @@ def find_impacts(
         time_s=here(picks.time_s),
         position=here(picks.position),
         normal=normal,
-        normal_radius_m=radius,
-        normal_spread=spread,
+        normal_radius_m=ground.radius_m,
+        normal_spread=ground.spread,
         v1=v1,
         v2=v2,
         vn1=values.vn1,

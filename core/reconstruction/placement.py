@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Picks on the terrain: do they lie on it, and what is its normal there?"""
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array
-from .picks import Picks
+from .picks import Mask, Picks
 
 if TYPE_CHECKING:
     from ..terrain.surface import Surface
@@ -97,9 +98,44 @@ def _box(low: Array, high: Array) -> str:
     return ", ".join(f"{axis} {a:.1f}…{b:.1f} m" for axis, a, b in zip("xyz", low, high, strict=True))
 
 
-def terrain_normals(
-    surface: "Surface", points: Array, diameter_m: Array, radius_m: float | None
-) -> tuple[Array, Array, Array]:
+@dataclass(frozen=True, eq=False)
+class GroundNormals:
+    """Normals at n picks.
+
+    Attributes
+    ----------
+    normal : (n, 3) unit, out of the ground; NaN where unknown.
+    radius_m : (n,) of the sphere in which the terrain normal was fitted [m]; NaN where the normal was given.
+    spread : (n,) root mean square angle between the terrain's faces there and the fitted plane [rad]; NaN likewise.
+    """
+
+    normal: Array
+    radius_m: Array
+    spread: Array
+
+    def take(self, rows: Any) -> "GroundNormals":
+        """Some of them."""
+        return GroundNormals(self.normal[rows], self.radius_m[rows], self.spread[rows])
+
+
+def pick_normals(
+    picks: Picks, surface: "Surface | None", diameter_m: Array, radius_m: float | None, wanted: Mask
+) -> GroundNormals:
+    """The normals of picks: as given, else those of the terrain, where they are `wanted` (n,).
+
+    Parameters
+    ----------
+    diameter_m, radius_m : see `terrain_normals`.
+    """
+    found = GroundNormals(picks.normal.copy(), np.full(len(picks), np.nan), np.full(len(picks), np.nan))
+    bare = np.flatnonzero(np.isnan(picks.normal[:, 0]) & wanted)
+    if surface is not None and bare.size:
+        fitted = terrain_normals(surface, picks.position[bare], diameter_m[bare], radius_m)
+        found.normal[bare], found.radius_m[bare], found.spread[bare] = fitted.normal, fitted.radius_m, fitted.spread
+    return found
+
+
+def terrain_normals(surface: "Surface", points: Array, diameter_m: Array, radius_m: float | None) -> GroundNormals:
     """Normals of the terrain at block scale.
 
     Parameters
@@ -107,12 +143,6 @@ def terrain_normals(
     points : (n, 3) local [m]; the sphere is set on the closest point of the terrain.
     diameter_m : (n,) of the block [m].
     radius_m : of the sphere; None takes `default_normal_radius` for each block.
-
-    Returns
-    -------
-    normal : (n, 3) unit, out of the ground.
-    radius : (n,) that was used [m].
-    spread : (n,) root mean square angle between the terrain's faces there and its fitted plane [rad].
     """
     from ..terrain.orientation import block_scale_normals, default_normal_radius
     from ..terrain.raycast import closest_points
@@ -121,7 +151,7 @@ def terrain_normals(
     radius = np.full(len(points), np.nan if radius_m is None else radius_m)
     spread = np.full(len(points), np.nan)
     if not len(points):
-        return normal, radius, spread
+        return GroundNormals(normal, radius, spread)
     on_terrain = closest_points(surface, points).point
     if radius_m is None:
         for diameter in np.unique(diameter_m):
@@ -130,4 +160,4 @@ def terrain_normals(
         rows = radius == used
         fitted = block_scale_normals(surface, on_terrain[rows], float(used))
         normal[rows], spread[rows] = fitted.normal, np.radians(fitted.spread_deg)
-    return normal, radius, spread
+    return GroundNormals(normal, radius, spread)

@@ -15,7 +15,7 @@ from .drag import Drag
 from .flight import Flights
 from .impact import DeviationForm, Impacts
 from .impact_rows import find_impacts
-from .motion import solve_motion
+from .motion import FlightEnds, solve_motion
 from .picks import Indices, Picks
 from .placement import check_placement
 
@@ -37,6 +37,7 @@ class Reconstruction:
     block : of all trajectories, or by trajectory name.
     gravity_mps2 : [m/s²].
     drag : None without.
+    ends : what the flights join.
     notes : sentences for the summary about what deserves a look.
     """
 
@@ -49,6 +50,7 @@ class Reconstruction:
     block: Block | Mapping[str, Block]
     gravity_mps2: float
     drag: Drag | None
+    ends: FlightEnds
     notes: tuple[str, ...]
 
 
@@ -62,6 +64,7 @@ def reconstruct(
     normal_radius_m: float | None = None,
     site: str = "",
     eq10: DeviationForm = "signed",
+    flights: FlightEnds = "contacts",
 ) -> Reconstruction:
     """Reconstruct the motion and the impacts from timed picks (Noël et al. 2018, eq. 1–10).
 
@@ -74,6 +77,8 @@ def reconstruct(
     normal_radius_m : of the sphere in which the terrain normal is fitted; None takes the default for the block.
     site : name written to the table.
     eq10 : see `apparent`.
+    flights : whether they join the marked contact points, as in the paper, or the block's centre at each contact, a
+        radius out along the terrain normal. Refined picks are meant with centres.
 
     Raises
     ------
@@ -98,17 +103,18 @@ def reconstruct(
         picks = picks.in_shift(surface.shift)
         notes = check_placement(picks, surface, per_pick(picks, block, lambda one: one.diameter_m))
 
-    motion = solve_motion(picks, block, gravity_mps2, drag, surface)
+    motion = solve_motion(picks, block, gravity_mps2, drag, surface, normal_radius_m, flights)
     return Reconstruction(
         picks=picks,
         flights=motion.flights,
-        impacts=find_impacts(motion, surface=surface, normal_radius_m=normal_radius_m, site=site, eq10=eq10),
+        impacts=find_impacts(motion, site=site, eq10=eq10),
         clearance=motion.clearance,
         incident_flight=motion.incident,
         restituted_flight=motion.restituted,
         block=block,
         gravity_mps2=gravity_mps2,
         drag=drag,
+        ends=flights,
         notes=notes + _lonely(picks),
     )
 

@@ -71,12 +71,12 @@ def open_video(path: str | Path, progress: Callable[[str], None] | None = None) 
     if progress:
         progress(f"Reading the timestamps of {path.name}")
     capture = _capture(path)
-    times, keys = [], []
+    times, keys, shape = [], [], None
     while capture.grab():
+        shape = capture.retrieve()[1].shape if shape is None else shape
         times.append(capture.get(0) / 1000)
         if capture.get(_cv2().CAP_PROP_LRF_HAS_KEY_FRAME):
             keys.append(times[-1])
-    shape = capture.retrieve()[1].shape if times else None
     if not times:
         raise InputError("No frame of this file can be decoded", file=path)
     cv2 = _cv2()

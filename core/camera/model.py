@@ -1,0 +1,407 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The camera: a pinhole with Brown's lens distortion, its pose, and the way between points and pixels.
+
+Pixels are counted from the top-left *corner* of the image, u to the right and v down, so that the centre of the first
+pixel is (0.5, 0.5); OpenCV's own functions count from that centre. The camera's axes are x right, y down, z forward:
+``Xc = R (X − position)``.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import null_space
+
+from ..errors import InputError
+from ..georeference import GlobalShift
+from ..vectors import Array, norm, unit
+
+INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
+"""The inner parameters of a camera, in the order of every array of them; the focal lengths and the centre in px."""
+
+NEWTON_STEPS = 60
+
+
+def _forward() -> Array:
+    return np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A camera at a place.
+
+    Attributes
+    ----------
+    width, height : of the image [px].
+    fx, fy, cx, cy : focal lengths and principal point [px].
+    k1, k2, k3, p1, p2 : Brown's radial and tangential coefficients as OpenCV has them, on normalised coordinates.
+    position : (3,) of the centre of projection, local [m].
+    rotation : (3, 3) from the world to the camera; without one it looks along +y with z up.
+    shift : between local and survey coordinates.
+
+    Raises
+    ------
+    InputError : a number is not finite, a length not positive, or the rotation not a rotation.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float = 0.0
+    k2: float = 0.0
+    k3: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=_forward)
+    shift: GlobalShift = field(default_factory=GlobalShift)
+
+    def __post_init__(self) -> None:
+        position = np.array(self.position, dtype=np.float64)
+        rotation = np.array(self.rotation, dtype=np.float64)
+        if self.width <= 0 or self.height <= 0:
+            raise InputError(f"The camera's image is {self.width} × {self.height} px, which is no size")
+        if not np.isfinite(self.intrinsics).all() or self.fx <= 0 or self.fy <= 0:
+            raise InputError("The camera's inner parameters are not finite, or its focal length is not positive")
+        if position.shape != (3,) or not np.isfinite(position).all():
+            raise InputError("The camera's position is not three finite numbers")
+        if rotation.shape != (3, 3) or not np.isfinite(rotation).all():
+            raise InputError("The camera's rotation is not three rows of three finite numbers")
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+            raise InputError("The camera's rotation is not a rotation: its rows are not at right angles, or it mirrors")
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "rotation", rotation)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [px]."""
+        return self.width, self.height
+
+    @property
+    def intrinsics(self) -> Array:
+        """(9,) in the order of `INTRINSICS`."""
+        return np.array([getattr(self, name) for name in INTRINSICS], dtype=np.float64)
+
+    def in_shift(self, shift: GlobalShift) -> "Camera":
+        """The same camera in the local frame of another shift."""
+        return replace(self, position=shift.to_local(self.shift.to_survey(self.position)), shift=shift)
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Pixels of n points, and how they answer to everything that made them.
+
+    Attributes
+    ----------
+    pixel : (n, 2) [px]; NaN, with the derivatives, behind the camera and beyond the validity of the distortion.
+    depth : (n,) along the camera's axis [m].
+    d_point, d_position : (n, 2, 3) by the point and by the camera's position [px/m].
+    d_rotation : (n, 2, 3) by w at 0 in ``R' = exp([w]×) R`` [px/rad]: about the camera's own axes.
+    d_intrinsics : (n, 2, 9) in the order of `INTRINSICS`.
+    """
+
+    pixel: Array
+    depth: Array
+    d_point: Array
+    d_rotation: Array
+    d_position: Array
+    d_intrinsics: Array
+
+
+def with_intrinsics(camera: Camera, values: ArrayLike) -> Camera:
+    """The camera with other inner parameters, (9,) in the order of `INTRINSICS`."""
+    numbers = np.asarray(values, dtype=np.float64).tolist()
+    return replace(camera, **dict(zip(INTRINSICS, numbers, strict=True)))
+
+
+def look_at(
+    width: int,
+    height: int,
+    position: ArrayLike,
+    target: ArrayLike,
+    *,
+    focal_px: float | None = None,
+    fov_deg: float | None = None,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+) -> Camera:
+    """An undistorted camera that looks at a point.
+
+    Parameters
+    ----------
+    position, target : (3,) local [m].
+    focal_px, fov_deg : one of them: the focal length, or the horizontal angle of view.
+    up : (3,) what is upright in the image; when the camera looks along it, +y is taken.
+
+    Raises
+    ------
+    InputError : neither or both of the focal length and the angle of view; the target is the position.
+    """
+    if (focal_px is None) == (fov_deg is None):
+        raise InputError("A camera needs either its focal length or its angle of view")
+    focal = focal_px if focal_px is not None else width / 2 / np.tan(np.radians(fov_deg or 0.0) / 2)
+    place, upright = np.asarray(position, dtype=np.float64), np.asarray(up, dtype=np.float64)
+    forward = unit(np.asarray(target, dtype=np.float64) - place)
+    if not np.isfinite(forward).all():
+        raise InputError("The camera cannot look at the place where it stands")
+    right = np.cross(forward, upright)
+    if norm(right) < 1e-9 * norm(upright):
+        right = np.cross(forward, [0.0, 1.0, 0.0])
+    if norm(right) < 1e-9:
+        right = null_space(forward[None])[:, 0]
+    right = unit(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    return Camera(width, height, focal, focal, width / 2, height / 2, position=place, rotation=rotation)
+
+
+def project(
+    camera: Camera, points: ArrayLike, *, position: Array | None = None, rotation: Array | None = None
+) -> Array:
+    """Pixels of points, (n, 2) [px].
+
+    Parameters
+    ----------
+    points : (n, 3) local [m].
+    position, rotation : (n, 3) and (n, 3, 3), a pose for each point instead of the camera's own.
+
+    Notes
+    -----
+    A point behind the camera, or beyond the radius to which the distortion can be inverted, has no pixel: NaN.
+    """
+    seen = _in_camera(camera, points, position, rotation)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        plane = seen[:, :2] / seen[:, 2:]
+    plane[~(seen[:, 2] > 0)] = np.nan
+    return distort(camera, plane)
+
+
+def rays(
+    camera: Camera, pixels: ArrayLike, *, position: Array | None = None, rotation: Array | None = None
+) -> tuple[Array, Array]:
+    """The rays through pixels: origins (n, 3) local [m] and unit directions (n, 3).
+
+    Parameters
+    ----------
+    pixels : (n, 2) [px], inside the image or not.
+    position, rotation : (n, 3) and (n, 3, 3), a pose for each pixel instead of the camera's own.
+
+    Notes
+    -----
+    A pixel that the distortion reaches from no direction has no ray: its direction is NaN.
+    """
+    plane = undistort(camera, pixels)
+    seen = unit(np.column_stack([plane, np.ones(len(plane))]))
+    turn = camera.rotation if rotation is None else np.asarray(rotation, dtype=np.float64)
+    directions = seen @ turn if turn.ndim == 2 else np.einsum("nij,ni->nj", turn, seen)
+    place = camera.position if position is None else np.asarray(position, dtype=np.float64)
+    return np.array(np.broadcast_to(place, directions.shape)), directions
+
+
+def validity_radius(camera: Camera) -> float:
+    """The undistorted radius, on normalised coordinates, up to which the distortion is monotonic; inf without end."""
+    return _validity_radius(camera.k1, camera.k2, camera.k3, float(np.hypot(camera.p1, camera.p2)))
+
+
+def distort(camera: Camera, normalised: ArrayLike) -> Array:
+    """Pixels of normalised coordinates (x/z, y/z), (n, 2) → (n, 2) [px]; NaN beyond the validity of the distortion."""
+    plane = np.asarray(normalised, dtype=np.float64).reshape(-1, 2)
+    if _is_distorted(camera):
+        reach = validity_radius(camera)
+        plane = np.where((np.einsum("ni,ni->n", plane, plane) <= reach**2)[:, None], plane, np.nan)
+        plane = _distorted(camera, plane)
+    return plane * [camera.fx, camera.fy] + [camera.cx, camera.cy]
+
+
+def undistort(camera: Camera, pixels: ArrayLike) -> Array:
+    """Normalised coordinates (x/z, y/z) of pixels, (n, 2) → (n, 2), by Newton's method; NaN where there are none."""
+    plane = (np.asarray(pixels, dtype=np.float64).reshape(-1, 2) - [camera.cx, camera.cy]) / [camera.fx, camera.fy]
+    return _undistorted(camera, plane) if _is_distorted(camera) else plane
+
+
+def project_with_derivatives(
+    camera: Camera, points: ArrayLike, *, position: Array | None = None, rotation: Array | None = None
+) -> Projection:
+    """Pixels and their derivatives; the parameters are those of `project`."""
+    seen = _in_camera(camera, points, position, rotation)
+    depth = seen[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        plane = seen[:, :2] / seen[:, 2:]
+        inverse = 1 / depth
+    reach = validity_radius(camera)
+    plane[~((depth > 0) & (np.einsum("ni,ni->n", plane, plane) <= reach**2))] = np.nan
+    x, y = plane.T
+    focal = np.array([camera.fx, camera.fy])
+    bent = _distorted(camera, plane)
+
+    a, b, c = _bending(camera, plane)
+    by_plane = np.stack([np.stack([a, b], axis=1), np.stack([b, c], axis=1)], axis=1) * focal[:, None]
+    by_seen = np.empty((x.size, 2, 3))
+    by_seen[:, :, :2] = by_plane * inverse[:, None, None]
+    by_seen[:, :, 2] = -np.einsum("nij,nj->ni", by_plane, plane) * inverse[:, None]
+    turn = camera.rotation if rotation is None else np.asarray(rotation, dtype=np.float64)
+    by_point = by_seen @ turn
+
+    r2 = x * x + y * y
+    radial = np.stack([r2, r2**2, r2**3], axis=1)
+    by_inner = np.zeros((x.size, 2, 9))
+    by_inner[:, 0, 0], by_inner[:, 1, 1] = bent.T
+    by_inner[:, 0, 2] = by_inner[:, 1, 3] = 1.0
+    by_inner[:, :, 4:7] = (plane * focal)[:, :, None] * radial[:, None, :]
+    by_inner[:, :, 7] = np.stack([2 * x * y, r2 + 2 * y * y], axis=1) * focal
+    by_inner[:, :, 8] = np.stack([r2 + 2 * x * x, 2 * x * y], axis=1) * focal
+
+    return Projection(
+        pixel=bent * focal + [camera.cx, camera.cy],
+        depth=depth,
+        d_point=by_point,
+        d_rotation=-np.cross(by_seen, seen[:, None, :]),
+        d_position=-by_point,
+        d_intrinsics=by_inner,
+    )
+
+
+def rotation_from_vector(vector: ArrayLike) -> Array:
+    """exp([w]×), (..., 3) [rad] → (..., 3, 3): Rodrigues' formula."""
+    w = np.asarray(vector, dtype=np.float64)
+    angle = norm(w)[..., None, None]
+    skew = np.zeros((*w.shape, 3))
+    skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0] = np.moveaxis(w, -1, 0)
+    skew -= np.swapaxes(skew, -1, -2)
+    return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (skew @ skew)
+
+
+def vector_from_rotation(rotation: ArrayLike) -> Array:
+    """The rotation vector of rotations, (..., 3, 3) → (..., 3) [rad], of length 0…π."""
+    q = quaternion_from_rotation(rotation)
+    sine = norm(q[..., 1:])
+    angle = 2 * np.arctan2(sine, q[..., 0])
+    ratio = np.divide(angle, sine, out=np.full(sine.shape, 2.0), where=sine > 0)
+    return q[..., 1:] * ratio[..., None]
+
+
+def quaternion_from_rotation(rotation: ArrayLike) -> Array:
+    """Unit quaternions w, x, y, z with w ≥ 0 of rotations, (..., 3, 3) → (..., 4): Shepperd 1978."""
+    r = np.asarray(rotation, dtype=np.float64)
+    xx, yy, zz = r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]
+    # Row i is 4 qᵢ q: the row of the largest component is well conditioned.
+    products = np.empty((*r.shape[:-2], 4, 4))
+    products[..., 0, 0], products[..., 1, 1] = 1 + xx + yy + zz, 1 + xx - yy - zz
+    products[..., 2, 2], products[..., 3, 3] = 1 - xx + yy - zz, 1 - xx - yy + zz
+    for i, j, value in (
+        (0, 1, r[..., 2, 1] - r[..., 1, 2]),
+        (0, 2, r[..., 0, 2] - r[..., 2, 0]),
+        (0, 3, r[..., 1, 0] - r[..., 0, 1]),
+        (1, 2, r[..., 0, 1] + r[..., 1, 0]),
+        (1, 3, r[..., 0, 2] + r[..., 2, 0]),
+        (2, 3, r[..., 1, 2] + r[..., 2, 1]),
+    ):
+        products[..., i, j] = products[..., j, i] = value
+    largest = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    q = unit(np.take_along_axis(products, largest[..., None, None], axis=-2)[..., 0, :])
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def _is_distorted(camera: Camera) -> bool:
+    return any((camera.k1, camera.k2, camera.k3, camera.p1, camera.p2))
+
+
+def _in_camera(camera: Camera, points: ArrayLike, position: Array | None, rotation: Array | None) -> Array:
+    """(n, 3) camera coordinates [m]."""
+    away = np.asarray(points, dtype=np.float64).reshape(-1, 3) - (camera.position if position is None else position)
+    turn = camera.rotation if rotation is None else np.asarray(rotation, dtype=np.float64)
+    return away @ turn.T if turn.ndim == 2 else np.einsum("nij,nj->ni", turn, away)
+
+
+def _distorted(camera: Camera, plane: Array) -> Array:
+    """Brown's distortion of normalised coordinates, (n, 2) → (n, 2)."""
+    r2 = np.einsum("ni,ni->n", plane, plane)[:, None]
+    tangential = np.array([camera.p2, camera.p1])
+    stretch = 1 + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3))
+    return plane * (stretch + 2 * (plane @ tangential)[:, None]) + r2 * tangential
+
+
+def _bending(camera: Camera, plane: Array) -> tuple[Array, Array, Array]:
+    """The symmetric derivative of the distortion, [[a, b], [b, c]], each (n,)."""
+    x, y = plane.T
+    r2 = x * x + y * y
+    stretch = 1 + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3))
+    slope = 2 * (camera.k1 + r2 * (2 * camera.k2 + 3 * camera.k3 * r2))
+    a = stretch + slope * x * x + 2 * camera.p1 * y + 6 * camera.p2 * x
+    b = slope * x * y + 2 * camera.p1 * x + 2 * camera.p2 * y
+    return a, b, stretch + slope * y * y + 6 * camera.p1 * y + 2 * camera.p2 * x
+
+
+def _undistorted(camera: Camera, target: Array) -> Array:
+    """The inverse of `_distorted` within its validity radius, (n, 2); NaN outside the image of that disc.
+
+    The distortion is the gradient of a function that is convex within the disc, so that Newton's method with shortened
+    steps finds the one point there is.
+    """
+    reach = validity_radius(camera)
+    result = np.full(target.shape, np.nan)
+    rows = np.flatnonzero(np.isfinite(target).all(axis=1))
+    goal = target[rows]
+    at = _within(goal, reach)
+    miss = goal - _distorted(camera, at)
+    share = np.ones(rows.size)
+    for _ in range(NEWTON_STEPS):
+        scale = 1 + norm(goal)
+        arrived = norm(miss) <= 4e-16 * scale
+        result[rows[arrived]] = at[arrived]
+        keep = ~arrived
+        rows, goal, at, miss, share, scale = (each[keep] for each in (rows, goal, at, miss, share, scale))
+        if not rows.size:
+            break
+        a, b, c = _bending(camera, at)
+        determinant = np.maximum(a * c - b * b, 1e-12)
+        step = np.stack([c * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - b * miss[:, 0]], axis=1)
+        new = _within(at + step * (share / determinant)[:, None], reach)
+        new_miss = goal - _distorted(camera, new)
+        better = norm(new_miss) < norm(miss)
+        at[better], miss[better] = new[better], new_miss[better]
+        share = np.where(better, np.minimum(2 * share, 1), share / 4)
+        # No step helps any more: rounding, or a target that nothing reaches.
+        stuck = share < 1e-3
+        fine = stuck & (norm(miss) <= 1e-13 * scale)
+        result[rows[fine]] = at[fine]
+        rows, goal, at, miss, share = (each[~stuck] for each in (rows, goal, at, miss, share))
+    return result
+
+
+def _within(plane: Array, reach: float) -> Array:
+    """Points drawn back onto the disc that the distortion is valid in, (n, 2)."""
+    if np.isinf(reach):
+        return plane.copy()
+    return plane * np.minimum(1, reach / np.maximum(norm(plane), 1e-300))[:, None]
+
+
+@lru_cache(maxsize=256)
+def _validity_radius(k1: float, k2: float, k3: float, tangential: float) -> float:
+    """Where the derivative of the distortion, a symmetric matrix, first stops being positive definite in a direction.
+
+    With L = 1 + k1 r² + …, L' = d(rL)/dr, a = p r and c the cosine of the direction from the tangential axis, the
+    determinant is L L' + 2 a c (L' + 3 L) + 16 a² c² − 4 a². Its least value over c lies at c = −1, where it is
+    (L' − 6a)(L − 2a), or between, where it is L L' − (L' + 3L)²/16 − 4 a².
+    """
+    if not any((k1, k2, k3, tangential)):
+        return float("inf")
+    r = np.polynomial.Polynomial([0.0, 1.0])
+    stretch = 1 + k1 * r**2 + k2 * r**4 + k3 * r**6
+    slope = 1 + 3 * k1 * r**2 + 5 * k2 * r**4 + 7 * k3 * r**6
+    side = tangential * r
+    ends = [_positive_roots(slope - 6 * side), _positive_roots(stretch - 2 * side)]
+    if tangential:
+        between = _positive_roots(stretch * slope - (slope + 3 * stretch) ** 2 / 16 - 4 * side**2)
+        ends.append(between[(slope + 3 * stretch)(between) < 16 * side(between)])
+    return float(np.min(np.concatenate(ends), initial=np.inf))
+
+
+def _positive_roots(polynomial: np.polynomial.Polynomial) -> Array:
+    trimmed = polynomial.trim()
+    if trimmed.degree() < 1:
+        return np.empty(0)
+    roots = trimmed.roots()
+    return np.real(roots[(np.abs(np.imag(roots)) < 1e-9) & (np.real(roots) > 0)])

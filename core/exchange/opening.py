@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From project.toml to numbers: its terrain, its picks, and what is reconstructed from them."""
 
+from typing import cast
+
 from ..errors import RockfallError
 from ..reconstruction.block import Block
 from ..reconstruction.drag import Drag
+from ..reconstruction.motion import FlightEnds
 from ..reconstruction.trajectory import Reconstruction, reconstruct
 from ..terrain.readers import read_terrain
 from ..terrain.surface import Surface
@@ -34,5 +37,6 @@ def open_project(project: Project) -> tuple[Surface | None, Reconstruction]:
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if how.drag else None,
         normal_radius_m=how.normal_radius_m,
         site=project.site.name,
+        flights=cast(FlightEnds, how.flights),
     )
     return surface, result

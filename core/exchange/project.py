@@ -7,7 +7,7 @@ written again, so that an older Rockfall does not lose what a newer one has stor
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -20,6 +20,9 @@ from ..georeference import GlobalShift
 SCHEMA = 1
 ENGINES = ("auto", "cycles", "eevee", "workbench")
 UP_AXES = ("auto", "z", "y")
+FLIGHTS = ("contacts", "centres")
+FREE = ("camera", "clock", "drag", "gravity")
+LOSSES = ("huber", "cauchy", "linear")
 
 Extra = Mapping[str, Any]
 Vector3 = tuple[float, float, float]
@@ -82,6 +85,7 @@ class ReconstructionSettings:
     gravity_mps2 : acceleration of gravity.
     drag : whether the flights are computed with the drag of air.
     drag_coefficient, air_density_kgpm3 : C_D and ρ, used when ``drag`` is true.
+    flights : what the flights join, one of `FLIGHTS`: the marked contact points, or the block's centre at each contact.
     """
 
     normal_radius_m: float | None = None
@@ -89,6 +93,52 @@ class ReconstructionSettings:
     drag: bool = False
     drag_coefficient: float = DRAG_COEFFICIENT
     air_density_kgpm3: float = AIR_DENSITY_KGPM3
+    flights: str = "contacts"
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class VideoEntry:
+    """One video, and what is known of it.
+
+    Attributes
+    ----------
+    file : the video; it may have moved, since its numbers are used without it.
+    camera : camera.toml, the solved view.
+    track : track.csv, the block in the frames.
+    events : events.csv, the impacts seen in the frames; first picks are made from it where the project has none.
+    offset_s, drift, origin_s : of the `Clock`: common time = offset + (1 + drift) · rate · (video time − origin).
+    capture_rate_hz : pictures per second when filming; None when the file plays at the speed of the fall.
+    row_time_s : readout time of one row of the image [s]: rolling shutter.
+    """
+
+    name: str
+    file: Path | None = None
+    camera: Path | None = None
+    track: Path | None = None
+    events: Path | None = None
+    offset_s: float = 0.0
+    drift: float = 0.0
+    origin_s: float = 0.0
+    capture_rate_hz: float | None = None
+    row_time_s: float = 0.0
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RefinementSettings:
+    """How picks are fitted to the footage.
+
+    Attributes
+    ----------
+    free : what is fitted beside the picks, of `FREE`.
+    sigma_terrain_m : standard deviation of the terrain across itself [m]; None for the default.
+    loss : one of `LOSSES`, how pixels that do not fit count.
+    """
+
+    free: tuple[str, ...] = ()
+    sigma_terrain_m: float | None = None
+    loss: str = "huber"
     extra: Extra = field(default_factory=dict)
 
 
@@ -143,6 +193,8 @@ class Project:
     blocks: tuple[BlockEntry, ...] = ()
     reconstruction: ReconstructionSettings = field(default_factory=ReconstructionSettings)
     render: tuple[RenderPreset, ...] = ()
+    videos: tuple[VideoEntry, ...] = ()
+    refinement: RefinementSettings = field(default_factory=RefinementSettings)
     extra: Extra = field(default_factory=dict)
 
     def block_of(self, trajectory: str) -> BlockEntry:
@@ -178,7 +230,9 @@ def read_project(path: str | Path) -> Project:
     block = _block(top.table("block"), BlockEntry(), named=False)
     blocks = tuple(_block(table, block, named=True) for table in top.tables("blocks"))
     render = tuple(_preset(table) for table in top.tables("render"))
-    for key, names in (("blocks", [entry.name for entry in blocks]), ("render", [preset.name for preset in render])):
+    videos = tuple(_video(table) for table in top.tables("videos"))
+    for key, entries in (("blocks", blocks), ("render", render), ("videos", videos)):
+        names = [entry.name for entry in entries]
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
             raise top.wrong(key, f"names {repeated[0]!r} twice", "Give each entry a name of its own")
@@ -190,6 +244,8 @@ def read_project(path: str | Path) -> Project:
         blocks=blocks,
         reconstruction=_reconstruction(top.table("reconstruction")),
         render=render,
+        videos=videos,
+        refinement=_refinement(top.table("refinement")),
         extra=top.rest() | ({"picks": picks.rest()} if picks.rest() else {}),
     )
 
@@ -217,6 +273,9 @@ def write_project(project: Project, path: str | Path) -> None:
     content["block"] = {key: value for key, value in _plain(project.block).items() if key != "name"}
     content["blocks"] = [_plain(block) for block in project.blocks]
     content["reconstruction"] = _plain(project.reconstruction)
+    content["videos"] = [_files_as(relative, _plain(video)) for video in project.videos]
+    if project.videos or project.refinement != RefinementSettings():
+        content["refinement"] = _plain(project.refinement)
     content["render"] = [_plain(preset) for preset in project.render]
     content = {key: value for key, value in content.items() if value not in ({}, [])} | extra
     path.write_text(tomli_w.dumps(content), encoding="utf-8", newline="\n")
@@ -235,6 +294,10 @@ def _plain(part: Any) -> dict[str, Any]:
         else:
             values[key] = value
     return values | dict(part.extra)
+
+
+def _files_as(relative: Callable[[Path], str], values: dict[str, Any]) -> dict[str, Any]:
+    return {key: relative(value) if isinstance(value, Path) else value for key, value in values.items()}
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -301,6 +364,37 @@ def _reconstruction(table: "_Table") -> ReconstructionSettings:
         drag=table.flag("drag", False),
         drag_coefficient=table.number("drag_coefficient", DRAG_COEFFICIENT),
         air_density_kgpm3=table.number("air_density_kgpm3", AIR_DENSITY_KGPM3),
+        flights=table.choice("flights", FLIGHTS, "contacts"),
+        extra=table.rest(),
+    )
+
+
+def _video(table: "_Table") -> VideoEntry:
+    file = table.path("file", anywhere=True) if table.has("file") else None
+    entry = VideoEntry(
+        name=table.text("name") if file is None or table.has("name") else file.stem,
+        file=file,
+        camera=table.path("camera") if table.has("camera") else None,
+        track=table.path("track") if table.has("track") else None,
+        events=table.path("events") if table.has("events") else None,
+        offset_s=table.signed("offset_s", 0.0),
+        drift=table.signed("drift", 0.0),
+        origin_s=table.signed("origin_s", 0.0),
+        capture_rate_hz=table.optional_number("capture_rate_hz"),
+        row_time_s=table.signed("row_time_s", 0.0),
+        extra=table.rest(),
+    )
+    if abs(entry.drift) >= 1.0:
+        advice = "It is relative: 1e-5 is 36 ms per hour; a slow-motion file has capture_rate_hz instead"
+        raise table.wrong("drift", f"is {entry.drift:g}", advice)
+    return entry
+
+
+def _refinement(table: "_Table") -> RefinementSettings:
+    return RefinementSettings(
+        free=table.choices("free", FREE),
+        sigma_terrain_m=table.optional_number("sigma_terrain_m"),
+        loss=table.choice("loss", LOSSES, "huber"),
         extra=table.rest(),
     )
 
@@ -343,6 +437,9 @@ class _Table:
     def take(self, key: str) -> Any:
         return self._content.pop(key, None)
 
+    def has(self, key: str) -> bool:
+        return key in self._content
+
     def rest(self) -> dict[str, Any]:
         return dict(self._content)
 
@@ -368,19 +465,32 @@ class _Table:
             raise self.wrong(key, f"is {value!r}", f"Choose one of {', '.join(known)}")
         return value
 
+    def choices(self, key: str, known: tuple[str, ...]) -> tuple[str, ...]:
+        value = self._taken(key, [], "a list")
+        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+            raise self.wrong(key, f"is {value!r}, not a list of texts", f'Write a list, such as ["{known[0]}"]')
+        for item in value:
+            if item not in known:
+                raise self.wrong(key, f"has {item!r}", f"Choose from {', '.join(known)}")
+        return tuple(dict.fromkeys(value))
+
     def flag(self, key: str, default: bool) -> bool:
         value = self._taken(key, default, "true or false")
         if not isinstance(value, bool):
             raise self.wrong(key, f"is {value!r}", "Write true or false, without quotation marks")
         return value
 
-    def number(self, key: str, default: float, zero_allowed: bool = False) -> float:
+    def signed(self, key: str, default: float) -> float:
         value = self._taken(key, default, "a number")
         if not _is_number(value):
             raise self.wrong(key, f"is {value!r}, not a number", "Write a number without quotation marks")
+        return float(value)
+
+    def number(self, key: str, default: float, zero_allowed: bool = False) -> float:
+        value = self.signed(key, default)
         if value < 0.0 or (value == 0.0 and not zero_allowed):
             raise self.wrong(key, f"is {value:g}", f"Give a number {'not below' if zero_allowed else 'above'} zero")
-        return float(value)
+        return value
 
     def optional_number(self, key: str, zero_allowed: bool = False) -> float | None:
         return self.number(key, _REQUIRED, zero_allowed) if key in self._content else None
@@ -401,9 +511,10 @@ class _Table:
     def optional_vector(self, key: str) -> Vector3 | None:
         return self.vector(key) if key in self._content else None
 
-    def path(self, key: str) -> Path:
+    def path(self, key: str, anywhere: bool = False) -> Path:
+        """A file; it must be there unless it may be `anywhere`."""
         file = self._file.parent / self.text(key)
-        if not file.is_file():
+        if not (anywhere or file.is_file()):
             raise self.wrong(key, f"names a file that is not there: {file}", "Paths are relative to the project file")
         return file
 

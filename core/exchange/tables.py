@@ -103,19 +103,19 @@ def write_picks(picks: Picks, path: str | Path) -> None:
     columns: Columns = {
         "trajectory": picks.trajectory.tolist(),
         "time_s": picks.time_s,
-        **_vectors(POSITION, picks.shift.to_survey(picks.position)),
+        **vector_columns(POSITION, picks.shift.to_survey(picks.position)),
         "kind": picks.kind.tolist(),
         "status": picks.status.tolist(),
     }
     if np.isfinite(picks.normal).any():
-        columns |= _vectors(NORMAL, picks.normal)
+        columns |= vector_columns(NORMAL, picks.normal)
     for name, values in (("sigma_time_s", picks.sigma_time_s), ("sigma_position_m", picks.sigma_position_m)):
         if np.isfinite(values).any():
             columns[name] = values
     if np.isfinite(picks.angular_velocity).any():
-        columns |= _vectors(SPIN, picks.angular_velocity)
+        columns |= vector_columns(SPIN, picks.angular_velocity)
     columns |= picks.extra
-    _write(path, columns)
+    write_columns(path, columns)
 
 
 def write_impacts(impacts: Impacts, path: str | Path) -> None:
@@ -133,7 +133,7 @@ def write_impacts(impacts: Impacts, path: str | Path) -> None:
         if np.isfinite(values).any():
             columns[column[0]] = values
     columns |= impacts.extra
-    _write(path, columns)
+    write_columns(path, columns)
 
 
 def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
@@ -213,7 +213,7 @@ def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
     columns |= {name: _rounded(survey[:, i]) for i, name in enumerate(POSITION)}
     columns |= {name: _rounded(samples.velocity[:, i]) for i, name in enumerate(("vx_mps", "vy_mps", "vz_mps"))}
     columns |= {"height_m": _rounded(samples.height_m), "kinetic_J": _rounded(samples.kinetic_j)}
-    _write(path, columns)
+    write_columns(path, columns)
 
 
 def impact_columns(impacts: Impacts) -> tuple[str, ...]:
@@ -262,12 +262,15 @@ def _rounded(values: Array) -> list[str]:
     return ["" if value != value else f"{value:.6f}" for value in values.tolist()]
 
 
-def _vectors(names: Iterable[str], values: Array) -> Columns:
+def vector_columns(names: Iterable[str], values: Array) -> Columns:
     return {name: values[:, i] for i, name in enumerate(names)}
 
 
-def _write(path: str | Path, columns: Columns) -> None:
-    """Some rows at a time: their text takes many times the memory of the numbers."""
+def write_columns(path: str | Path, columns: Columns) -> None:
+    """Write a table: a header, and undefined numbers as empty cells.
+
+    Some rows at a time: their text takes many times the memory of the numbers.
+    """
     rows = min(map(len, columns.values()))
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")

@@ -11,9 +11,11 @@ from rockfall.core.exchange.project import (
     CameraPlacement,
     Project,
     ReconstructionSettings,
+    RefinementSettings,
     RenderPreset,
     Site,
     TerrainSource,
+    VideoEntry,
     read_project,
     write_project,
 )
@@ -46,11 +48,27 @@ d2_m = 0.3
 density_kgpm3 = 2400
 
 [[videos]]
-file = "kept.mp4"
+file = "moved/away.mp4"
+camera = "data/camera.toml"
+track = "data/track.csv"
+offset_s = -3.25
+drift = -1e-5
+capture_rate_hz = 240
+row_time_s = 1.5e-5
+operator = "kept"
+
+[[videos]]
+name = "right"
+
+[refinement]
+free = ["clock", "camera"]
+loss = "cauchy"
+kept = 1
 
 [reconstruction]
 normal_radius_m = 0.5
 drag = true
+flights = "centres"
 
 [[render]]
 name = "preview"
@@ -67,6 +85,8 @@ camera = { position = [2600050.25, 1200000, 1300], target = [2600000, 1200000, 1
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "terrain.ply").touch()
+    (tmp_path / "data" / "camera.toml").touch()
+    (tmp_path / "data" / "track.csv").touch()
     (tmp_path / "picks.csv").touch()
     return tmp_path
 
@@ -89,7 +109,21 @@ def test_everything_is_read(folder: Path) -> None:
     assert project.block.d1_m == 0.4
     assert project.block_of("B01") == BlockEntry("B01", 0.4, 0.3, 0.35, 2400.0)
     assert project.block_of("B02") == project.block
-    assert project.reconstruction == ReconstructionSettings(normal_radius_m=0.5, drag=True)
+    assert project.reconstruction == ReconstructionSettings(normal_radius_m=0.5, drag=True, flights="centres")
+    left, right = project.videos
+    assert left == VideoEntry(
+        name="away",
+        file=folder / "moved" / "away.mp4",
+        camera=folder / "data" / "camera.toml",
+        track=folder / "data" / "track.csv",
+        offset_s=-3.25,
+        drift=-1e-5,
+        capture_rate_hz=240.0,
+        row_time_s=1.5e-5,
+        extra={"operator": "kept"},
+    )
+    assert right == VideoEntry("right")
+    assert project.refinement == RefinementSettings(("clock", "camera"), loss="cauchy", extra={"kept": 1})
     preset = project.preset("preview")
     assert (preset.width, preset.height, preset.engine, preset.stagger_s) == (640, 360, "cycles", 0.0)
     assert preset.camera == CameraPlacement((2600050.25, 1200000.0, 1300.0), (2600000.0, 1200000.0, 1250.0))
@@ -98,7 +132,6 @@ def test_everything_is_read(folder: Path) -> None:
 def test_unknown_keys_and_sections_survive_reading_and_writing(folder: Path) -> None:
     project = read(folder, FULL)
     assert project.extra["title"] == "kept"
-    assert project.extra["videos"] == [{"file": "kept.mp4"}]
     assert project.extra["picks"] == {"encoding": "kept"}
     assert project.terrain is not None
     assert project.terrain.extra == {"tiles": ["kept"]}
@@ -114,6 +147,8 @@ def test_round_trip_of_doubles_is_exact(folder: Path) -> None:
         picks=folder / "picks.csv",
         blocks=(BlockEntry("a", 0.30000000000000004), BlockEntry("b", density_kgpm3=2650.1)),
         render=(RenderPreset("film", stagger_s=1 / 3, fps=29.97),),
+        videos=(VideoEntry("left", offset_s=0.1 + 0.2, drift=1e-5 / 3, track=folder / "data" / "track.csv"),),
+        refinement=RefinementSettings(("drag",), sigma_terrain_m=0.1 + 0.2),
     )
     write_project(project, folder / "project.toml")
     assert read_project(folder / "project.toml") == project
@@ -155,8 +190,19 @@ def test_the_smallest_project(folder: Path) -> None:
         ("width = 640", "width = 640.5", ["render 1: width", "whole number"]),
         ("[site]", "[[site]]", ["site", "not a section"]),
         ("[[render]]", "[render]", ["render", "[[render]]"]),
+        ('flights = "centres"', 'flights = "center"', ["reconstruction.flights", "contacts, centres"]),
+        ("data/camera.toml", "data/none.toml", ["videos 1: camera", "none.toml", "relative"]),
+        ("data/track.csv", "data/none.csv", ["videos 1: track", "none.csv"]),
+        ("offset_s = -3.25", 'offset_s = "0:03"', ["videos 1: offset_s", "quotation marks"]),
+        ("drift = -1e-5", "drift = 7", ["videos 1: drift is 7", "capture_rate_hz"]),
+        ("capture_rate_hz = 240", "capture_rate_hz = 0", ["videos 1: capture_rate_hz", "above zero"]),
+        ('name = "right"', "", ["videos 2: name is missing"]),
+        ('name = "right"', 'name = "away"', ["videos names 'away' twice"]),
+        ('"camera"]', '"lens"]', ["refinement.free has 'lens'", "camera, clock"]),
+        ('free = ["clock", "camera"]', 'free = "clock"', ["refinement.free", '["camera"]']),
+        ('loss = "cauchy"', 'loss = "l2"', ["refinement.loss", "huber"]),
         ('name = "B01"', "", ["blocks 1: name is missing"]),
-        ('[[videos]]', '[[blocks]]\nname = "B01"\n[[videos]]', ["blocks names 'B01' twice"]),
+        ('[[render]]', '[[blocks]]\nname = "B01"\n[[render]]', ["blocks names 'B01' twice"]),
         ("target = [2600000, 1200000, 1250]", "fov_deg = 200", ["render 1: camera.fov_deg"]),
         (", target = [2600000, 1200000, 1250]", "", ["render 1: camera.target is missing"]),
     ],

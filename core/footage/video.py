@@ -1,15 +1,51 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a video file really contains: its frames, each with its own timestamp, and the pictures themselves."""
+"""What a video file really contains: its frames, each with its own timestamp, and the pictures themselves.
 
+The header's rate and number of frames are only reported. Video time counts from the start of the video stream, as
+players show it.
+"""
+
+import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..vectors import Array
+from .containers import codec_name, container_of, holds_sound, lacks_index
+
+type Image = NDArray[np.uint8]
+type Indices = NDArray[np.intp]
+type Report = Callable[[str], None]
+
+SAME_TIME_S = 1e-6
+FRAME_AT_TOLERANCE_S = 1e-5
+"""Tables keep times with six decimals."""
+MILLISECOND_S = 1e-3
+GAP = 1.5
+"""A step longer than this many usual steps misses frames."""
+SAME_RATE = 0.02
+"""Steps that differ by less than this, relatively, are of a constant rate."""
+FEW_FRAMES = 48
+FAR_FRAMES = 40
+"""Beyond this many frames a seek is quicker than grabbing on: it goes back 16 frames itself, then to a keyframe."""
+REPORT_EVERY = 200
+MOST_REORDERED = 16
+SAMPLE = 4
+"""Pictures are compared at every fourth pixel."""
+FFMPEG_QUIET = "-8"
+CONVERT = (
+    "Convert it with ffmpeg -i {name} -c:v libx264 -crf 16 -fps_mode passthrough -an {stem}_h264.mp4: "
+    "H.264 of constant quality, and the timestamps stay as they are"
+)
+
+
+def _none() -> Indices:
+    return np.empty(0, np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +56,15 @@ class Video:
     ----------
     path : the file.
     width, height : as displayed, after the rotation [px].
-    rotation_deg : clockwise turn that the file asks for: 0, 90, 180, 270.
+    rotation_deg : clockwise turn that the file asks for, already applied to all pictures: 0, 90, 180 or 270.
     codec, container : readable names.
-    header_rate_hz, header_frames : what the file announces; not to be trusted.
-    time_s : (f,) timestamps of the frames, ascending [s].
-    keyframe_s : (k,) timestamps of the frames from which decoding can start [s].
+    header_rate_hz, header_frames : what the file announces, NaN and 0 where it does not; not to be trusted.
+    time_s : (f,) timestamps of the frames, in the order of display [s].
+    keyframe_s : (k,) timestamps of the frames at which decoding can begin [s]; empty where that is not known.
+    pixel_aspect : width / height of a pixel.
+    counted : a frame is found by counting from the first, since timestamps are missing or repeated.
+    decoded : every frame has been decoded to know this; otherwise those at both ends.
+    repeated : (r,) frames that show the picture of the frame before; known only when `decoded`.
     """
 
     path: Path
@@ -37,6 +77,15 @@ class Video:
     header_frames: int
     time_s: Array
     keyframe_s: Array
+    pixel_aspect: float = 1.0
+    counted: bool = False
+    decoded: bool = False
+    repeated: Indices = field(default_factory=_none)
+
+    @property
+    def frames(self) -> int:
+        """Number of frames that can be decoded, f."""
+        return self.time_s.size
 
     @property
     def step_s(self) -> Array:
@@ -44,95 +93,383 @@ class Video:
         return np.diff(self.time_s)
 
     @property
+    def usual_step_s(self) -> float:
+        """The median step [s], NaN for a single frame."""
+        return float(np.median(self.step_s)) if self.frames > 1 else np.nan
+
+    @property
+    def resolution_s(self) -> float:
+        """Rounding of the timestamps: a millisecond in Matroska and WebM, 0 where it does not matter [s]."""
+        milliseconds = (self.time_s - self.time_s[0]) / MILLISECOND_S
+        whole = np.abs(milliseconds - np.round(milliseconds)).max() < 1e-6
+        return MILLISECOND_S if whole else 0.0
+
+    @property
     def duration_s(self) -> float:
         """From the first frame to the end of the last [s]."""
-        return float(self.time_s[-1] - self.time_s[0] + (np.median(self.step_s) if self.time_s.size > 1 else 0.0))
+        return float(self.time_s[-1] - self.time_s[0]) + (self.usual_step_s if self.frames > 1 else 0.0)
 
     @property
     def mean_rate_hz(self) -> float:
-        """Frames per second of video time, NaN for a single frame."""
+        """Frames per second over the whole video, gaps included; NaN for a single frame."""
         span = float(self.time_s[-1] - self.time_s[0])
-        return (self.time_s.size - 1) / span if span > 0 else np.nan
+        return (self.frames - 1) / span if span > 0 else np.nan
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames per second outside the gaps: the rate at which the camera wrote them; NaN for a single frame."""
+        steady = np.delete(self.step_s, self.gaps)
+        return 1.0 / float(steady.mean()) if steady.size and steady.mean() > 0 else self.mean_rate_hz
+
+    @property
+    def is_variable(self) -> bool:
+        """Whether the steps differ, by more than the rounding of the timestamps and apart from gaps."""
+        steady = np.delete(self.step_s, self.gaps)
+        allowed = max(1.01 * self.resolution_s, SAME_RATE * self.usual_step_s)
+        return bool(steady.size and np.abs(steady - np.median(steady)).max() > allowed)
+
+    @property
+    def gaps(self) -> Indices:
+        """(g,) frames after which frames are missing: the next comes later than 1.5 usual steps."""
+        if self.frames < 2:
+            return _none()
+        return np.flatnonzero(self.step_s > GAP * self.usual_step_s + self.resolution_s)
+
+    @property
+    def missing(self) -> Indices:
+        """(g,) how many frames would fit into each gap."""
+        return np.round(self.step_s[self.gaps] / self.usual_step_s).astype(np.intp) - 1
+
+    @property
+    def duplicates(self) -> Indices:
+        """(d,) frames with the timestamp of the frame before."""
+        return np.flatnonzero(self.step_s < SAME_TIME_S) + 1
 
 
-SAME_TIME_S = 1e-5
+def open_video(path: str | Path, progress: Report | None = None, *, thorough: bool = False) -> Video:
+    """Find the frames of a video file and their timestamps.
 
+    The timestamps come from the packets, without decoding, where decoding the frames at both ends of the video finds
+    the same; otherwise, and when `thorough`, all frames are decoded.
 
-def open_video(path: str | Path, progress: Callable[[str], None] | None = None) -> Video:
-    """Look at every frame of a video file.
+    Parameters
+    ----------
+    progress : is told what is going on.
+    thorough : decode every frame, and compare each picture with the one before.
 
     Raises
     ------
-    InputError : a file that is missing or has no video that can be decoded.
+    InputError : a file that is missing, no video, cut short before its first frame, in a codec that cannot be decoded,
+        or without timestamps.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InputError("There is no such file", file=path)
-    if progress:
-        progress(f"Reading the timestamps of {path.name}")
-    capture = _capture(path)
-    times, keys, shape = [], [], None
-    while capture.grab():
-        shape = capture.retrieve()[1].shape if shape is None else shape
-        times.append(capture.get(0) / 1000)
-        if capture.get(_cv2().CAP_PROP_LRF_HAS_KEY_FRAME):
-            keys.append(times[-1])
-    if not times:
-        raise InputError("No frame of this file can be decoded", file=path)
-    cv2 = _cv2()
-    code = int(capture.get(cv2.CAP_PROP_FOURCC))
-    return Video(
-        path=path,
-        width=int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)) if shape is None else shape[1],
-        height=int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)) if shape is None else shape[0],
-        rotation_deg=int(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360,
-        codec=code.to_bytes(4, "little").decode("latin-1"),
-        container=path.suffix[1:].upper(),
-        header_rate_hz=float(capture.get(cv2.CAP_PROP_FPS)),
-        header_frames=int(capture.get(cv2.CAP_PROP_FRAME_COUNT)),
-        time_s=np.array(times),
-        keyframe_s=np.array(keys),
-    )
+    say = progress or _silent
+    _refuse_other_files(path)
+    say(f"Reading the timestamps of {path.name}")
+    packet_times, keyframes = _packets(path)
+    video = replace(_described(path), time_s=packet_times, keyframe_s=keyframes)
+    if thorough or not _decodes_as_told(video):
+        video = _decoded(video, say)
+    if video.frames > 1 and video.time_s[-1] - video.time_s[0] < SAME_TIME_S:
+        raise InputError(
+            f"The {video.frames} frames of this file have no timestamps",
+            file=path,
+            advice=f"Tell the true rate with ffmpeg -r RATE -i {path.name} -c copy {path.stem}.mp4",
+        )
+    return video
 
 
 def frame_at(video: Video, time_s: float) -> int:
     """The frame on display at a video time: the last whose timestamp is not after it, 0 before the first."""
-    return max(int(np.searchsorted(video.time_s, time_s + SAME_TIME_S, side="right")) - 1, 0)
+    return max(int(np.searchsorted(video.time_s, time_s + FRAME_AT_TOLERANCE_S, side="right")) - 1, 0)
 
 
 def read_frames(
-    video: Video, indices: Sequence[int] | None = None, *, grey: bool = False
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Pictures of the frames `indices` (ascending; all when None): index, (h, w, 3) BGR or (h, w) uint8."""
+    video: Video, indices: Sequence[int] | Indices | None = None, *, grey: bool = False
+) -> Iterator[tuple[int, Image]]:
+    """Pictures as displayed: pairs of the frame's index and (h, w, 3) BGR, or (h, w) when `grey`.
+
+    A picture is known by its timestamp, never by counting from where a seek may have landed.
+
+    Parameters
+    ----------
+    indices : ascending; None for all frames.
+
+    Raises
+    ------
+    InputError : indices that are not ascending or beyond the video, a frame that cannot be decoded.
+    """
     cv2 = _cv2()
-    wanted = range(video.time_s.size) if indices is None else indices
-    capture, position = _capture(video.path), -1
-    for index in wanted:
-        while position < index:
-            if not capture.grab():
-                raise InputError(f"Frame {index} cannot be decoded", file=video.path)
-            position += 1
-        picture = capture.retrieve()[1]
-        yield int(index), cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if grey else picture
+    for index, capture in _grabbed(video, _checked(video, indices)):
+        there, picture = capture.retrieve()
+        if not there:
+            raise _undecodable(video, index)
+        yield index, cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if grey else picture
 
 
-def read_frame(video: Video, index: int, *, grey: bool = False) -> np.ndarray:
-    """The picture of one frame, (h, w, 3) BGR or (h, w) uint8."""
+def read_frame(video: Video, index: int, *, grey: bool = False) -> Image:
+    """The picture of one frame, (h, w, 3) BGR or (h, w) when `grey`; see `read_frames`."""
     return next(picture for _, picture in read_frames(video, [index], grey=grey))
 
 
-def _cv2() -> Any:
-    import os
+def _grabbed(video: Video, indices: Indices) -> Iterator[tuple[int, Any]]:
+    """The capture, standing at each of the frames in turn."""
+    capture, frame = _capture(video.path), -1
+    for index in indices.tolist():
+        if not video.counted and _keyframes_about(video, index)[0] > frame + FAR_FRAMES:
+            capture, frame = _seek(video, capture, index)
+        while frame < index:
+            if not capture.grab():
+                raise _undecodable(video, index)
+            frame = frame + 1 if video.counted else _frame_of(video, capture)
+        if not video.counted and abs(_time_s(capture) - video.time_s[index]) > SAME_TIME_S:
+            raise _undecodable(video, index)
+        yield index, capture
 
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+
+def _keyframes_about(video: Video, index: int) -> tuple[int, int]:
+    """The last keyframe up to a frame and the next after it; 0 and f where there is none."""
+    key = int(np.searchsorted(video.keyframe_s, video.time_s[index] + SAME_TIME_S, side="right"))
+    places = np.searchsorted(video.time_s, video.keyframe_s[max(key - 1, 0) : key + 1] - SAME_TIME_S)
+    before = int(places[0]) if key > 0 else 0
+    return before, int(places[-1]) if key < video.keyframe_s.size else video.frames
+
+
+def _seek(video: Video, capture: Any, index: int) -> tuple[Any, int]:
+    """The capture at a frame up to `index` from which on all pictures are whole, and that frame.
+
+    Notes
+    -----
+    OpenCV takes the rate for constant and may land anywhere, so the timestamp tells where it did. Where decoding began
+    at the keyframe after `index`, the frames shown just before it would be damaged (an open group of pictures);
+    there are never more than 16 (H.264 A.3, H.265 A.4).
+    """
+    cv2 = _cv2()
+    before, after = _keyframes_about(video, index)
+    guess = video.time_s[index] * video.header_rate_hz
+    for back in (1, 16, 128):
+        if not guess > back:
+            break
+        capture.set(cv2.CAP_PROP_POS_FRAMES, int(guess - back))
+        if not capture.grab():
+            break
+        frame = _frame_of(video, capture)
+        if frame <= before or frame <= min(index, after - MOST_REORDERED - 1):
+            return capture, frame
+    return _capture(video.path), -1
+
+
+def _frame_of(video: Video, capture: Any) -> int:
+    """Index of the frame just grabbed; that of the one before for a timestamp that is not known."""
+    return int(np.searchsorted(video.time_s, _time_s(capture) + SAME_TIME_S, side="right")) - 1
+
+
+def _checked(video: Video, indices: Sequence[int] | Indices | None) -> Indices:
+    if indices is None:
+        return np.arange(video.frames)
+    wanted = np.asarray(indices, np.intp).reshape(-1)
+    outside = wanted[(wanted < 0) | (wanted >= video.frames)]
+    if outside.size:
+        raise InputError(
+            f"There is no frame {outside[0]}: the video has the frames 0 to {video.frames - 1}", file=video.path
+        )
+    if (np.diff(wanted) < 0).any():
+        raise InputError("Frames are read in ascending order", file=video.path)
+    return wanted
+
+
+def _described(path: Path) -> Video:
+    """The video without its frames, as its header and its first picture tell.
+
+    Raises
+    ------
+    InputError : there is no picture.
+    """
+    cv2, capture = _cv2(), _capture(path)
+    there, picture = capture.read()
+    if not there:
+        raise _no_picture(path)
+    rate, frames = capture.get(cv2.CAP_PROP_FPS), capture.get(cv2.CAP_PROP_FRAME_COUNT)
+    across, up = capture.get(cv2.CAP_PROP_SAR_NUM), capture.get(cv2.CAP_PROP_SAR_DEN)
+    rotation = round(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
+    aspect = across / up if across > 0 and up > 0 else 1.0
+    return Video(
+        path=path,
+        width=picture.shape[1],
+        height=picture.shape[0],
+        rotation_deg=rotation,
+        codec=codec_name(int(capture.get(cv2.CAP_PROP_FOURCC))),
+        container=container_of(path) or path.suffix[1:].upper(),
+        header_rate_hz=float(rate) if rate > 0 else np.nan,
+        header_frames=int(frames) if frames > 0 else 0,
+        time_s=np.empty(0),
+        keyframe_s=np.empty(0),
+        pixel_aspect=1 / aspect if rotation % 180 else aspect,
+    )
+
+
+def _packets(path: Path) -> tuple[Array, Array]:
+    """Timestamps of all packets and of those of keyframes, ascending; nothing is decoded."""
+    cv2 = _cv2()
+    capture = _opened(path, [cv2.CAP_PROP_FORMAT, -1])
+    times, keys = [], []
+    while capture.grab():
+        times.append(_time_s(capture))
+        keys.append(capture.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME) > 0)
+    time_s = np.array(times)
+    return np.sort(time_s), np.sort(time_s[np.array(keys, bool)])
+
+
+def _decodes_as_told(video: Video) -> bool:
+    """Whether decoding finds the packets' timestamps: of the first frames, and from a late keyframe to the end."""
+    if video.frames == 0 or video.duplicates.size:
+        return False
+    tail = max(video.frames - FEW_FRAMES, 0)
+    try:
+        for _ in _grabbed(video, np.arange(min(FEW_FRAMES, tail))):
+            pass
+        for _, capture in _grabbed(video, np.arange(tail, video.frames)):
+            last = capture
+    except InputError:
+        return False
+    return not last.grab()
+
+
+def _decoded(video: Video, say: Report) -> Video:
+    """The frames as decoding them all finds them."""
+    capture, before = _capture(video.path), None
+    times: list[float] = []
+    repeated: list[int] = []
+    while capture.grab():
+        there, picture = capture.retrieve()
+        if not there:
+            break
+        if len(times) % REPORT_EVERY == 0:
+            say(f"Decoding {video.path.name}, frame {len(times)} of about {video.frames}")
+        sample = picture[::SAMPLE, ::SAMPLE].copy()
+        if before is not None and np.array_equal(sample, before):
+            repeated.append(len(times))
+        times.append(_time_s(capture))
+        before = sample
+    time_s, whole = _without_holes(np.array(times))
+    if (np.diff(time_s) < -SAME_TIME_S).any():
+        raise InputError("The timestamps run backwards", file=video.path, advice=_convert(video.path))
+    known = whole and np.isin(_ticks(time_s), _ticks(video.time_s)).all()
+    return replace(
+        video,
+        time_s=time_s,
+        keyframe_s=video.keyframe_s if known else np.empty(0),
+        counted=not whole or bool((np.diff(time_s) < SAME_TIME_S).any()),
+        decoded=True,
+        repeated=np.array(repeated, np.intp),
+    )
+
+
+def _without_holes(time_s: Array) -> tuple[Array, bool]:
+    """Timestamps (f,) with those filled in that OpenCV tells as 0 since there are none, and whether all were there.
+
+    AVI files with B-frames lack that of the last frame.
+    """
+    there = np.r_[True, time_s[1:] != 0.0]
+    if there.all() or there.sum() < 2:
+        return time_s, bool(there.all())
+    frame, known = np.flatnonzero(there), time_s[there]
+    filled = np.interp(np.arange(time_s.size), frame, known)
+    late = np.arange(frame[-1] + 1, time_s.size)
+    filled[late] = known[-1] + (late - frame[-1]) * np.median(np.diff(known))
+    return filled, False
+
+
+def _ticks(time_s: Array) -> NDArray[np.int64]:
+    return np.round(time_s / SAME_TIME_S).astype(np.int64)
+
+
+def _time_s(capture: Any) -> float:
+    """Timestamp of the frame or packet just grabbed, from the start of the stream [s]."""
+    return float(capture.get(_cv2().CAP_PROP_POS_MSEC)) / 1000
+
+
+def _capture(path: Path) -> Any:
+    """A capture that decodes.
+
+    Raises
+    ------
+    InputError : the file cannot be opened as a video.
+    """
+    capture = _opened(path, [])
+    if not capture.isOpened():
+        raise _no_picture(path)
+    return capture
+
+
+def _opened(path: Path, settings: list[int]) -> Any:
+    """OpenCV's capture, by FFmpeg alone: other backends take a name with digits for a series of pictures."""
+    cv2 = _cv2()
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        return cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, settings)
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
+def _cv2() -> Any:
+    """OpenCV; what FFmpeg would print about a damaged file is told by our own messages."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)
     import cv2
 
     return cv2
 
 
-def _capture(path: Path) -> Any:
-    cv2 = _cv2()
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
-    if not capture.isOpened():
-        raise InputError("This file has no video that can be decoded", file=path)
-    return capture
+def _refuse_other_files(path: Path) -> None:
+    if path.is_dir():
+        raise InputError("This is a folder", file=path, advice="Give the video file itself")
+    if not path.is_file():
+        raise InputError("There is no such file", file=path, advice="Check the path")
+    if path.stat().st_size == 0:
+        raise InputError("The file is empty", file=path, advice="Copy it again from the camera")
+    container = container_of(path)
+    if container.endswith((" picture", " sound")):
+        kind, what = container.rsplit(" ", 1)
+        raise InputError(f"This is a {what} file ({kind}), not a video", file=path, advice="Give the video itself")
+
+
+def _no_picture(path: Path) -> InputError:
+    """Why no picture of the file can be had."""
+    container = container_of(path)
+    packets = _opened(path, [_cv2().CAP_PROP_FORMAT, -1])
+    if packets.isOpened():
+        codec = codec_name(int(packets.get(_cv2().CAP_PROP_FOURCC)))
+        return InputError(
+            f"No picture can be decoded: the video is in {codec}, which is damaged or not supported here",
+            file=path,
+            advice=_convert(path),
+        )
+    if container in ("MP4", "MOV") and lacks_index(path):
+        return InputError(
+            "The file is cut short: its index, which comes last, is missing",
+            file=path,
+            advice="Copy it again from the camera; after a recording that broke off, the program untrunc can often "
+            "rebuild it with the help of a whole file of the same camera",
+        )
+    if container and holds_sound(path):
+        return InputError("The file holds sound and no video", file=path, advice="Give the video itself")
+    if container:
+        return InputError(f"This {container} file holds no video that can be read", file=path, advice=_convert(path))
+    return InputError("This is not a video file", file=path, advice="Give an MP4, MOV, MKV, WebM or AVI file")
+
+
+def _undecodable(video: Video, index: int) -> InputError:
+    return InputError(
+        f"Frame {index} at {video.time_s[index]:.3f} s cannot be decoded: the file is damaged there",
+        file=video.path,
+        advice="rockfall inspect tells which frames can be had; copy the file again from the camera",
+    )
+
+
+def _convert(path: Path) -> str:
+    return CONVERT.format(name=path.name, stem=path.stem)
+
+
+def _silent(_: str) -> None:
+    pass

@@ -35,6 +35,7 @@ FAR_FRAMES = 40
 """Beyond this many frames a seek is quicker than grabbing on: it goes back 16 frames itself, then to a keyframe."""
 REPORT_EVERY = 200
 MOST_REORDERED = 16
+SEEKS = 5
 SAMPLE = 4
 """Pictures are compared at every fourth pixel."""
 FFMPEG_QUIET = "-8"
@@ -246,16 +247,18 @@ def _seek(video: Video, capture: Any, index: int) -> tuple[Any, int]:
     """
     cv2 = _cv2()
     before, after = _keyframes_about(video, index)
-    guess = video.time_s[index] * video.header_rate_hz
-    for back in (1, 16, 128):
+    guess, back = video.time_s[index] * video.header_rate_hz, 1.0
+    for _ in range(SEEKS):
         if not guess > back:
             break
         capture.set(cv2.CAP_PROP_POS_FRAMES, int(guess - back))
-        if not capture.grab():
-            break
-        frame = _frame_of(video, capture)
-        if frame <= before or frame <= min(index, after - MOST_REORDERED - 1):
-            return capture, frame
+        late_s = 0.0
+        if capture.grab():
+            frame = _frame_of(video, capture)
+            if frame <= before or frame <= min(index, after - MOST_REORDERED - 1):
+                return capture, frame
+            late_s = max(_time_s(capture) - float(video.time_s[index]), 0.0)
+        back += MOST_REORDERED + 2 * late_s * video.header_rate_hz
     return _capture(video.path), -1
 
 

@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motion of the background: how every frame of hand-held or stabilised footage lies on the first one.
+
+Corners are followed by pyramidal Lucas–Kanade (Bouguet 2001) with a forward-backward check (Kalal et al. 2010). They are
+always compared with the frame in which they were found, not with the one before, so that errors do not add up; a
+homography to the reference frame is estimated robustly (MAGSAC++, Barath et al. 2020), then by least squares.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..vectors import Array
+from .sources import Source, frames, opencv
+
+GRID = (16, 10)
+PER_CELL = 4
+WINDOW_PX = 21
+LEVELS = 4
+FORWARD_BACKWARD_PX = 0.5
+INLIER_PX = 1.5
+FEWEST = 12
+FEWEST_SHARE = 0.25
+RENEW_SHARE = 0.6
+STILL_PX = 0.15
+"""A tripod: the typical corner never moves further than this."""
+
+Indices = np.ndarray
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class BackgroundMotion:
+    """Where the background of f consecutive frames lies in the reference frame.
+
+    Attributes
+    ----------
+    frames : (f,) frame numbers, ascending without gaps.
+    homography : (f, 3, 3) frame → reference frame, on pixels whose origin is the corner of the image.
+    inliers : (f,) corners that agree.
+    rms_px : (f,) of their residuals, in the reference frame.
+    still : the camera does not move: every homography is the identity.
+    """
+
+    frames: Indices
+    homography: Array
+    inliers: Indices
+    rms_px: Array
+    still: bool
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedFeatures:
+    """m sightings of background corners.
+
+    Attributes
+    ----------
+    frame, feature : (m,) frame number, and number of the corner.
+    pixel : (m, 2) [px].
+    """
+
+    frame: Indices
+    feature: Indices
+    pixel: Array
+
+
+def no_motion(first: int, last: int) -> BackgroundMotion:
+    """What is known of a camera on a tripod without looking: frames `first` to `last` do not move."""
+    count = last - first + 1
+    return BackgroundMotion(
+        frames=np.arange(first, last + 1),
+        homography=np.tile(np.eye(3), (count, 1, 1)),
+        inliers=np.zeros(count, dtype=np.intp),
+        rms_px=np.full(count, np.nan),
+        still=True,
+    )
+
+
+def stabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
+    """(n, 2) pixels of frames (n,) as they would lie in the reference frame."""
+    return _through(_of(motion, frame), pixels)
+
+
+def destabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
+    """(n, 2) pixels of the reference frame as they lie in frames (n,); undoes `stabilise`."""
+    return _through(np.linalg.inv(_of(motion, frame)), pixels)
+
+
+def background_motion(
+    source: Source, *, first: int = 0, last: int | None = None, progress: Progress | None = None
+) -> tuple[BackgroundMotion, TrackedFeatures]:
+    """Follow the background; frame `first` is the reference.
+
+    Raises
+    ------
+    InputError : the background cannot be followed, with the frame.
+    """
+    last = source.time_s.size - 1 if last is None else last
+    follower, numbers, homographies, inliers, rms = None, [], [], [], []
+    sightings: list[tuple[int, Indices, Array]] = []
+    for frame, picture in frames(source, range(first, last + 1)):
+        if progress and frame % 25 == 0:
+            progress(f"Following the background: frame {frame} of {last}")
+        grey = opencv().cvtColor(picture, opencv().COLOR_BGR2GRAY)
+        if follower is None:
+            follower = _Follower(grey, frame)
+        else:
+            follower.advance(grey, frame)
+        numbers.append(frame)
+        homographies.append(follower.homography)
+        inliers.append(follower.names.size)
+        rms.append(follower.rms)
+        sightings.append((frame, follower.names, follower.pixel))
+    still = _is_still(sightings)
+    count = len(numbers)
+    features = TrackedFeatures(
+        frame=np.concatenate([np.full(names.size, frame) for frame, names, _ in sightings]),
+        feature=np.concatenate([names for _, names, _ in sightings]),
+        pixel=np.concatenate([pixel for _, _, pixel in sightings]) + 0.5,
+    )
+    corner = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+    homography = np.tile(np.eye(3), (count, 1, 1)) if still else corner @ np.array(homographies) @ np.linalg.inv(corner)
+    return BackgroundMotion(
+        frames=np.array(numbers),
+        homography=homography,
+        inliers=np.array(inliers),
+        rms_px=np.array(rms),
+        still=still,
+    ), features
+
+
+class _Follower:
+    """Corners on their way through the frames, in OpenCV's pixels.
+
+    names, pixel, reference: of the corners that agree in the current frame: number, place there, and in the reference.
+    """
+
+    def __init__(self, grey: np.ndarray, frame: int) -> None:
+        self.homography, self.rms = np.eye(3), 0.0
+        self.names = np.zeros(0, dtype=np.intp)
+        self.pixel = self.reference = np.zeros((0, 2))
+        self.count = 0
+        self.small = opencv().pyrDown(grey)
+        self._renew(grey)
+        if self.names.size < FEWEST:
+            raise _lost(frame, f"only {self.names.size} corners are found in it")
+
+    def advance(self, grey: np.ndarray, frame: int) -> None:
+        """Follow all corners into the next frame."""
+        small = opencv().pyrDown(grey)
+        coarse, _ = _flow(self.small, small, self.pixel / 2, None, LEVELS)
+        step = 2 * coarse - self.pixel
+        guess = self.pixel + np.where(np.isfinite(step), step, _median(step))
+        pixel, good = _flow(self.key, grey, self.key_pixel, guess, 1)
+        back, back_good = _flow(grey, self.key, np.where(good[:, None], pixel, guess), self.key_pixel, 1)
+        good &= back_good & (np.hypot(*(back - self.key_pixel).T) < FORWARD_BACKWARD_PX)
+        height, width = grey.shape
+        good &= (pixel > 1).all(axis=1) & (pixel < (width - 2, height - 2)).all(axis=1)
+        if good.sum() < FEWEST:
+            raise _lost(frame, f"only {good.sum()} corners of the frames before are found again in it")
+        homography, agrees = _fit(pixel[good], self.reference[good])
+        kept = np.flatnonzero(good)[agrees]
+        if kept.size < max(FEWEST, FEWEST_SHARE * self.pixel.shape[0]):
+            raise _lost(frame, f"only {kept.size} of {self.pixel.shape[0]} corners move together")
+        self.small, self.homography = small, homography
+        self.names, self.pixel = self.names[kept], pixel[kept]
+        self.reference, self.key_pixel = self.reference[kept], self.key_pixel[kept]
+        residual = _through(homography, self.pixel) - self.reference
+        self.rms = float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
+        if self.names.size < RENEW_SHARE * self.key_count:
+            self._renew(grey)
+
+    def _renew(self, grey: np.ndarray) -> None:
+        """Make this the frame that corners are compared with, and find new ones where there are few."""
+        fresh = _corners(grey, self.pixel)
+        self.names = np.concatenate([self.names, self.count + np.arange(len(fresh))])
+        self.count += len(fresh)
+        self.pixel = np.concatenate([self.pixel, fresh])
+        self.reference = np.concatenate([self.reference, _through(self.homography, fresh)])
+        self.key, self.key_pixel, self.key_count = grey, self.pixel, self.names.size
+
+
+def _corners(grey: np.ndarray, taken: Array) -> Array:
+    """(n, 2) corners, at most `PER_CELL` in every cell of a grid, those that are taken counted."""
+    cv2 = opencv()
+    height, width = grey.shape
+    apart = max(min(width, height) / 100, 4.0)
+    found = cv2.goodFeaturesToTrack(grey, 4000, 0.004, apart)
+    found = np.zeros((0, 2)) if found is None else found.reshape(-1, 2).astype(np.float64)
+    if len(taken) and len(found):
+        nearest = np.min(np.hypot(*(found[:, None] - taken[None]).transpose(2, 0, 1)), axis=1)
+        found = found[nearest > apart]
+    room = np.full(GRID[0] * GRID[1], PER_CELL)
+    np.subtract.at(room, _cell(taken, width, height), 1)
+    cell = _cell(found, width, height)
+    order = np.argsort(cell, kind="stable")
+    start = np.searchsorted(cell[order], cell[order], side="left")
+    rank = np.empty(len(found), dtype=np.intp)
+    rank[order] = np.arange(len(found)) - start
+    return found[rank < room[cell]]
+
+
+def _cell(pixel: Array, width: int, height: int) -> Indices:
+    column = np.clip(pixel[:, 0] * GRID[0] / width, 0, GRID[0] - 1).astype(np.intp)
+    row = np.clip(pixel[:, 1] * GRID[1] / height, 0, GRID[1] - 1).astype(np.intp)
+    return row * GRID[0] + column
+
+
+def _flow(before: np.ndarray, after: np.ndarray, pixel: Array, guess: Array | None, levels: int) -> tuple[Array, np.ndarray]:
+    """Places in the picture after, NaN where they are lost, and whether they are found."""
+    cv2 = opencv()
+    moved, status, _ = cv2.calcOpticalFlowPyrLK(
+        before,
+        after,
+        pixel.astype(np.float32),
+        (pixel if guess is None else guess).astype(np.float32),
+        winSize=(WINDOW_PX, WINDOW_PX),
+        maxLevel=levels,
+        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005),
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+    )
+    good = status.ravel().astype(np.bool_)
+    return np.where(good[:, None], moved.astype(np.float64), np.nan), good
+
+
+def _fit(pixel: Array, reference: Array) -> tuple[Array, np.ndarray]:
+    """Homography, and which corners agree with it."""
+    cv2 = opencv()
+    cv2.setRNGSeed(1)
+    homography, mask = cv2.findHomography(pixel, reference, cv2.USAC_MAGSAC, INLIER_PX, maxIters=2000, confidence=0.999)
+    if homography is None:
+        return np.eye(3), np.zeros(len(pixel), dtype=np.bool_)
+    agrees = mask.ravel().astype(np.bool_)
+    if agrees.sum() >= FEWEST:
+        refined, _ = cv2.findHomography(pixel[agrees], reference[agrees], 0)
+        homography = homography if refined is None else refined
+    return homography, agrees
+
+
+def _is_still(sightings: list[tuple[int, Indices, Array]]) -> bool:
+    """Whether the corners of the first frame stay where they are, the typical one of every quarter of them."""
+    _, names, start = sightings[0]
+    place = dict(zip(names.tolist(), range(names.size), strict=True))
+    middle = np.median(start, axis=0)
+    for _, here, pixel in sightings[1:]:
+        which = np.array([place.get(name, -1) for name in here.tolist()])
+        known = which >= 0
+        if known.sum() < FEWEST:
+            return False
+        moved = pixel[known] - start[which[known]]
+        quarter = (start[which[known]] > middle) @ (1, 2)
+        for q in range(4):
+            if (quarter == q).sum() >= 5 and np.hypot(*np.median(moved[quarter == q], axis=0)) > STILL_PX * 2:
+                return False
+        if np.hypot(*np.median(moved, axis=0)) > STILL_PX:
+            return False
+    return True
+
+
+def _of(motion: BackgroundMotion, frame: Indices) -> Array:
+    index = np.asarray(frame, dtype=np.intp) - motion.frames[0]
+    outside = (index < 0) | (index >= motion.frames.size)
+    if outside.any():
+        which = np.atleast_1d(np.asarray(frame))[np.atleast_1d(outside)][0]
+        raise InputError(
+            f"The motion of the background is not known at frame {which}",
+            advice=f"It is from frame {motion.frames[0]} to {motion.frames[-1]}",
+        )
+    return motion.homography[index]
+
+
+def _through(homography: Array, pixel: Array) -> Array:
+    """(n, 2) through one homography or one for each."""
+    moved = np.einsum("...ij,...j->...i", homography[..., :2], pixel) + homography[..., 2]
+    return moved[..., :2] / moved[..., 2:]
+
+
+def _median(steps: Array) -> Array:
+    known = steps[np.isfinite(steps).all(axis=1)]
+    return np.median(known, axis=0) if len(known) else np.zeros(2)
+
+
+def _lost(frame: int, why: str) -> InputError:
+    return InputError(
+        f"The background cannot be followed into frame {frame}: {why}",
+        advice="Stay within one shot and clear pictures (--from, --to), or say that the camera stands still (--still)",
+    )

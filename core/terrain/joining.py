@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several tiles of a terrain become one surface."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..georeference import GlobalShift
+from ..vectors import Array
+from .surface import Surface
+
+SAME_M = 1e-3
+"""Border points of two tiles that are this close are the same point, as files and single precision round them."""
+SAME_PART = 1e-5
+"""They are never further apart than this part of the whole terrain, so that a small model is not welded shut."""
+
+
+def moved(surface: Surface, shift: GlobalShift) -> Surface:
+    """The same terrain in local coordinates of another shift."""
+    offset = surface.shift.vector - shift.vector
+    if not offset.any():
+        return surface if surface.shift == shift else replace(surface, shift=shift)
+    return replace(surface, vertices=surface.vertices + offset, shift=shift)
+
+
+def join(surfaces: Sequence[Surface]) -> Surface:
+    """One surface of several tiles, in the first one's shift; a single tile is returned as it is.
+
+    Tiles that were cut from one mesh are sewn together again where their borders share points, so that normals and
+    neighbourhoods reach across. Nothing is filled where tiles leave a gap, and tiles that overlap stay two sheets.
+
+    Raises
+    ------
+    InputError : there is no tile.
+    """
+    if not surfaces:
+        raise InputError("There is no terrain to join")
+    if len(surfaces) == 1:
+        return surfaces[0]
+    tiles = [moved(surface, surfaces[0].shift) for surface in surfaces]
+    starts = np.cumsum([0, *(len(tile.vertices) for tile in tiles)])
+    vertices = np.concatenate([tile.vertices for tile in tiles])
+    faces = np.concatenate([tile.faces + np.int32(start) for tile, start in zip(tiles, starts[:-1], strict=True)])
+    same = _same_points(tiles, starts)
+    vertices, faces = _merged(vertices, faces, same)
+    return Surface(vertices, faces, tiles[0].shift, ", ".join(tile.name for tile in tiles))
+
+
+def _same_points(tiles: Sequence[Surface], starts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(p, 2) numbers of border points that are one point of two tiles."""
+    from scipy.spatial import cKDTree
+
+    low = np.min([tile.bounds[0] for tile in tiles], axis=0)
+    high = np.max([tile.bounds[1] for tile in tiles], axis=0)
+    tolerance = min(SAME_M, SAME_PART * float((high - low).max()))
+    number, owner, place = [], [], []
+    for i, tile in enumerate(tiles):
+        near = np.zeros(len(tile.vertices), np.bool_)
+        for j, other in enumerate(tiles):
+            if i != j:
+                first, last = other.bounds + np.array([[-tolerance], [tolerance]])
+                near |= ((tile.vertices >= first) & (tile.vertices <= last)).all(axis=1)
+        which = np.flatnonzero(near & _on_border(tile)) if near.any() else np.empty(0, np.int64)
+        number.append(which + starts[i])
+        owner.append(np.full(len(which), i))
+        place.append(tile.vertices[which])
+    every, tile_of = np.concatenate(number), np.concatenate(owner)
+    if len(every) < 2:
+        return np.empty((0, 2), np.int64)
+    pairs = cKDTree(np.concatenate(place)).query_pairs(tolerance, output_type="ndarray")
+    return every[pairs[tile_of[pairs[:, 0]] != tile_of[pairs[:, 1]]]]
+
+
+def _on_border(surface: Surface) -> NDArray[np.bool_]:
+    border = np.zeros(len(surface.vertices), np.bool_)
+    face, edge = np.nonzero(surface.neighbours == -1)
+    border[surface.faces[face, edge]] = border[surface.faces[face, (edge + 1) % 3]] = True
+    return border
+
+
+def _merged(vertices: Array, faces: NDArray[np.int32], same: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32]]:
+    """Without the second of each pair of points."""
+    if not len(same):
+        return vertices, faces
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(vertices)
+    graph = coo_array((np.ones(len(same), np.bool_), (same[:, 0], same[:, 1])), shape=(n, n))
+    _, group = connected_components(graph, directed=False)
+    _, first = np.unique(group, return_index=True)
+    kept = np.zeros(n, np.bool_)
+    kept[first] = True
+    number = (np.cumsum(kept) - 1).astype(np.int32)
+    faces = number[first[group]][faces]
+    real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return vertices[kept], faces[real]

@@ -17,6 +17,8 @@ TRAIL_GROUP = "Rockfall trail"
 TIME_ATTRIBUTE = "display_time_s"
 SPEED_ATTRIBUTE = "speed_mps"
 SPEED_COLOUR = "speed_colour"
+TICK_ATTRIBUTE = "tick"
+TICK_RADII = 2.2
 RELIEF_COLOUR = "relief"
 
 
@@ -60,15 +62,19 @@ def shaded_material(name: str, attribute: str) -> bpy.types.Material:
 
 
 def trail_group() -> bpy.types.GeometryNodeTree:
-    """Geometry nodes: a polyline with times becomes a tube, wholly or up to the current time.
+    """Geometry nodes: a polyline with times becomes a tube, wholly or up to the current time, with beads at ticks.
 
     The polyline's bare points are joined to the tube because Blender keeps the active colour attribute (which the
     viewport's solid mode shows) from the original mesh alone; its edges would be drawn black.
     """
     existing = bpy.data.node_groups.get(TRAIL_GROUP)
-    if existing is not None:
+    if existing is not None and "Ticks" in existing.interface.items_tree:
         return existing
     group = bpy.data.node_groups.new(TRAIL_GROUP, "GeometryNodeTree")
+    if existing is not None:  # of a file saved before there were ticks
+        existing.user_remap(group)
+        bpy.data.node_groups.remove(existing)
+        group.name = TRAIL_GROUP
     group.is_modifier = True
     interface = group.interface
     interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
@@ -76,6 +82,7 @@ def trail_group() -> bpy.types.GeometryNodeTree:
     radius.subtype, radius.default_value, radius.min_value = "DISTANCE", 0.06, 0.0
     until_now = interface.new_socket("Up to now", in_out="INPUT", socket_type="NodeSocketBool")
     until_now.default_value = False
+    interface.new_socket("Ticks", in_out="INPUT", socket_type="NodeSocketBool").default_value = False
     interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
 
     new, link = group.nodes.new, group.links.new
@@ -115,8 +122,40 @@ def trail_group() -> bpy.types.GeometryNodeTree:
     bare.domain, bare.mode = "EDGE", "EDGE_FACE"
     link(cut.outputs[0], bare.inputs["Geometry"])
     link(bare.outputs[0], join.inputs[0])
+    link(_beads(group, source, cut.outputs[0], material.inputs["Material"].default_value), join.inputs[0])
     link(join.outputs[0], result.inputs[0])
     return group
+
+
+def _beads(
+    group: bpy.types.GeometryNodeTree,
+    source: bpy.types.Node,
+    points: bpy.types.NodeSocket,
+    look: bpy.types.Material,
+) -> bpy.types.NodeSocket:
+    """A bead on each point that is a tick, in the colour of the point."""
+    new, link = group.nodes.new, group.links.new
+    tick, both = new("GeometryNodeInputNamedAttribute"), new("FunctionNodeBooleanMath")
+    tick.data_type, both.operation = "BOOLEAN", "AND"
+    tick.inputs["Name"].default_value = TICK_ATTRIBUTE
+    size, bead = new("ShaderNodeMath"), new("GeometryNodeMeshIcoSphere")
+    size.operation, size.inputs[1].default_value = "MULTIPLY", TICK_RADII
+    instances, real, material = (
+        new("GeometryNodeInstanceOnPoints"),
+        new("GeometryNodeRealizeInstances"),
+        new("GeometryNodeSetMaterial"),
+    )
+    material.inputs["Material"].default_value = look
+    link(tick.outputs["Attribute"], both.inputs[0])
+    link(source.outputs["Ticks"], both.inputs[1])
+    link(source.outputs["Radius"], size.inputs[0])
+    link(size.outputs[0], bead.inputs["Radius"])
+    link(points, instances.inputs["Points"])
+    link(both.outputs[0], instances.inputs["Selection"])
+    link(bead.outputs[0], instances.inputs["Instance"])
+    link(instances.outputs[0], real.inputs[0])
+    link(real.outputs[0], material.inputs[0])
+    return material.outputs[0]
 
 
 def socket_id(group: bpy.types.GeometryNodeTree, name: str) -> str:

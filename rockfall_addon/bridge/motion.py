@@ -17,6 +17,7 @@ from ...core.vectors import Array
 
 DRAG_KEY_STEP_S = 0.1  # with drag the cubic is an approximation: Hermite's error at this step is below 0.1 mm
 JUMP_FRAMES = 1e-3
+CONSTANT, BEZIER = 0, 2  # as the interpolation of keys is numbered
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,33 +69,42 @@ def motion_keys(flights: Flights, which: Array, offset: Array | float = 0.0) -> 
     )
 
 
-def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float) -> None:
-    """Replace an object's location curves by these keys, at frame = time × rate."""
+def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float, *, in_place: bool = False) -> bool:
+    """Replace an object's location curves by these keys, at frame = time × rate.
+
+    in_place : write only when the number of keys stays the same, so that no key is freed while a person drags keys.
+
+    Returns
+    -------
+    Whether the keys were written.
+    """
     frames = keys.time_s * rate
     same = np.flatnonzero(np.diff(frames) < JUMP_FRAMES) + 1  # a jump: two positions at one time
     frames[same] += JUMP_FRAMES
     third = np.diff(frames) / 3
     count = len(frames)
+    if in_place and [len(curve.keyframe_points) for curve in location_curves(thing)] != [count] * 3:
+        return False
+    interpolation = np.where(keys.held, CONSTANT, BEZIER).astype(np.int32)
     bag = _channelbag(thing)
     for axis in range(3):
-        old = bag.fcurves.find("location", index=axis)
-        if old is not None:
-            bag.fcurves.remove(old)
-        curve = bag.fcurves.new("location", index=axis)
-        curve.keyframe_points.add(count)
+        curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
+        points = curve.keyframe_points
+        if len(points) != count:
+            points.clear()
+            points.add(count)
         value = keys.position[:, axis]
         left, right = np.column_stack([frames, value]), np.column_stack([frames, value])
         right[:-1] += np.column_stack([third, third / rate * keys.velocity_after[:-1, axis]])
         left[1:] -= np.column_stack([third, third / rate * keys.velocity_before[1:, axis]])
-        points = curve.keyframe_points
         points.foreach_set("co", np.column_stack([frames, value]).ravel())
         points.foreach_set("handle_left_type", np.zeros(count, dtype=np.int32))
         points.foreach_set("handle_right_type", np.zeros(count, dtype=np.int32))
         points.foreach_set("handle_left", left.ravel())
         points.foreach_set("handle_right", right.ravel())
-        for index in np.flatnonzero(keys.held):
-            points[int(index)].interpolation = "CONSTANT"
+        points.foreach_set("interpolation", interpolation)
         curve.update()
+    return True
 
 
 def write_visibility_keys(thing: bpy.types.Object, spans_s: Sequence[tuple[float, float]], rate: float) -> None:
@@ -118,9 +128,24 @@ def key_location_once(thing: bpy.types.Object, frame: float) -> None:
     bag = _channelbag(thing)
     for axis in range(3):
         curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
-        curve.keyframe_points.clear()
-        curve.keyframe_points.insert(frame, thing.location[axis], options={"FAST"})
+        points = curve.keyframe_points
+        if len(points) == 1:
+            points[0].co = (frame, thing.location[axis])
+        else:
+            points.clear()
+            points.insert(frame, thing.location[axis], options={"FAST"})
         curve.update()
+
+
+def location_curves(thing: bpy.types.Object) -> list[bpy.types.FCurve]:
+    """The curves that move an object, as many as there are."""
+    animation = thing.animation_data
+    action = animation.action if animation is not None else None
+    if action is None or not action.layers or not action.layers[0].strips or animation.action_slot is None:
+        return []
+    bag = action.layers[0].strips[0].channelbag(animation.action_slot)
+    found = [bag.fcurves.find("location", index=axis) for axis in range(3)] if bag is not None else []
+    return [curve for curve in found if curve is not None]
 
 
 def _channelbag(thing: bpy.types.Object) -> bpy.types.ActionChannelbag:
@@ -129,7 +154,11 @@ def _channelbag(thing: bpy.types.Object) -> bpy.types.ActionChannelbag:
         action = bpy.data.actions.new(thing.name)
         animation.action = action
         animation.action_slot = action.slots.new(id_type="OBJECT", name=thing.name)
+    elif animation.action.users - animation.action.use_fake_user > 1:  # of a linked duplicate
+        animation.action = animation.action.copy()
     action, slot = animation.action, animation.action_slot
+    if slot is None:
+        slot = animation.action_slot = next(iter(action.slots), None) or action.slots.new("OBJECT", thing.name)
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
     return strip.channelbag(slot, ensure=True)

@@ -1,17 +1,37 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Picks: one object each, placed on the terrain and keyed at its time.
 
-The doubles are kept as ID properties. An object that was moved by hand wins over them: its place is the pick's.
+The doubles are kept as ID properties, beside the frame at which the key was written. A person edits a pick by moving
+its object (its place differs from the kept one) or its key (the frame differs); `read` sees the edit at once, `absorb`
+makes it the pick's state.
 """
 
 import uuid
+from collections.abc import Iterable, Mapping, Sequence
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Quaternion, Vector
 
 from ...core.reconstruction.picks import Picks, make_picks
+from ...core.terrain.raycast import closest_points
+from ...core.terrain.surface import Surface
+from ...core.vectors import Array
 from . import materials, motion, state, timing
+
+ID_KEY, TRAJECTORY_KEY, TIME_KEY = "rockfall_id", "rockfall_trajectory", "rockfall_time_s"
+POSITION_KEY, KIND_KEY, STATUS_KEY = "rockfall_position_m", "rockfall_kind", "rockfall_status"
+NORMAL_KEY, EXTRA_KEY, ROW_KEY = "rockfall_normal", "rockfall_extra", "rockfall_row"
+SIGMA_TIME_KEY, SIGMA_POSITION_KEY = "rockfall_sigma_time_s", "rockfall_sigma_position_m"
+SPIN_KEY = "rockfall_angular_velocity_radps"
+KEY_FRAME_KEY = "rockfall_key_frame"
+PICK_SHIFT_KEY = "rockfall_pick_shift_m"
+SOURCE_KEY = "rockfall_picks_source"
+
+CONFIDENCE_SIGMA_M = {1: 0.50, 2: 0.20, 3: 0.05}
+"""Standard deviation that a person's confidence in a place stands for, where the pick has none of its own [m]."""
+SAME_FRAME = 1e-3
+"""Keys nearer than this have not been moved [frames]."""
 
 MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler than any model's colour
     "impact": (0.95, 0.95, 0.95),
@@ -23,85 +43,279 @@ MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler th
 MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the rough surface
 
 
+def things_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
+    """The objects of the picks, all or those of some trajectories, in no order."""
+    names = None if trajectories is None else set(trajectories)
+    return [
+        thing
+        for thing in scene.objects
+        if thing.get(state.ROLE_KEY) == state.PICK_ROLE
+        and TRAJECTORY_KEY in thing
+        and (names is None or thing[TRAJECTORY_KEY] in names)
+    ]
+
+
+def with_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
+    """The pick with an id."""
+    return next((thing for thing in things_of(scene) if thing.get(ID_KEY) == identifier), None)
+
+
 def show_picks(
     scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offsets: dict[str, float], radius_m: float
-) -> None:
+) -> list[bpy.types.Object]:
     """Bring the picks' objects in line; a pick that is there already (by trajectory and time) keeps its object and id.
 
     normals : (n, 3) directions of the discs, NaN rows lie flat.
-    offsets : from `timing.display_offsets`.
+    offsets : from `timing.offsets_of`.
+
+    Returns
+    -------
+    The object of each pick.
     """
-    there = {(o["rockfall_trajectory"], o["rockfall_time_s"]): o for o in state.with_role(scene, state.PICK_ROLE)}
-    rate = timing.frame_rate(scene)
+    kept_rate = timing.keyed_rate(scene)
+    there = {(o[TRAJECTORY_KEY], time_of(o, kept_rate)): o for o in things_of(scene)}
+    rate, shown = timing.frame_rate(scene), []
     for i in range(len(picks.time_s)):
-        trajectory, kind = str(picks.trajectory[i]), str(picks.kind[i])
-        thing = there.pop((trajectory, float(picks.time_s[i])), None)
+        trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
+        thing = there.pop((trajectory, time), None)
         if thing is None:
             number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
-            thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
-            thing["rockfall_id"] = uuid.uuid4().hex
-            state.collection(scene, "Trajectories", trajectory).objects.link(thing)
-        thing.data = _marker(kind)
-        normal = Vector(normals[i]) if np.isfinite(normals[i]).all() else Vector((0.0, 0.0, 1.0))
-        thing.rotation_mode = "QUATERNION"
-        thing.rotation_quaternion = normal.to_track_quat("Z", "Y")
-        thing.scale = (radius_m, radius_m, radius_m)
-        thing.location = picks.position[i]
-        thing[state.ROLE_KEY] = state.PICK_ROLE
-        thing["rockfall_trajectory"] = trajectory
-        thing["rockfall_time_s"] = float(picks.time_s[i])
-        thing["rockfall_position_m"] = picks.position[i].tolist()
-        thing["rockfall_kind"], thing["rockfall_status"] = kind, str(picks.status[i])
-        thing["rockfall_row"] = int(picks.row[i])
+            thing = _new(scene, trajectory, kind, number)
+        thing[TRAJECTORY_KEY], thing[TIME_KEY] = trajectory, time
+        thing[POSITION_KEY] = picks.position[i].tolist()
+        thing[KIND_KEY], thing[STATUS_KEY] = kind, str(picks.status[i])
+        thing[ROW_KEY] = int(picks.row[i])
         for key, value in (
-            ("rockfall_normal", picks.normal[i]),
-            ("rockfall_angular_velocity_radps", picks.angular_velocity[i]),
-            ("rockfall_sigma_time_s", picks.sigma_time_s[i : i + 1]),
-            ("rockfall_sigma_position_m", picks.sigma_position_m[i : i + 1]),
+            (NORMAL_KEY, picks.normal[i]),
+            (SPIN_KEY, picks.angular_velocity[i]),
+            (SIGMA_TIME_KEY, picks.sigma_time_s[i : i + 1]),
+            (SIGMA_POSITION_KEY, picks.sigma_position_m[i : i + 1]),
         ):
             if np.isfinite(value).all():
                 thing[key] = value.tolist()
             elif key in thing:
                 del thing[key]
-        thing["rockfall_extra"] = {name: str(values[i]) for name, values in picks.extra.items()}
-        motion.key_location_once(thing, (float(picks.time_s[i]) - offsets[trajectory]) * rate)
+        extra = {name: str(values[i]) for name, values in picks.extra.items()}
+        if EXTRA_KEY not in thing or thing[EXTRA_KEY].to_dict() != extra:
+            thing[EXTRA_KEY] = extra
+        thing[PICK_SHIFT_KEY] = picks.shift.vector.tolist()
+        pose(thing, normals[i], (time - offsets[trajectory]) * rate, radius_m)
+        shown.append(thing)
     state.remove_objects(list(there.values()))
-    scene["rockfall_picks_source"] = picks.source
+    scene[SOURCE_KEY] = picks.source
+    return shown
+
+
+def add_pick(
+    scene: bpy.types.Scene,
+    trajectory: str,
+    time_s: float,
+    position_m: Sequence[float] | Array,
+    *,
+    kind: str = "impact",
+    status: str = "ok",
+    extra: Mapping[str, str] | None = None,
+) -> bpy.types.Object:
+    """A new pick at a local place; `live.sync` then makes the trajectory follow."""
+    number = len(things_of(scene, [trajectory])) + 1
+    thing = _new(scene, trajectory, kind, number)
+    thing[TRAJECTORY_KEY], thing[TIME_KEY], thing[ROW_KEY] = trajectory, float(time_s), 0
+    thing[POSITION_KEY] = [float(value) for value in position_m]
+    thing[KIND_KEY], thing[STATUS_KEY] = kind, status
+    thing[EXTRA_KEY] = dict(extra or {})
+    thing[PICK_SHIFT_KEY] = state.read_shift(scene).vector.tolist()
+    offset = timing.offset_of(scene, trajectory, float(time_s))
+    frame = (float(time_s) - offset) * timing.frame_rate(scene)
+    pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m)
+    return thing
+
+
+def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float) -> None:
+    """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay."""
+    marker = _marker(thing[KIND_KEY])
+    if thing.data is not marker:
+        thing.data = marker
+    up = Vector(normal) if np.isfinite(normal).all() else Vector((0.0, 0.0, 1.0))
+    turn = up.to_track_quat("Z", "Y")
+    if thing.rotation_mode != "QUATERNION":
+        thing.rotation_mode = "QUATERNION"
+    if (Quaternion(thing.rotation_quaternion) - turn).magnitude > 1e-6:
+        thing.rotation_quaternion = turn
+    if (thing.scale - Vector((radius_m,) * 3)).length > 1e-6 * radius_m:
+        thing.scale = (radius_m,) * 3
+    place = list(thing[POSITION_KEY])
+    if not _same_place(thing.location, place):
+        thing.location = place
+    if not _keyed_at(thing, frame):
+        motion.key_location_once(thing, frame)
+    thing[KEY_FRAME_KEY] = float(np.float32(frame))
 
 
 def picks_of(scene: bpy.types.Scene) -> Picks:
-    """The picks as they stand in the scene: trajectories in the order of their starts."""
-    things = state.with_role(scene, state.PICK_ROLE)
+    """The picks as they stand in the scene: trajectories in the order of their starts.
+
+    Raises
+    ------
+    InputError : two picks of a trajectory at one time, and whatever else `make_picks` refuses.
+    """
+    return read(scene, ordered(scene, things_of(scene)))
+
+
+def ordered(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Trajectories in the order of their starts, the picks of each in the order of time."""
+    rate = timing.keyed_rate(scene)
+    rows = [(thing[TRAJECTORY_KEY], time_of(thing, rate), thing) for thing in things]
     started: dict[str, float] = {}
-    for thing in things:
-        name, time = thing["rockfall_trajectory"], thing["rockfall_time_s"]
+    for name, time, _ in rows:
         started[name] = min(time, started.get(name, time))
-    things.sort(key=lambda o: (started[o["rockfall_trajectory"]], o["rockfall_trajectory"], o["rockfall_time_s"]))
-    names = list(dict.fromkeys(name for o in things for name in o["rockfall_extra"]))
+    rows.sort(key=lambda row: (started[row[0]], row[0], row[1]))
+    return [thing for _, _, thing in rows]
+
+
+def read(
+    scene: bpy.types.Scene,
+    things: Sequence[bpy.types.Object],
+    surface: Surface | None = None,
+    reach_m: float = 0.0,
+) -> Picks:
+    """The picks of these objects, which are in order, with what a person is just doing to them.
+
+    surface, reach_m : see `resting_place`; without a surface a moved pick is where its object is.
+    """
+    rate = timing.keyed_rate(scene)
+    extras = [thing[EXTRA_KEY].to_dict() if EXTRA_KEY in thing else {} for thing in things]
+    names = list(dict.fromkeys(name for extra in extras for name in extra))
     return make_picks(
-        [o["rockfall_trajectory"] for o in things],
-        [o["rockfall_time_s"] for o in things],
-        [_position(o) for o in things],
-        kind=[o["rockfall_kind"] for o in things],
-        status=[o["rockfall_status"] for o in things],
-        normal=_doubles(things, "rockfall_normal", 3),
-        sigma_time_s=_doubles(things, "rockfall_sigma_time_s", 1),
-        sigma_position_m=_doubles(things, "rockfall_sigma_position_m", 1),
-        angular_velocity=_doubles(things, "rockfall_angular_velocity_radps", 3),
-        row=[o["rockfall_row"] for o in things],
-        extra={n: np.array([str(o["rockfall_extra"].get(n, "")) for o in things], dtype=np.str_) for n in names},
-        source=str(scene.get("rockfall_picks_source", "")),
+        [thing[TRAJECTORY_KEY] for thing in things],
+        [time_of(thing, rate) for thing in things],
+        [resting_place(thing, surface, reach_m) for thing in things],
+        kind=[thing[KIND_KEY] for thing in things],
+        status=[thing[STATUS_KEY] for thing in things],
+        normal=[
+            [np.nan] * 3 if NORMAL_KEY not in thing or (surface is not None and moved(thing)) else list(thing[NORMAL_KEY])
+            for thing in things
+        ],
+        sigma_time_s=_doubles(things, SIGMA_TIME_KEY, 1),
+        sigma_position_m=_doubles(things, SIGMA_POSITION_KEY, 1),
+        angular_velocity=_doubles(things, SPIN_KEY, 3),
+        row=[thing.get(ROW_KEY, 0) for thing in things],
+        extra={name: np.array([str(extra.get(name, "")) for extra in extras], dtype=np.str_) for name in names},
+        source=str(scene.get(SOURCE_KEY, "")),
         shift=state.read_shift(scene),
         sort=True,
     )
 
 
-def _position(thing: bpy.types.Object) -> np.ndarray:
-    stored, place = np.array(thing["rockfall_position_m"]), np.array(thing.location)
-    return stored if np.array_equal(stored.astype(np.float32), place.astype(np.float32)) else place
+def moved(thing: bpy.types.Object) -> bool:
+    """Whether the object is elsewhere than the pick."""
+    return not _same_place(thing.location, thing[POSITION_KEY])
 
 
-def _doubles(things: list[bpy.types.Object], key: str, width: int) -> np.ndarray:
+def frames_moved(thing: bpy.types.Object) -> float:
+    """How far the key was moved in time since it was written [frames]; keys that were added do not count."""
+    kept = thing.get(KEY_FRAME_KEY)
+    if kept is None:
+        return 0.0
+    for curve in motion.location_curves(thing):
+        frames = [point.co[0] for point in curve.keyframe_points]
+        if frames:
+            nearest = min((frame - kept for frame in frames), key=abs)
+            if abs(nearest) > max(SAME_FRAME, 4e-7 * abs(kept)):
+                return nearest
+    return 0.0
+
+
+def time_of(thing: bpy.types.Object, rate: float) -> float:
+    """The pick's time on the common clock [s], with the edit of its key. `rate` is the one that the keys have."""
+    shift = frames_moved(thing)
+    return float(thing[TIME_KEY]) + (shift / rate if shift else 0.0)
+
+
+def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> Array:
+    """(3,) where the pick is, with the edit of its object.
+
+    A pick that was on the terrain, that is nearer to it than `reach_m`, stays on it: it is moved along the terrain, to
+    the point closest to its object. A pass is a point in the air and goes where it is put.
+    """
+    stored = np.array(thing[POSITION_KEY])
+    if not moved(thing):
+        return stored
+    place = np.array(thing.location, dtype=np.float64)
+    if surface is None or thing[KIND_KEY] == "pass":
+        return place
+    near = closest_points(surface, np.stack([stored, place]))
+    return near.point[1] if near.distance[0] <= reach_m else place
+
+
+def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> bool:
+    """Make what a person did to the object the state of the pick; True when there was something.
+
+    On another place the terrain has another normal: one that came with the pick is dropped where there is a terrain.
+    """
+    changed = False
+    frames = frames_moved(thing)
+    if frames:
+        thing[TIME_KEY] = float(thing[TIME_KEY]) + frames / timing.keyed_rate(scene)
+        thing[KEY_FRAME_KEY] = float(thing[KEY_FRAME_KEY]) + frames
+        changed = True
+    if moved(thing):
+        thing[POSITION_KEY] = resting_place(thing, surface, reach_m).tolist()
+        if surface is not None and NORMAL_KEY in thing:
+            del thing[NORMAL_KEY]
+        changed = True
+    return changed
+
+
+def trusted(picks: Picks) -> Picks:
+    """The picks with the standard deviation that their confidence stands for, where they have none of their own."""
+    from dataclasses import replace
+
+    if "confidence" not in picks.extra:
+        return picks
+    sigma = picks.sigma_position_m.copy()
+    for i, text in enumerate(picks.extra["confidence"].tolist()):
+        if np.isnan(sigma[i]) and text.isdecimal():
+            sigma[i] = CONFIDENCE_SIGMA_M.get(int(text), np.nan)
+    return replace(picks, sigma_position_m=sigma)
+
+
+def set_extra(thing: bpy.types.Object, name: str, text: str) -> None:
+    """Keep a further column of the pick, such as its note; an empty one is dropped."""
+    extra = thing[EXTRA_KEY].to_dict() if EXTRA_KEY in thing else {}
+    extra.pop(name, None)
+    thing[EXTRA_KEY] = extra | ({name: text} if text else {})
+
+
+def extra_of(thing: bpy.types.Object, name: str) -> str:
+    """A further column of the pick as text."""
+    return str(thing[EXTRA_KEY].get(name, "")) if EXTRA_KEY in thing else ""
+
+
+def _new(scene: bpy.types.Scene, trajectory: str, kind: str, number: int) -> bpy.types.Object:
+    thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
+    thing[state.ROLE_KEY], thing[ID_KEY] = state.PICK_ROLE, uuid.uuid4().hex
+    state.collection(scene, "Trajectories", trajectory).objects.link(thing)
+    return thing
+
+
+def _same_place(location: Vector, stored: Sequence[float]) -> bool:
+    """Whether a single-precision place is that of these doubles."""
+    return Vector(stored) == location if len(location) == 3 else False
+
+
+def _keyed_at(thing: bpy.types.Object, frame: float) -> bool:
+    """Whether the object has the one key that it should have."""
+    curves = list(motion.location_curves(thing))
+    wanted = float(np.float32(frame))
+    return len(curves) == 3 and all(
+        len(curve.keyframe_points) == 1
+        and curve.keyframe_points[0].co[0] == wanted
+        and curve.keyframe_points[0].co[1] == thing.location[curve.array_index]
+        for curve in curves
+    )
+
+
+def _doubles(things: Sequence[bpy.types.Object], key: str, width: int) -> np.ndarray:
     rows = [list(o[key]) if key in o else [np.nan] * width for o in things]
     return np.array(rows, dtype=np.float64).reshape(-1, width)
 

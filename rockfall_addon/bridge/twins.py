@@ -59,7 +59,7 @@ def show_twins(
     twins = find_twins(scene, result, models)
     _remove_objects(scene)
     scene[MODELS_KEY] = " ".join(twins.models)
-    offsets = timing.display_offsets(result.picks, scene.rockfall.playback == "REAL", scene.rockfall.stagger_s)
+    offsets = timing.shown_offsets(scene, result.picks)
     begin_s = twins.time_s - np.array([offsets[name] for name in twins.trajectory.tolist()])
     blocks = {thing["rockfall_trajectory"]: thing for thing in state.with_role(scene, state.BLOCK_ROLE)}
     for model in twins.models:

@@ -24,6 +24,7 @@ COMMANDS = {
     "merge": "impact tables of several sites → one table with its sources, impacts.csv and datapackage.json",
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
     "terrain": "any terrain file → terrain.ply, and what there is to know about it",
+    "inspect": "what a video file really contains, with advice",
     "render": "the animation of a project, through Blender",
 }
 """Name → help; the module of the same name in `commands` does it."""

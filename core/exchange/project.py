@@ -5,17 +5,15 @@ Paths are relative to the file. Keys and sections that this version does not kno
 written again, so that an older Rockfall does not lose what a newer one has stored.
 """
 
-import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..georeference import GlobalShift
+from .toml_text import TomlTable, Vector3, read_toml
 
 SCHEMA = 1
 ENGINES = ("auto", "cycles", "eevee", "workbench")
@@ -25,7 +23,6 @@ FREE = ("camera", "clock", "drag", "gravity")
 LOSSES = ("huber", "cauchy", "linear")
 
 Extra = Mapping[str, Any]
-Vector3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -224,7 +221,7 @@ def read_project(path: str | Path) -> Project:
         terrain or table that is not there. The message names the file, the key and what to do.
     """
     path = Path(path)
-    top = _Table(_load(path), "", path)
+    top = TomlTable(read_toml(path, "project"), "", path)
     _check_schema(top)
     site, terrain, picks = top.table("site"), top.table("terrain"), top.table("picks")
     block = _block(top.table("block"), BlockEntry(), named=False)
@@ -300,28 +297,7 @@ def _files_as(relative: Callable[[Path], str], values: dict[str, Any]) -> dict[s
     return {key: relative(value) if isinstance(value, Path) else value for key, value in values.items()}
 
 
-def _load(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(
-            f"The project cannot be read ({error.strerror})", file=path, advice="Check the path"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise InputError("The project is not UTF-8 text", file=path, advice="Save it as UTF-8") from error
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        row = re.search(r"line (\d+)", str(error))
-        raise InputError(
-            f"This is not valid TOML: {error}",
-            file=path,
-            row=int(row[1]) if row else text.count("\n") + 1,
-            advice="Text stands in quotation marks, a section's name in square brackets",
-        ) from error
-
-
-def _check_schema(top: "_Table") -> None:
+def _check_schema(top: TomlTable) -> None:
     schema = top.take("schema")
     if schema is None:
         raise top.wrong("schema", "is missing", f"Start the file with: schema = {SCHEMA}")
@@ -335,7 +311,7 @@ def _check_schema(top: "_Table") -> None:
         )
 
 
-def _terrain(table: "_Table") -> TerrainSource:
+def _terrain(table: TomlTable) -> TerrainSource:
     return TerrainSource(
         file=table.path("file"),
         shift=table.optional_vector("shift"),
@@ -346,7 +322,7 @@ def _terrain(table: "_Table") -> TerrainSource:
     )
 
 
-def _block(table: "_Table", default: BlockEntry, named: bool) -> BlockEntry:
+def _block(table: TomlTable, default: BlockEntry, named: bool) -> BlockEntry:
     return BlockEntry(
         name=table.text("name") if named else "",
         d1_m=table.number("d1_m", default.d1_m),
@@ -357,7 +333,7 @@ def _block(table: "_Table", default: BlockEntry, named: bool) -> BlockEntry:
     )
 
 
-def _reconstruction(table: "_Table") -> ReconstructionSettings:
+def _reconstruction(table: TomlTable) -> ReconstructionSettings:
     return ReconstructionSettings(
         normal_radius_m=table.optional_number("normal_radius_m"),
         gravity_mps2=table.number("gravity_mps2", GRAVITY_MPS2),
@@ -369,7 +345,7 @@ def _reconstruction(table: "_Table") -> ReconstructionSettings:
     )
 
 
-def _video(table: "_Table") -> VideoEntry:
+def _video(table: TomlTable) -> VideoEntry:
     file = table.path("file", anywhere=True) if table.has("file") else None
     entry = VideoEntry(
         name=table.text("name") if file is None or table.has("name") else file.stem,
@@ -390,7 +366,7 @@ def _video(table: "_Table") -> VideoEntry:
     return entry
 
 
-def _refinement(table: "_Table") -> RefinementSettings:
+def _refinement(table: TomlTable) -> RefinementSettings:
     return RefinementSettings(
         free=table.choices("free", FREE),
         sigma_terrain_m=table.optional_number("sigma_terrain_m"),
@@ -399,7 +375,7 @@ def _refinement(table: "_Table") -> RefinementSettings:
     )
 
 
-def _preset(table: "_Table") -> RenderPreset:
+def _preset(table: TomlTable) -> RenderPreset:
     camera = table.table("camera")
     return RenderPreset(
         name=table.text("name"),
@@ -414,124 +390,8 @@ def _preset(table: "_Table") -> RenderPreset:
     )
 
 
-def _camera(table: "_Table") -> CameraPlacement:
+def _camera(table: TomlTable) -> CameraPlacement:
     fov_deg = table.number("fov_deg", 40.0)
     if fov_deg >= 180.0:
         raise table.wrong("fov_deg", f"is {fov_deg:g}", "Give the horizontal angle of view, below 180")
     return CameraPlacement(table.vector("position"), table.vector("target"), fov_deg, table.rest())
-
-
-_REQUIRED: Any = object()
-
-
-class _Table:
-    """One TOML table being read: keys are taken out with a check of their type, what is left over is unknown."""
-
-    def __init__(self, content: dict[str, Any] | None, place: str, file: Path) -> None:
-        self.absent = content is None
-        self._content, self._place, self._file = dict(content or {}), place, file
-
-    def wrong(self, key: str, problem: str, advice: str) -> InputError:
-        return InputError(f"{self._place}{key} {problem}", file=self._file, advice=advice)
-
-    def take(self, key: str) -> Any:
-        return self._content.pop(key, None)
-
-    def has(self, key: str) -> bool:
-        return key in self._content
-
-    def rest(self) -> dict[str, Any]:
-        return dict(self._content)
-
-    def _taken(self, key: str, default: Any, wanted: str) -> Any:
-        value = self.take(key)
-        if value is None:
-            if default is _REQUIRED:
-                raise self.wrong(key, "is missing", f"Give {wanted}")
-            return default
-        return value
-
-    def text(self, key: str, default: Any = _REQUIRED) -> str:
-        value = self._taken(key, default, "a text in quotation marks")
-        if not isinstance(value, str):
-            raise self.wrong(key, f"is {value!r}, not a text", "Put it in quotation marks")
-        if default is _REQUIRED and not value:
-            raise self.wrong(key, "is empty", "Give a name")
-        return value
-
-    def choice(self, key: str, known: tuple[str, ...], default: str) -> str:
-        value = self.text(key, default)
-        if value not in known:
-            raise self.wrong(key, f"is {value!r}", f"Choose one of {', '.join(known)}")
-        return value
-
-    def choices(self, key: str, known: tuple[str, ...]) -> tuple[str, ...]:
-        value = self._taken(key, [], "a list")
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self.wrong(key, f"is {value!r}, not a list of texts", f'Write a list, such as ["{known[0]}"]')
-        for item in value:
-            if item not in known:
-                raise self.wrong(key, f"has {item!r}", f"Choose from {', '.join(known)}")
-        return tuple(dict.fromkeys(value))
-
-    def flag(self, key: str, default: bool) -> bool:
-        value = self._taken(key, default, "true or false")
-        if not isinstance(value, bool):
-            raise self.wrong(key, f"is {value!r}", "Write true or false, without quotation marks")
-        return value
-
-    def signed(self, key: str, default: float) -> float:
-        value = self._taken(key, default, "a number")
-        if not _is_number(value):
-            raise self.wrong(key, f"is {value!r}, not a number", "Write a number without quotation marks")
-        return float(value)
-
-    def number(self, key: str, default: float, zero_allowed: bool = False) -> float:
-        value = self.signed(key, default)
-        if value < 0.0 or (value == 0.0 and not zero_allowed):
-            raise self.wrong(key, f"is {value:g}", f"Give a number {'not below' if zero_allowed else 'above'} zero")
-        return value
-
-    def optional_number(self, key: str, zero_allowed: bool = False) -> float | None:
-        return self.number(key, _REQUIRED, zero_allowed) if key in self._content else None
-
-    def whole(self, key: str, default: int) -> int:
-        value = self._taken(key, default, "a whole number")
-        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-            raise self.wrong(key, f"is {value!r}", "Give a whole number above zero")
-        return value
-
-    def vector(self, key: str) -> Vector3:
-        value = self._taken(key, _REQUIRED, "three numbers, [x, y, z]")
-        if not isinstance(value, list) or len(value) != 3 or not all(_is_number(item) for item in value):
-            raise self.wrong(key, f"is {value!r}", "Give three numbers, [x, y, z]")
-        x, y, z = (float(item) for item in value)
-        return x, y, z
-
-    def optional_vector(self, key: str) -> Vector3 | None:
-        return self.vector(key) if key in self._content else None
-
-    def path(self, key: str, anywhere: bool = False) -> Path:
-        """A file; it must be there unless it may be `anywhere`."""
-        file = self._file.parent / self.text(key)
-        if not (anywhere or file.is_file()):
-            raise self.wrong(key, f"names a file that is not there: {file}", "Paths are relative to the project file")
-        return file
-
-    def table(self, key: str) -> "_Table":
-        value = self.take(key)
-        if value is not None and not isinstance(value, dict):
-            raise self.wrong(key, f"is {value!r}, not a section", f"Write a section: [{self._place}{key}]")
-        return _Table(value, f"{self._place}{key}.", self._file)
-
-    def tables(self, key: str) -> list["_Table"]:
-        value = self.take(key)
-        if value is None:
-            return []
-        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
-            raise self.wrong(key, "is not a list of sections", f"Write one section for each: [[{key}]]")
-        return [_Table(item, f"{key} {number}: ", self._file) for number, item in enumerate(value, 1)]
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""camera.toml and the pairs it is solved from. Positions in files are survey coordinates."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..camera.model import Camera
+from ..camera.motion import MovingCamera
+from ..errors import InputError
+from ..georeference import GlobalShift
+from ..reconstruction.picks import Indices, Mask, Names
+from ..vectors import Array
+from .csv_text import read_table
+from .tables import POSITION, Columns, vector_columns, write_columns
+from .toml_text import TomlTable, read_toml
+
+LENS = ("k1", "k2", "k3", "p1", "p2")
+SAME_ROTATION = 1e-6
+"""Rows this close to unit length and right angles are taken as they are: rounding."""
+NEAR_ROTATION = 1e-3
+"""Rows this close are a rotation that was written with few decimals: the nearest rotation is taken."""
+
+PAIRS_REQUIRED = ("u_px", "v_px", *POSITION)
+PAIRS_KNOWN = (*PAIRS_REQUIRED, "name", "pair", "frame", "sigma_px", "sigma_m", "used")
+NO = ("0", "no", "false")
+YES = ("", "1", "yes", "true")
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFile:
+    """What camera.toml holds.
+
+    Attributes
+    ----------
+    camera : the view, with a pose for each frame if it moves.
+    rmse_px : of the pairs it was solved from; None when unknown.
+    sigma : standard deviations by name: those of `INTRINSICS` in their units, x, y, z [m], omega, phi, kappa [rad].
+    crs : coordinate reference system of the position, empty when unknown.
+    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path; None when unknown.
+    extra : keys that this version does not know.
+    """
+
+    camera: MovingCamera
+    rmse_px: float | None = None
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    crs: str = ""
+    pose_covariance: Array | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """n pixels and the points of the terrain that are seen there.
+
+    Attributes
+    ----------
+    pixel : (n, 2) [px].
+    point : (n, 3) local [m].
+    name : (n,) for people; the number of the row where none is given.
+    frame : (n,) of the video, −1 where not given.
+    sigma_px, sigma_m : (n,) standard deviations of a coordinate; NaN where not given.
+    used : (n,) False for pairs that are only to be checked.
+    row : (n,) in a text editor.
+    source : the file.
+    shift : of the local frame.
+    """
+
+    pixel: Array
+    point: Array
+    name: Names
+    frame: Indices
+    sigma_px: Array
+    sigma_m: Array
+    used: Mask
+    row: Indices
+    source: Path
+    shift: GlobalShift
+
+    def __len__(self) -> int:
+        return len(self.pixel)
+
+    def error(self, index: int, problem: str, advice: str) -> InputError:
+        """An `InputError` that points at one pair."""
+        return InputError(problem, file=self.source, row=int(self.row[index]), advice=advice)
+
+
+def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFile:
+    """Read camera.toml.
+
+    Parameters
+    ----------
+    shift : of the local frame (the terrain's); None takes the shift proposed for the camera's position.
+
+    Raises
+    ------
+    InputError : a key that is missing or wrong, a rotation that is none, frames that do not ascend.
+    """
+    path = Path(path)
+    top = TomlTable(read_toml(path, "camera"), "", path)
+    crs = top.text("crs", "")
+    survey = top.numbers("position", (3,))
+    shift = shift if shift is not None else GlobalShift.proposed(survey, survey, crs)
+    numbers = {name: top.number(name) for name in ("fx", "fy")}
+    numbers |= {name: top.signed(name) for name in ("cx", "cy")} | {name: top.signed(name, 0.0) for name in LENS}
+    camera = Camera(
+        width=top.whole("width"),
+        height=top.whole("height"),
+        position=shift.to_local(survey),
+        rotation=_rotation(top),
+        shift=shift,
+        **numbers,
+    )
+    moving = _path(top, camera)
+    rmse = top.optional_number("rmse_px", zero_allowed=True)
+    sigma = top.table("sigma")
+    covariance = top.numbers("pose_covariance", (6, 6)) if top.has("pose_covariance") else None
+    if covariance is not None and not _is_covariance(covariance):
+        raise top.wrong("pose_covariance", "is not symmetric and positive", "Remove it, or solve the camera again")
+    return CameraFile(
+        camera=moving,
+        rmse_px=rmse,
+        sigma={name: sigma.number(name, 0.0, zero_allowed=True) for name in sigma.rest()},
+        crs=crs,
+        pose_covariance=covariance,
+        extra=top.rest(),
+    )
+
+
+def write_camera(
+    path: str | Path,
+    camera: MovingCamera,
+    *,
+    rmse_px: float | None = None,
+    sigma: Mapping[str, float] | None = None,
+    crs: str = "",
+    pose_covariance: Array | None = None,
+    extra: Mapping[str, Any] | None = None,
+) -> None:
+    """Write camera.toml, each number so that it reads back as the same double; see `CameraFile`."""
+    import tomli_w
+
+    one = camera.camera
+    to_survey = one.shift.to_survey
+    content: dict[str, Any] = {"width": one.width, "height": one.height}
+    content |= {name: float(getattr(one, name)) for name in ("fx", "fy", "cx", "cy", *LENS)}
+    content |= {"position": to_survey(one.position).tolist(), "rotation": one.rotation.tolist()}
+    if rmse_px is not None and np.isfinite(rmse_px):
+        content["rmse_px"] = float(rmse_px)
+    if crs or one.shift.crs:
+        content["crs"] = crs or one.shift.crs
+    if pose_covariance is not None and np.isfinite(pose_covariance).all():
+        content["pose_covariance"] = np.asarray(pose_covariance, dtype=np.float64).tolist()
+    if known := {name: float(value) for name, value in (sigma or {}).items() if np.isfinite(value)}:
+        content["sigma"] = known
+    if not camera.is_fixed:
+        content["frame"] = [
+            {"time_s": time, "position": position, "rotation": rotation}
+            | ({"sigma_position_m": metres} if metres else {})
+            | ({"sigma_rotation_rad": radians} if radians else {})
+            for time, position, rotation, metres, radians in zip(
+                camera.time_s.tolist(),
+                to_survey(camera.position).tolist(),
+                camera.rotation.tolist(),
+                camera.sigma_position_m.tolist(),
+                camera.sigma_rotation.tolist(),
+                strict=True,
+            )
+        ]
+    Path(path).write_text(tomli_w.dumps(content | dict(extra or {})), encoding="utf-8", newline="\n")
+
+
+def read_pairs(path: str | Path, shift: GlobalShift | None = None) -> Pairs:
+    """Read pairs.csv: pixels and the terrain points seen there.
+
+    Parameters
+    ----------
+    shift : of the local frame (the terrain's); None takes the shift proposed for the points.
+
+    Raises
+    ------
+    InputError : anything that is wrong with the table, with the row.
+    """
+    table = read_table(path, PAIRS_REQUIRED, PAIRS_KNOWN)
+    survey = table.vectors(POSITION, required=True)
+    shift = shift if shift is not None else GlobalShift.proposed(survey.min(axis=0), survey.max(axis=0))
+    frame = table.numbers("frame")
+    for i in np.flatnonzero(~np.isnan(frame) & ((frame < 0) | (frame % 1 != 0))):
+        raise table.error(int(i), f"The frame {frame[i]:g} is no whole number of zero or more", "Frames count from 0")
+    sigmas = {name: table.numbers(name) for name in ("sigma_px", "sigma_m")}
+    for name, sigma in sigmas.items():
+        for i in np.flatnonzero(sigma < 0):
+            raise table.error(int(i), f"{name} is below zero", "Give a number of zero or more, or nothing")
+    used = [cell.lower() for cell in table.text("used")]
+    for i, cell in enumerate(used):
+        if cell not in (*YES, *NO):
+            raise table.error(i, f"'{cell}' in column used is neither 1 nor 0", "Write 0 to leave the pair out")
+    names = table.text("name") if "name" in table.columns else table.text("pair")
+    return Pairs(
+        pixel=table.vectors(("u_px", "v_px"), required=True),
+        point=shift.to_local(survey),
+        name=np.array([name or str(number) for number, name in enumerate(names, 1)], dtype=np.str_),
+        frame=np.where(np.isnan(frame), -1, frame).astype(np.intp),
+        used=np.array([cell not in NO for cell in used], dtype=np.bool_),
+        row=np.asarray(table.row, dtype=np.intp),
+        source=Path(path),
+        shift=shift,
+        **sigmas,
+    )
+
+
+def write_pair_residuals(path: str | Path, pairs: Pairs, residual_px: Array, residual_m: Array, used: Mask) -> None:
+    """Write pairs_residuals.csv: the pairs in their order, each with what is left of it.
+
+    Parameters
+    ----------
+    residual_px : (n, 2) marked minus projected [px]; NaN where the camera does not see the point.
+    residual_m : (n,) how far that is at the point [m].
+    used : (n,) whether the pair counted in the solution.
+    """
+    columns: Columns = {"pair": [str(number) for number in range(1, len(pairs) + 1)]}
+    columns |= vector_columns(("u_px", "v_px"), pairs.pixel)
+    columns |= vector_columns(("residual_u_px", "residual_v_px"), residual_px)
+    columns |= {"residual_m": residual_m, "used": ["1" if one else "0" for one in used.tolist()], "name": pairs.name}
+    if (pairs.frame >= 0).any():
+        columns["frame"] = [str(frame) if frame >= 0 else "" for frame in pairs.frame.tolist()]
+    write_columns(path, columns)
+
+
+def _path(top: TomlTable, camera: Camera) -> MovingCamera:
+    """The poses of the frames; the camera's own where there are none."""
+    frames = top.tables("frame")
+    times = np.array([frame.signed("time_s") for frame in frames])
+    for i in np.flatnonzero(np.diff(times) <= 0):
+        problem = f"is {times[i + 1]:g} s, after {times[i]:g} s"
+        raise frames[i + 1].wrong("time_s", problem, "Put the frames in the order of their times, each time once")
+    if not frames:
+        return MovingCamera(camera, np.zeros(1), camera.position[None], camera.rotation[None], np.zeros(1), np.zeros(1))
+    return MovingCamera(
+        camera,
+        times,
+        camera.shift.to_local(np.stack([frame.numbers("position", (3,)) for frame in frames])),
+        np.stack([_rotation(frame) for frame in frames]),
+        np.array([frame.number("sigma_position_m", 0.0, zero_allowed=True) for frame in frames]),
+        np.array([frame.number("sigma_rotation_rad", 0.0, zero_allowed=True) for frame in frames]),
+    )
+
+
+def _rotation(table: TomlTable) -> Array:
+    """(3, 3) from the world to the camera; the nearest rotation to one that was rounded."""
+    rows = table.numbers("rotation", (3, 3))
+    off = float(np.abs(rows @ rows.T - np.eye(3)).max())
+    if off > NEAR_ROTATION:
+        raise table.wrong(
+            "rotation",
+            f"is no rotation: its rows are off unit length and right angles by {off:.2g}",
+            "Give three rows of unit length, at right angles: the camera's right, down and forward in the world",
+        )
+    if np.linalg.det(rows) < 0:
+        raise table.wrong(
+            "rotation",
+            "mirrors: it is left-handed",
+            "Its rows are the camera's right, down and forward; change the sign of one row",
+        )
+    if off > SAME_ROTATION:
+        left, _, right = np.linalg.svd(rows)
+        rows = left @ right
+    return rows
+
+
+def _is_covariance(matrix: Array) -> bool:
+    size = np.abs(np.diag(matrix)).max()
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-12 * size):
+        return False
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    scale[scale == 0] = 1.0
+    return bool(np.linalg.eigvalsh(matrix / np.outer(scale, scale)).min() > -1e-9)

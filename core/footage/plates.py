@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The picture without what moves: a median of frames that are laid on each other, and how much it varies."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..vectors import Array
+from .background import BackgroundMotion
+from .sources import Source, frames, opencv
+
+SAMPLES = 15
+REACH = 300
+"""Frames on either side from which samples are taken."""
+SHARED = 0.5
+"""Share of the view that a sample has in common with the plate, at least."""
+WANDERED = 0.1
+"""Share of the picture by which a moving camera may wander before it needs another plate."""
+NOISE_FLOOR = 2.0
+"""Grey levels; compressed video shows none where nothing happens."""
+IQR_TO_SIGMA = 1.349
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """The background as seen in one frame.
+
+    Attributes
+    ----------
+    anchor : that frame.
+    picture : (h, w, 3) median, uint8.
+    sigma : (h, w) standard deviation of a channel [grey levels], float32.
+    seen : (h, w) uint8, 255 where the background is known.
+    """
+
+    anchor: int
+    picture: np.ndarray
+    sigma: np.ndarray
+    seen: np.ndarray
+
+
+class Plates:
+    """Plates of a video, made where they are needed; the two latest are kept."""
+
+    def __init__(
+        self, source: Source, motion: BackgroundMotion, progress: Callable[[str], None] | None = None
+    ) -> None:
+        self._source, self._motion, self._progress = source, motion, progress
+        self._kept: list[Plate] = []
+
+    def window(
+        self, frame: int, left: int, top: int, width: int, height: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Background of a window of a frame: picture (height, width, 3), its sigma, and where it is known (float32)."""
+        plate = self._plate(frame)
+        if self._motion.still:
+            part = (slice(top, top + height), slice(left, left + width))
+            return tuple(a[part].astype(np.float32) for a in (plate.picture, plate.sigma, plate.seen > 0))  # type: ignore[return-value]
+        cv2 = opencv()
+        shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
+        across = _centred(self._between(frame, plate.anchor)) @ shift
+        size, flags = (width, height), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        picture = cv2.warpPerspective(plate.picture, across, size, flags=flags)
+        sigma = cv2.warpPerspective(plate.sigma, across, size, flags=flags)
+        seen = cv2.warpPerspective(plate.seen, across, size, flags=flags)
+        return picture.astype(np.float32), np.maximum(sigma, NOISE_FLOOR), (seen > 250).astype(np.float32)
+
+    def _plate(self, frame: int) -> Plate:
+        for plate in reversed(self._kept):
+            near = abs(plate.anchor - frame) <= REACH
+            if near and (self._motion.still or self._wandered(frame, plate.anchor) < WANDERED):
+                return plate
+        plate = self._make(frame)
+        self._kept = [*self._kept[-1:], plate]
+        return plate
+
+    def _make(self, anchor: int) -> Plate:
+        if self._progress:
+            self._progress(f"Making the background around frame {anchor}")
+        low = max(anchor - REACH, int(self._motion.frames[0]))
+        high = min(anchor + REACH, int(self._motion.frames[-1]))
+        near = [frame for frame in range(low, high + 1) if self._wandered(frame, anchor) < 1 - SHARED]
+        chosen = sorted({near[i] for i in np.linspace(0, len(near) - 1, SAMPLES).round().astype(int)})
+        cv2 = opencv()
+        layers, known = [], []
+        for frame, picture in frames(self._source, chosen):
+            if not self._motion.still:
+                size = picture.shape[1::-1]
+                across = _centred(self._between(frame, anchor))
+                full = np.full(picture.shape[:2], 255, np.uint8)
+                known.append(cv2.warpPerspective(full, across, size) > 250)
+                picture = cv2.warpPerspective(picture, across, size)
+            layers.append(picture)
+        return _median(anchor, layers, known)
+
+    def _wandered(self, frame: int, anchor: int) -> float:
+        """How far the corners of a frame lie from those of the anchor, as a share of the picture."""
+        if self._motion.still:
+            return 0.0
+        size = np.array([self._source.width, self._source.height], dtype=np.float64)
+        corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
+        moved = np.column_stack([corners, np.ones(4)]) @ self._between(frame, anchor).T
+        return float(np.abs((moved[:, :2] / moved[:, 2:] - corners) / size).max())
+
+    def _between(self, frame: int, anchor: int) -> Array:
+        first = int(self._motion.frames[0])
+        return np.linalg.solve(self._motion.homography[anchor - first], self._motion.homography[frame - first])
+
+
+def _centred(homography: Array) -> Array:
+    """For OpenCV, whose pixels count from the centre of the first."""
+    corner = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+    return np.linalg.inv(corner) @ homography @ corner
+
+
+def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> Plate:
+    """Median and quartiles; what is not known is sorted to the end."""
+    for layer, there in zip(layers, known, strict=False):
+        layer[~there] = 255
+    ordered = _sorted(layers)
+    count = len(ordered)
+    if not known:
+        middle, low, high = (ordered[int(q * (count - 1))] for q in (0.5, 0.25, 0.75))
+        seen = np.full(middle.shape[:2], 255, np.uint8)
+    else:
+        number = np.sum(known, axis=0)
+        stack = np.stack(ordered)
+        middle, low, high = (
+            np.take_along_axis(stack, (q * np.maximum(number - 1, 0)).astype(np.intp)[None, :, :, None], axis=0)[0]
+            for q in (0.5, 0.25, 0.75)
+        )
+        seen = np.where(number >= max(3, count // 3), 255, 0).astype(np.uint8)
+    spread = (high.astype(np.float32) - low) / IQR_TO_SIGMA
+    variance = opencv().blur(np.mean(spread**2, axis=2), (5, 5))
+    return Plate(anchor, middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen)
+
+
+def _sorted(layers: list[np.ndarray]) -> list[np.ndarray]:
+    """Sorted pixel by pixel, by a network of exchanges of whole pictures (odd-even transposition sort)."""
+    cv2, ordered = opencv(), list(layers)
+    for turn in range(len(ordered)):
+        for i in range(turn % 2, len(ordered) - 1, 2):
+            a, b = ordered[i], ordered[i + 1]
+            ordered[i], ordered[i + 1] = cv2.min(a, b), cv2.max(a, b)
+    return ordered

@@ -65,7 +65,7 @@ def rate_advice(
     if spin_radps is not None:
         sentences.append(turn_advice(rate, abs(spin_radps) / (2 * pi)))
     elif speed_mps is not None and radius_m is not None:
-        spinning = f"At {speed_mps:.3g} m/s a rolling block of {radius_m:.3g} m radius"
+        spinning = f"At {speed_mps:.3g} m/s a rolling block of {2 * radius_m:.3g} m diameter"
         sentences.append(turn_advice(rate, rolling_turns_hz(speed_mps, radius_m), spinning))
     else:
         sentences.append(
@@ -86,8 +86,8 @@ def content_advice(video: Video) -> list[str]:
     sentences = []
     if video.header_frames > video.frames:
         sentences.append(
-            f"The file announces {video.header_frames} frames, of which {video.frames} can be decoded: "
-            "count no frames, use the timestamps."
+            f"By its header the file should have {video.header_frames} frames, and {video.frames} can be decoded: "
+            "time is not to be told by counting frames."
         )
     if video.is_variable:
         sentences.append("The frame rate varies: frame number / rate is not the time, the timestamps are.")

@@ -164,14 +164,15 @@ def synchronise(
             f"The events lie within {np.ptp(ran):.3g} s, too close together to tell a drift (± {100 * least:.2g} %)",
             advice="Mark events near both ends of the video, or fit no drift",
         )
-    suspects = _suspects(reference, rate * seen, sigma, fit_drift)
+    off = _disagreement(reference, rate * seen, fit_drift)
+    suspects = _suspects(off, sigma)
     return Synchronisation(
         clock=Clock(offset, drift, origin, rate),
         residual_s=residual,
         sigma_offset_s=float(scale / np.sqrt(weight.sum())),
         sigma_drift=sigma_drift,
         suspects=suspects,
-        notes=tuple(_notes(reference - rate * seen, sigma, suspects, drift)),
+        notes=tuple(_notes(off, sigma, suspects, drift)),
     )
 
 
@@ -226,19 +227,22 @@ def _scale(residual: Array, sigma: Array, fitted: int, *, known: bool) -> float:
     return max(scatter, 1.0) if known else scatter
 
 
-def _suspects(reference: Array, ran: Array, sigma: Array, with_drift: bool) -> Indices:
-    """Events far from what most others agree on: the median offset, or the line of Theil and Sen."""
-    if reference.size < 3:
-        return np.empty(0, np.intp)
+def _disagreement(reference: Array, ran: Array, with_drift: bool) -> Array:
+    """How far each event is from what most agree on: the median offset, or the line of Theil (1950) and Sen (1968)."""
     off = reference - ran
     if with_drift and reference.size > 3:
         i, j = np.triu_indices(reference.size, 1)
         apart = np.abs(ran[j] - ran[i]) > 0
-        slope = np.median((off[j] - off[i])[apart] / (ran[j] - ran[i])[apart])
-        off = off - slope * ran
-    distance = np.abs(off - np.median(off))
-    usual = np.maximum(MAD_TO_SIGMA * float(np.median(distance)), sigma)
-    return np.flatnonzero(distance > WRONG_SIGMAS * usual)
+        off = off - np.median((off[j] - off[i])[apart] / (ran[j] - ran[i])[apart]) * ran
+    return off - np.median(off)
+
+
+def _suspects(off: Array, sigma: Array) -> Indices:
+    """Events far off the others, by the median absolute deviation or their own sigma."""
+    if off.size < 3:
+        return np.empty(0, np.intp)
+    usual = np.maximum(MAD_TO_SIGMA * float(np.median(np.abs(off))), sigma)
+    return np.flatnonzero(np.abs(off) > WRONG_SIGMAS * usual)
 
 
 def _notes(off: Array, sigma: Array, suspects: Indices, drift: float) -> list[str]:

@@ -28,6 +28,7 @@ FRAME_AT_TOLERANCE_S = 1e-5
 MILLISECOND_S = 1e-3
 GAP = 1.5
 """A step longer than this many usual steps misses frames."""
+LOCAL_STEPS = 31
 SAME_RATE = 0.02
 """Steps that differ by less than this, relatively, are of a constant rate."""
 FEW_FRAMES = 48
@@ -119,27 +120,42 @@ class Video:
     @property
     def rate_hz(self) -> float:
         """Frames per second outside the gaps: the rate at which the camera wrote them; NaN for a single frame."""
-        steady = np.delete(self.step_s, self.gaps)
-        return 1.0 / float(steady.mean()) if steady.size and steady.mean() > 0 else self.mean_rate_hz
+        steady = self._steady_s
+        return 1.0 / float(steady.mean()) if steady.size else np.nan
 
     @property
     def is_variable(self) -> bool:
         """Whether the steps differ, by more than the rounding of the timestamps and apart from gaps."""
-        steady = np.delete(self.step_s, self.gaps)
+        steady = self._steady_s
         allowed = max(1.01 * self.resolution_s, SAME_RATE * self.usual_step_s)
         return bool(steady.size and np.abs(steady - np.median(steady)).max() > allowed)
 
     @property
     def gaps(self) -> Indices:
-        """(g,) frames after which frames are missing: the next comes later than 1.5 usual steps."""
-        if self.frames < 2:
-            return _none()
-        return np.flatnonzero(self.step_s > GAP * self.usual_step_s + self.resolution_s)
+        """(g,) frames after which frames are missing: the next comes later than 1.5 steps that are usual there."""
+        return (
+            np.flatnonzero(self.step_s > GAP * self._local_step_s + self.resolution_s) if self.frames > 1 else _none()
+        )
 
     @property
     def missing(self) -> Indices:
         """(g,) how many frames would fit into each gap."""
-        return np.round(self.step_s[self.gaps] / self.usual_step_s).astype(np.intp) - 1
+        if self.frames < 2:
+            return _none()
+        return np.round(self.step_s[self.gaps] / self._local_step_s[self.gaps]).astype(np.intp) - 1
+
+    @property
+    def _local_step_s(self) -> Array:
+        """(f − 1,) median of the steps around each: phones take fewer frames for a while when it gets dark [s]."""
+        from scipy.ndimage import median_filter
+
+        return median_filter(self.step_s, size=LOCAL_STEPS, mode="nearest")
+
+    @property
+    def _steady_s(self) -> Array:
+        """Steps that are neither gaps nor zero [s]."""
+        steady = np.delete(self.step_s, self.gaps)
+        return steady[steady > SAME_TIME_S]
 
     @property
     def duplicates(self) -> Indices:

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall inspect``: what it says, writes and refuses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rockfall.core.cli import main
+
+FOLDER = Path(__file__).parent.parent / "data" / "videos"
+
+
+def told(capsys, *argv):
+    assert main(["inspect", *map(str, argv)]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return captured.out
+
+
+def test_it_tells_what_there_is(capsys):
+    said = told(capsys, FOLDER / "variable.mp4")
+    assert "64 × 48 px\n" in said
+    assert "H.264 in MP4" in said
+    assert "67 can be decoded, 67 announced" in said
+    assert "variable (lowest" in said
+    assert "2 missing after frame 9 at" in said
+    assert "3 frames are missing in 2 gaps" in said
+    assert "motion" not in said
+
+
+def test_rotation_and_slow_motion(capsys):
+    said = told(capsys, FOLDER / "rotated.mov", "--capture-rate", "239.76")
+    assert "48 × 64 px, shown turned by 90° clockwise" in said
+    assert "29.97 frames a second, constant" in said
+    assert "8 times slower than life: the 1.335 s took 0.167 s" in said
+    assert "up to 48 a second" in said
+
+
+def test_cut_files(capsys):
+    assert "the file should have 24 frames, and 11 can be decoded" in told(capsys, FOLDER / "cut.avi")
+    assert "1 can be decoded, 1 announced" in told(capsys, FOLDER / "single.mp4")
+
+
+def test_speed_is_given_or_told_by_picks(tmp_path, capsys):
+    picks = tmp_path / "picks.csv"
+    picks.write_text("trajectory,time_s,x_m,y_m,z_m\na,0,0,0,0\na,1,0,0,-4\na,2,0,0,-13\nb,0,900,0,0\n")
+    block = ["--diameter", "0.35"]
+    by_speed = told(capsys, FOLDER / "constant.mp4", *block, "--speed", "9")
+    assert "At 9 m/s a rolling block of 0.35 m diameter turns 8.2 times a second: 41 frames" in by_speed
+    assert told(capsys, FOLDER / "constant.mp4", *block, "--picks", picks) == by_speed
+
+
+def test_frames_are_written(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert "Written: frames.csv" in told(capsys, FOLDER / "variable.mkv", "--out", out)
+    lines = (out / "frames.csv").read_text().splitlines()
+    assert lines[:3] == ["frame,time_s,step_s", "0,0.000000,", "1,0.037000,0.037000"]
+    times = np.array([float(line.split(",")[1]) for line in lines[1:]])
+    assert times.size == 67
+    assert (np.diff(times) > 0).all()
+
+
+@pytest.mark.parametrize("name", ["none.mp4", "cut.mp4", "strange.mp4"])
+def test_bad_videos_end_with_status_1(name, tmp_path, capsys):
+    assert main(["inspect", str(FOLDER / name), "--out", str(tmp_path / "out")]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert name in captured.err
+    assert captured.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_usage(capsys):
+    assert main(["inspect", str(FOLDER / "constant.mp4"), "--speed", "-3"]) == 2
+    assert main(["inspect"]) == 2
+    assert "usage" in capsys.readouterr().err

@@ -1,46 +1,89 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What runs by itself: keys follow the frame rate, caches are dropped when another file is loaded."""
+"""What runs by itself: trajectories follow their picks, keys follow the frame rate, files are brought up to date."""
 
 import bpy
 from bpy.app.handlers import persistent
 
-from .bridge import terrain, timing
+from .bridge import impact_rows, live, migration, picks, problems, terrain, timing
 
 _owner = object()
 
 
 @persistent
+@problems.guarded
 def _follow_rate(scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    timing.follow_frame_rate(scene)
+    _keep_rate(scene)
 
 
 @persistent
+@problems.guarded
+def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    _keep_rate(scene)
+    live.notice(scene, depsgraph)
+
+
+@persistent
+@problems.guarded
 def _loaded(_path: str) -> None:
     terrain.forget_surfaces()
+    problems.forget()
     _listen()  # subscriptions do not survive loading
+    _catch_up()
 
 
 @persistent
+@problems.guarded
 def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     terrain.forget_surfaces()
-    timing.follow_frame_rate(scene)
+    _keep_rate(scene)
+    live.touch(scene)
 
 
+@persistent
+@problems.guarded
+def _saving(_path: str) -> None:
+    for scene in bpy.data.scenes:
+        live.sync(scene, dragging=live.is_dragging())
+
+
+@problems.guarded
 def _rate_changed() -> None:
     for scene in bpy.data.scenes:
-        timing.follow_frame_rate(scene)
+        _keep_rate(scene)
+
+
+@problems.guarded
+def _chosen() -> None:
+    thing = impact_rows.selected(bpy.context)
+    if thing is not None:
+        impact_rows.highlight(bpy.context.scene, thing.get(picks.ID_KEY, ""))
+
+
+@problems.guarded
+def _catch_up() -> None:
+    """Files of older versions, and picks that were changed while nobody watched."""
+    for scene in bpy.data.scenes:
+        migration.migrate(scene)
+        live.touch(scene)
+
+
+def _keep_rate(scene: bpy.types.Scene) -> None:
+    if not migration.is_newer(scene) and timing.follow_frame_rate(scene):
+        live.touch(scene)
 
 
 def _listen() -> None:
     for name in ("fps", "fps_base"):
         bpy.msgbus.subscribe_rna(key=(bpy.types.RenderSettings, name), owner=_owner, args=(), notify=_rate_changed)
+    bpy.msgbus.subscribe_rna(key=(bpy.types.LayerObjects, "active"), owner=_owner, args=(), notify=_chosen)
 
 
 HANDLERS = (
     ("frame_change_pre", _follow_rate),
-    ("depsgraph_update_post", _follow_rate),
+    ("depsgraph_update_post", _updated),
     ("render_init", _follow_rate),
     ("load_post", _loaded),
+    ("save_pre", _saving),
     ("undo_post", _restored),
     ("redo_post", _restored),
 )
@@ -50,9 +93,16 @@ def register() -> None:
     for name, function in HANDLERS:
         getattr(bpy.app.handlers, name).append(function)
     _listen()
+    if not bpy.app.background:
+        bpy.app.timers.register(_catch_up, first_interval=0.0)
+    elif hasattr(bpy.data, "scenes"):  # not while Blender starts
+        _catch_up()
 
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_owner)
+    for function in (live.work, _catch_up):
+        if bpy.app.timers.is_registered(function):
+            bpy.app.timers.unregister(function)
     for name, function in HANDLERS:
         getattr(bpy.app.handlers, name).remove(function)

@@ -8,6 +8,7 @@ makes it the pick's state.
 
 import uuid
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -91,7 +92,7 @@ def show_picks(
             (SIGMA_TIME_KEY, picks.sigma_time_s[i : i + 1]),
             (SIGMA_POSITION_KEY, picks.sigma_position_m[i : i + 1]),
         ):
-            if np.isfinite(value).all():
+            if np.isfinite(value).all() and not (key == SIGMA_POSITION_KEY and _of_confidence(picks, i)):
                 thing[key] = value.tolist()
             elif key in thing:
                 del thing[key]
@@ -192,7 +193,9 @@ def read(
         kind=[thing[KIND_KEY] for thing in things],
         status=[thing[STATUS_KEY] for thing in things],
         normal=[
-            [np.nan] * 3 if NORMAL_KEY not in thing or (surface is not None and moved(thing)) else list(thing[NORMAL_KEY])
+            [np.nan] * 3
+            if NORMAL_KEY not in thing or (surface is not None and moved(thing))
+            else list(thing[NORMAL_KEY])
             for thing in things
         ],
         sigma_time_s=_doubles(things, SIGMA_TIME_KEY, 1),
@@ -268,8 +271,6 @@ def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | N
 
 def trusted(picks: Picks) -> Picks:
     """The picks with the standard deviation that their confidence stands for, where they have none of their own."""
-    from dataclasses import replace
-
     if "confidence" not in picks.extra:
         return picks
     sigma = picks.sigma_position_m.copy()
@@ -277,6 +278,12 @@ def trusted(picks: Picks) -> Picks:
         if np.isnan(sigma[i]) and text.isdecimal():
             sigma[i] = CONFIDENCE_SIGMA_M.get(int(text), np.nan)
     return replace(picks, sigma_position_m=sigma)
+
+
+def _of_confidence(picks: Picks, i: int) -> bool:
+    """Whether a pick's standard deviation is no more than what its confidence says."""
+    text = str(picks.extra["confidence"][i]) if "confidence" in picks.extra else ""
+    return text.isdecimal() and CONFIDENCE_SIGMA_M.get(int(text)) == picks.sigma_position_m[i]
 
 
 def set_extra(thing: bpy.types.Object, name: str, text: str) -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials and geometry-node groups, made by code so that no binary file has to be trusted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import bpy
 import numpy as np
@@ -10,8 +10,8 @@ from ...core.colours import srgb_to_linear
 
 ROCK_COLOUR = (0.47, 0.43, 0.38)
 THIN_COLOUR = (0.30, 0.42, 0.60)
-RELIEF_FLOOR = 0.25  # what is left of the light where hillshade or eye-dome are zero
 RELIEF_BRIGHTNESS = 1.2
+RELIEF_MIDDLE = 0.4  # the light that contrast leaves as it is
 SUN_DIRECTION = (-0.5, -0.5, 0.7071)  # from the north-west as on maps would be behind a camera that looks up the slope
 TRAIL_GROUP = "Rockfall trail"
 TIME_ATTRIBUTE = "display_time_s"
@@ -20,14 +20,31 @@ SPEED_COLOUR = "speed_colour"
 TICK_ATTRIBUTE = "tick"
 TICK_RADII = 2.2
 RELIEF_COLOUR = "relief"
+TERRAIN_MATERIAL = "Rockfall terrain"
+TERRAIN_VALUES = {"hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "brightness": 1.0, "contrast": 1.0}
+"""Nodes of the terrain's material whose values the sliders set."""
 
 
 def terrain_material() -> bpy.types.Material:
     """Relief as in Noël et al. 2018, figure 3: hillshade × eye-dome from the vertex attributes, thin data hatched.
 
-    It emits its colour: no lamp, no shadow rays, no noise, the same picture from every engine.
+    It emits its colour: no lamp, no shadow rays, no noise, the same picture from every engine. One from a file of an
+    earlier version, without nodes for the sliders, is built anew.
     """
-    return _material("Rockfall terrain", _build_terrain)
+    material = _material(TERRAIN_MATERIAL, _build_terrain)
+    tree = material.node_tree
+    if any(name not in tree.nodes for name in TERRAIN_VALUES):
+        tree.nodes.clear()
+        _build_terrain(tree, tree.nodes.new("ShaderNodeOutputMaterial"))
+    return material
+
+
+def set_terrain_values(material: bpy.types.Material, values: Mapping[str, float]) -> None:
+    """Give the terrain's material the sliders' values; nodes that a person has removed are left alone."""
+    for name, value in values.items():
+        node = material.node_tree.nodes.get(name)
+        if node is not None and node.outputs[0].default_value != value:
+            node.outputs[0].default_value = value
 
 
 def emission_material(name: str, attribute: str, strength: float = 1.0) -> bpy.types.Material:
@@ -172,6 +189,14 @@ def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> No
         modifier[identifier] = value
 
 
+def get_input(modifier: bpy.types.NodesModifier, name: str) -> object:
+    """The value of an input of a modifier's node group, in Blender 5.2 and before."""
+    identifier = socket_id(modifier.node_group, name)
+    if hasattr(modifier, "properties"):
+        return getattr(modifier.properties.inputs, identifier).value
+    return modifier[identifier]
+
+
 def linear_colour(colour: tuple[float, float, float]) -> tuple[float, float, float, float]:
     """An sRGB colour as Blender's materials and attributes want it."""
     r, g, b = srgb_to_linear(np.array(colour)).tolist()
@@ -206,28 +231,35 @@ def _build_terrain(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> No
         node.attribute_name = name
         return node.outputs["Fac"]
 
+    def slider(name: str) -> bpy.types.NodeSocket:
+        node = new("ShaderNodeValue")
+        node.name = node.label = name
+        node.outputs[0].default_value = TERRAIN_VALUES[name]
+        return node.outputs[0]
+
+    def lit(name: str) -> bpy.types.NodeSocket:
+        """1 - strength · (1 - value)."""
+        dark = _math(tree, "SUBTRACT", attribute(name), 1.0)
+        result = _math(tree, "MULTIPLY_ADD", dark, slider(name))
+        result.node.inputs[2].default_value = 1.0
+        return result
+
     # hatches: stripes of one metre across the diagonal, where data are thin
     place, split = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ")
     link(place.outputs["Object"], split.inputs[0])
     diagonal = _math(tree, "ADD", split.outputs["X"], _math(tree, "ADD", split.outputs["Y"], split.outputs["Z"]))
     stripe = _math(tree, "GREATER_THAN", _math(tree, "FRACT", diagonal, 0.0), 0.5)
-    hatch = _math(tree, "MULTIPLY", stripe, _math(tree, "MULTIPLY", attribute("thin"), 0.7))
+    hatch = _math(tree, "MULTIPLY", stripe, _math(tree, "MULTIPLY", attribute("thin"), slider("thin")))
 
     rock = new("ShaderNodeMix")
     rock.data_type = "RGBA"
     rock.inputs["A"].default_value = (*ROCK_COLOUR, 1.0)
     rock.inputs["B"].default_value = (*THIN_COLOUR, 1.0)
     link(hatch, rock.inputs["Factor"])
-    light = _math(tree, "MULTIPLY", _affine(tree, attribute("hillshade")), _affine(tree, attribute("eye_dome")))
-    bright = _math(tree, "MULTIPLY", light, RELIEF_BRIGHTNESS)
-    _emit(tree, output, rock.outputs["Result"], bright)
-
-
-def _affine(tree: bpy.types.ShaderNodeTree, value: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """RELIEF_FLOOR + (1 - RELIEF_FLOOR) · value, so that no shade is black."""
-    result = _math(tree, "MULTIPLY_ADD", value, 1.0 - RELIEF_FLOOR)
-    result.node.inputs[2].default_value = RELIEF_FLOOR
-    return result
+    light = _math(tree, "MULTIPLY", lit("hillshade"), lit("eye_dome"))
+    even = _math(tree, "POWER", _math(tree, "DIVIDE", light, RELIEF_MIDDLE), slider("contrast"))
+    bright = _math(tree, "MULTIPLY", even, RELIEF_MIDDLE * RELIEF_BRIGHTNESS)
+    _emit(tree, output, rock.outputs["Result"], _math(tree, "MULTIPLY", bright, slider("brightness")))
 
 
 def _math(

@@ -6,12 +6,13 @@ from math import tan
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
-from mathutils.bvhtree import BVHTree
 
 from ...core.errors import RockfallError
 from ...core.exchange.project import CameraPlacement
 from ...core.film.framing import Margins, Seen, View, downhill_direction, look_at, place_camera
-from ...core.vectors import Array
+from ...core.terrain.raycast import cast_rays
+from ...core.terrain.surface import Surface
+from ...core.vectors import Array, norm
 from ..bridge import state, terrain
 from .motions import Motion
 
@@ -27,9 +28,9 @@ def automatic_view(scene: bpy.types.Scene, motions: list[Motion], aspect: float,
     ------
     RockfallError : there are neither trajectories nor a terrain.
     """
-    ground = terrain.active_terrain(scene)
+    surface = terrain.surface_of_scene(scene)
     points = np.vstack([motion.position for motion in motions]) if motions else np.empty((0, 3))
-    around = _vertices(ground) if ground is not None and (whole or not motions) else np.empty((0, 3))
+    around = surface.vertices if surface is not None and (whole or not motions) else np.empty((0, 3))
     if len(points) and len(around):
         low, high = points.min(axis=0), points.max(axis=0)
         reach = CONTEXT * float(np.linalg.norm(high - low))
@@ -42,7 +43,8 @@ def automatic_view(scene: bpy.types.Scene, motions: list[Motion], aspect: float,
         downhill = downhill_direction(*ends)
     else:
         downhill = _steepest_way(around)
-    seen = None if ground is None else _visibility(ground, _thinned(points if len(points) else around, WATCHED_POINTS))
+    watched = _thinned(points if len(points) else around, WATCHED_POINTS)
+    seen = None if surface is None else _visibility(surface, watched)
     return place_camera(framed, downhill, aspect, seen, Margins(0.04, 0.04, 0.04, 0.04) if whole else None)
 
 
@@ -75,26 +77,14 @@ def scene_points(scene: bpy.types.Scene, motions: list[Motion]) -> Array:
     return np.vstack(parts)
 
 
-def _visibility(ground: bpy.types.Object, points: Array) -> Seen:
-    tree = BVHTree.FromObject(ground, bpy.context.evaluated_depsgraph_get())
-    inverse = ground.matrix_world.inverted()
-    starts = [inverse @ Vector(point) + Vector((0, 0, LIFT_M)) for point in points]
+def _visibility(surface: Surface, points: Array) -> Seen:
+    starts = points + np.array([0.0, 0.0, LIFT_M])
 
     def seen(position: Array) -> Array:
-        eye = inverse @ Vector(position)
-        rays = [(start, eye - start) for start in starts]
-        return np.array(
-            [tree.ray_cast(start, ray.normalized(), ray.length)[0] is None for start, ray in rays], dtype=float
-        )
+        rays = position - starts
+        return (cast_rays(surface, starts, rays).distance >= norm(rays)).astype(float)
 
     return seen
-
-
-def _vertices(ground: bpy.types.Object) -> Array:
-    places = np.empty(3 * len(ground.data.vertices), dtype=np.float32)
-    ground.data.vertices.foreach_get("co", places)
-    world = np.array(ground.matrix_world)
-    return places.reshape(-1, 3).astype(np.float64) @ world[:3, :3].T + world[:3, 3]
 
 
 def _thinned(points: Array, count: int) -> Array:

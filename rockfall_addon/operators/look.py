@@ -45,8 +45,7 @@ def _ours(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def _up_the_slope(scene: bpy.types.Scene) -> Quaternion:
     """View rotation of somebody who stands below the slope, somewhat to the side, and looks up at it."""
-    ground = terrain.active_terrain(scene)
-    fall = terrain.downhill(ground) if ground is not None else Vector((0.0, -1.0, 0.0))
+    fall = terrain.downhill(scene)
     towards_viewer = Vector((fall.x, fall.y, 0.0)).normalized()
     towards_viewer.rotate(Quaternion((0.0, 0.0, 1.0), radians(ASIDE_DEG)))
     towards_viewer.z = 0.4

@@ -40,10 +40,7 @@ class ROCKFALL_OT_export_tables(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         result = reconstruction.reconstruct_scene(scene)
-        ground = terrain.active_terrain(scene)
-        samples = sample_trajectories(
-            result, TRAJECTORY_STEP_S, surface=None if ground is None else terrain.surface_of(ground)
-        )
+        samples = sample_trajectories(result, TRAJECTORY_STEP_S, surface=terrain.surface_of_scene(scene))
         with output_folder(Path(bpy.path.abspath(self.directory))) as folder:
             write_picks(result.picks, folder / "picks.csv")
             write_impacts(result.impacts, folder / "impacts.csv")

@@ -21,6 +21,7 @@ INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 """The inner parameters of a camera, in the order of every array of them; the focal lengths and the centre in px."""
 
 NEWTON_STEPS = 60
+TABLE_SIZE = 512
 
 
 def _forward() -> Array:
@@ -193,8 +194,10 @@ def rays(
     A pixel that the distortion reaches from no direction has no ray: its direction is NaN.
     """
     plane = undistort(camera, pixels)
-    seen = unit(np.column_stack([plane, np.ones(len(plane))]))
-    turn = camera.rotation if rotation is None else np.asarray(rotation, dtype=np.float64)
+    seen: Array = np.ones((len(plane), 3))
+    seen[:, :2] = plane
+    seen = unit(seen)
+    turn: Array = camera.rotation if rotation is None else np.asarray(rotation, dtype=np.float64)
     directions = seen @ turn if turn.ndim == 2 else np.einsum("nij,ni->nj", turn, seen)
     place = camera.position if position is None else np.asarray(position, dtype=np.float64)
     return np.array(np.broadcast_to(place, directions.shape)), directions
@@ -257,7 +260,7 @@ def project_with_derivatives(
         pixel=bent * focal + [camera.cx, camera.cy],
         depth=depth,
         d_point=by_point,
-        d_rotation=-np.cross(by_seen, seen[:, None, :]),
+        d_rotation=np.cross(seen[:, None, :], by_seen).astype(np.float64, copy=False),
         d_position=-by_point,
         d_intrinsics=by_inner,
     )
@@ -341,34 +344,44 @@ def _undistorted(camera: Camera, target: Array) -> Array:
     steps finds the one point there is.
     """
     reach = validity_radius(camera)
-    result = np.full(target.shape, np.nan)
-    rows = np.flatnonzero(np.isfinite(target).all(axis=1))
-    goal = target[rows]
-    at = _within(goal, reach)
-    miss = goal - _distorted(camera, at)
-    share = np.ones(rows.size)
+    at = _radially_undistorted(camera, target, reach)
+    miss = target - _distorted(camera, at)
+    scale, length = 1 + norm(target), norm(miss)
+    share = np.ones(len(target))
+    active = np.flatnonzero(np.isfinite(target).all(axis=1))
     for _ in range(NEWTON_STEPS):
-        scale = 1 + norm(goal)
-        arrived = norm(miss) <= 4e-16 * scale
-        result[rows[arrived]] = at[arrived]
-        keep = ~arrived
-        rows, goal, at, miss, share, scale = (each[keep] for each in (rows, goal, at, miss, share, scale))
-        if not rows.size:
+        active = active[(length[active] > 4e-16 * scale[active]) & (share[active] > 1e-6)]
+        if not active.size:
             break
-        a, b, c = _bending(camera, at)
+        here, gap = at[active], miss[active]
+        a, b, c = _bending(camera, here)
         determinant = np.maximum(a * c - b * b, 1e-12)
-        step = np.stack([c * miss[:, 0] - b * miss[:, 1], a * miss[:, 1] - b * miss[:, 0]], axis=1)
-        new = _within(at + step * (share / determinant)[:, None], reach)
-        new_miss = goal - _distorted(camera, new)
-        better = norm(new_miss) < norm(miss)
-        at[better], miss[better] = new[better], new_miss[better]
-        share = np.where(better, np.minimum(2 * share, 1), share / 4)
-        # No step helps any more: rounding, or a target that nothing reaches.
-        stuck = share < 1e-3
-        fine = stuck & (norm(miss) <= 1e-13 * scale)
-        result[rows[fine]] = at[fine]
-        rows, goal, at, miss, share = (each[~stuck] for each in (rows, goal, at, miss, share))
-    return result
+        step = np.stack([c * gap[:, 0] - b * gap[:, 1], a * gap[:, 1] - b * gap[:, 0]], axis=1)
+        new = _within(here + step * (share[active] / determinant)[:, None], reach)
+        new_miss = target[active] - _distorted(camera, new)
+        new_length = norm(new_miss)
+        better = new_length < length[active]
+        improved = active[better]
+        at[improved], miss[improved], length[improved] = new[better], new_miss[better], new_length[better]
+        share[active] = np.where(better, np.minimum(2 * share[active], 1), share[active] / 4)
+    return np.where((length <= 1e-12 * scale)[:, None], at, np.nan)
+
+
+def _radially_undistorted(camera: Camera, target: Array, reach: float) -> Array:
+    """Where Newton's method starts: the inverse of the radial part, from a table, (n, 2)."""
+
+    def bent(radius: Array) -> Array:
+        r2 = radius**2
+        return radius * (1 + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3)))
+
+    length = norm(target)
+    far = np.max(length[np.isfinite(length)], initial=1e-3)
+    end = min(far, reach)
+    while end < reach and bent(np.array(end)) < far:
+        end = min(2 * end, reach)
+    radius = np.linspace(0, end, TABLE_SIZE)
+    found = np.interp(length, np.maximum.accumulate(bent(radius)), radius)
+    return target * np.divide(found, length, out=np.ones_like(length), where=length > 0)[:, None]
 
 
 def _within(plane: Array, reach: float) -> Array:
@@ -400,7 +413,7 @@ def _validity_radius(k1: float, k2: float, k3: float, tangential: float) -> floa
 
 
 def _positive_roots(polynomial: np.polynomial.Polynomial) -> Array:
-    trimmed = polynomial.trim()
+    trimmed = polynomial.trim(1e-13)  # what is less bends no lens, and makes the roots overflow
     if trimmed.degree() < 1:
         return np.empty(0)
     roots = trimmed.roots()

@@ -1,0 +1,446 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How near refinement comes to the truth, and to the best that the footage allows, on synthetic rockfalls.
+
+Blocks bounce as spheres down a rough slope. A sphere's distance from the terrain at a contact is off by 2 cm (angular
+blocks, errors of the scan), and the normal that R_N is told by is off the block-scale normal by the latter's spread.
+Cameras stand opposite; the run fills 70 % of the tighter side of the image. Each has a pose that is off by what 12 pairs
+of pixels (1.5 px) and points (3 cm) allow, and is held by hand, stabilised to 0.2 px. People mark contacts to 3 px in
+the first view, at whole frames; the tracker's pixels are off by 1.5 px. Other views' clocks are off by up to 50 ms.
+"""
+
+import argparse
+import csv
+import statistics
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from rockfall.core.camera.model import look_at, project, project_with_derivatives, rays, rotation_from_vector
+from rockfall.core.camera.motion import MovingCamera
+from rockfall.core.footage.clock import Clock
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.block import Block
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.placement import terrain_normals
+from rockfall.core.reconstruction.refinement import PixelObservations, Refinement, View, refine
+from rockfall.core.reconstruction.refinement_problem import Unknowns, evaluate
+from rockfall.core.reconstruction.refinement_setup import Setup, prepare, set_up
+from rockfall.core.reconstruction.refinement_sigmas import velocity_rows
+from rockfall.core.reconstruction.refinement_solver import normal_equations
+from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.terrain.raycast import cast_rays, closest_points
+from rockfall.core.terrain.surface import Surface
+from scipy.ndimage import gaussian_filter
+from scipy.optimize import least_squares
+
+GRAVITY = 9.81
+BLOCK = Block()
+RADIUS = BLOCK.radius_m
+DIP = np.radians(38.0)
+SIGMA_TERRAIN, SIGMA_TRACK, SIGMA_PICK, SIGMA_STEADY = 0.02, 1.5, 3.0, 0.2
+PAIRS, SIGMA_PAIR_PX, SIGMA_PAIR_M = 12, 1.5, 0.03
+FILL = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Fall:
+    """A true trajectory: n contacts with the centre, the contact point, times, velocities and R_N (NaN at the ends)."""
+
+    centre: np.ndarray
+    contact: np.ndarray
+    time_s: np.ndarray
+    v1: np.ndarray
+    v2: np.ndarray
+    rn: np.ndarray
+
+
+@dataclass(frozen=True)
+class Case:
+    """A footage."""
+
+    name: str
+    width: int
+    height: int
+    rate_hz: float
+    distance_m: float
+    views: int
+
+
+CASES = (
+    Case("4K, 30 Hz, 150 m, one view", 3840, 2160, 30.0, 150.0, 1),
+    Case("4K, 30 Hz, 150 m, two views", 3840, 2160, 30.0, 150.0, 2),
+    Case("4K, 30 Hz, 150 m, three views", 3840, 2160, 30.0, 150.0, 3),
+    Case("1080p, 60 Hz, 300 m, one view", 1920, 1080, 60.0, 300.0, 1),
+    Case("1080p, 60 Hz, 300 m, three views", 1920, 1080, 60.0, 300.0, 3),
+)
+
+
+def rough_slope(rng: np.random.Generator) -> Surface:
+    """A slope of 38° towards +x, with humps of metres and stones of decimetres; points 0.4 m apart."""
+    step, nx, ny = 0.4, 190, 110
+    x, y = np.meshgrid(np.arange(nx) * step, (np.arange(ny) - ny / 2) * step, indexing="ij")
+    rough = sum(
+        height * noise / noise.std()
+        for height, noise in (
+            (size, gaussian_filter(rng.normal(size=(nx, ny)), width))
+            for size, width in ((0.25, 6), (0.08, 2), (0.03, 0.7))
+        )
+    )
+    vertices = np.stack([x, y, -np.tan(DIP) * x + rough], axis=-1).reshape(-1, 3)
+    corner = (np.arange(nx - 1)[:, None] * ny + np.arange(ny - 1)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + ny, corner + ny + 1], 1), np.stack([corner, corner + ny + 1, corner + 1], 1)]
+    )
+    return Surface(vertices, faces.astype(np.int32), GlobalShift(), "rough slope")
+
+
+def flown(centre: np.ndarray, velocity: np.ndarray, elapsed: np.ndarray) -> np.ndarray:
+    """Places along a parabola."""
+    return centre + np.outer(elapsed, velocity) - np.outer(elapsed**2, [0, 0, GRAVITY / 2])
+
+
+def next_contact(surface: Surface, centre: np.ndarray, velocity: np.ndarray, reach: float) -> float:
+    """When the sphere's centre comes within `reach` of the terrain again; NaN if not within 1.6 s."""
+
+    def distance(elapsed: np.ndarray) -> np.ndarray:
+        places = flown(centre, velocity, elapsed)
+        closest = closest_points(surface, places)
+        side = np.einsum("ni,ni->n", places - closest.point, surface.face_normals[closest.face])
+        return np.where(side < 0, -closest.distance, closest.distance) - reach
+
+    elapsed = np.arange(0.004, 1.6, 0.004)
+    above = distance(elapsed)
+    left = np.flatnonzero(above > 0.03)
+    if not left.size:
+        return np.nan
+    hit = np.flatnonzero(above[left[0] :] < 0)
+    if not hit.size:
+        return np.nan
+    high = elapsed[left[0] + hit[0]]
+    low = high - 0.004
+    for _ in range(8):
+        trial = np.linspace(low, high, 9)
+        under = int(np.argmax(distance(trial) < 0))
+        low, high = trial[under - 1], trial[under]
+    return float((low + high) / 2)
+
+
+def fall(surface: Surface, rng: np.random.Generator) -> Fall:
+    """A random fall of 6 to 10 contacts; flights of 0.3 s and more, 4 to 17 m/s."""
+    while True:
+        wanted = int(rng.integers(6, 11))
+        x, y = rng.uniform(6, 14), rng.uniform(-6, 6)
+        ground = cast_rays(surface, [[x, y, 50.0]], (0, 0, -1)).point[0]
+        centre = ground + np.array([0, 0, 1.0])
+        velocity = np.array([rng.uniform(3, 6), rng.normal() * 0.8, rng.uniform(-3, 0)])
+        t, rows = 0.0, []
+        while len(rows) < wanted:
+            off = rng.normal() * SIGMA_TERRAIN
+            duration = next_contact(surface, centre, velocity, RADIUS + off)
+            if not duration > (0.3 if rows else 0.05):
+                break
+            t += duration
+            centre = flown(centre, velocity, np.array([duration]))[0]
+            arriving = velocity - [0, 0, GRAVITY * duration]
+            contact = closest_points(surface, centre[None]).point[0]
+            ground_normal = terrain_normals(surface, contact[None], np.array([2 * RADIUS]), None)
+            normal = ground_normal.normal[0]
+            rn, rt = rng.uniform(0.3, 0.75), rng.uniform(0.65, 0.9)
+            into = arriving @ normal
+            if into > -1.0:
+                break
+            leaving = rt * (arriving - into * normal) - rn * into * normal
+            felt = normal + np.cross(normal, rng.normal(size=3) * ground_normal.spread[0] / np.sqrt(2))
+            felt_rn = -(leaving @ felt) / (arriving @ felt)
+            fast = max(np.linalg.norm(arriving), np.linalg.norm(leaving))
+            if fast > 17 or np.linalg.norm(leaving) < 3.5 or centre[0] > 66 or abs(centre[1]) > 16:
+                break
+            rows.append((centre, contact, t, arriving, leaving, felt_rn))
+            velocity = leaving
+        if len(rows) == wanted:
+            columns = [np.array(column) for column in zip(*rows, strict=True)]
+            columns[3][0], columns[4][-1] = np.nan, np.nan
+            columns[5][[0, -1]] = np.nan
+            return Fall(*columns)
+
+
+def pose_covariance(camera, surface: Surface, around: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(6, 6) of a pose solved from pairs on the slope in the image, with the inner parameters known."""
+    points = []
+    while len(points) < PAIRS:
+        pixel = rng.uniform([0, 0], camera.size, (PAIRS, 2))
+        origin, direction = rays(camera, pixel)
+        hit = cast_rays(surface, origin, direction)
+        points += list(hit.point[np.isfinite(hit.distance)])
+    seen = project_with_derivatives(camera, np.array(points[:PAIRS]))
+    jacobian = np.concatenate([seen.d_rotation, seen.d_position], axis=2)
+    noise = SIGMA_PAIR_PX**2 * np.eye(2) + SIGMA_PAIR_M**2 * seen.d_point @ np.swapaxes(seen.d_point, 1, 2)
+    return np.linalg.inv((np.swapaxes(jacobian, 1, 2) @ np.linalg.inv(noise) @ jacobian).sum(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Footage:
+    """What was filmed of one fall: true and solved views, marked picks, tracked pixels."""
+
+    truth: Fall
+    true_views: tuple[View, ...]
+    views: tuple[View, ...]
+    picks: object
+    pixels: PixelObservations
+
+
+def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) -> Footage:
+    """Film a fall."""
+    middle = (truth.centre.min(axis=0) + truth.centre.max(axis=0)) / 2
+    first = rng.uniform(45, 60)
+    azimuths = np.radians([first, first - rng.uniform(60, 90), first - rng.uniform(30, 45)])[: case.views]
+    true_views, views, rows = [], [], []
+    for number, azimuth in enumerate(azimuths):
+        place = middle + case.distance_m * np.array([np.cos(azimuth), np.sin(azimuth), 0.1])
+        camera = look_at(case.width, case.height, place, middle, focal_px=1000.0)
+        extent = np.ptp(project(camera, truth.centre), axis=0)
+        focal = 1000.0 * float(np.min(FILL * np.array(camera.size) / extent))
+        camera = look_at(case.width, case.height, place, middle, focal_px=focal)
+        covariance = pose_covariance(camera, surface, middle, rng)
+
+        offset = float(rng.uniform(-3, 3)) + truth.time_s[0]
+        common = (
+            truth.time_s[0]
+            - 1
+            + rng.uniform() / case.rate_hz
+            + np.arange(0, np.ptp(truth.time_s) + 2, 1 / case.rate_hz)
+        )
+        video = common - offset
+        shake = np.cumsum(rng.normal(size=(common.size, 3)), axis=0) * 2 / focal
+        held = rotation_from_vector(shake) @ camera.rotation
+        steady = rotation_from_vector(rng.normal(size=(common.size, 3)) * SIGMA_STEADY / focal)
+        still = np.zeros(common.size)
+        positions = np.repeat(place[None], common.size, axis=0)
+        path = MovingCamera(camera, video, positions, held, still, still)
+        true_views.append(View(f"camera {number + 1}", path, Clock(offset), 0.0, covariance))
+
+        error = np.linalg.cholesky(covariance) @ rng.normal(size=6)
+        turned = rotation_from_vector(error[:3]) @ camera.rotation
+        solved = MovingCamera(
+            replace(camera, rotation=turned, position=place + error[3:]),
+            video,
+            positions + error[3:],
+            steady @ held @ camera.rotation.T @ turned,
+            still,
+            np.full(common.size, SIGMA_STEADY / focal),
+        )
+        guess = offset + (0.0 if number == 0 else float(rng.uniform(-0.05, 0.05)))
+        views.append(View(f"camera {number + 1}", solved, Clock(guess), 0.0, covariance))
+
+        inside = np.flatnonzero((common > truth.time_s[0]) & (common < truth.time_s[-1]))
+        flight = np.searchsorted(truth.time_s, common[inside], side="right") - 1
+        since = common[inside] - truth.time_s[flight]
+        fallen = np.outer(since**2, [0, 0, GRAVITY / 2])
+        where = truth.centre[flight] + since[:, None] * truth.v2[flight] - fallen
+        pixel = project(camera, where, rotation=held[inside], position=positions[inside])
+        rows.append((np.full(inside.size, number), video[inside], pixel + SIGMA_TRACK * rng.normal(size=pixel.shape)))
+
+    view, video_s, pixel = (np.concatenate(column) for column in zip(*rows, strict=True))
+    pixels = PixelObservations(view, np.full(view.size, "a"), video_s, pixel, np.full(view.size, SIGMA_TRACK))
+    return Footage(truth, tuple(true_views), tuple(views), marked(surface, truth, true_views[0], views[0], rng), pixels)
+
+
+def marked(surface: Surface, truth: Fall, true: View, solved: View, rng: np.random.Generator):
+    """Picks in the first view: rays through pixels onto the terrain, at whole frames."""
+    path = true.camera
+    frame = np.abs(np.asarray(true.clock.to_common(path.time_s))[:, None] - truth.time_s).argmin(axis=0)
+    for _ in range(50):
+        pixel = project(path.camera, truth.contact, position=path.position[frame], rotation=path.rotation[frame])
+        pixel = pixel + SIGMA_PICK * rng.normal(size=pixel.shape)
+        origin, direction = rays(
+            path.camera, pixel, position=solved.camera.position[frame], rotation=solved.camera.rotation[frame]
+        )
+        hit = cast_rays(surface, origin, direction)
+        if np.isfinite(hit.distance).all() and (np.linalg.norm(hit.point - truth.contact, axis=1) < 10).all():
+            break
+    times = np.asarray(solved.clock.to_common(path.time_s[frame]))
+    return make_picks(["a"] * len(frame), times, hit.point)
+
+
+def bound(surface: Surface, footage: Footage, free: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, Setup]:
+    """Cramér–Rao: covariances (n, 3, 3) of v1 and v2 at the truth, all nuisance parameters included."""
+    ground = prepare(footage.picks, surface, BLOCK, None, None, SIGMA_TERRAIN)
+    setup = set_up(ground, footage.true_views, footage.pixels, ["a"], GRAVITY, frozenset(free))
+    zeros = np.zeros((len(footage.views), 3))
+    truth = footage.truth
+    state = Unknowns(truth.centre, truth.time_s, zeros, zeros, zeros[:, 0], zeros[:, 0], 0.0, GRAVITY)
+    problem = replace(setup.problem, sigma_px=np.full(len(footage.pixels), np.hypot(SIGMA_TRACK, SIGMA_STEADY)))
+    there = evaluate(problem, state)
+    information, _ = normal_equations(problem, there, (there.segment >= 0).astype(float))
+    covariance = np.linalg.inv(information)
+    n = len(truth.time_s)
+    segment = np.arange(-1, n - 1), np.r_[np.arange(n - 1), -1]
+    slopes = [velocity_rows(problem, there.motion, segment[i], at_end=i == 0) for i in range(2)]
+    return *(slope @ covariance @ np.swapaxes(slope, 1, 2) for slope in slopes), setup
+
+
+@dataclass
+class Tally:
+    """Numbers of all the velocities of a case."""
+
+    raw: list
+    refined: list
+    sigma: list
+    best: list
+    speed: list
+    component_hits: list
+    speed_hits: list
+    rn: list
+    rn_sigma: list
+    camera: list
+    camera_before: list
+    seconds: list
+    iterations: list
+    unsettled: int = 0
+
+
+def measure(case: Case, surface: Surface, falls: list[Fall], seed: int) -> Tally:
+    """Film, mark, refine and compare all falls."""
+    rng = np.random.default_rng(seed)
+    tally = Tally(*([] for _ in range(13)))
+    free = ("camera",) if case.views == 1 else ("camera", "clock")
+    for truth in falls:
+        footage = film(case, surface, truth, rng)
+        raw = reconstruct(footage.picks, surface=surface, block=BLOCK).impacts
+        start = time.perf_counter()
+        result = refine(
+            footage.picks, footage.views, footage.pixels, surface=surface, block=BLOCK, free=free,
+            sigma_terrain_m=SIGMA_TERRAIN,
+        )  # fmt: skip
+        tally.seconds.append(time.perf_counter() - start)
+        tally.iterations.append(result.iterations)
+        add(tally, truth, raw, result, footage, bound(surface, footage, free), case)
+    return tally
+
+
+def add(tally: Tally, truth: Fall, raw, result: Refinement, footage: Footage, best, case: Case) -> None:
+    """Add one fall's numbers."""
+    impacts = result.reconstruction.impacts
+    for name, true, covariance, own in (
+        ("v1", truth.v1, best[0], slice(1, None)),
+        ("v2", truth.v2, best[1], slice(-1)),
+    ):
+        true, found, marked_v = velocity[own], getattr(impacts, name)[own], getattr(raw, name)[own]
+        speed = np.linalg.norm(true, axis=1)
+        direction = true / speed[:, None]
+        tally.speed += speed.tolist()
+        tally.raw += (np.linalg.norm(marked_v, axis=1) / speed - 1).tolist()
+        error = np.linalg.norm(found, axis=1) - speed
+        tally.refined += (error / speed).tolist()
+        tally.best += (np.sqrt(np.einsum("ni,nij,nj->n", direction, covariance[own], direction)) / speed).tolist()
+        tally.component_hits += (np.abs(found - true) < 1.96 * impacts.sigma[name][own]).ravel().tolist()
+        energy = "kinetic1_j" if name == "v1" else "kinetic2_j"
+        sigma = impacts.sigma[energy][own] / (impacts.mass_kg[own] * np.linalg.norm(found, axis=1))
+        tally.speed_hits += (np.abs(error) < 1.96 * sigma).tolist()
+    inner = slice(1, -1)
+    tally.rn += (impacts.rn - truth.rn)[inner].tolist()
+    tally.rn_sigma += impacts.sigma["rn"][inner].tolist()
+    for true, solved, refined in zip(footage.true_views, footage.views, result.views, strict=True):
+        place = true.camera.camera.position
+        tally.camera_before.append(np.linalg.norm(solved.camera.camera.position - place) / case.distance_m)
+        tally.camera.append(np.linalg.norm(refined.camera.camera.position - place) / case.distance_m)
+    tally.unsettled += any("did not settle" in sentence for sentence in result.advice)
+
+
+def row_of(case: Case, tally: Tally, rng: np.random.Generator) -> dict[str, str]:
+    """The numbers of a case as text."""
+    best = np.array(tally.best)
+    refined, rn, rn_sigma = np.array(tally.refined), np.array(tally.rn), np.array(tally.rn_sigma)
+    least = float(np.median(np.abs(rng.normal(size=(200, best.size)) * best)))
+    reached = float(np.median(np.abs(refined)))
+    known = np.isfinite(rn)
+    return {
+        "footage": case.name,
+        "raw speed error %": f"{100 * np.median(np.abs(tally.raw)):.1f}",
+        "refined speed error %": f"{100 * reached:.2f}",
+        "Cramér–Rao %": f"{100 * least:.2f}",
+        "ratio": f"{reached / least:.2f}",
+        "rms / Cramér–Rao": f"{np.sqrt(np.mean((refined / best) ** 2)):.2f}",
+        "R_N error": f"{np.median(np.abs(rn[known])):.3f}",
+        "coverage v %": f"{100 * np.mean(tally.component_hits):.1f}",
+        "coverage speed %": f"{100 * np.mean(tally.speed_hits):.1f}",
+        "coverage R_N %": f"{100 * np.mean(np.abs(rn[known]) < 1.96 * rn_sigma[known]):.1f}",
+        "camera before %": f"{100 * np.median(tally.camera_before):.3f}",
+        "camera after %": f"{100 * np.median(tally.camera):.3f}",
+        "time ms": f"{1e3 * statistics.median(tally.seconds):.0f}",
+        "iterations": f"{statistics.median(tally.iterations):.0f}",
+        "unsettled": str(tally.unsettled),
+    }
+
+
+def compare_speed(surface: Surface, truth: Fall, seed: int) -> None:
+    """Time of refine, and of scipy's least squares with a numeric Jacobian on the same residuals."""
+    from rockfall.core.reconstruction.refinement_problem import moved
+    from rockfall.core.reconstruction.refinement_solver import solve
+
+    case = Case("two views", 3840, 2160, 30.0, 150.0, 2)
+    footage = film(case, surface, truth, np.random.default_rng(seed))
+    free = frozenset({"camera"})
+    views = tuple(replace(view, clock=true.clock) for view, true in zip(footage.views, footage.true_views, strict=True))
+    ground = prepare(footage.picks, surface, BLOCK, None, None, SIGMA_TERRAIN)
+    setup = set_up(ground, views, footage.pixels, ["a"], GRAVITY, free)
+    start = time.perf_counter()
+    ours = solve(setup.problem, setup.state, "linear")
+    own = time.perf_counter() - start
+    scale = 1 / np.sqrt(np.diag(ours.information))
+
+    def residuals(step: np.ndarray) -> np.ndarray:
+        there = evaluate(setup.problem, moved(setup.problem, setup.state, step * scale))
+        return np.concatenate([there.pixels.residual.ravel(), *(rows.residual.ravel() for rows in there.others)])
+
+    start = time.perf_counter()
+    theirs = least_squares(residuals, np.zeros(setup.problem.columns.size), method="trf", xtol=1e-10)
+    taken = time.perf_counter() - start
+    squares = (ours.evaluation.pixels.residual**2).sum() + sum((r.residual**2).sum() for r in ours.evaluation.others)
+    print(
+        f"\n{len(truth.time_s)} impacts, {len(footage.pixels)} pixels, {setup.problem.columns.size} unknowns: "
+        f"{1e3 * own:.0f} ms, {ours.iterations} iterations, cost {squares / 2:.3f}; scipy's least_squares with a "
+        f"numeric Jacobian {taken:.2f} s, {taken / own:.0f} times as long, cost {theirs.cost:.3f}"
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trajectories", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--cases", type=int, nargs="*", default=list(range(len(CASES))))
+    parser.add_argument("--out", type=Path, help="CSV file")
+    arguments = parser.parse_args()
+    rng = np.random.default_rng(arguments.seed)
+    surface = rough_slope(rng)
+    falls = [fall(surface, rng) for _ in range(arguments.trajectories)]
+    speeds = np.concatenate([np.linalg.norm(one.v1[1:], axis=1) for one in falls])
+    flights = np.concatenate([np.diff(one.time_s) for one in falls])
+    spread = np.degrees(
+        terrain_normals(surface, falls[0].contact, np.full(len(falls[0].contact), 2 * RADIUS), None).spread
+    )
+    print(
+        f"{len(falls)} falls, {sum(len(one.time_s) for one in falls)} contacts, median flight {np.median(flights):.2f} s, "
+        f"median incident speed {np.median(speeds):.1f} m/s, normal's spread about {np.median(spread):.0f}°\n"
+    )
+    rows = []
+    for number in arguments.cases:
+        row = row_of(
+            CASES[number], measure(CASES[number], surface, falls, arguments.seed + 1), np.random.default_rng(0)
+        )
+        if not rows:
+            print("| " + " | ".join(row) + " |\n|" + "---|" * len(row))
+        print("| " + " | ".join(row.values()) + " |", flush=True)
+        rows.append(row)
+    compare_speed(surface, max(falls, key=lambda one: len(one.time_s)), arguments.seed)
+    if arguments.out:
+        with arguments.out.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, rows[0])
+            writer.writeheader()
+            writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ...core.errors import RockfallError
+from ...core.georeference import LARGE_COORDINATE_M
 from ...core.terrain.joining import join, moved
 from ...core.terrain.shading import Shading
 from ...core.terrain.surface import Surface
@@ -20,7 +21,7 @@ ID_KEY = "rockfall_id"
 FILE_KEY = "rockfall_file"
 THIN_KEY = "rockfall_thin_share"
 REACH_KEY = "rockfall_reach_m"
-USED_KEY = "rockfall_terrain_used"
+LEAST_THIN = 0.005
 
 
 @dataclass
@@ -173,22 +174,44 @@ def forget_surfaces() -> None:
         known.doubtful = True
 
 
-def note_use(scene: bpy.types.Scene) -> None:
-    """Remember the tiles that the shown trajectories were computed on, so that the panel sees when they change."""
-    scene[USED_KEY] = in_use(scene)
+def warnings(scene: bpy.types.Scene) -> list[str]:
+    """What needs a person's attention, in sentences."""
+    said = []
+    for tile in state.with_role(scene, state.TERRAIN_ROLE):
+        if not has_faces(tile):
+            said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
+        reach = float(tile.get(REACH_KEY, 0.0))
+        if reach > LARGE_COORDINATE_M:
+            step = float(np.spacing(np.float32(reach))) * 1000
+            said.append(
+                f"{tile.name} reaches {reach / 1000:.0f} km from the project's origin. Blender is single precision and "
+                f"shows and saves it in steps of {step:.{0 if step >= 10 else 1}f} mm there. Is it of this project?"
+            )
+    return said
 
 
-def has_changed(scene: bpy.types.Scene) -> bool:
-    """Whether tiles came, went, moved or were cut since the shown trajectories were computed."""
-    return USED_KEY in scene and scene[USED_KEY] != in_use(scene)
-
-
-def in_use(scene: bpy.types.Scene) -> str:
-    """A text that is another when the scene has other tiles, or has them elsewhere."""
-    return "; ".join(
-        f"{tile.get(ID_KEY, tile.name)} {len(tile.data.polygons)} {zlib.crc32(np.array(tile.matrix_world).tobytes())}"
-        for tile in sorted(tiles(scene), key=lambda tile: str(tile.get(ID_KEY, tile.name)))
-    )
+def remarks(scene: bpy.types.Scene) -> list[str]:
+    """What is good to know about the scene's terrain, in sentences."""
+    said = []
+    grounds = tiles(scene)
+    faces = sum(len(tile.data.polygons) for tile in grounds)
+    drawn = sum(terrain_view.drawn_triangles(tile) for tile in grounds)
+    if drawn < faces:
+        said.append(
+            f"The 3-D view draws {drawn / 1e6:.2g} of {faces / 1e6:.2g} million triangles. Rays, normals and renders "
+            "use them all."
+        )
+    thin = [(len(tile.data.vertices), float(tile.get(THIN_KEY, 0.0))) for tile in grounds]
+    share = sum(count * part for count, part in thin) / max(1, sum(count for count, _ in thin))
+    if share >= LEAST_THIN:
+        said.append(f"{100 * share:.0f} % of the points have thin data (bluish): the surface is guessed there.")
+    moved_by_hand = [tile.name for tile in grounds if tile.matrix_world != Matrix.Identity(4)]
+    if moved_by_hand:
+        said.append(f"Moved, turned or scaled in Blender: {', '.join(moved_by_hand)}. Rockfall takes it where it is.")
+    scale = scene.unit_settings.scale_length
+    if scale != 1.0:
+        said.append(f"Blender shows lengths × {scale:g} (the scene's unit scale); Rockfall computes in metres.")
+    return said
 
 
 def _read(thing: bpy.types.Object) -> Surface:

@@ -52,6 +52,11 @@ def stand_in(tile: bpy.types.Object) -> bpy.types.Object | None:
     return materials.get_input(modifier, STAND_IN)
 
 
+def is_coarse(scene: bpy.types.Scene) -> bool:
+    """Whether a tile of the scene has a coarse view, be it switched on or off."""
+    return any(MODIFIER in tile.modifiers for tile in state.with_role(scene, state.TERRAIN_ROLE))
+
+
 def drawn_triangles(tile: bpy.types.Object) -> int:
     """How many triangles the 3-D view draws of a tile."""
     other = stand_in(tile)

@@ -9,9 +9,10 @@ from bpy_extras.io_utils import ImportHelper
 
 from ...core.errors import RockfallError
 from ...core.georeference import GlobalShift
+from ...core.terrain.advice import sentences
 from ...core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
 from ...core.terrain.shading import shade
-from ..bridge import reconstruction, state, terrain
+from ..bridge import materials, reconstruction, state, terrain, terrain_look
 from . import look
 from .reporting import reported
 
@@ -69,6 +70,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
             f"{found.name}: {found.kind}, {found.point_count:,} points, {found.face_count:,} faces",
             *found.summary,
         ]
+        self.facts += [said for said in sentences(found.minimum, found.maximum, shift) if said not in self.facts]
         return context.window_manager.invoke_props_dialog(
             self, width=420, title="Import Terrain", confirm_text="Import"
         )
@@ -113,17 +115,71 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
     def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:
-        if state.has_shift(scene):
-            return state.read_shift(scene)
+        """The project's shift, else the one that was given, else None: one is proposed.
+
+        Raises
+        ------
+        RockfallError : the shift is no shift, or not that of the project.
+        """
         texts = (self.shift_x, self.shift_y, self.shift_z)
-        if not any(texts):
-            return None
         try:
-            return GlobalShift(*(float(text or "0") for text in texts))
+            given = GlobalShift(*(float(text or "0") for text in texts)) if any(texts) else None
         except ValueError:
             raise RockfallError(
                 f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0."
             ) from None
+        if not state.has_shift(scene):
+            return given
+        shift = state.read_shift(scene)
+        if given is not None and (given.x, given.y, given.z) != (shift.x, shift.y, shift.z):
+            raise RockfallError(
+                f"This project has the shift ({shift.x:.10g}, {shift.y:.10g}, {shift.z:.10g}) m, so a terrain with the "
+                f"shift ({given.x:.10g}, {given.y:.10g}, {given.z:.10g}) m would not fit to it. Leave the shift empty: "
+                "all files share the project's."
+            )
+        return shift
+
+
+class ROCKFALL_OT_reset_relief(bpy.types.Operator):
+    """Give the sliders of the terrain's relief their usual values"""
+
+    bl_idname = "rockfall.reset_relief"
+    bl_label = "Reset Relief"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_terrain(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for name in materials.TERRAIN_VALUES:
+            context.scene.rockfall_terrain.property_unset(name)
+        terrain_look.apply(context.scene)
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_toggle_full_terrain(bpy.types.Operator):
+    """Draw every triangle of a large terrain in the 3-D view, or a coarse copy that is quick to draw"""
+
+    bl_idname = "rockfall.toggle_full_terrain"
+    bl_label = "Switch Between Coarse and Full Terrain"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_terrain(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.rockfall_terrain
+        settings.full_resolution = not settings.full_resolution
+        return {"FINISHED"}
+
+
+def _has_terrain(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if state.with_role(context.scene, state.TERRAIN_ROLE):
+        return True
+    cls.poll_message_set("Import a terrain first")
+    return False
 
 
 class ROCKFALL_FH_terrain(bpy.types.FileHandler):
@@ -139,4 +195,9 @@ class ROCKFALL_FH_terrain(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-CLASSES = (ROCKFALL_OT_import_terrain, ROCKFALL_FH_terrain)
+CLASSES = (
+    ROCKFALL_OT_import_terrain,
+    ROCKFALL_OT_reset_relief,
+    ROCKFALL_OT_toggle_full_terrain,
+    ROCKFALL_FH_terrain,
+)

@@ -3,8 +3,10 @@
 
 import bpy
 
-from ..bridge import state
-from .base import RockfallPanel, advise, facts
+from ..bridge import shown, state, terrain, terrain_view
+from .base import RockfallPanel, advise, facts, paragraph
+
+NARROW_SPACE = "\u202f"
 
 
 class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
@@ -15,26 +17,57 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         grounds = state.with_role(scene, state.TERRAIN_ROLE)
         if not grounds:
-            advise(context, layout, False, "Import your scan, or begin with the demo.")
+            if scene.get(shown.GROUND_KEY):
+                paragraph(context, layout, "The terrain is gone. Undo, or import it again.", "ERROR")
+            else:
+                advise(context, layout, False, "Import your scan, or begin with the demo.")
             column = layout.column(align=True)
             column.scale_y = 1.4
             column.operator("rockfall.load_demo", icon="PLAY")
             column.operator("rockfall.import_terrain", icon="IMPORT")
             return
-        advise(context, layout, True, "Ready.")
-        shift = state.read_shift(scene)
-        ground = grounds[0]
-        rows = [
-            ("Terrain", ground.name),
-            ("Triangles", f"{len(ground.data.polygons):,}".replace(",", " ")),
-            ("Shift X", f"{shift.x:.2f} m"),
-            ("Shift Y", f"{shift.y:.2f} m"),
-            ("Shift Z", f"{shift.z:.2f} m"),
-        ]
-        facts(layout, [*rows, ("System", shift.crs or "unknown")])
+        warnings = terrain.warnings(scene)
+        for sentence in warnings:
+            paragraph(context, layout, sentence, "ERROR")
+        if not warnings:
+            advise(context, layout, True, "Ready.")
+        self._list_tiles(grounds)
+        for sentence in terrain.remarks(scene):
+            paragraph(context, layout, sentence, "INFO")
         row = layout.row(align=True)
-        row.operator("rockfall.show_relief", icon="SHADING_SOLID")
-        row.operator("rockfall.import_terrain", text="Add", icon="IMPORT")
+        row.operator("rockfall.show_relief", text="Show relief", icon="SHADING_SOLID")
+        row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
+        self._relief(scene)
+        shift = state.read_shift(scene)
+        rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
+        facts(layout, [*rows, ("System", shift.crs or "unknown")])
+
+    def _list_tiles(self, grounds: list[bpy.types.Object]) -> None:
+        column = self.layout.box().column(align=True)
+        for ground in grounds:
+            row = column.split(factor=0.62)
+            row.label(text=ground.name, icon="MESH_GRID", translate=False)
+            faces = len(ground.data.polygons) if ground.type == "MESH" else 0
+            row.label(text=f"{faces:,} triangles".replace(",", NARROW_SPACE))
+            file = str(ground.get(terrain.FILE_KEY, ""))
+            if file and file != ground.name:
+                column.label(text=f"from {file}", icon="BLANK1", translate=False)
+
+    def _relief(self, scene: bpy.types.Scene) -> None:
+        settings = scene.rockfall_terrain
+        layout = self.layout.column()
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(align=True)
+        for name in ("hillshade", "eye_dome", "thin"):
+            column.prop(settings, name, slider=True)
+        column = layout.column(align=True)
+        for name in ("brightness", "contrast"):
+            column.prop(settings, name)
+        layout.operator("rockfall.reset_relief", icon="LOOP_BACK")
+        if terrain_view.is_coarse(scene):
+            layout.prop(settings, "full_resolution", toggle=True, icon="MESH_GRID")
+            layout.prop(settings, "view_limit")
 
 
 CLASSES = (ROCKFALL_PT_terrain,)

@@ -25,6 +25,9 @@ COMMANDS = {
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
     "terrain": "any terrain file → terrain.ply, and what there is to know about it",
     "inspect": "what a video file really contains, with advice",
+    "track": "follows the block through a video from one click → track.csv, proposed impacts",
+    "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
+    "refine": "fits picks and times to the pixels of the footage → picks, impacts with standard deviations",
     "render": "the animation of a project, through Blender",
 }
 """Name → help; the module of the same name in `commands` does it."""

@@ -3,6 +3,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,22 @@ def unit(text: str) -> float:
         return positive(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text} is neither {', '.join(UNITS_M)} nor a number of metres") from None
+
+
+def known_names(text: str, known: Sequence[str], option: str) -> tuple[str, ...]:
+    """The names of a comma-separated list, each once; "none" is an empty list.
+
+    Raises
+    ------
+    InputError : a name that is not among the known ones.
+    """
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in [] if names == ["none"] else names:
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f"Did you mean {near[0]}? " if near else ""
+            raise InputError(f"{option} has '{name}'", advice=f"{hint}Choose from {', '.join(known)}, or none")
+    return () if names == ["none"] else tuple(dict.fromkeys(names))
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from ..errors import RockfallError
 from ..reconstruction.block import Block
 from ..reconstruction.drag import Drag
 from ..reconstruction.motion import FlightEnds
+from ..reconstruction.picks import Picks
 from ..reconstruction.trajectory import Reconstruction, reconstruct
 from ..terrain.readers import read_terrain
 from ..terrain.surface import Surface
@@ -23,20 +24,47 @@ def open_project(project: Project) -> tuple[Surface | None, Reconstruction]:
     """
     if project.picks is None:
         raise RockfallError('The project names no table of picks: add [picks] file = "picks.csv" to it.')
-    source, how = project.terrain, project.reconstruction
-    surface = None
-    if source is not None:
-        surface = read_terrain(source.file, shift=source.global_shift, up=source.up, unit_m=source.unit_m)
+    surface = open_terrain(project)
     picks = read_picks(project.picks, None if surface is None else surface.shift)
-    entries = {name: project.block_of(name) for name in dict.fromkeys(picks.trajectory.tolist())}
+    how = project.reconstruction
     result = reconstruct(
         picks,
         surface=surface,
-        block={name: Block(one.d1_m, one.d2_m, one.d3_m, one.density_kgpm3) for name, one in entries.items()},
+        block=blocks_of(project, picks),
         gravity_mps2=how.gravity_mps2,
-        drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if how.drag else None,
+        drag=drag_of(project),
         normal_radius_m=how.normal_radius_m,
         site=project.site.name,
         flights=cast(FlightEnds, how.flights),
     )
     return surface, result
+
+
+def open_terrain(project: Project) -> Surface | None:
+    """The project's terrain, None when it has none.
+
+    Raises
+    ------
+    RockfallError : the file is bad.
+    """
+    source = project.terrain
+    if source is None:
+        return None
+    return read_terrain(source.file, shift=source.global_shift, up=source.up, unit_m=source.unit_m)
+
+
+def block_of(project: Project, trajectory: str) -> Block:
+    """The block of a trajectory."""
+    entry = project.block_of(trajectory)
+    return Block(entry.d1_m, entry.d2_m, entry.d3_m, entry.density_kgpm3)
+
+
+def blocks_of(project: Project, picks: Picks) -> dict[str, Block]:
+    """The block of each trajectory of the picks."""
+    return {name: block_of(project, name) for name in dict.fromkeys(picks.trajectory.tolist())}
+
+
+def drag_of(project: Project) -> Drag | None:
+    """The drag of air, None when the flights are parabolas."""
+    how = project.reconstruction
+    return Drag(how.air_density_kgpm3, how.drag_coefficient) if how.drag else None

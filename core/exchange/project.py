@@ -19,7 +19,7 @@ SCHEMA = 1
 ENGINES = ("auto", "cycles", "eevee", "workbench")
 UP_AXES = ("auto", "z", "y")
 FLIGHTS = ("contacts", "centres")
-FREE = ("camera", "clock", "drag", "gravity")
+FREE = ("camera", "clock", "clock_drift", "drag", "gravity")
 LOSSES = ("huber", "cauchy", "linear")
 
 Extra = Mapping[str, Any]

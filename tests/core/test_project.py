@@ -3,9 +3,11 @@
 
 import dataclasses
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from rockfall.core.errors import InputError
+from rockfall.core.exchange import project as formats
 from rockfall.core.exchange.project import (
     BlockEntry,
     CameraPlacement,
@@ -19,6 +21,8 @@ from rockfall.core.exchange.project import (
     read_project,
     write_project,
 )
+from rockfall.core.reconstruction import refinement, refinement_solver
+from rockfall.core.reconstruction.motion import FlightEnds
 
 FULL = """
 schema = 1
@@ -236,6 +240,12 @@ def test_a_file_that_is_missing_or_no_text(folder: Path) -> None:
 def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
     with pytest.raises(InputError, match="preview"):
         read(folder, FULL).preset("cinema")
+
+
+def test_a_project_knows_what_a_refinement_knows() -> None:
+    assert formats.FREE == refinement.FREE
+    assert set(formats.LOSSES) == set(refinement_solver.LOSSES)
+    assert set(formats.FLIGHTS) == set(get_args(FlightEnds))
 
 
 def test_a_project_cannot_be_changed_in_place(folder: Path) -> None:

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall refine``: picks and times fitted to the pixels of the footage → picks and impacts with deviations."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from ..errors import InputError, RockfallError
+from ..vectors import Array, norm
+from .options import add_out, known_names, positive
+from .progress import Progress
+from .reconstruct import DEFAULT_STEP_S
+
+if TYPE_CHECKING:
+    from ..exchange.footage import Footage
+    from ..exchange.project import Project, RefinementSettings
+    from ..reconstruction.impact import Impacts
+    from ..reconstruction.picks import Picks
+    from ..reconstruction.refinement import Refinement
+    from ..reconstruction.views import View
+    from ..terrain.surface import Surface
+
+MOST_ROWS = 20
+LOSSES = ("huber", "cauchy", "linear")
+POSE = ("rx", "ry", "rz", "x", "y", "z")
+TINY = 1e-9
+"""A fitted drag of zero is none: the project's must be above zero."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("project", metavar="PROJECT", help="project.toml, with videos that have a camera and a track")
+    add_out(parser)
+    parser.add_argument(
+        "--free",
+        metavar="A,B,…",
+        help="what is fitted beside the picks: camera, clock, clock_drift, drag, gravity; or none (default: as the "
+        "project says)",
+    )
+    parser.add_argument(
+        "--loss", choices=LOSSES, help="how pixels that do not fit count (default: as the project says, else huber)"
+    )
+    parser.add_argument(
+        "--trajectory", action="extend", nargs="+", metavar="NAME", help="only these (default: all of the project)"
+    )
+    parser.add_argument(
+        "--step",
+        type=positive,
+        default=DEFAULT_STEP_S,
+        metavar="S",
+        help="time step of trajectories.csv [s] (default %(default)s)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Refine, write the tables and the refined project, print the summary."""
+    from ..exchange.footage import open_footage, take_trajectories
+    from ..exchange.opening import blocks_of, drag_of, open_terrain
+    from ..exchange.output import output_folder
+    from ..exchange.project import read_project
+    from ..reconstruction.refinement import refine
+    from ..reconstruction.refinement_solver import Loss
+
+    with output_folder(arguments.out) as folder, Progress() as progress:
+        progress(f"Reading {arguments.project}")
+        project = read_project(arguments.project)
+        how = _settings(project.refinement, arguments)
+        surface = open_terrain(project)
+        footage = open_footage(project, None if surface is None else surface.shift)
+        picks, notes = _picks(project, surface, footage)
+        footage = _named(footage, picks)
+        if arguments.trajectory:
+            picks = _chosen(picks, arguments.trajectory)
+            footage = take_trajectories(footage, arguments.trajectory)
+        progress(f"Fitting {len(picks)} picks to {len(footage.observations)} pixels")
+        refined = refine(
+            picks,
+            footage.views,
+            footage.observations,
+            surface=surface,
+            block=blocks_of(project, picks),
+            gravity_mps2=project.reconstruction.gravity_mps2,
+            drag=drag_of(project),
+            normal_radius_m=project.reconstruction.normal_radius_m,
+            free=how.free,
+            sigma_terrain_m=how.sigma_terrain_m,
+            loss=cast(Loss, how.loss),
+            site=project.site.name,
+        )
+        progress("Writing the tables")
+        written = _write(folder, project, how, footage, refined, surface, arguments.step)
+    for sentence in (*notes, *footage.notes, *_summary(picks, footage, refined)):
+        print(sentence)
+    print(f"Written: {', '.join(written)} in {arguments.out}")
+    return 0
+
+
+def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> "RefinementSettings":
+    """As the project says, but for what was typed."""
+    from ..exchange.project import FREE
+
+    free = settings.free if arguments.free is None else known_names(arguments.free, FREE, "--free")
+    return replace(settings, free=free, loss=arguments.loss or settings.loss)
+
+
+def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
+    """The project's picks, or first ones from the events that were seen; with a sentence about these."""
+    from ..exchange.footage import picks_from_events
+    from ..exchange.tables import read_picks
+
+    if project.picks is not None:
+        return read_picks(project.picks, footage.views[0].camera.camera.shift if surface is None else surface.shift), ()
+    names = sorted(set(footage.observations.trajectory.tolist()) - {""})
+    alone = names[0] if len(names) == 1 else project.blocks[0].name if len(project.blocks) == 1 else "block"
+    picks = picks_from_events(project, surface, name=alone)
+    count = picks.group_starts.size
+    runs = "trajectory" if count == 1 else "trajectories"
+    return picks, (f"{len(picks)} first picks of {count} {runs} were made from the events seen in the videos.",)
+
+
+def _named(footage: "Footage", picks: "Picks") -> "Footage":
+    """Pixels without a trajectory belong to the only one that there is.
+
+    Raises
+    ------
+    InputError : there are several.
+    """
+    seen = footage.observations
+    if not (nameless := seen.trajectory == "").any():
+        return footage
+    names = list(dict.fromkeys(picks.trajectory.tolist()))
+    if len(names) != 1:
+        i = int(np.argmax(nameless))
+        raise InputError(
+            f"The track does not name the trajectory, but there are picks of {len(names)}",
+            file=footage.entries[int(seen.view[i])].track,
+            row=int(footage.row[i]),
+            advice=f"Add a column trajectory, with {', '.join(names[:5])}",
+        )
+    return replace(footage, observations=replace(seen, trajectory=np.where(nameless, names[0], seen.trajectory)))
+
+
+def _chosen(picks: "Picks", names: Sequence[str]) -> "Picks":
+    """The picks of some trajectories.
+
+    Raises
+    ------
+    RockfallError : one of them has no picks.
+    """
+    from ..reconstruction.picks import take
+
+    known = list(dict.fromkeys(picks.trajectory.tolist()))
+    for name in names:
+        if name not in known:
+            raise RockfallError(f"There is no trajectory {name!r}. The picks have: {', '.join(known)}.")
+    return take(picks, np.isin(picks.trajectory, names))
+
+
+def _write(
+    folder: Path,
+    project: "Project",
+    how: "RefinementSettings",
+    footage: "Footage",
+    refined: "Refinement",
+    surface: "Surface | None",
+    step_s: float,
+) -> list[str]:
+    """Write all files; returns their names."""
+    from ..exchange.cameras import write_camera
+    from ..exchange.footage_tables import write_refinement_residuals
+    from ..exchange.project import write_project
+    from ..exchange.tables import write_impacts, write_picks, write_trajectories
+    from ..reconstruction.sampling import sample_trajectories
+
+    made, seen = refined.reconstruction, footage.observations
+    write_picks(refined.picks, folder / "picks.csv")
+    write_impacts(made.impacts, folder / "impacts.csv")
+    write_trajectories(sample_trajectories(made, step_s, surface), folder / "trajectories.csv")
+    write_refinement_residuals(
+        folder / "residuals.csv",
+        trajectory=seen.trajectory,
+        video=np.array([entry.name for entry in footage.entries])[seen.view],
+        frame=footage.frame,
+        time_s=seen.time_s,
+        pixel=seen.pixel,
+        residual_px=refined.residual_px,
+        outlier=refined.outlier,
+    )
+    written = ["picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv"]
+    entries = {}
+    for i, (entry, view, camera) in enumerate(zip(footage.entries, refined.views, footage.cameras, strict=True)):
+        entries[entry.name] = replace(entry, offset_s=view.clock.offset_s, drift=view.clock.drift)
+        if "camera" in how.free and footage.views[i].pose_covariance is not None:
+            file = folder / f"camera_{_as_file(entry.name)}.toml"
+            sigma = {name: value for name, value in camera.sigma.items() if name not in POSE} | _pose_sigma(view)
+            write_camera(
+                file,
+                view.camera,
+                rmse_px=float(refined.rmse_px_by_view[i]),
+                sigma=sigma,
+                crs=camera.crs,
+                pose_covariance=view.pose_covariance,
+                extra=camera.extra,
+            )
+            entries[entry.name] = replace(entries[entry.name], camera=file)
+            written.append(file.name)
+    reconstruction = replace(project.reconstruction, flights=made.ends, gravity_mps2=made.gravity_mps2)
+    if made.drag is not None:
+        reconstruction = replace(reconstruction, drag=True, drag_coefficient=max(made.drag.coefficient, TINY))
+    result = replace(
+        project,
+        picks=folder / "picks.csv",
+        videos=tuple(entries.get(video.name, video) for video in project.videos),
+        reconstruction=reconstruction,
+        refinement=how,
+    )
+    write_project(result, folder / "project.toml")
+    return [*written, "project.toml"]
+
+
+def _pose_sigma(view: "View") -> dict[str, float]:
+    if view.pose_covariance is None:
+        return {}
+    return dict(zip(POSE, np.sqrt(np.diag(view.pose_covariance)).tolist(), strict=True))
+
+
+def _as_file(name: str) -> str:
+    """A video's name as a part of a file name."""
+    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
+
+
+def _summary(before: "Picks", footage: "Footage", refined: "Refinement") -> list[str]:
+    seen = footage.observations
+    used = np.isfinite(refined.residual_px[:, 0])
+    sentences = [
+        f"{int(used.sum())} pixels in {len(footage.views)} {'video' if len(footage.views) == 1 else 'videos'}: "
+        f"{refined.rmse_px_before:.2f} px off the marked motion, {refined.rmse_px:.2f} px off the fitted one "
+        f"(root mean square), {int(refined.outlier.sum())} outliers; {refined.iterations} steps."
+    ]
+    if len(footage.views) > 1:
+        each = [f"{view.name} {rmse:.2f} px" for view, rmse in zip(refined.views, refined.rmse_px_by_view, strict=True)]
+        sentences.append(f"By video: {', '.join(each)}.")
+    moved = np.isin(refined.picks.trajectory, np.unique(seen.trajectory))
+    shift = norm(refined.picks.position - before.in_shift(refined.picks.shift).position)[moved]
+    late = np.abs(refined.picks.time_s - before.time_s)[moved]
+    if shift.size:
+        sentences.append(
+            f"The picks moved by {100 * np.median(shift):.1f} cm and {1e3 * np.median(late):.1f} ms (medians), by "
+            f"{100 * shift.max():.1f} cm and {1e3 * late.max():.1f} ms at most."
+        )
+    if refined.noise_scale > 1:
+        sentences.append(
+            f"The residuals are {refined.noise_scale:.2f} times what was stated; the deviations allow for it."
+        )
+    sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in refined.unknowns.items()]
+    return [*sentences, *_impact_lines(refined.reconstruction.impacts), *refined.advice]
+
+
+def _impact_lines(impacts: "Impacts") -> list[str]:
+    """The impacts as a table for people."""
+    if not len(impacts):
+        return ["No impacts."]
+    speed, speed_sigma = norm(impacts.v1), _speed_sigma(impacts)
+    rn, rn_sigma = impacts.rn, impacts.sigma.get("rn", np.full(len(impacts), np.nan))
+    width = max(len("trajectory"), *map(len, impacts.trajectory.tolist()[:MOST_ROWS]))
+    lines = [f"{'trajectory':<{width}}  impact    time s  incident speed m/s             R_N"]
+    for i in range(min(len(impacts), MOST_ROWS)):
+        lines.append(
+            f"{impacts.trajectory[i]:<{width}}  {impacts.impact[i]:>6}  {impacts.time_s[i]:>8.3f}  "
+            f"{_with(speed[i], speed_sigma[i], 2):>18}  {_with(rn[i], rn_sigma[i], 3):>14}"
+        )
+    if len(impacts) > MOST_ROWS:
+        lines.append(f"… and {len(impacts) - MOST_ROWS} more impacts, in impacts.csv.")
+    return lines
+
+
+def _speed_sigma(impacts: "Impacts") -> Array:
+    """(n,) standard deviation of the incident speed, as if its normal and tangential parts were independent."""
+    nothing = np.full(len(impacts), np.nan)
+    normal, tangential = (impacts.sigma.get(name, nothing) for name in ("vn1", "vt1"))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.hypot(impacts.vn1 * normal, impacts.vt1 * tangential) / norm(impacts.v1))
+
+
+def _with(value: float, sigma: float, digits: int) -> str:
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.{digits}f}" + (f" ± {sigma:.{digits}f}" if np.isfinite(sigma) else "")

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a project's videos to numbers: views with their clocks, the block's pixels, and first picks from seen events."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..camera.model import rays
+from ..errors import InputError, RockfallError
+from ..footage.clock import Clock
+from ..georeference import GlobalShift
+from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
+from ..reconstruction.placement import terrain_normals
+from ..reconstruction.views import PixelObservations, View
+from ..terrain.raycast import cast_rays
+from ..terrain.surface import Surface
+from ..vectors import Array, norm
+from .cameras import CameraFile, read_camera
+from .footage_tables import Events, Track, read_events, read_track
+from .opening import block_of
+from .project import Project, VideoEntry
+
+SIGMA_PX = 1.0
+"""Of a tracked pixel without a standard deviation of its own."""
+MARGIN = 0.1
+"""A tracked block may leave the image by this part of its size."""
+SETTLED_M = 1e-4
+SETTLING = 20
+
+EXAMPLE = 'name = "left", camera = "camera.toml", track = "track.csv", offset_s = 0.0'
+
+
+@dataclass(frozen=True, eq=False)
+class Footage:
+    """What a project's videos tell: v views and m pixels.
+
+    Attributes
+    ----------
+    entries, cameras, views : (v,) the videos that have a camera and a track, what is in their files, and as views.
+    observations : the block's pixels in all of them.
+    frame, row : (m,) of the tracks; −1 where the frame is not given.
+    notes : sentences about what was left out.
+    """
+
+    entries: tuple[VideoEntry, ...]
+    cameras: tuple[CameraFile, ...]
+    views: tuple[View, ...]
+    observations: PixelObservations
+    frame: Indices
+    row: Indices
+    notes: tuple[str, ...] = ()
+
+
+def open_footage(project: Project, shift: GlobalShift | None = None, name: str = "") -> Footage:
+    """Read the cameras and tracks of a project.
+
+    Parameters
+    ----------
+    shift : of the local frame (the terrain's); None takes the one proposed for the first camera.
+    name : of the trajectory, for tracks that name none.
+
+    Raises
+    ------
+    RockfallError : no video has both a camera and a track, or one of the files is bad.
+    """
+    files = [(video, video.camera, video.track) for video in project.videos]
+    used = [(video, camera, track) for video, camera, track in files if camera is not None and track is not None]
+    entries = tuple(video for video, _, _ in used)
+    if not entries:
+        raise RockfallError(_nothing_to_see(project))
+    notes = tuple(
+        f"Video {video.name} is not used: it has no {'camera' if video.camera is None else 'track'}."
+        for video in project.videos
+        if video not in entries and (video.camera or video.track)
+    )
+    cameras: list[CameraFile] = []
+    views: list[View] = []
+    tracks: list[Track] = []
+    for entry, camera_file, track_file in used:
+        camera, track = read_camera(camera_file, shift), read_track(track_file)
+        shift = camera.camera.camera.shift
+        _check_inside(track, camera, entry)
+        clock = clock_of(entry, track.frame, track.time_s)
+        cameras.append(camera)
+        tracks.append(track)
+        views.append(View(entry.name, camera.camera, clock, entry.row_time_s, camera.pose_covariance))
+    names = np.concatenate([np.where(track.trajectory == "", name, track.trajectory) for track in tracks])
+    sigma = np.concatenate([track.sigma_px for track in tracks])
+    observations = PixelObservations(
+        view=np.repeat(np.arange(len(tracks)), [len(track) for track in tracks]),
+        trajectory=names,
+        time_s=np.concatenate([track.time_s for track in tracks]),
+        pixel=np.concatenate([track.pixel for track in tracks]),
+        sigma_px=np.where(np.isnan(sigma), SIGMA_PX, sigma),
+    )
+    frame = np.concatenate([track.frame for track in tracks])
+    row = np.concatenate([track.row for track in tracks])
+    return Footage(entries, tuple(cameras), tuple(views), observations, frame, row, notes)
+
+
+def take_trajectories(footage: Footage, names: Collection[str]) -> Footage:
+    """The footage with the pixels of some trajectories only."""
+    rows = np.isin(footage.observations.trajectory, list(names))
+    return replace(
+        footage, observations=footage.observations.take(rows), frame=footage.frame[rows], row=footage.row[rows]
+    )
+
+
+def clock_of(entry: VideoEntry, frame: Indices, time_s: Array) -> Clock:
+    """The clock of a video; the rate of the file comes from the file itself, else from the frames (n,) of a table.
+
+    Raises
+    ------
+    InputError : a capture rate is given, but neither tells the rate of the file.
+    """
+    rate = 1.0
+    if entry.capture_rate_hz is not None:
+        rate = _file_rate(entry, frame, time_s) / entry.capture_rate_hz
+    return Clock(entry.offset_s, entry.drift, entry.origin_s, rate)
+
+
+def picks_from_events(project: Project, surface: Surface | None, *, name: str = "") -> Picks:
+    """First picks, where the rays of the events of a project's videos meet the terrain.
+
+    Parameters
+    ----------
+    surface : the terrain; without one nothing tells the distance.
+    name : of the trajectory, for events that name none.
+
+    Raises
+    ------
+    RockfallError : no video has a camera and events, or there is no terrain.
+    InputError : a ray misses the terrain, with the row.
+
+    Notes
+    -----
+    Events are pixels of the block's centre. A trajectory is taken from the video that has most events of it.
+    """
+    entries = [video for video in project.videos if video.camera is not None and video.events is not None]
+    if not entries:
+        raise RockfallError(
+            'The project has no picks, and no video with events to make them from: add [picks] file = "picks.csv", or '
+            'events = "events.csv" to its [[videos]].'
+        )
+    if surface is None:
+        raise RockfallError('Picks can be made from events on a terrain only: add [terrain] file = "…" to the project.')
+    found = [(entry, read_events(Path(str(entry.events)))) for entry in entries]
+    parts = [
+        _event_picks(project, entry, events, rows, surface, name)
+        for (entry, events), rows in zip(found, _best_views([events for _, events in found]), strict=True)
+        if rows.any()
+    ]
+    columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+    return make_picks(
+        columns["trajectory"],
+        columns["time_s"],
+        columns["position"],
+        kind=columns["kind"],
+        sigma_time_s=columns["sigma_time_s"],
+        extra={key: columns[key] for key in ("video", "frame", "u_px", "v_px")},
+        shift=surface.shift,
+        sort=True,
+    )
+
+
+def contact_points(
+    surface: Surface, origins: Array, directions: Array, diameter_m: Array, normal_radius_m: float | None = None
+) -> tuple[Array, Array]:
+    """Where blocks touch the terrain, whose centres lie on rays; (n, 3) points and (n, 3) normals, NaN where missed.
+
+    Parameters
+    ----------
+    origins, directions : (n, 3) of the rays.
+    diameter_m : (n,) of the blocks.
+
+    Notes
+    -----
+    The centre is a radius from the contact along the normal, so the contact lies where the ray, moved by that much into
+    the ground, meets the terrain; the normal there is found by iteration. A grazing ray that never settles keeps the
+    mean of its last two contacts.
+    """
+    hits = cast_rays(surface, origins, directions)
+    point = hits.point.copy()
+    normal = np.full_like(point, np.nan)
+    going = np.flatnonzero(hits.face >= 0)
+    for step in range(SETTLING):
+        if not going.size:
+            break
+        normal[going] = terrain_normals(surface, point[going], diameter_m[going], normal_radius_m).normal
+        moved = origins[going] - diameter_m[going, None] / 2 * normal[going]
+        found = cast_rays(surface, moved, directions[going]).point
+        found = np.where(np.isnan(found), point[going], found)
+        moving = norm(found - point[going]) > SETTLED_M
+        point[going] = found if step < SETTLING - 1 else (found + point[going]) / 2
+        going = going[moving]
+    return point, normal
+
+
+def _event_picks(
+    project: Project,
+    entry: VideoEntry,
+    events: Events,
+    rows: Mask,
+    surface: Surface,
+    name: str,
+) -> dict[str, Names | Array]:
+    chosen = np.flatnonzero(rows)
+    camera = read_camera(Path(str(entry.camera)), surface.shift).camera
+    clock = clock_of(entry, events.frame, events.time_s)
+    names = np.where(events.trajectory == "", name, events.trajectory)[chosen]
+    position, rotation = camera.poses_at(events.time_s[chosen])
+    pixel = events.pixel[chosen]
+    origins, directions = rays(camera.camera, pixel, position=position, rotation=rotation)
+    sizes = {one: block_of(project, one).diameter_m for one in set(names.tolist())}
+    diameter = np.array([sizes[one] for one in names.tolist()])
+    seen = np.isfinite(directions).all(axis=1)
+    point = np.full((chosen.size, 3), np.nan)
+    point[seen], _ = contact_points(
+        surface, origins[seen], directions[seen], diameter[seen], project.reconstruction.normal_radius_m
+    )
+    for i in np.flatnonzero(np.isnan(point[:, 0])):
+        raise events.error(
+            int(chosen[i]),
+            f"The ray through the pixel ({pixel[i, 0]:.1f}, {pixel[i, 1]:.1f}) of {entry.name} misses the terrain",
+            "Check the camera and the event, or give a larger terrain",
+        )
+    late = entry.row_time_s * (pixel[:, 1] - camera.camera.height / 2)
+    frames = events.frame[chosen].tolist()
+    return {
+        "trajectory": names,
+        "time_s": clock.to_common(events.time_s[chosen]) + late,
+        "position": point,
+        "kind": events.kind[chosen],
+        "sigma_time_s": events.sigma_time_s[chosen] * clock.rate,
+        "video": np.full(chosen.size, entry.name),
+        "frame": np.array([str(frame) if frame >= 0 else "" for frame in frames], dtype=np.str_),
+        "u_px": np.array(list(map(repr, pixel[:, 0].tolist())), dtype=np.str_),
+        "v_px": np.array(list(map(repr, pixel[:, 1].tolist())), dtype=np.str_),
+    }
+
+
+def _best_views(tables: list[Events]) -> list[Mask]:
+    """For each table, the rows (n,) of the trajectories of which it has most events; the first one on a tie."""
+    most: dict[str, tuple[int, int]] = {}
+    for number, events in enumerate(tables):
+        names, counts = np.unique(events.trajectory, return_counts=True)
+        for one, count in zip(names.tolist(), counts.tolist(), strict=True):
+            if count > most.get(one, (0, 0))[0]:
+                most[one] = count, number
+    return [
+        np.array([most[one][1] == number for one in events.trajectory.tolist()], dtype=np.bool_)
+        for number, events in enumerate(tables)
+    ]
+
+
+def _file_rate(entry: VideoEntry, frame: Indices, time_s: Array) -> float:
+    """Frames per second of the file."""
+    if entry.file is not None and entry.file.is_file():
+        from ..footage.video import open_video
+
+        return open_video(entry.file).rate_hz
+    known = np.flatnonzero(frame >= 0)
+    if known.size > 1 and np.ptp(frame[known]) > 0:
+        return 1.0 / float(np.polyfit(frame[known], time_s[known], 1)[0])
+    raise InputError(
+        f"Video {entry.name} has a capture rate, but nothing tells the rate of its file",
+        file=entry.file,
+        advice="Correct the path of the video in the project, or give the column frame in its track",
+    )
+
+
+def _check_inside(track: Track, camera: CameraFile, entry: VideoEntry) -> None:
+    one = camera.camera.camera
+    size = np.array(one.size)
+    outside = (track.pixel < -MARGIN * size) | (track.pixel > (1 + MARGIN) * size)
+    for i in np.flatnonzero(outside.any(axis=1)):
+        raise track.error(
+            int(i),
+            f"The pixel ({track.pixel[i, 0]:g}, {track.pixel[i, 1]:g}) lies far outside the image of camera "
+            f"{Path(str(entry.camera)).name}, {one.width} × {one.height} px",
+            "Track and camera must belong to one video, in one size",
+        )
+
+
+def _nothing_to_see(project: Project) -> str:
+    if not project.videos:
+        problem = "The project has no videos"
+    else:
+        lacking = [f"{video.name} has no {_lack(video)}" for video in project.videos]
+        problem = f"No video of the project has both a camera and a track: {'; '.join(lacking)}"
+    return (
+        f"{problem}. Solve the camera with rockfall align, track the block, and add a section [[videos]] to the "
+        f"project, with a line for each of: {EXAMPLE}."
+    )
+
+
+def _lack(video: VideoEntry) -> str:
+    missing = [word for word, path in (("camera", video.camera), ("track", video.track)) if path is None]
+    return " and no ".join(missing)

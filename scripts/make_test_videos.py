@@ -31,7 +31,7 @@ def picture(number: int) -> av.VideoFrame:
 
 def make(name, codec, times, base, *, rate=30, pixels="yuv420p", numbers=None, options=None, stamps=None) -> None:
     """Write a video of frames at `times` [s], whole multiples of `base`; `stamps` replace them in the container."""
-    with av.open(str(FOLDER / name), "w") as container:
+    with av.open(str(FOLDER / name), "w", options={"fflags": "+bitexact"}) as container:
         stream = container.add_stream(codec, rate=rate, options=options or {})
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, pixels
         stream.codec_context.time_base = stream.time_base = base
@@ -117,6 +117,7 @@ def main() -> None:
     make("doubled.mkv", "libx264", still, MILLISECOND, rate=25, options=H264 | {"bf": "0"}, stamps=doubled)
     make("single.mp4", "libx264", even[:1], FINE, options=H264)
     make("no_times.h264", "libx264", even[:12], Fraction(1, 30), options=H264 | {"bf": "0"})
+    make("interlaced.mp4", "libx264", even[:12], FINE, options=H264 | {"flags": "+ildct+ilme"})
     sound("sound.mp4")
     shorten("cut.mp4", "constant.mp4", 0.6)
     shorten("cut.mkv", "variable.mkv", 0.6)

@@ -44,6 +44,10 @@ CONVERT = (
     "Convert it with ffmpeg -i {name} -c:v libx264 -crf 16 -fps_mode passthrough -an {stem}_h264.mp4: "
     "H.264 of constant quality, and the timestamps stay as they are"
 )
+DEINTERLACE = (
+    "Make a frame of each field, which also doubles the rate: ffmpeg -i {name} -vf bwdif=mode=send_field -c:v libx264 "
+    "-crf 16 -fps_mode passthrough -an {stem}_fields.mp4"
+)
 
 
 def _none() -> Indices:
@@ -149,7 +153,7 @@ class Video:
         """(f − 1,) median of the steps around each: phones take fewer frames for a while when it gets dark [s]."""
         from scipy.ndimage import median_filter
 
-        return median_filter(self.step_s, size=LOCAL_STEPS, mode="nearest")
+        return median_filter(self.step_s, size=LOCAL_STEPS, mode="mirror")
 
     @property
     def _steady_s(self) -> Array:
@@ -177,7 +181,7 @@ def open_video(path: str | Path, progress: Report | None = None, *, thorough: bo
     Raises
     ------
     InputError : a file that is missing, no video, cut short before its first frame, in a codec that cannot be decoded,
-        or without timestamps.
+        without timestamps, or interlaced.
     """
     path = Path(path)
     say = progress or _silent
@@ -193,6 +197,7 @@ def open_video(path: str | Path, progress: Report | None = None, *, thorough: bo
             file=path,
             advice=f"Tell the true rate with ffmpeg -r RATE -i {path.name} -c copy {path.stem}.mp4",
         )
+    _refuse_still(video)
     return video
 
 
@@ -476,6 +481,19 @@ def _no_picture(path: Path) -> InputError:
     if container:
         return InputError(f"This {container} file holds no video that can be read", file=path, advice=_convert(path))
     return InputError("This is not a video file", file=path, advice="Give an MP4, MOV, MKV, WebM or AVI file")
+
+
+def _refuse_still(video: Video) -> None:
+    """OpenCV 5.0 hands over the same memory for all frames of interlaced video, whatever is in it, without an error."""
+    places = np.r_[np.arange(min(4, video.frames)), np.linspace(0, video.frames - 1, 6).astype(np.intp)]
+    pictures = (picture for _, picture in read_frames(video, np.unique(places)))
+    first = next(pictures)
+    if video.frames > 1 and all(np.array_equal(picture, first) for picture in pictures):
+        raise InputError(
+            "All frames give the same picture, as interlaced video does here",
+            file=video.path,
+            advice=DEINTERLACE.format(name=video.path.name, stem=video.path.stem),
+        )
 
 
 def _undecodable(video: Video, index: int) -> InputError:

@@ -2,6 +2,7 @@
 """What a video contains, against PyAV's timestamps and the frame numbers that the pictures show."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -71,8 +72,8 @@ def test_each_picture_is_the_one_asked_for(name, seeking):
     number = np.arange(video.frames)
     if name == "repeated.avi":
         number = number - (number > 11)
-    if name == "cut.mkv":  # of the last group, cut in two, only the last picture is there
-        number[-1] += 2
+    if name == "cut.mkv":  # of the last group, cut in two, only the picture that comes first in the file is there
+        number[-1] += 1
     pictures = dict(read_frames(video, grey=True))
     assert [shown(picture, turned) for picture in pictures.values()] == number.tolist()
     seeking.clear()
@@ -141,6 +142,16 @@ def test_a_slower_rate_is_no_series_of_gaps():
     assert video.gaps.size == 0
 
 
+@pytest.mark.parametrize("place", [0, 1, 50, 97, 98])
+def test_gaps_are_found_also_at_the_ends(place):
+    step = np.full(99, 0.02)
+    step[place] = 0.10
+    step[60:80] = 0.04  # darker for a while
+    video = replace(open_video(FOLDER / "constant.mp4"), time_s=np.r_[0, np.cumsum(step)])
+    assert video.gaps.tolist() == [place]
+    assert video.missing.tolist() == [4]
+
+
 def test_repeated_pictures_and_doubled_timestamps():
     assert open_video(FOLDER / "repeated.avi", thorough=True).repeated.tolist() == [12]
     doubled = open_video(FOLDER / "doubled.mkv")
@@ -200,6 +211,7 @@ def test_a_file_that_was_damaged_since(tmp_path):
         ("cut.mp4", "its index, which comes last, is missing"),
         ("sound.mp4", "sound and no video"),
         ("strange.mp4", r"xyz1.*ffmpeg -i strange.mp4 -c:v libx264 .*-fps_mode passthrough"),
+        ("interlaced.mp4", "same picture, as interlaced video.* bwdif=mode=send_field"),
         ("no_times.h264", "12 frames of this file have no timestamps"),
         ("times.json", "not a video file"),
     ],

@@ -148,9 +148,9 @@ def look_at(
     forward = unit(np.asarray(target, dtype=np.float64) - place)
     if not np.isfinite(forward).all():
         raise InputError("The camera cannot look at the place where it stands")
-    right = np.cross(forward, upright)
+    right: Array = np.asarray(np.cross(forward, upright), dtype=np.float64)
     if norm(right) < 1e-9 * norm(upright):
-        right = np.cross(forward, [0.0, 1.0, 0.0])
+        right = np.asarray(np.cross(forward, [0.0, 1.0, 0.0]), dtype=np.float64)
     if norm(right) < 1e-9:
         right = null_space(forward[None])[:, 0]
     right = unit(right)

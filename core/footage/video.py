@@ -37,6 +37,7 @@ FAR_FRAMES = 40
 REPORT_EVERY = 200
 MOST_REORDERED = 16
 SEEKS = 5
+DAMAGED = 30
 SAMPLE = 4
 """Pictures are compared at every fourth pixel."""
 FFMPEG_QUIET = "-8"
@@ -241,7 +242,7 @@ def _grabbed(video: Video, indices: Indices) -> Iterator[tuple[int, Any]]:
         if not video.counted and _keyframes_about(video, index)[0] > frame + FAR_FRAMES:
             capture, frame = _seek(video, capture, index)
         while frame < index:
-            if not capture.grab():
+            if not _grab(capture):
                 raise _undecodable(video, index)
             frame = frame + 1 if video.counted else _frame_of(video, capture)
         if not video.counted and abs(_time_s(capture) - video.time_s[index]) > SAME_TIME_S:
@@ -274,7 +275,7 @@ def _seek(video: Video, capture: Any, index: int) -> tuple[Any, int]:
             break
         capture.set(cv2.CAP_PROP_POS_FRAMES, int(guess - back))
         late_s = 0.0
-        if capture.grab():
+        if _grab(capture):
             frame = _frame_of(video, capture)
             if frame <= before or frame <= min(index, after - MOST_REORDERED - 1):
                 return capture, frame
@@ -337,7 +338,7 @@ def _packets(path: Path) -> tuple[Array, Array]:
     cv2 = _cv2()
     capture = _opened(path, [cv2.CAP_PROP_FORMAT, -1])
     times, keys = [], []
-    while capture.grab():
+    while _grab(capture):
         times.append(_time_s(capture))
         keys.append(capture.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME) > 0)
     time_s = np.array(times)
@@ -356,7 +357,7 @@ def _decodes_as_told(video: Video) -> bool:
             last = capture
     except InputError:
         return False
-    return not last.grab()
+    return not _grab(last)
 
 
 def _decoded(video: Video, say: Report) -> Video:
@@ -364,10 +365,10 @@ def _decoded(video: Video, say: Report) -> Video:
     capture, before = _capture(video.path), None
     times: list[float] = []
     repeated: list[int] = []
-    while capture.grab():
+    while _grab(capture):
         there, picture = capture.retrieve()
         if not there:
-            break
+            continue
         if len(times) % REPORT_EVERY == 0:
             say(f"Decoding {video.path.name}, frame {len(times)} of about {video.frames}")
         sample = picture[::SAMPLE, ::SAMPLE].copy()
@@ -406,6 +407,11 @@ def _without_holes(time_s: Array) -> tuple[Array, bool]:
 
 def _ticks(time_s: Array) -> NDArray[np.int64]:
     return np.round(time_s / SAME_TIME_S).astype(np.int64)
+
+
+def _grab(capture: Any) -> bool:
+    """Go to the next frame or packet, past a few damaged ones; False at the end."""
+    return any(capture.grab() for _ in range(DAMAGED))
 
 
 def _time_s(capture: Any) -> float:

@@ -174,6 +174,23 @@ def test_cut_files_tell_what_is_left():
         assert video.header_frames >= announced
 
 
+def test_decoding_goes_on_after_damage(tmp_path, seeking):
+    path = tmp_path / "damaged.mp4"
+    data = bytearray((FOLDER / "constant.mp4").read_bytes())
+    begin = data.index(b"mdat") + 4
+    middle = begin + (len(data) - begin) // 3
+    data[middle : middle + 60] = bytes(byte ^ 0x5A for byte in data[middle : middle + 60])
+    path.write_bytes(data)
+    video = open_video(path)
+    assert 30 <= video.frames < 40
+    assert video.gaps.size >= 1
+    assert video.frames + video.missing.sum() == 40
+    late = np.flatnonzero(video.time_s > video.keyframe_s[-1] - 1e-6)
+    assert late.size >= 4
+    for index, picture in read_frames(video, late):
+        assert shown(picture) == round(30 * video.time_s[index])
+
+
 def test_frame_at():
     video = open_video(FOLDER / "variable.mp4")
     for index in (0, 9, 10, 66):

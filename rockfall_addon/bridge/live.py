@@ -252,8 +252,8 @@ def _finish(scene: bpy.types.Scene, changed: bool) -> None:
 
 def _ground_changed(scene: bpy.types.Scene) -> bool:
     """Whether there is another terrain than the trajectories were computed with; one that is gone changes nothing."""
-    now, before = shown.ground(scene), scene.get(shown.GROUND_KEY, "")
-    if now == before or not now:
+    now = shown.ground(scene)
+    if not now or now == scene.get(shown.GROUND_KEY, ""):
         return False
     scene[shown.GROUND_KEY] = now
     return True

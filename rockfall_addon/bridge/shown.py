@@ -14,6 +14,7 @@ from . import picks, state, timing
 
 SHOWN_KEY = "rockfall_shown"
 GROUND_KEY = "rockfall_ground"
+"""The terrain that the trajectories were computed on; empty or missing without."""
 COMPLETE = "+"
 """Behind the fingerprint of a trajectory that has flights and a block."""
 _KEPT = (

@@ -3,11 +3,12 @@
 
 import bpy
 
-from . import demo, film, look, models, picks, share, terrain
+from . import demo, film, impacts, look, models, picks, share, terrain
 
 CLASSES = (
     *terrain.CLASSES,
     *picks.CLASSES,
+    *impacts.CLASSES,
     *look.CLASSES,
     *models.CLASSES,
     *demo.CLASSES,

@@ -3,12 +3,13 @@
 
 import bpy
 
-from . import film, impact, models, picks, playback, share, terrain
+from . import film, impact, impact_table, models, picks, playback, share, terrain
 
 CLASSES = (
     *terrain.CLASSES,
     *picks.CLASSES,
     *impact.CLASSES,
+    *impact_table.CLASSES,
     *models.CLASSES,
     *playback.CLASSES,
     *film.CLASSES,

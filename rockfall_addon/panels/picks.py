@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..bridge import state
+from ..bridge import problems, state
 from .base import RockfallPanel, advise, paragraph
 
 
@@ -19,14 +19,14 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
             advise(context, layout, False, "Import a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
-        if problem := scene.get("rockfall_problem"):
-            paragraph(context, layout, problem, "ERROR")
+        for sentence in problems.sentences(scene):
+            paragraph(context, layout, sentence, "ERROR")
         runs = "trajectory" if len(flights) == 1 else "trajectories"
         advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
         layout.use_property_split = True
         settings = scene.rockfall
         column = layout.column(align=True)
-        for name in ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag"):
+        for name in ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag", "flights_join"):
             column.prop(settings, name)
         layout.operator("rockfall.reconstruct", icon="FILE_REFRESH")
 

@@ -28,8 +28,10 @@ class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
             column.prop(settings, "stagger_s")
         for name in ("block_scale", "trail_radius_m", "marker_radius_m"):
             column.prop(settings, name)
+        column.prop(settings, "colour_by")
         column = layout.column(heading="Trails", align=True)
         column.prop(settings, "trail_until_now")
+        column.prop(settings, "show_ticks")
         column.prop(settings, "show_legend")
 
 

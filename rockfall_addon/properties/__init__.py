@@ -3,14 +3,29 @@
 
 import bpy
 
+from .impacts import ImpactRow, PickProperties
 from .settings import SceneSettings
+from .terrain import TerrainSettings
+
+GROUPS = {"rockfall": SceneSettings, "rockfall_terrain": TerrainSettings}
+"""Property of a scene → its group."""
 
 
 def register() -> None:
-    bpy.utils.register_class(SceneSettings)
-    bpy.types.Scene.rockfall = bpy.props.PointerProperty(type=SceneSettings)
+    for name, group in GROUPS.items():
+        bpy.utils.register_class(group)
+        setattr(bpy.types.Scene, name, bpy.props.PointerProperty(type=group))
+    bpy.utils.register_class(ImpactRow)
+    bpy.types.Scene.rockfall_impacts = bpy.props.CollectionProperty(type=ImpactRow)
+    bpy.utils.register_class(PickProperties)
+    bpy.types.Object.rockfall_pick = bpy.props.PointerProperty(type=PickProperties)
 
 
 def unregister() -> None:
-    del bpy.types.Scene.rockfall
-    bpy.utils.unregister_class(SceneSettings)
+    del bpy.types.Object.rockfall_pick
+    bpy.utils.unregister_class(PickProperties)
+    del bpy.types.Scene.rockfall_impacts
+    bpy.utils.unregister_class(ImpactRow)
+    for name, group in reversed(GROUPS.items()):
+        delattr(bpy.types.Scene, name)
+        bpy.utils.unregister_class(group)

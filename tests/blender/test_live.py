@@ -1,0 +1,474 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Edits of picks, by hand, by key, by panel, are followed by their trajectory, and by no other."""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+GRAVITY = 9.81
+RATE = 24.0
+SLOPE = 0.7  # fall per metre along x
+
+
+def ground(x: float) -> float:
+    return 50.0 - SLOPE * x
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """Two runs down a plane, the second 30 s later and 5 m beside the first; B's last impact is doubtful."""
+    rows = ["trajectory,time_s,x_m,y_m,z_m,kind,status,sigma_position_m,note"]
+    for name, later, y in (("A", 0.0, 0.0), ("B", 30.0, 5.0)):
+        kinds = ("release", "impact", "impact", "impact", "stop")
+        for time, x, kind in zip(
+            (10.0, 10.7312, 11.90017, 12.4, 13.0), (0.0, 4.0, 12.0, 16.0, 19.0), kinds, strict=True
+        ):
+            status = "doubtful" if name == "B" and time == 12.4 else "ok"
+            rows.append(f"{name},{time + later!r},{x!r},{y!r},{ground(x)!r},{kind},{status},0.05,seen")
+    path = tmp_path / "picks.csv"
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def terrain_file(tmp_path: Path) -> Path:
+    path = tmp_path / "plane.obj"
+    corners = [(x, y, ground(x)) for x, y in ((-10, -20), (60, -20), (60, 30), (-10, 30))]
+    path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in corners) + "f 1 2 3\nf 1 3 4\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def scene(part, table: Path) -> bpy.types.Scene:
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    return bpy.context.scene
+
+
+@pytest.fixture
+def slope(part, table: Path, terrain_file: Path) -> bpy.types.Scene:
+    """The scene with its terrain."""
+    surface = part("core.terrain.readers").read_terrain(terrain_file)
+    part("rockfall_addon.bridge.terrain").add_terrain(
+        bpy.context.scene, surface, part("core.terrain.shading").shade(surface)
+    )
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    return bpy.context.scene
+
+
+def update() -> None:
+    bpy.context.view_layer.update()
+
+
+def picks_of(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
+    found = [o for o in scene.objects if o.get("rockfall_role") == "pick" and o["rockfall_trajectory"] == name]
+    return sorted(found, key=lambda o: o["rockfall_time_s"])
+
+
+def trail(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    (found,) = [o for o in scene.objects if o.get("rockfall_role") == "flights" and o["rockfall_trajectory"] == name]
+    return found
+
+
+def places(mesh: bpy.types.Mesh) -> np.ndarray:
+    values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.vertices.foreach_get("co", values)
+    return values.reshape(-1, 3)
+
+
+def values(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    attribute = mesh.attributes[name]
+    found = np.empty(len(mesh.vertices), dtype=bool if attribute.data_type == "BOOLEAN" else np.float32)
+    attribute.data.foreach_get("value", found)
+    return found
+
+
+def key_frames(thing: bpy.types.Object) -> list[list[float]]:
+    (layer,) = thing.animation_data.action.layers
+    bag = layer.strips[0].channelbag(thing.animation_data.action_slot)
+    return [[point.co[0] for point in bag.fcurves.find("location", index=i).keyframe_points] for i in range(3)]
+
+
+def move_key(thing: bpy.types.Object, frames: float) -> None:
+    bag = thing.animation_data.action.layers[0].strips[0].channelbag(thing.animation_data.action_slot)
+    for curve in bag.fcurves:
+        for point in curve.keyframe_points:
+            point.co_ui[0] += frames
+        curve.update()
+    update()
+
+
+def check_shown(scene: bpy.types.Scene, part) -> None:
+    """What is shown is what a reconstruction of the picks from nothing gives."""
+    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(scene)
+    rows = {(row.trajectory, row.number): row for row in scene.rockfall_impacts}
+    assert len(rows) == len(result.impacts)
+    for i in range(len(result.impacts)):
+        row = rows[str(result.impacts.trajectory[i]), int(result.impacts.impact[i])]
+        np.testing.assert_allclose([row.r, row.rn], [result.impacts.r[i], result.impacts.rn[i]], rtol=1e-6)
+        pick = next(o for o in scene.objects if o.get("rockfall_id") == row.pick)
+        assert pick["rockfall_time_s"] == result.impacts.time_s[i]
+        np.testing.assert_array_equal(pick["rockfall_position_m"], result.impacts.position[i])
+        np.testing.assert_array_equal(pick["rockfall_result"]["incident_mps"], result.impacts.v1[i])
+    for name in set(result.picks.trajectory.tolist()):
+        which = np.flatnonzero(result.flights.trajectory == name)
+        shown = places(trail(scene, name).data)
+        for point in (*result.flights.start_position[which], result.flights.end_position[which[-1]]):
+            assert np.linalg.norm(shown - point, axis=1).min() < 1e-4
+
+
+def test_a_moved_object_moves_its_trajectory_alone(scene: bpy.types.Scene, part) -> None:
+    pick, others = picks_of(scene, "A")[2], places(trail(scene, "B").data)
+    before = trail(scene, "A"), trail(scene, "A").data.name
+    pick.location.y += 0.5
+    update()
+    assert pick["rockfall_position_m"][1] == pytest.approx(0.5)
+    assert before == (trail(scene, "A"), trail(scene, "A").data.name), "the trail is brought in line, not made anew"
+    check_shown(scene, part)
+    np.testing.assert_array_equal(places(trail(scene, "B").data), others)
+    scene.frame_set(3)
+    assert pick.location.y == pytest.approx(0.5), "the key follows the object"
+
+
+def test_a_moved_pick_stays_on_the_terrain(slope: bpy.types.Scene, part) -> None:
+    pick = picks_of(slope, "A")[2]
+    pick.location = (13.0, 0.4, ground(13.0) + 0.6)
+    update()
+    x, y, z = pick["rockfall_position_m"]
+    assert z == pytest.approx(ground(x), abs=1e-5)
+    normal = np.array([SLOPE, 0.0, 1.0]) / np.hypot(SLOPE, 1.0)
+    expected = np.array([13.0, 0.4, ground(13.0) + 0.6]) - 0.6 / np.hypot(SLOPE, 1.0) * normal
+    np.testing.assert_allclose([x, y, z], expected, atol=1e-5)
+    np.testing.assert_allclose(pick.location, expected, atol=1e-5)
+    check_shown(slope, part)
+    pick.rockfall_pick.kind = "pass"
+    pick.location.z += 2.0
+    update()
+    assert pick["rockfall_position_m"][2] > ground(pick["rockfall_position_m"][0]) + 1.9, "a pass is in the air"
+
+
+def test_a_moved_key_moves_the_time(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    place, time = list(pick["rockfall_position_m"]), pick["rockfall_time_s"]
+    move_key(pick, 2.5)
+    assert pick["rockfall_time_s"] == pytest.approx(time + 2.5 / RATE, abs=1e-6)
+    assert list(pick["rockfall_position_m"]) == place
+    check_shown(scene, part)
+    time = pick["rockfall_time_s"]
+    update()
+    assert pick["rockfall_time_s"] == time, "once is enough"
+    frames = key_frames(pick)
+    assert frames == [[pytest.approx((time - 10.0) * RATE, abs=1e-4)]] * 3
+
+
+def test_the_first_key_moves_without_moving_the_others(scene: bpy.types.Scene, part) -> None:
+    first, second = picks_of(scene, "A")[:2]
+    frame = key_frames(second)
+    move_key(first, -3.0)
+    assert first["rockfall_time_s"] == pytest.approx(10.0 - 3 / RATE, abs=1e-6)
+    assert key_frames(second) == frame
+    check_shown(scene, part)
+
+
+def test_a_key_inserted_elsewhere_is_no_time(scene: bpy.types.Scene, part) -> None:
+    """Auto-keying at another frame: the place is new, the time is not."""
+    pick = picks_of(scene, "A")[2]
+    time = pick["rockfall_time_s"]
+    scene.frame_set(70)
+    pick.location.y = 0.25
+    pick.keyframe_insert("location", frame=70)
+    update()
+    assert pick["rockfall_time_s"] == time
+    assert pick["rockfall_position_m"][1] == 0.25
+    assert key_frames(pick) == [[pytest.approx((time - 10.0) * RATE, abs=1e-4)]] * 3
+    check_shown(scene, part)
+
+
+def test_a_deleted_pick_leaves_a_longer_flight(scene: bpy.types.Scene, part) -> None:
+    bpy.data.objects.remove(picks_of(scene, "A")[2])
+    update()
+    assert len(picks_of(scene, "A")) == 4
+    check_shown(scene, part)
+
+
+def test_a_trajectory_without_picks_is_gone(scene: bpy.types.Scene, part) -> None:
+    for pick in picks_of(scene, "A"):
+        bpy.data.objects.remove(pick)
+    update()
+    assert not [o for o in scene.objects if o.get("rockfall_trajectory") == "A"]
+    assert {row.trajectory for row in scene.rockfall_impacts} == {"B"}
+    check_shown(scene, part)
+
+
+def test_a_copy_is_a_pick_of_its_own_at_the_present_moment(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    scene.frame_set(40)
+    copy = pick.copy()
+    copy.animation_data.action = pick.animation_data.action.copy()
+    scene.collection.objects.link(copy)
+    copy.location.y += 0.1
+    update()
+    assert copy["rockfall_id"] != pick["rockfall_id"]
+    assert copy["rockfall_time_s"] == pytest.approx(10.0 + 40 / RATE, abs=1e-5)
+    assert len(picks_of(scene, "A")) == 6
+    check_shown(scene, part)
+
+
+def test_a_linked_copy_gets_keys_of_its_own(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    frames = key_frames(pick)
+    scene.frame_set(40)
+    copy = pick.copy()  # shares the action
+    scene.collection.objects.link(copy)
+    update()
+    assert copy.animation_data.action != pick.animation_data.action
+    assert key_frames(pick) == frames
+    assert key_frames(copy)[0][0] == pytest.approx(40.0, abs=1e-3)
+
+
+def test_panel_edits(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    pick.rockfall_pick.status = "shattered"
+    assert "gap" in picks_of(scene, "A")[1]["rockfall_result"]["flags"] or "gap" in pick["rockfall_result"]["flags"]
+    pick.rockfall_pick.status = "ok"
+    pick.rockfall_pick.kind = "pass"
+    assert "rockfall_result" not in pick
+    assert pick.data.name == "Rockfall pass"
+    check_shown(scene, part)
+    pick.rockfall_pick.time_s = "11.812345678901234"
+    assert pick["rockfall_time_s"] == 11.812345678901234
+    check_shown(scene, part)
+    pick.rockfall_pick.time_s = "soon"
+    assert pick["rockfall_time_s"] == 11.812345678901234
+    pick.rockfall_pick.note = "a dust cloud"
+    assert dict(pick["rockfall_extra"])["note"] == "a dust cloud"
+
+
+def test_confidence_is_a_standard_deviation(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    known = list(pick["rockfall_result"]["sigma_r"])
+    del pick["rockfall_sigma_position_m"]
+    pick.rockfall_pick.confidence = "1"
+    assert pick["rockfall_result"]["sigma_r"][0] > 2 * known[0]
+    assert "rockfall_sigma_position_m" not in pick
+    assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
+    assert "rockfall_sigma_position_m" not in pick, "the confidence is not turned into a given deviation"
+    pick.rockfall_pick.confidence = "NONE"
+    assert np.isnan(pick["rockfall_result"]["sigma_r"][0])
+
+
+def test_nudge(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    time = pick["rockfall_time_s"]
+    bpy.context.view_layer.objects.active = pick
+    assert bpy.ops.rockfall.nudge_pick_time(frames=0.1) == {"FINISHED"}
+    assert pick["rockfall_time_s"] == pytest.approx(time + 0.1 / RATE, abs=1e-12)
+    check_shown(scene, part)
+
+
+def test_two_picks_at_one_time_are_told_and_the_last_good_flights_stay(scene: bpy.types.Scene, part) -> None:
+    first, second = picks_of(scene, "A")[1:3]
+    shown = places(trail(scene, "A").data)
+    second.rockfall_pick.time_s = first.rockfall_pick.time_s
+    problem = scene["rockfall_problem"]
+    assert "trajectory A" in problem
+    assert "10.7312" in problem
+    np.testing.assert_array_equal(places(trail(scene, "A").data), shown)
+    assert trail(scene, "A")["rockfall_stale"]
+    picks_of(scene, "B")[2].location.y += 0.3
+    update()
+    assert "trajectory A" in scene["rockfall_problem"]
+    second.rockfall_pick.time_s = "11.9"
+    assert scene["rockfall_problem"] == ""
+    assert not trail(scene, "A").get("rockfall_stale")
+    check_shown(scene, part)
+
+
+def test_a_bad_trajectory_does_not_stop_the_others_from_following_a_setting(scene: bpy.types.Scene, part) -> None:
+    picks_of(scene, "A")[2].rockfall_pick.time_s = "10.7312"
+    mass = trail(scene, "B")["rockfall_mass_kg"]
+    scene.rockfall.block_diameter_m = 0.7
+    assert trail(scene, "B")["rockfall_mass_kg"] == pytest.approx(8 * mass, rel=1e-3)
+    assert "trajectory A" in scene["rockfall_problem"]
+
+
+def test_deleted_terrain_is_told(slope: bpy.types.Scene, part) -> None:
+    (terrain,) = [o for o in slope.objects if o.get("rockfall_role") == "terrain"]
+    rn = picks_of(slope, "A")[1]["rockfall_result"]["rn"][0]
+    bpy.data.objects.remove(terrain)
+    update()
+    assert "terrain is gone" in slope["rockfall_problem"]
+    assert picks_of(slope, "A")[1]["rockfall_result"]["rn"][0] == rn, "what was computed stays"
+    picks_of(slope, "A")[2].location.y += 0.3
+    update()
+    assert np.isnan(picks_of(slope, "A")[1]["rockfall_result"]["rn"][0])
+    assert np.isfinite(picks_of(slope, "A")[1]["rockfall_result"]["r"][0])
+    assert picks_of(slope, "B")[1]["rockfall_result"]["rn"][0] == rn
+    assert "terrain is gone" in slope["rockfall_problem"]
+
+
+def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part) -> None:
+    (terrain,) = [o for o in slope.objects if o.get("rockfall_role") == "terrain"]
+    terrain.location.z -= 0.4
+    update()
+    update()
+    check_shown(slope, part)
+    assert picks_of(slope, "B")[1]["rockfall_result"]["bounce_height_m"][0] > 0.3
+
+
+def test_unit_scale_backside_and_early_picks_are_told(slope: bpy.types.Scene, part) -> None:
+    slope.unit_settings.scale_length = 0.01
+    part("rockfall_addon.bridge.live").touch(slope)
+    assert "unit scale is 0.01" in slope["rockfall_problem"]
+    slope.unit_settings.scale_length = 1.0
+    part("rockfall_addon.bridge.live").touch(slope)
+    assert slope["rockfall_problem"] == ""
+    pick = picks_of(slope, "A")[1]
+    pick["rockfall_normal"] = [0.0, 0.6, -0.8]
+    part("rockfall_addon.bridge.live").touch(slope)
+    assert "Trajectory A, 10.731 s: the pick is on the back" in slope["rockfall_problem"]
+    del pick["rockfall_normal"]
+    slope["rockfall_time_origin_s"] = 10.5
+    slope.rockfall.playback = "REAL"
+    assert "Trajectory A, 10.000 s: the pick is before the start" in slope["rockfall_problem"]
+    assert key_frames(picks_of(slope, "A")[0])[0][0] == pytest.approx(-0.5 * RATE)
+    assert "back" not in slope["rockfall_problem"]
+
+
+def test_errors_of_ours_are_told_once(scene: bpy.types.Scene, part, monkeypatch, capsys) -> None:
+    live, problems = part("rockfall_addon.bridge.live"), part("rockfall_addon.bridge.problems")
+
+    def broken(*_: object, **__: object) -> None:
+        raise ValueError("quite unexpected")
+
+    monkeypatch.setattr(live, "sync", broken)
+    for _ in range(5):
+        picks_of(scene, "A")[1].location.y += 0.1
+        update()
+    assert capsys.readouterr().out.count("quite unexpected") == 1
+    assert sum("quite unexpected" in text for text in problems.sentences(scene)) == 1
+    monkeypatch.undo()
+    problems.forget()
+    picks_of(scene, "A")[1].location.y += 0.1
+    update()
+    check_shown(scene, part)
+
+
+def test_below_the_terrain_is_red_and_frames_are_ticks(slope: bpy.types.Scene, part) -> None:
+    assert not values(trail(slope, "A").data, "below_terrain").any()
+    pick = picks_of(slope, "A")[2]
+    pick.rockfall_pick.kind = "pass"
+    pick.location.z -= 3.0
+    update()
+    mesh = trail(slope, "A").data
+    below = values(mesh, "below_terrain")
+    shown = places(mesh)
+    deep = shown[:, 2] - (50.0 - SLOPE * shown[:, 0])
+    np.testing.assert_array_equal(below, deep < -0.2 * 0.175)
+    assert below.any()
+    colours = np.empty(4 * len(shown), dtype=np.float32)
+    mesh.attributes["speed_colour"].data.foreach_get("color", colours)
+    np.testing.assert_allclose(colours.reshape(-1, 4)[below], [[1, 0, 0, 1]] * int(below.sum()))
+    ticks = values(mesh, "display_time_s")[values(mesh, "tick")] * RATE
+    assert len(ticks) > 50
+    np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-3)
+
+
+def test_beads_are_geometry(scene: bpy.types.Scene) -> None:
+    def corners() -> int:
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        return len(trail(scene, "A").evaluated_get(depsgraph).data.vertices)
+
+    bare = corners()
+    scene.rockfall.show_ticks = True
+    ticks = int(values(trail(scene, "A").data, "tick").sum())
+    assert corners() == bare + 12 * ticks
+    scene.rockfall.show_ticks = False
+    assert corners() == bare
+
+
+@pytest.mark.parametrize("by", ["SPEED", "ENERGY", "DOUBT"])
+def test_colours(scene: bpy.types.Scene, part, by: str) -> None:
+    scene.rockfall.colour_by = by
+    mesh = trail(scene, "B").data
+    colours = np.empty(4 * len(mesh.vertices), dtype=np.float32)
+    mesh.attributes["speed_colour"].data.foreach_get("color", colours)
+    speed = values(mesh, "speed_mps")
+    if by == "SPEED":
+        part_of = speed / scene.rockfall.speed_top_mps
+    elif by == "ENERGY":
+        part_of = 0.5 * trail(scene, "B")["rockfall_mass_kg"] * speed**2 / 1000 / scene.rockfall.energy_top_kj
+    else:
+        part_of = values(mesh, "doubt")
+        time = values(mesh, "display_time_s")
+        start = picks_of(scene, "B")[2]["rockfall_key_frame"] / RATE
+        assert (part_of[time > start + 1e-3] == 1.0).all(), "beside the doubtful impact"
+        assert (part_of[time < start - 0.5] < 1.0).all()
+    core = part("core.colours")
+    expected = core.srgb_to_linear(core.scale_colours(part_of, 0.0, 1.0))
+    np.testing.assert_allclose(colours.reshape(-1, 4)[:, :3], expected, atol=1e-4)
+
+
+def test_flights_join_centres(slope: bpy.types.Scene, part) -> None:
+    slope.rockfall.flights_join = "centres"
+    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(slope)
+    assert result.ends == "centres"
+    pick = picks_of(slope, "A")[1]
+    frame = pick["rockfall_key_frame"]
+    slope.frame_set(int(frame), subframe=frame % 1)
+    block = next(o for o in slope.objects if o.get("rockfall_role") == "block" and o["rockfall_trajectory"] == "A")
+    slope.rockfall.block_scale = 1.0
+    update()
+    normal = np.array([SLOPE, 0.0, 1.0]) / np.hypot(SLOPE, 1.0)
+    expected = np.array(pick["rockfall_position_m"]) + 0.175 * normal
+    np.testing.assert_allclose(block.matrix_world.translation, expected, atol=1e-3)
+
+
+def test_the_table_selects_and_follows_the_selection(scene: bpy.types.Scene, part) -> None:
+    rows = part("rockfall_addon.bridge.impact_rows")
+    assert [(row.trajectory, row.number) for row in scene.rockfall_impacts] == [
+        (name, i) for name in "AB" for i in (1, 2, 3)
+    ]
+    scene.rockfall.impact_index = 4
+    pick = picks_of(scene, "B")[2]
+    assert bpy.context.view_layer.objects.active == pick
+    assert pick.select_get()
+    assert scene.frame_current_final == pytest.approx(pick["rockfall_key_frame"], abs=1e-3)
+    rows.highlight(scene, picks_of(scene, "A")[1]["rockfall_id"])
+    assert scene.rockfall.impact_index == 0
+
+
+def test_the_table_sorts_and_filters(scene: bpy.types.Scene, part) -> None:
+    table = part("rockfall_addon.panels.impact_table")
+    rows = list(scene.rockfall_impacts)
+
+    def listed() -> list:
+        shown, order = table.arranged(rows, scene.rockfall, "A")
+        return [row for _, row, seen in sorted(zip(order, rows, shown, strict=True), key=lambda x: x[0]) if seen]
+
+    for column in ("r", "theta1_deg", "speed1_mps", "time_s"):
+        for down in (False, True):
+            scene.rockfall.table_sort, scene.rockfall.table_descending = column, down
+            numbers = [getattr(row, column) for row in listed()]
+            known = [value for value in numbers if not np.isnan(value)]
+            assert known == sorted(known, reverse=down)
+            assert np.isfinite(numbers[: len(known)]).all(), "what is not defined comes last"
+    scene.rockfall.table_trajectory = True
+    assert {row.trajectory for row in listed()} == {"A"}
+    scene.rockfall.table_trajectory, scene.rockfall.table_flagged = False, True
+    assert [row.flags for row in listed()] == [row.flags for row in listed() if row.flags]
+    assert bpy.ops.rockfall.sort_impacts(column="rn") == {"FINISHED"}
+    assert (scene.rockfall.table_sort, scene.rockfall.table_descending) == ("rn", False)
+    assert bpy.ops.rockfall.sort_impacts(column="rn") == {"FINISHED"}
+    assert scene.rockfall.table_descending
+
+
+def test_a_new_pick(slope: bpy.types.Scene, part) -> None:
+    picks, live = part("rockfall_addon.bridge.picks"), part("rockfall_addon.bridge.live")
+    for time, x in ((50.0, 2.0), (50.8, 6.0), (51.5, 11.0)):
+        picks.add_pick(slope, "new run", time, [x, -3.0, ground(x)])
+    live.sync(slope)
+    check_shown(slope, part)
+    assert len(json.loads(slope["rockfall_shown"])) == 3

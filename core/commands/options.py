@@ -60,7 +60,7 @@ def known_names(text: str, known: Sequence[str], option: str) -> tuple[str, ...]
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in [] if names == ["none"] else names:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
+            near = get_close_matches(name, known, n=1, cutoff=0.5)
             hint = f"Did you mean {near[0]}? " if near else ""
             raise InputError(f"{option} has '{name}'", advice=f"{hint}Choose from {', '.join(known)}, or none")
     return () if names == ["none"] else tuple(dict.fromkeys(names))

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""rockfall align: the camera that made the pixels is found, with honest deviations, and mistakes are named."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from rockfall.core.camera.model import Camera, look_at, project
+from rockfall.core.cli import main
+from rockfall.core.exchange.cameras import read_camera
+from rockfall.core.exchange.csv_text import read_table
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.vectors import norm
+
+SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 1_000.0)
+SIGMA_PX = 0.4
+NAMES = [f"P{i}" for i in range(16)]
+
+
+def truth(size=(1920, 1080), focal=1500.0) -> Camera:
+    camera = look_at(*size, [-40.0, -55.0, 12.0], [0.0, 0.0, 20.0], focal_px=focal)
+    return replace(camera, shift=SHIFT)
+
+
+def scene(camera: Camera, seed=5):
+    """Points of a rough slope that fill the camera's image, and their pixels."""
+    rng = np.random.default_rng(seed)
+    points = np.empty((0, 3))
+    while len(points) < len(NAMES):
+        more = np.stack([rng.uniform(-25, 40, 60), rng.uniform(-20, 50, 60), np.zeros(60)], axis=1)
+        more[:, 2] = 0.7 * more[:, 1] + 4 * np.sin(more[:, 0] / 5) + rng.normal(size=60)
+        pixel = project(camera, more)
+        points = np.concatenate([points, more[((pixel > 10) & (pixel < np.array(camera.size) - 10)).all(axis=1)]])
+    points = points[: len(NAMES)]
+    return points, project(camera, points) + SIGMA_PX * rng.normal(size=(len(points), 2))
+
+
+def write(path, points, pixels, extra=None):
+    columns = ["name,u_px,v_px,x_m,y_m,z_m" + "".join(f",{name}" for name in extra or {})]
+    for i, (pixel, point) in enumerate(zip(pixels.tolist(), SHIFT.to_survey(points).tolist(), strict=True)):
+        more = [str(values[i]) for values in (extra or {}).values()]
+        columns.append(",".join([f"P{i}", *map(repr, pixel), *map(repr, point), *more]))
+    path.write_text("\n".join(columns) + "\n")
+    return path
+
+
+@pytest.fixture
+def pairs(tmp_path):
+    return write(tmp_path / "pairs.csv", *scene(truth()))
+
+
+def align(capsys, table, *options):
+    out = table.parent / "out"
+    assert main(["align", str(table), *map(str, options), "--out", str(out)]) == 0
+    return read_camera(out / "camera.toml", SHIFT), capsys.readouterr().out
+
+
+def refused(capsys, table, *options):
+    before = sorted(path.name for path in table.parent.iterdir())
+    assert main(["align", str(table), *map(str, options), "--out", str(table.parent / "out")]) == 1
+    assert sorted(path.name for path in table.parent.iterdir()) == before
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def test_the_camera_is_found_within_its_deviations(pairs, capsys):
+    found, said = align(capsys, pairs, "--size", "1920x1080", "--sigma-px", SIGMA_PX)
+    camera = found.camera.camera
+    assert abs(camera.fx - 1500) < 4 * found.sigma["fx"]
+    assert found.sigma["fx"] < 10
+    off = camera.position - truth().position
+    for i, name in enumerate("xyz"):
+        assert abs(off[i]) < 4 * found.sigma[name]
+    assert norm(off) < 0.5
+    assert 0.5 * SIGMA_PX < found.rmse_px / np.sqrt(2) < 1.5 * SIGMA_PX
+    assert found.pose_covariance.shape == (6, 6)
+    assert np.sqrt(np.diag(found.pose_covariance))[3:] == pytest.approx([found.sigma[name] for name in "xyz"])
+    assert "16 of 16 pairs" in said
+    # The diagonal of 36 × 24 mm over that of the image, by hand: 43.267/2202.9 × 1500 = 29.46.
+    assert "29.4 mm equivalent" in said or "29.5 mm equivalent" in said
+    assert "Position: x 2599960." in said or "Position: x 2599959." in said
+    assert "Largest residuals: P" in said
+    residuals = read_table(pairs.parent / "out" / "pairs_residuals.csv", ("pair", "u_px"), ())
+    assert list(residuals.columns)[:7] == [
+        "pair", "u_px", "v_px", "residual_u_px", "residual_v_px", "residual_m", "used"
+    ]  # fmt: skip
+    length = np.hypot(residuals.numbers("residual_u_px"), residuals.numbers("residual_v_px"))
+    assert np.sqrt(np.mean(length**2)) == pytest.approx(found.rmse_px)
+    # A pixel is as wide as the depth over the focal length, a little less across a slanting ray.
+    depth = (scene(truth())[0] - camera.position) @ camera.rotation[2]
+    share = residuals.numbers("residual_m") / (length * depth / camera.fx)
+    assert (share < 1.0001).all()
+    assert (share > 0.7).all()
+
+
+def test_a_wrong_pair_is_named_left_out_and_still_in_the_table(tmp_path, capsys):
+    points, pixels = scene(truth())
+    pixels[4] += [35.0, -20.0]
+    table = write(tmp_path / "pairs.csv", points, pixels)
+    found, said = align(capsys, table, "--size", "1920x1080", "--sigma-px", SIGMA_PX)
+    assert "15 of 16 pairs" in said
+    assert "1 left out as wrong: P4" in said
+    assert abs(found.camera.camera.fx - 1500) < 4 * found.sigma["fx"]
+    residuals = read_table(table.parent / "out" / "pairs_residuals.csv", ("pair",), ())
+    assert residuals.text("used") == ["0" if i == 4 else "1" for i in range(16)]
+    assert residuals.numbers("residual_u_px")[4] == pytest.approx(35, abs=3)
+    kept, said = align(capsys, table, "--size", "1920x1080", "--no-robust")
+    assert "16 of 16 pairs" in said
+    assert kept.rmse_px > 3 * found.rmse_px
+
+
+def test_pairs_that_are_not_used_check_the_camera(tmp_path, capsys):
+    points, pixels = scene(truth())
+    pixels[2] += [80.0, 0.0]
+    table = write(tmp_path / "pairs.csv", points, pixels, {"used": ["0" if i in (2, 9) else "" for i in range(16)]})
+    _, said = align(capsys, table, "--size", "1920X1080")
+    assert "14 of 16 pairs" in said
+    line = next(line for line in said.splitlines() if line.startswith("Not used, to check"))
+    assert "P2 79." in line or "P2 80." in line
+    assert "P9 " in line
+
+
+def test_what_is_known_of_the_lens_is_kept(pairs, capsys):
+    found, said = align(capsys, pairs, "--size", "1920 x 1080", "--focal", 1500)
+    assert found.camera.camera.fx == 1500.0
+    assert "fx" not in found.sigma
+    assert "Focal length: 1500.0 px" in said
+    assert norm(found.camera.camera.position - truth().position) < 0.2
+    fov = np.degrees(2 * np.arctan(960 / 1500))
+    found, _ = align(capsys, pairs, "--size", "1920x1080", "--fov", repr(float(fov)))
+    assert found.camera.camera.fx == pytest.approx(1500.0)
+    both, _ = align(capsys, pairs, "--size", "1920x1080", "--focal", 1400, "--free", "f")
+    assert abs(both.camera.camera.fx - 1500) < 4 * both.sigma["fx"]
+
+
+def test_a_rough_camera_gives_the_distortion_and_a_place_to_begin(tmp_path, capsys):
+    lens = replace(truth(), k1=-0.12)
+    table = write(tmp_path / "pairs.csv", *scene(lens))
+    free, said = align(capsys, table, "--size", "1920x1080", "--free", "f,k1")
+    assert abs(free.camera.camera.k1 + 0.12) < 4 * free.sigma["k1"] < 0.1
+    assert "Lens: k1 -0.1" in said
+    (tmp_path / "rough.toml").write_bytes((tmp_path / "out" / "camera.toml").read_bytes())
+    again, _ = align(capsys, table, "--size", "1920x1080", "--camera", tmp_path / "rough.toml", "--free", "none")
+    assert again.camera.camera.k1 == free.camera.camera.k1
+    assert again.camera.camera.position == pytest.approx(free.camera.camera.position, abs=1e-3)
+
+
+def test_the_video_gives_the_size_and_the_check_picture(tmp_path, capsys):
+    camera = truth((320, 240), 260.0)
+    table = write(tmp_path / "pairs.csv", *scene(camera))
+    video = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 25, (320, 240))
+    for shade in (40, 90, 140):
+        writer.write(np.full((240, 320, 3), shade, np.uint8))
+    writer.release()
+    found, said = align(capsys, table, "--video", video, "--frame", 1)
+    assert found.camera.camera.size == (320, 240)
+    assert "align.png" in said
+    picture = cv2.imread(str(tmp_path / "out" / "align.png"))
+    assert picture.shape == (240, 320, 3)
+    assert np.median(picture) == pytest.approx(90, abs=4)
+    # The centre of each cross is green, at the pixel that holds the projected point.
+    for u, v in project(found.camera.camera, scene(camera)[0]):
+        b, g, r = picture[int(v) - 1 : int(v) + 2, int(u) - 1 : int(u) + 2].reshape(-1, 3).astype(int).max(axis=0)
+        assert g > 150
+        assert g > max(b, r) - 1
+    assert "no frame 7" in refused_again(capsys, table, "--video", video, "--frame", 7)
+
+
+def refused_again(capsys, table, *options):
+    out = table.parent / "other"
+    assert main(["align", str(table), *map(str, options), "--out", str(out)]) == 1
+    assert not out.exists()
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--size", "1920"], ["--size 1920 is no size", "1920x1080"]),
+        (["--size", "0x1080"], ["no size"]),
+        (["--size", "1920x1080", "--free", "f,k9"], ["'k9'", "Did you mean k1" , "none"]),
+        (["--size", "1920x1080", "--free", "f,fx"], ["f already frees"]),
+        (["--size", "1920x1080", "--free", "none"], ["focal length is neither free nor known"]),
+        (["--size", "1920x1080", "--fov", "180"], ["below 180"]),
+        (["--size", "640x480"], ["pairs.csv, row ", "outside the image of 640 × 480 px"]),
+        (["--video", "none.mp4"], ["none.mp4"]),
+        (["--size", "1920x1080", "--camera", "none.toml"], ["none.toml", "cannot be read"]),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named(pairs, capsys, options, said):
+    message = refused(capsys, pairs, *options)
+    for text in said:
+        assert text in message
+
+
+def test_pairs_that_give_no_camera_are_refused(tmp_path, capsys):
+    points, pixels = scene(truth())
+    few = write(tmp_path / "pairs.csv", points[:3], pixels[:3])
+    assert "3 pairs are too few" in refused(capsys, few, "--size", "1920x1080")
+    line = points[0] + np.linspace(0, 1, 16)[:, None] * (points[1] - points[0])
+    write(few, line, project(truth(), line))
+    assert "lie on a line" in refused(capsys, few, "--size", "1920x1080")
+    write(few, points, pixels, {"used": ["0"] * 16})
+    assert "No pair is to be used" in refused(capsys, few, "--size", "1920x1080")
+    few.write_text("u_px,v_px,x,y,z\n1,2,3,4,5\n")
+    assert "x_m, y_m, z_m" in refused(capsys, few, "--size", "1920x1080")
+
+
+def test_a_text_is_no_video(pairs, capsys, tmp_path):
+    fake = tmp_path / "film.mp4"
+    fake.write_text("this is no video\n" * 50)
+    assert "film.mp4" in refused(capsys, pairs, "--video", fake)
+
+
+def test_usage(pairs, capsys):
+    assert main(["align", str(pairs), "--out", "x"]) == 2
+    assert main(["align", str(pairs), "--size", "10x10", "--video", "a.mp4", "--out", "x"]) == 2
+    assert main(["align", str(pairs), "--size", "1920x1080", "--sigma-px", "0", "--out", "x"]) == 2
+    capsys.readouterr()

@@ -21,10 +21,10 @@ LONGEST = 500
 """Sightings in a piece, at most."""
 SMOOTH = 0.02
 """Share of the distance that a flight travels between frames, by which it may leave a polynomial."""
-LEAST_SCORE = 5.0
+LEAST_SCORE = 8.0
 LEAST_TURN = 0.15
 """Change of velocity as a share of the larger velocity, at least."""
-REACH = 12
+REACH = 15
 """Sightings on either side of a kink that tell its time."""
 AROUND = 2.5
 """Frames around a cut in which the pieces may meet."""

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..vectors import Array
 from .background import BackgroundMotion, background_motion, destabilise, stabilise
+from .kinks import find_kinks
 from .plates import Plates
 from .sources import Source, frames
 from .templates import Appearance, Cover, Sighting, clip_window, cover, first_looks, fit, learn, search
@@ -30,7 +31,12 @@ LARGEST_JUMP = 1.6
 SHUTTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LEARNING = 0.12
 VISIBLE = 0.4
+CONTRAST = 1.2
+"""With the background, in standard deviations of a pixel, at least."""
 KINK_SIGMAS = 4.0
+NEIGHBOURS = 8
+SHAPE = 0.005
+"""Standard deviation of the centre of a block that is no sphere, in diameters."""
 
 Indices = np.ndarray
 Progress = Callable[[str], None]
@@ -227,7 +233,8 @@ def _follow(
             return state.credible(), reason
     edge = "first" if step < 0 else "last"
     if state.missed:
-        return state.credible(), f"It is not seen after frame {state.rows[-1].frame}" if state.rows else "It is not seen"
+        verb = "leaves the picture" if state.leaving else "is not seen"
+        return state.credible(), f"It {verb} after frame {state.rows[-1].frame}"
     return state.rows, f"Frame {end} is the {edge} that was looked at"
 
 
@@ -242,6 +249,7 @@ class _State:
         self.missed = self.since = 0
         self.votes = np.zeros(len(SHUTTERS))
         self.before: np.ndarray | None = None
+        self.leaving = False
         self.why = ""
 
     def advance(self, frame: int, picture: np.ndarray, plates: Plates) -> str:
@@ -255,11 +263,11 @@ class _State:
         centre = destabilise(self.motion, np.array([frame]), stable[None])[0]
         diameter = self.looks.diameter_px
         step = velocity * self._step_s(frame)
-        leaving = self._outside(centre, 0.0)
+        self.leaving = self._outside(centre, 0.0)
         centre = np.clip(centre, 0.0, (self.video.width, self.video.height))
         tight = 0.5 * diameter + 3 * sigma
         wide = diameter + LARGEST_JUMP * float(np.hypot(*step)) * (1 + min(self.missed, JUMP_FRAMES))
-        wide = max(tight, wide) if leaving or self.missed < JUMP_FRAMES else tight
+        wide = max(tight, wide) if self.leaving or self.missed < JUMP_FRAMES else tight
         wide = min(wide, 0.25 * max(picture.shape[:2]))
         reach = wide + diameter + 0.5 * float(np.hypot(*step)) * self.looks.shutter + 3
         if self._repeated(picture, centre, reach):
@@ -268,7 +276,7 @@ class _State:
         seen, jumped = self._choose(here, centre, step, tight, wide)
         if seen is None:
             self.missed += 1
-            return self._given_up(leaving, sigma, velocity, frame)
+            return self._given_up(sigma, velocity, frame)
         self._accept(frame, time, picture, plates, here, seen, jumped, (stable, sigma), step)
         return ""
 
@@ -278,6 +286,11 @@ class _State:
         here = cover(picture, frame, plates, self.looks, self.start.pixel, 2 * diameter + float(np.hypot(*step)) + 3)
         self._vote(here, self.start.pixel, step)
         seen = fit(here, self.looks, self.start.pixel, step * self.looks.shutter)
+        if seen is not None and seen.contrast < 2 * CONTRAST:
+            raise InputError(
+                f"The block hardly stands out from the background in frame {frame}",
+                advice="Click on it in a frame in which it does",
+            )
         if seen is None or seen.score < 0.3:
             seen = Sighting(self.start.pixel, 0.2 * diameter, diameter, 0.5, 1.0, 1.0, 0.0)
         stable = self._stable(frame, seen.pixel)
@@ -301,10 +314,10 @@ class _State:
         for i in np.argsort(-value):
             if away[i] <= tight and score[i] >= needed - 0.1:
                 seen = fit(here, self.looks, pixel[i], streak)
-                if seen is not None and seen.score >= needed and seen.visible > 0.15:
+                if seen is not None and seen.score >= needed and seen.visible > 0.15 and seen.contrast > CONTRAST:
                     return seen, False
         self.why = self._reason(here, centre, score, away, tight)
-        if wide <= tight:
+        if wide <= tight or self.since < CONFIRMED - 1:
             return None, False
         return self._elsewhere(here, centre, streak, wide), True
 
@@ -320,7 +333,7 @@ class _State:
                     continue
                 own = (place - last) / (1 + self.missed) * self.looks.shutter
                 seen = fit(here, self.looks, place, own)
-                if seen is not None and seen.score > SURE and seen.amplitude > 0.6 and seen.visible > VISIBLE:
+                if seen is not None and seen.score > SURE and seen.amplitude > 0.6 and seen.visible > VISIBLE and seen.contrast > CONTRAST:
                     found.append(seen)
         found.sort(key=lambda seen: -seen.score)
         rivals = [
@@ -400,13 +413,13 @@ class _State:
         best = float(score[away <= tight].max(initial=0))
         return "hidden" if best < 0.4 else "hidden in part or changed"
 
-    def _given_up(self, leaving: bool, sigma: float, velocity: Array, frame: int) -> str:
-        fades = self.missed > GAP_FRAMES or (sigma > 4 * self.looks.diameter_px and not leaving)
+    def _given_up(self, sigma: float, velocity: Array, frame: int) -> str:
+        fades = self.missed > GAP_FRAMES or (sigma > 4 * self.looks.diameter_px and not self.leaving)
         if not fades:
             return ""
         credible = self.credible()
         at = credible[-1].frame if credible else frame
-        if leaving:
+        if self.leaving:
             return f"It leaves the picture after frame {at}"
         slow = float(np.hypot(*velocity)) * self._usual_s < 0.05 * self.looks.diameter_px
         return f"It is lost after frame {at}: {'at rest, or ' if slow else ''}{self.why or 'hidden'}"
@@ -461,28 +474,40 @@ def _assembled(rows: Sequence[_Row], stopped: tuple[str, str]) -> BlockTrack:
 def _calibrated(track: BlockTrack) -> Array:
     """Standard deviations that agree with how far the places scatter about smooth motion.
 
-    What the fit of one frame says is scaled by one factor, from the typical residual of every place against a parabola
-    through its neighbours; where the block looks less like itself than usual, because a part of it is hidden, up to a
-    share of its size is added.
+    What the fit of one frame says is scaled by one factor, from the residuals of the places against parabolas through
+    their neighbours in the same flight. A share of the size stands for the shape, whose turning shows only slowly;
+    where the block looks less like itself than usual, because a part of it is hidden, more is added.
     """
-    unlike = np.maximum(np.median(track.score) - 0.03 - track.score, 0) if track.score.size else track.score
-    sigma = np.maximum(track.sigma_px, 0.01)
-    ratio = _smooth_ratio(track.time_s, track.stable, sigma)
-    scale = np.clip(np.sqrt(np.median(ratio) / 1.386), 0.3, 5.0) if ratio.size >= 8 else 1.5
-    return np.sqrt((sigma * scale) ** 2 + (0.35 * track.diameter_px * unlike) ** 2 + 0.02**2)
+    if track.frame.size < 3:
+        return 2 * track.sigma_px + 0.05 * track.diameter_px
+    unlike = np.maximum(np.median(track.score) - 0.03 - track.score, 0)
+    fitted, shape = np.maximum(track.sigma_px, 0.01), SHAPE * track.diameter_px + 0.35 * track.diameter_px * unlike
+    scale, breaks = 1.5, np.zeros(0)
+    for _ in range(3):
+        sigma = np.hypot(fitted * scale, shape)
+        ratio = _smooth_ratio(track.time_s, track.stable, sigma, breaks)
+        if ratio.size < 8:
+            break
+        scale = float(np.clip(scale * np.sqrt(np.mean(np.minimum(ratio, 12.0)) / 2), 0.3, 8.0))
+        breaks = find_kinks(track.time_s, track.stable, np.hypot(fitted * scale, shape)).time_s
+    return np.hypot(fitted * scale, shape)
 
 
-def _smooth_ratio(time_s: Array, place: Array, sigma: Array, half: int = 4) -> Array:
+def _smooth_ratio(time_s: Array, place: Array, sigma: Array, breaks: Array) -> Array:
     """(k,) squared residuals, both coordinates, over their expected variance; chi-squared with 2 degrees of freedom.
 
-    Each is that of a point against the parabola through the `half` points on either side of it.
+    Each is that of a sighting against the parabola through its neighbours on both sides, none beyond a break.
     """
+    flight = np.searchsorted(breaks, time_s)
     ratio = []
-    for i in range(half, time_s.size - half):
-        window = np.r_[i - half : i, i + 1 : i + half + 1]
-        when = (time_s[window] - time_s[i]) / max(np.ptp(time_s[window]), 1e-9)
+    for i in range(time_s.size):
+        window = np.arange(max(i - NEIGHBOURS, 0), min(i + NEIGHBOURS + 1, time_s.size))
+        window = window[(flight[window] == flight[i]) & (window != i)]
+        if min((window < i).sum(), (window > i).sum()) < 3:
+            continue
+        when = (time_s[window] - time_s[i]) / np.ptp(time_s[window])
         design = when[:, None] ** np.arange(3) / sigma[window, None]
-        spread = np.linalg.pinv(design.T @ design)
+        spread = np.linalg.inv(design.T @ design)
         value = spread @ design.T @ (place[window] / sigma[window, None])
         ratio.append(np.sum((place[i] - value[0]) ** 2) / (sigma[i] ** 2 + spread[0, 0]))
     return np.array(ratio)

@@ -33,14 +33,15 @@ def synthetic(path: Path, frames: int) -> None:
     writer.release()
 
 
-def seconds(function: Callable[[], object], repeats: int = 3) -> float:
-    """The quickest of a few runs."""
-    times = []
+def seconds(*functions: Callable[[], object], repeats: int = 3) -> list[float]:
+    """The quickest of a few runs of each, in turns so that other work on the machine meets all of them."""
+    times: list[list[float]] = [[] for _ in functions]
     for _ in range(repeats):
-        start = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - start)
-    return min(times)
+        for function, own in zip(functions, times, strict=True):
+            start = time.perf_counter()
+            function()
+            own.append(time.perf_counter() - start)
+    return [min(own) for own in times]
 
 
 def row(what: str, value: str, note: str = "") -> None:
@@ -78,17 +79,18 @@ def benchmark(path: Path) -> None:
         f"{video.frames} frames",
         f"{video.width} × {video.height}, {video.codec}, {video.keyframe_s.size} keyframes",
     )
-    every = seconds(lambda: decode_all(path))
-    opened, thorough = seconds(lambda: open_video(path)), seconds(lambda: open_video(path, thorough=True))
+    every, opened, thorough = seconds(
+        lambda: decode_all(path), lambda: open_video(path), lambda: open_video(path, thorough=True)
+    )
     row("decoding every frame for its time", f"{every:.2f} s", f"{video.frames / every:.0f} frames/s")
     row("open_video", f"{opened:.2f} s", f"{every / opened:.1f} times as quick; decoded all: {video.decoded}")
     row("open_video, thorough", f"{thorough:.2f} s", f"{thorough / every:.2f} of decoding")
     for grey in (False, True):
-        took = seconds(lambda grey=grey: drain(video, grey), repeats=1)
+        [took] = seconds(lambda grey=grey: drain(video, grey), repeats=1)
         row(f"read_frames, {'grey' if grey else 'colour'}", f"{video.frames / took:.0f} frames/s")
     places = [int(part * (video.frames - 1)) for part in (0.1, 0.5, 0.9)]
     for index in places:
-        alone, up_to = seconds(lambda i=index: read_frame(video, i)), seconds(lambda i=index: read_up_to(video, i))
+        alone, up_to = seconds(lambda i=index: read_frame(video, i), lambda i=index: read_up_to(video, i))
         row(f"frame {index} alone", f"{1000 * alone:.0f} ms", f"{up_to / alone:.1f} times as quick as reading up to it")
 
 

@@ -311,7 +311,7 @@ def _described(path: Path) -> Video:
     InputError : there is no picture.
     """
     cv2, capture = _cv2(), _capture(path)
-    there, picture = capture.read()
+    there, picture = capture.retrieve() if _grab(capture) else (False, None)
     if not there:
         raise _no_picture(path)
     rate, frames = capture.get(cv2.CAP_PROP_FPS), capture.get(cv2.CAP_PROP_FRAME_COUNT)
@@ -350,6 +350,8 @@ def _decodes_as_told(video: Video) -> bool:
     if video.frames == 0 or video.duplicates.size:
         return False
     tail = max(video.frames - FEW_FRAMES, 0)
+    if (key := _keyframes_about(video, tail)[0]) > 0:  # nearer to it, OpenCV would begin at the keyframe before
+        tail = max(tail, min(key + MOST_REORDERED + 2, video.frames - 1))
     try:
         for _ in _grabbed(video, np.arange(min(FEW_FRAMES, tail))):
             pass

@@ -311,7 +311,9 @@ def _described(path: Path) -> Video:
     InputError : there is no picture.
     """
     cv2, capture = _cv2(), _capture(path)
-    there, picture = capture.retrieve() if _grab(capture) else (False, None)
+    if not _grab(capture):
+        raise _no_picture(path)
+    there, picture = capture.retrieve()
     if not there:
         raise _no_picture(path)
     rate, frames = capture.get(cv2.CAP_PROP_FPS), capture.get(cv2.CAP_PROP_FRAME_COUNT)

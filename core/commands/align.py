@@ -3,6 +3,8 @@
 
 import argparse
 import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,21 +12,25 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, norm
-from .options import add_out, known_names, not_negative, positive, whole
+from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_told, whole
 from .progress import Progress
 
 if TYPE_CHECKING:
     from ..camera.model import Camera
+    from ..camera.motion import MovingCamera
     from ..camera.resection import Resection
     from ..exchange.cameras import Pairs
     from ..footage.video import Video
     from ..georeference import GlobalShift
-    from ..reconstruction.picks import Mask
+    from ..reconstruction.picks import Indices, Mask
+    from ..terrain.surface import Surface
 
 FREE = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 FILM_DIAGONAL_MM = 43.2666
 """Of the 36 × 24 mm frame, by which cameras state their equivalent focal length."""
 WORST = 3
+KEY_PAIRS = 4
+"""The fewest that give a pose."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,6 +52,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known.add_argument("--focal", type=positive, metavar="PX", help="focal length [px]")
     known.add_argument("--fov", type=positive, metavar="DEG", help="horizontal angle of view [°]")
     known.add_argument("--camera", metavar="FILE", help="camera.toml with what is known, and where to begin")
+    moving = parser.add_argument_group("a camera that moves")
+    moving.add_argument(
+        "--moving",
+        choices=("rotation", "full"),
+        help="follow the background through the video, for a pose of each frame: of a camera that turns at one place, "
+        "or (full, needs --terrain) also moves. Frames that the column frame of PAIRS names are solved by themselves",
+    )
+    moving.add_argument(
+        "--frames", type=whole, nargs=2, metavar=("FIRST", "LAST"), help="of the video to follow (default all)"
+    )
+    moving.add_argument("--terrain", metavar="MESH", help="mesh, grid or cloud; the points are checked against it")
     errors = parser.add_argument_group("errors of the pairs")
     errors.add_argument(
         "--sigma-px",
@@ -62,6 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a point's coordinates [m] (default %(default)s)",
     )
     errors.add_argument("--no-robust", action="store_true", help="keep pairs that do not fit the others")
+    add_terrain_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -70,28 +88,39 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.cameras import read_pairs, write_camera, write_pair_residuals
     from ..exchange.output import output_folder
 
+    if arguments.moving and not arguments.video:
+        raise InputError("--moving follows the background through a video", advice="Give it with --video FILE")
+    if arguments.moving == "full" and not arguments.terrain:
+        raise InputError("--moving full needs the terrain", advice="Give it with --terrain MESH, or use rotation")
     with output_folder(arguments.out) as folder, Progress() as progress:
+        surface = terrain_as_told(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
-        pairs = read_pairs(arguments.pairs)
+        pairs = read_pairs(arguments.pairs, None if surface is None else surface.shift)
         video = _video(arguments.video, progress) if arguments.video else None
         size = (video.width, video.height) if video is not None else _size(arguments.size)
+        frame = _frame(arguments, pairs, video)
         progress("Solving the camera")
-        found, used = _solve(pairs, size, arguments)
-        residual_px, residual_m = _residuals(found.camera, pairs)
+        solved = _solve(pairs, size, frame, arguments)
+        path, motion = fixed(solved.found.camera), list[str]()
+        if arguments.moving and video is not None:
+            path, motion = _follow(solved, video, frame, surface, arguments, progress)
+        residual_px, residual_m = _residuals(path, pairs, video, frame)
         progress("Writing the camera")
         write_camera(
             folder / "camera.toml",
-            fixed(found.camera),
-            rmse_px=found.rmse_px,
-            sigma=found.sigma,
-            pose_covariance=found.pose_covariance,
+            path,
+            rmse_px=solved.found.rmse_px,
+            sigma=solved.found.sigma,
+            pose_covariance=solved.found.pose_covariance,
         )
-        write_pair_residuals(folder / "pairs_residuals.csv", pairs, residual_px, residual_m, used)
+        write_pair_residuals(folder / "pairs_residuals.csv", pairs, residual_px, residual_m, solved.used)
         written = ["camera.toml", "pairs_residuals.csv"]
         if video is not None:
-            _draw(folder / "align.png", video, _frame(arguments, pairs, video), pairs, residual_px, used)
+            shown = (pairs.frame < 0) | (pairs.frame == frame) | (not arguments.moving)
+            _draw(folder / "align.png", video, frame, pairs, residual_px, solved.used, shown)
             written.append("align.png")
-    for sentence in _summary(found, pairs, residual_px, used):
+    placed = _on_terrain(pairs, surface) if surface is not None else []
+    for sentence in (*_summary(solved, pairs, residual_px), *placed, *motion):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
@@ -110,32 +139,124 @@ def _video(file: str, progress: Progress) -> "Video":
     return open_video(file, progress)
 
 
-def _solve(pairs: "Pairs", size: tuple[int, int], arguments: argparse.Namespace) -> "tuple[Resection, Mask]":
-    """The camera from the pairs that are to be used; and (n,) which of all of them were."""
-    from ..camera.resection import resect
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """The reference frame's camera, those of other frames, and (n,) which pairs counted."""
 
+    found: "Resection"
+    keys: "Mapping[int, Resection]"
+    used: "Mask"
+    notes: tuple[str, ...]
+
+
+def _solve(pairs: "Pairs", size: tuple[int, int], frame: int, arguments: argparse.Namespace) -> _Solved:
+    """Solve the camera; of a moving one, each frame that has enough pairs."""
     told = arguments.focal is not None or arguments.fov is not None
     free = known_names(arguments.free, FREE, "--free") if arguments.free is not None else () if told else ("f",)
-    rows = np.flatnonzero(pairs.used)
-    if not rows.size:
-        raise InputError("No pair is to be used", file=pairs.source, advice="Write 1 in the column used")
-    found = resect(
-        pairs.pixel[rows],
-        pairs.point[rows],
-        *size,
-        free=free,
-        camera=_start(arguments, size, pairs.shift),
-        sigma_px=np.where(np.isnan(pairs.sigma_px), arguments.sigma_px, pairs.sigma_px)[rows],
-        sigma_m=np.where(np.isnan(pairs.sigma_m), arguments.sigma_m, pairs.sigma_m)[rows],
-        names=pairs.name[rows].tolist(),
-        robust=not arguments.no_robust,
-        shift=pairs.shift,
-        rows=pairs.row[rows].tolist(),
-        source=str(pairs.source),
-    )
+    here = pairs.used & ((pairs.frame < 0) | (pairs.frame == frame)) if arguments.moving else pairs.used
+    if not here.any():
+        where = f" in frame {frame}" if arguments.moving else ""
+        raise InputError(f"No pair is to be used{where}", file=pairs.source, advice="Write 1 in the column used")
     used = np.zeros(len(pairs), dtype=np.bool_)
-    used[rows[found.used]] = True
-    return found, used
+
+    def solve(rows: "Indices", free: tuple[str, ...], start: "Camera | None") -> "Resection":
+        from ..camera.resection import resect
+
+        found = resect(
+            pairs.pixel[rows],
+            pairs.point[rows],
+            *size,
+            free=free,
+            camera=start,
+            sigma_px=np.where(np.isnan(pairs.sigma_px), arguments.sigma_px, pairs.sigma_px)[rows],
+            sigma_m=np.where(np.isnan(pairs.sigma_m), arguments.sigma_m, pairs.sigma_m)[rows],
+            names=pairs.name[rows].tolist(),
+            robust=not arguments.no_robust,
+            shift=pairs.shift,
+            rows=pairs.row[rows].tolist(),
+            source=str(pairs.source),
+        )
+        used[rows[found.used]] = True
+        return found
+
+    found = solve(np.flatnonzero(here), free, _start(arguments, size, pairs.shift))
+    keys: dict[int, Resection] = {}
+    notes: list[str] = []
+    for other in np.unique(pairs.frame[pairs.used & ~here]).tolist():
+        rows = np.flatnonzero(pairs.used & (pairs.frame == other))
+        if rows.size < KEY_PAIRS:
+            notes.append(f"Frame {other} has {rows.size} pairs, too few to be solved: they only check the path.")
+            continue
+        keys[other] = solve(rows, (), found.camera)
+        notes.append(f"Frame {other}: {len(rows)} pairs fit to {keys[other].rmse_px:.2f} px.")
+    return _Solved(found, keys, used, tuple(notes))
+
+
+def _follow(
+    solved: _Solved,
+    video: "Video",
+    frame: int,
+    surface: "Surface | None",
+    arguments: argparse.Namespace,
+    progress: Progress,
+) -> "tuple[MovingCamera, list[str]]":
+    """A pose for each frame from the background; and sentences about it."""
+    from ..camera.model import vector_from_rotation
+    from ..camera.motion import FeatureTracks, fixed, solve_motion
+    from ..footage.background import background_motion
+
+    first, last = arguments.frames or (0, video.frames - 1)
+    if not 0 <= first <= last < video.frames:
+        raise InputError(
+            f"--frames {first} {last} is no part of the video",
+            file=video.path,
+            advice=f"It has the frames 0 to {video.frames - 1}",
+        )
+    for number in (frame, *solved.keys):
+        if not first <= number <= last:
+            raise InputError(
+                f"Pairs were picked on frame {number}, outside of --frames {first} {last}",
+                advice="Widen the range, or leave these pairs out",
+            )
+    background, seen = background_motion(video, first=first, last=last, progress=progress)
+    if background.still and not solved.keys:
+        return fixed(solved.found.camera), ["The camera stands still: one pose serves all frames."]
+    progress("Solving the camera of each frame")
+    made = solve_motion(
+        solved.found.camera,
+        FeatureTracks(seen.frame - first, seen.feature, seen.pixel),
+        video.time_s[first : last + 1],
+        frame - first,
+        mode=arguments.moving,
+        points_of=None if surface is None else _points_of(surface),
+        key_frames={number - first: found.camera for number, found in solved.keys.items()},
+    )
+    path = made.path
+    turned = np.degrees(norm(vector_from_rotation(path.rotation @ path.camera.rotation.T)))
+    moved = norm(path.position - path.camera.position)
+    sentences = [
+        f"Motion: a pose for each of {path.time_s.size} frames; it turns by up to {turned.max():.2f}°"
+        + (f" and moves by up to {moved.max():.2f} m" if arguments.moving == "full" else "")
+        + f". {np.median(made.features):.0f} features in a frame, {np.nanmedian(made.residual_px):.2f} px off (median)."
+    ]
+    sigma = path.sigma_rotation[np.isfinite(path.sigma_rotation)]
+    if sigma.size:
+        wide = path.camera.fx * float(sigma.max())
+        sentences.append(f"Relative to the solved frame, a pose is known to {wide:.2f} px in the image or better.")
+    return path, [*sentences, *made.advice]
+
+
+def _points_of(surface: "Surface") -> "Callable[[Array, Array], Array]":
+    """Where rays meet the terrain; NaN where they do not, or are none."""
+    from ..terrain.raycast import cast_rays
+
+    def meet(origins: Array, directions: Array) -> Array:
+        points = np.full_like(origins, np.nan)
+        good = np.isfinite(directions).all(axis=1)
+        points[good] = cast_rays(surface, origins[good], directions[good]).point
+        return points
+
+    return meet
 
 
 def _start(arguments: argparse.Namespace, size: tuple[int, int], shift: "GlobalShift") -> "Camera | None":
@@ -156,33 +277,51 @@ def _start(arguments: argparse.Namespace, size: tuple[int, int], shift: "GlobalS
     return Camera(width, height, focal, focal, width / 2, height / 2, shift=shift)
 
 
-def _residuals(camera: "Camera", pairs: "Pairs") -> tuple[Array, Array]:
+def _residuals(path: "MovingCamera", pairs: "Pairs", video: "Video | None", frame: int) -> tuple[Array, Array]:
     """Of all pairs, used or not: (n, 2) marked minus projected [px], and (n,) from the point to the ray [m]."""
     from ..camera.model import project, rays
 
-    origins, directions = rays(camera, pairs.pixel)
-    away = pairs.point - origins
-    return pairs.pixel - project(camera, pairs.point), norm(np.cross(away, directions))
+    time_s = np.zeros(len(pairs)) if video is None else video.time_s[np.where(pairs.frame < 0, frame, pairs.frame)]
+    position, rotation = path.poses_at(time_s)
+    origins, directions = rays(path.camera, pairs.pixel, position=position, rotation=rotation)
+    seen = project(path.camera, pairs.point, position=position, rotation=rotation)
+    return pairs.pixel - seen, norm(np.cross(pairs.point - origins, directions))
 
 
-def _frame(arguments: argparse.Namespace, pairs: "Pairs", video: "Video") -> int:
-    """The frame of the check picture: as told, else the one on which most pairs were picked."""
+def _frame(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> int:
+    """The reference frame: as told, else the one on which most pairs were picked."""
     given = pairs.frame[pairs.frame >= 0]
     frame = arguments.frame
     if frame is None:
         frame = int(np.bincount(given).argmax()) if given.size else 0
+    if video is None:
+        return int(frame)
+    advice = f"It has the frames 0 to {video.frames - 1}"
+    for i in np.flatnonzero(pairs.frame >= video.frames):
+        raise pairs.error(int(i), f"There is no frame {pairs.frame[i]} in {video.path.name}", advice)
     if frame >= video.frames:
-        raise InputError(
-            f"There is no frame {frame}", file=video.path, advice=f"It has the frames 0 to {video.frames - 1}"
-        )
-    return frame
+        raise InputError(f"There is no frame {frame}", file=video.path, advice=advice)
+    return int(frame)
 
 
-def _draw(path: Path, video: "Video", frame: int, pairs: "Pairs", residual_px: Array, used: "Mask") -> None:
+def _on_terrain(pairs: "Pairs", surface: "Surface") -> list[str]:
+    """How far the pairs' points are from the terrain."""
+    from ..terrain.raycast import closest_points
+
+    away = closest_points(surface, pairs.point).distance
+    worst = int(np.argmax(away))
+    return [
+        f"The points lie {np.median(away):.2f} m off the terrain (median), {away[worst]:.2f} m at most "
+        f"({pairs.name[worst]})."
+    ]
+
+
+def _draw(
+    path: Path, video: "Video", frame: int, pairs: "Pairs", residual_px: Array, used: "Mask", shown: "Mask"
+) -> None:
     from ..footage.pair_picture import draw_pairs, write_picture
     from ..footage.video import read_frame
 
-    shown = (pairs.frame < 0) | (pairs.frame == frame)
     marked = pairs.pixel[shown]
     picture = draw_pairs(
         read_frame(video, frame), marked, marked - residual_px[shown], pairs.name[shown].tolist(), used[shown]
@@ -190,12 +329,14 @@ def _draw(path: Path, video: "Video", frame: int, pairs: "Pairs", residual_px: A
     write_picture(path, picture)
 
 
-def _summary(found: "Resection", pairs: "Pairs", residual_px: Array, used: "Mask") -> list[str]:
+def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
+    found, used = solved.found, solved.used
     camera, sigma = found.camera, found.sigma
-    left_out = int(pairs.used.sum()) - int(used.sum())
+    left_out = len(found.wrong)
+    total, where = (found.used.size, " of the reference frame") if solved.notes else (len(pairs), "")
     spare = f", {found.redundancy} observations more than unknowns" if found.redundancy else ""
     sentences = [
-        f"{int(used.sum())} of {len(pairs)} pairs fit to {found.rmse_px:.2f} px (root mean square){spare}."
+        f"{int(found.used.sum())} of {total} pairs{where} fit to {found.rmse_px:.2f} px (root mean square){spare}."
         + (f" {left_out} left out as wrong: {', '.join(found.wrong)}." if left_out else "")
     ]
     equivalent = FILM_DIAGONAL_MM * camera.fx / float(np.hypot(*camera.size))
@@ -224,7 +365,7 @@ def _summary(found: "Resection", pairs: "Pairs", residual_px: Array, used: "Mask
     if (checked := ~pairs.used).any():
         off = [f"{pairs.name[i]} {_in_view(size[i])}" for i in np.flatnonzero(checked)]
         sentences.append(f"Not used, to check: {', '.join(off)}.")
-    return [*sentences, *found.advice]
+    return [*sentences, *solved.notes, *found.advice]
 
 
 def _same(one: float, other: float) -> bool:

@@ -177,12 +177,119 @@ def refused_again(capsys, table, *options):
     return capsys.readouterr().err
 
 
+EAST, UP_SLOPE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.8, 0.6])
+"""Axes of a slope through the local origin."""
+PER_M = 16.0
+FRAMES = 24
+
+
+def filmed(tmp_path, poses):
+    """A video of a speckled slope, its terrain, and the pixels of points on it in each frame."""
+    rng = np.random.default_rng(2)
+    speckle = cv2.GaussianBlur(rng.uniform(0, 255, (960, 1280)).astype(np.float32), (0, 0), 2.0)
+    speckle = cv2.normalize(speckle, None, 20, 235, cv2.NORM_MINMAX).astype(np.uint8)
+    # Texture pixel → slope [m] → pixel; OpenCV counts from the centre of the first pixel.
+    onto = np.array([[1 / PER_M, 0, -40], [0, -1 / PER_M, 30], [0, 0, 1]]) @ [[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]]
+    writer = cv2.VideoWriter(str(tmp_path / "film.avi"), cv2.VideoWriter.fourcc(*"MJPG"), 25, poses[0].size)
+    writer.set(cv2.VIDEOWRITER_PROP_QUALITY, 95)
+    for camera in poses:
+        lens = np.array([[camera.fx, 0, camera.cx - 0.5], [0, camera.fy, camera.cy - 0.5], [0, 0, 1]])
+        seen = np.stack([EAST, UP_SLOPE, -camera.position], axis=1)
+        picture = cv2.warpPerspective(speckle, lens @ camera.rotation @ seen @ onto, camera.size)
+        writer.write(cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR))
+    writer.release()
+    x, y = np.meshgrid(np.arange(-60.0, 61, 5), np.arange(-60.0, 61, 5))
+    corners = SHIFT.to_survey(x.ravel()[:, None] * EAST + y.ravel()[:, None] * UP_SLOPE)
+    rows = "\n".join(" ".join(f"{z:.4f}" for z in corners[:, 2].reshape(x.shape)[::-1][i]) for i in range(25))
+    head = "ncols 25\nnrows 25\nxllcenter 2599940\nyllcenter 1199952\ndx 5\ndy 4\nNODATA_value -9999\n"
+    (tmp_path / "slope.asc").write_text(head + rows + "\n")
+
+
+def paired(path, poses, picked):
+    """Pairs on the frames `picked`, with errors of 0.1 px."""
+    rng = np.random.default_rng(8)
+    lines = ["name,frame,u_px,v_px,x_m,y_m,z_m"]
+    for frame in picked:
+        place = rng.uniform([-14, -9], [14, 9], (12, 2))
+        points = place[:, :1] * EAST + place[:, 1:] * UP_SLOPE
+        pixels = project(poses[frame], points) + 0.1 * rng.normal(size=(12, 2))
+        for i, (pixel, point) in enumerate(zip(pixels.tolist(), SHIFT.to_survey(points).tolist(), strict=True)):
+            lines.append(",".join([f"P{i}", str(frame), *map(repr, [*pixel, *point])]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def walk(step_m):
+    """Cameras that turn to and fro, and walk."""
+    cameras = []
+    for i in range(FRAMES):
+        place = np.array([-4.0, -42.0, 6.0]) + np.array([1.0, 0.2, 0.05]) * step_m * i
+        aim = [2 * np.sin(i / 6), 0.0, 1.5 * np.sin(i / 9)]
+        cameras.append(replace(look_at(640, 480, place, aim, focal_px=620), shift=SHIFT))
+    return cameras
+
+
+def turn_px(path, poses):
+    """Largest error of a frame's rotation, as it shows in the image [px]."""
+    off = np.einsum("nij,nkj->nik", path.rotation, np.array([one.rotation for one in poses]))
+    return 620 * np.arccos(np.clip((np.trace(off, axis1=1, axis2=2) - 1) / 2, -1, 1)).max()
+
+
+def test_a_camera_that_turns_has_a_pose_for_each_frame(tmp_path, capsys):
+    poses = walk(0.0)
+    filmed(tmp_path, poses)
+    table = paired(tmp_path / "pairs.csv", poses, [0])
+    found, said = align(capsys, table, "--video", tmp_path / "film.avi", "--moving", "rotation", "--sigma-px", 0.1)
+    path = found.camera
+    assert path.time_s == pytest.approx(np.arange(FRAMES) / 25)
+    assert "a pose for each of 24 frames" in said
+    assert turn_px(path, poses) < 1.5
+    assert norm(path.position - poses[0].position).max() < 0.4
+    assert np.ptp(path.position, axis=0).max() == 0
+
+
+def test_a_camera_that_walks_is_tied_to_its_key_frames(tmp_path, capsys):
+    poses = walk(0.04)
+    filmed(tmp_path, poses)
+    table = paired(tmp_path / "pairs.csv", poses, [0, FRAMES - 1])
+    options = ["--video", tmp_path / "film.avi", "--sigma-px", 0.1, "--terrain", tmp_path / "slope.asc"]
+    found, said = align(capsys, table, *options, "--moving", "full", "--focal", 620, "--frame", 0)
+    truth_m = np.array([one.position for one in poses])
+    position = found.camera.camera.shift.to_survey(found.camera.position) - SHIFT.vector
+    assert norm(position - truth_m).max() < 0.15
+    assert turn_px(found.camera, poses) < 2.0
+    assert "Frame 23: 12 pairs fit to 0." in said
+    assert "off the terrain" in said
+    residuals = read_table(tmp_path / "out" / "pairs_residuals.csv", ("pair",), ())
+    assert np.abs(residuals.numbers("residual_u_px")).max() < 1.0
+    assert residuals.text("frame") == ["0"] * 12 + ["23"] * 12
+    # As one fixed camera the two frames contradict each other.
+    wrong, _ = align(capsys, table, "--size", "640x480", "--focal", 620, "--no-robust")
+    assert wrong.rmse_px > 3
+
+
+def test_a_tripod_needs_one_pose(tmp_path, capsys):
+    poses = walk(0.0)[:1] * 6
+    filmed(tmp_path, poses)
+    table = paired(tmp_path / "pairs.csv", poses, [0])
+    found, said = align(capsys, table, "--video", tmp_path / "film.avi", "--moving", "rotation")
+    assert found.camera.is_fixed
+    assert "stands still" in said
+    assert "--moving full needs the terrain" in refused_again(
+        capsys, table, "--video", tmp_path / "film.avi", "--moving", "full"
+    )
+    assert "--video" in refused_again(capsys, table, "--size", "640x480", "--moving", "rotation")
+    assert "0 to 5" in refused_again(
+        capsys, table, "--video", tmp_path / "film.avi", "--moving", "rotation", "--frames", "0", "9"
+    )
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         (["--size", "1920"], ["--size 1920 is no size", "1920x1080"]),
         (["--size", "0x1080"], ["no size"]),
-        (["--size", "1920x1080", "--free", "f,k9"], ["'k9'", "Did you mean k1" , "none"]),
+        (["--size", "1920x1080", "--free", "f,k9"], ["'k9'", "Did you mean k", "none"]),
         (["--size", "1920x1080", "--free", "f,fx"], ["f already frees"]),
         (["--size", "1920x1080", "--free", "none"], ["focal length is neither free nor known"]),
         (["--size", "1920x1080", "--fov", "180"], ["below 180"]),

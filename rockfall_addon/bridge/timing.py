@@ -28,9 +28,7 @@ def keyed_rate(scene: bpy.types.Scene) -> float:
     return float(scene.get(state.KEYED_RATE_KEY, 0.0)) or frame_rate(scene)
 
 
-def display_offsets(
-    picks: Picks, real_time: bool, stagger_s: float, origin_s: float | None = None
-) -> dict[str, float]:
+def display_offsets(picks: Picks, real_time: bool, stagger_s: float, origin_s: float | None = None) -> dict[str, float]:
     """What is subtracted from a trajectory's clock time to get its display time [s].
 
     origin_s : clock time of display time 0 in real time; None takes the first pick.

@@ -78,12 +78,11 @@ def show_twins(
 
 def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> Twins:
     """The twins of the models' means on the scene's terrain; errors as in `show_twins`."""
-    ground = terrain.active_terrain(scene)
-    if ground is None:
+    surface = terrain.surface_of_scene(scene)
+    if surface is None:
         raise RockfallError("The blocks of the models land on the terrain: import one first.")
     own = {name: values for name, values in parameters_of(scene).items() if name in models}
     predictions = compare(result.impacts, models, own)
-    surface = terrain.surface_of(ground)
     return fly_twins(result.impacts, predictions, surface, gravity_mps2=result.gravity_mps2, drag=result.drag)
 
 

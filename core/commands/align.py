@@ -360,7 +360,8 @@ def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
     size = norm(residual_px)
     order = [i for i in np.argsort(-np.nan_to_num(size, nan=np.inf)) if used[i]][:WORST]
     if order:
-        worst = [f"{pairs.name[i]} {size[i]:.2f} px" for i in order]
+        of = [f" (frame {frame})" if solved.keys and frame >= 0 else "" for frame in pairs.frame.tolist()]
+        worst = [f"{pairs.name[i]}{of[i]} {size[i]:.2f} px" for i in order]
         sentences.append(f"Largest residuals: {', '.join(worst)}.")
     if (checked := ~pairs.used).any():
         off = [f"{pairs.name[i]} {_in_view(size[i])}" for i in np.flatnonzero(checked)]

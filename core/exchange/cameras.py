@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..camera.model import Camera
 from ..camera.motion import MovingCamera
@@ -143,34 +144,30 @@ def write_camera(
     """Write camera.toml, each number so that it reads back as the same double; see `CameraFile`."""
     import tomli_w
 
-    one = camera.camera
+    one, more = camera.camera, dict(extra or {})
     to_survey = one.shift.to_survey
-    content: dict[str, Any] = {"width": one.width, "height": one.height}
-    content |= {name: float(getattr(one, name)) for name in ("fx", "fy", "cx", "cy", *LENS)}
-    content |= {"position": to_survey(one.position).tolist(), "rotation": one.rotation.tolist()}
+    tables = {key: value for key, value in more.items() if _is_table(value)}
+    lines = [f"width = {one.width}", f"height = {one.height}"]
+    lines += [_numbers(name, getattr(one, name)) for name in ("fx", "fy", "cx", "cy", *LENS)]
+    lines += [_numbers("position", to_survey(one.position)), _numbers("rotation", one.rotation)]
     if rmse_px is not None and np.isfinite(rmse_px):
-        content["rmse_px"] = float(rmse_px)
-    if crs or one.shift.crs:
-        content["crs"] = crs or one.shift.crs
+        lines.append(_numbers("rmse_px", rmse_px))
+    lines += tomli_w.dumps(
+        ({"crs": crs or one.shift.crs} if crs or one.shift.crs else {})
+        | {key: value for key, value in more.items() if key not in tables}
+    ).splitlines()
     if pose_covariance is not None and np.isfinite(pose_covariance).all():
-        content["pose_covariance"] = np.asarray(pose_covariance, dtype=np.float64).tolist()
-    if known := {name: float(value) for name, value in (sigma or {}).items() if np.isfinite(value)}:
-        content["sigma"] = known
-    if not camera.is_fixed:
-        content["frame"] = [
-            {"time_s": time, "position": position, "rotation": rotation}
-            | ({"sigma_position_m": metres} if metres else {})
-            | ({"sigma_rotation_rad": radians} if radians else {})
-            for time, position, rotation, metres, radians in zip(
-                camera.time_s.tolist(),
-                to_survey(camera.position).tolist(),
-                camera.rotation.tolist(),
-                camera.sigma_position_m.tolist(),
-                camera.sigma_rotation.tolist(),
-                strict=True,
-            )
-        ]
-    Path(path).write_text(tomli_w.dumps(content | dict(extra or {})), encoding="utf-8", newline="\n")
+        lines.append(_numbers("pose_covariance", pose_covariance))
+    if known := {name: value for name, value in (sigma or {}).items() if np.isfinite(value)}:
+        lines += ["", "[sigma]", *(_numbers(name, value) for name, value in known.items())]
+    if tables:
+        lines += ["", *tomli_w.dumps(tables).splitlines()]
+    for i, position in enumerate([] if camera.is_fixed else to_survey(camera.position)):
+        lines += ["", "[[frame]]", _numbers("time_s", camera.time_s[i]), _numbers("position", position)]
+        lines.append(_numbers("rotation", camera.rotation[i]))
+        deviations = {"sigma_position_m": camera.sigma_position_m[i], "sigma_rotation_rad": camera.sigma_rotation[i]}
+        lines += [_numbers(name, value) for name, value in deviations.items() if value]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
 def read_pairs(path: str | Path, shift: GlobalShift | None = None) -> Pairs:
@@ -230,6 +227,18 @@ def write_pair_residuals(path: str | Path, pairs: Pairs, residual_px: Array, res
     write_columns(path, columns)
 
 
+def _numbers(key: str, values: ArrayLike) -> str:
+    """A number or an array as TOML, each so that it reads back as the same double; a matrix has a row on each line."""
+    array = np.asarray(values, dtype=np.float64)
+    text = repr(array.tolist())
+    return f"{key} = " + (text.replace("[[", "[\n  [").replace("], ", "],\n  ").replace("]]", "],\n]"))
+
+
+def _is_table(value: Any) -> bool:
+    """A section, or a list of sections, which TOML has after all other keys."""
+    return isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(one, Mapping) for one in value))
+
+
 def _path(top: TomlTable, camera: Camera) -> MovingCamera:
     """The poses of the frames; the camera's own where there are none."""
     frames = top.tables("frame")
@@ -244,8 +253,8 @@ def _path(top: TomlTable, camera: Camera) -> MovingCamera:
         times,
         camera.shift.to_local(np.stack([frame.numbers("position", (3,)) for frame in frames])),
         np.stack([_rotation(frame) for frame in frames]),
-        np.array([frame.number("sigma_position_m", 0.0, zero_allowed=True) for frame in frames]),
-        np.array([frame.number("sigma_rotation_rad", 0.0, zero_allowed=True) for frame in frames]),
+        np.array([frame.deviation("sigma_position_m") for frame in frames]),
+        np.array([frame.deviation("sigma_rotation_rad") for frame in frames]),
     )
 
 

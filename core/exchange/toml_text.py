@@ -3,7 +3,7 @@
 
 import re
 import tomllib
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +109,12 @@ class TomlTable:
         if value < 0.0 or (value == 0.0 and not zero_allowed):
             raise self.wrong(key, f"is {value:g}", f"Give a number {'not below' if zero_allowed else 'above'} zero")
         return value
+
+    def deviation(self, key: str) -> float:
+        """Zero when it is missing; infinite where nothing is known."""
+        if self._content.get(key) == inf:
+            return float(self.take(key))
+        return self.number(key, 0.0, zero_allowed=True)
 
     def optional_number(self, key: str, zero_allowed: bool = False) -> float | None:
         return self.number(key, REQUIRED, zero_allowed) if key in self._content else None

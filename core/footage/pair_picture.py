@@ -36,7 +36,9 @@ def draw_pairs(
             ring = colour or (MARKED if believed else LEFT_OUT)
             cv2.circle(shown, _fixed(place), round(9 * unit * 2**FINE), ring, thick, cv2.LINE_AA, FINE)
             corner = (round(place[0] + 12 * unit), round(place[1] - 8 * unit))
-            cv2.putText(shown, str(name), corner, cv2.FONT_HERSHEY_SIMPLEX, 0.45 * unit, ring, thick, cv2.LINE_AA)
+            cv2.putText(
+                shown, str(name), corner, cv2.FONT_HERSHEY_SIMPLEX, max(0.45 * unit, 0.4), ring, thick, cv2.LINE_AA
+            )
             if np.isfinite(found).all():
                 cross = colour or (COMPUTED if believed else LEFT_OUT)
                 for arm in ((6 * unit, 0.0), (0.0, 6 * unit)):

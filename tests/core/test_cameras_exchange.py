@@ -35,7 +35,9 @@ def a_path() -> MovingCamera:
     time = np.sort(rng.random(7)) * 5 + 1.4
     position = SHIFT.to_local(SHIFT.to_survey(camera.position + 0.05 * rng.normal(size=(7, 3))))
     turns = rotation_from_vector(0.01 * rng.normal(size=(7, 3)))
-    return MovingCamera(camera, time, position, turns @ camera.rotation, rng.random(7) * 0.01, rng.random(7) * 1e-4)
+    sigma = rng.random((2, 7))
+    sigma[:, 3] = np.inf  # a frame in which nothing was recognised
+    return MovingCamera(camera, time, position, turns @ camera.rotation, 0.01 * sigma[0], 1e-4 * sigma[1])
 
 
 def same(one: MovingCamera, other: MovingCamera) -> bool:
@@ -59,6 +61,7 @@ def test_a_camera_is_the_same_after_writing_and_reading_to_the_last_bit(tmp_path
     write_camera(path, camera, rmse_px=1 / 3, sigma=sigma, pose_covariance=(covariance + covariance.T) / 2,
                  extra={"operator": "kept", "lens": {"make": "kept"}})  # fmt: skip
     read = read_camera(path, SHIFT)
+    assert "\n  [" in path.read_text()
     assert same(read.camera, camera)
     assert read.rmse_px == 1 / 3
     assert read.sigma == sigma

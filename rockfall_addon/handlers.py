@@ -24,7 +24,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 @problems.guarded
-def _loaded(_path: str) -> None:
+def _loaded(_path: str, _unused: object = None) -> None:
     terrain.forget_surfaces()
     problems.forget()
     _listen()  # subscriptions do not survive loading
@@ -41,7 +41,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
 
 @persistent
 @problems.guarded
-def _saving(_path: str) -> None:
+def _saving(_path: str, _unused: object = None) -> None:
     for scene in bpy.data.scenes:
         live.sync(scene, dragging=live.is_dragging())
 
@@ -50,6 +50,12 @@ def _saving(_path: str) -> None:
 def _rate_changed() -> None:
     for scene in bpy.data.scenes:
         _keep_rate(scene)
+
+
+@problems.guarded
+def _units_changed() -> None:
+    for scene in bpy.data.scenes:
+        live.touch(scene)
 
 
 @problems.guarded
@@ -75,6 +81,8 @@ def _keep_rate(scene: bpy.types.Scene) -> None:
 def _listen() -> None:
     for name in ("fps", "fps_base"):
         bpy.msgbus.subscribe_rna(key=(bpy.types.RenderSettings, name), owner=_owner, args=(), notify=_rate_changed)
+    units = (bpy.types.UnitSettings, "scale_length")
+    bpy.msgbus.subscribe_rna(key=units, owner=_owner, args=(), notify=_units_changed)
     bpy.msgbus.subscribe_rna(key=(bpy.types.LayerObjects, "active"), owner=_owner, args=(), notify=_chosen)
 
 

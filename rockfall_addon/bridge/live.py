@@ -61,7 +61,7 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if state.KEYED_RATE_KEY not in scene and migration.version(scene) is None:
         return
     names: set[str] | None = set()
-    for update in depsgraph.updates:
+    for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
         thing = update.id
         if isinstance(thing, bpy.types.Object):
             role = thing.get(state.ROLE_KEY)
@@ -69,7 +69,9 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
                 names.add(thing[picks.TRAJECTORY_KEY])
             elif role == state.TERRAIN_ROLE:
                 names = None
-        elif isinstance(thing, bpy.types.Scene | bpy.types.Collection):
+        elif isinstance(thing, bpy.types.Collection) or (
+            isinstance(thing, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
+        ):
             names = None
         if names is None:
             break

@@ -121,7 +121,7 @@ def add_pick(
     number = len(things_of(scene, [trajectory])) + 1
     thing = _new(scene, trajectory, kind, number)
     thing[TRAJECTORY_KEY], thing[TIME_KEY], thing[ROW_KEY] = trajectory, float(time_s), 0
-    thing[POSITION_KEY] = [float(value) for value in position_m]
+    thing[POSITION_KEY] = _writable(scene, position_m)
     thing[KIND_KEY], thing[STATUS_KEY] = kind, status
     thing[EXTRA_KEY] = dict(extra or {})
     thing[PICK_SHIFT_KEY] = state.read_shift(scene).vector.tolist()
@@ -262,7 +262,7 @@ def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | N
         thing[KEY_FRAME_KEY] = float(thing[KEY_FRAME_KEY]) + frames
         changed = True
     if moved(thing):
-        thing[POSITION_KEY] = resting_place(thing, surface, reach_m).tolist()
+        thing[POSITION_KEY] = _writable(scene, resting_place(thing, surface, reach_m))
         if surface is not None and NORMAL_KEY in thing:
             del thing[NORMAL_KEY]
         changed = True
@@ -278,6 +278,12 @@ def trusted(picks: Picks) -> Picks:
         if np.isnan(sigma[i]) and text.isdecimal():
             sigma[i] = CONFIDENCE_SIGMA_M.get(int(text), np.nan)
     return replace(picks, sigma_position_m=sigma)
+
+
+def _writable(scene: bpy.types.Scene, place: Sequence[float] | Array) -> list[float]:
+    """A place whose survey coordinates are doubles, so that a table gives it back to the last bit."""
+    shift = state.read_shift(scene)
+    return shift.to_local(shift.to_survey(np.asarray(place, dtype=np.float64))).tolist()
 
 
 def _of_confidence(picks: Picks, i: int) -> bool:

@@ -1,16 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From project.toml to the scene: what *Load demo* and a film without a window have in common."""
+"""Between project.toml and the scene: what *Load demo* and a film without a window have in common, and the way back."""
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import bpy
 
+from ...core.errors import RockfallError
 from ...core.exchange.opening import open_project
+from ...core.exchange.output import output_folder
 from ...core.exchange.parameters import checked_parameters
-from ...core.exchange.project import read_project
+from ...core.exchange.project import (
+    CameraPlacement,
+    Project,
+    RenderPreset,
+    Site,
+    TerrainSource,
+    read_project,
+    write_project,
+)
+from ...core.exchange.tables import write_picks
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.shading import shade
-from . import reconstruction, state, terrain, twins
+from ...core.terrain.writers import write_ply
+from . import migration, picks, reconstruction, state, terrain, twins
+
+DESCRIPTION_KEY, RENDER_KEY = "rockfall_site_description", "rockfall_render_presets"
 
 
 def load_project(scene: bpy.types.Scene, path: Path) -> Reconstruction:
@@ -27,8 +43,52 @@ def load_project(scene: bpy.types.Scene, path: Path) -> Reconstruction:
 
     state.write_shift(scene, result.picks.shift)
     reconstruction.keep_settings(scene, project, sorted(set(result.picks.trajectory.tolist())))
+    scene[DESCRIPTION_KEY] = project.site.description
+    scene[RENDER_KEY] = json.dumps([asdict(preset) for preset in project.render])
     twins.keep_parameters(scene, parameters)
     if surface is not None and shading is not None:
         terrain.add_terrain(scene, surface, shading)
     reconstruction.show(scene, result)
     return result
+
+
+def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
+    """Write project.toml, picks.csv and, when there is one, the terrain; `load_project` then gives the same again.
+
+    Several tiles are written as one terrain. Returns the path of project.toml.
+
+    Raises
+    ------
+    RockfallError : there are no picks, two are at one time, or the folder cannot be written.
+    """
+    migration.refuse_newer(scene)
+    if not picks.things_of(scene):
+        raise RockfallError("There are no picks to export: import some first, or load the demo.")
+    table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), state.read_shift(scene)
+    settings = reconstruction.project_settings(scene, table.trajectory.tolist())
+    with output_folder(folder) as place:
+        write_picks(table, place / "picks.csv")
+        if surface is not None:
+            write_ply(surface, place / "terrain.ply")
+        source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
+        parameters = twins.parameters_of(scene)
+        project = Project(
+            site=Site(str(scene.get(reconstruction.SITE_KEY, "")), str(scene.get(DESCRIPTION_KEY, ""))),
+            terrain=None if surface is None else source,
+            picks=place / "picks.csv",
+            block=settings.block,
+            blocks=settings.blocks,
+            reconstruction=settings.reconstruction,
+            render=tuple(_preset(values) for values in json.loads(scene.get(RENDER_KEY, "[]"))),
+            extra={"models": parameters} if parameters else {},
+        )
+        write_project(project, place / "project.toml")
+    return folder / "project.toml"
+
+
+def _preset(values: dict) -> RenderPreset:
+    placed = values.pop("camera")
+    if placed is None:
+        return RenderPreset(**values)
+    placed |= {name: tuple(placed[name]) for name in ("position", "target")}
+    return RenderPreset(**values, camera=CameraPlacement(**placed))

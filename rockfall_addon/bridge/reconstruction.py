@@ -4,10 +4,11 @@
 import json
 
 import bpy
+import numpy as np
 
 from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
 from ...core.errors import RockfallError
-from ...core.exchange.project import Project
+from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
@@ -18,6 +19,7 @@ from . import picks as pick_objects
 from .state import double
 
 SITE_KEY, GRAVITY_KEY = "rockfall_site", "rockfall_gravity_mps2"
+DEFAULT_BLOCK_KEY, NORMAL_RADIUS_KEY = "rockfall_default_block", "rockfall_normal_radius_m"
 BLOCKS_KEY, DRAG_KEY = "rockfall_blocks", "rockfall_drag"  # d1, d2, d3, density by trajectory, as text; ρ, C_D
 
 
@@ -37,7 +39,7 @@ def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Rec
         block=blocks_of(scene, set(picks.trajectory.tolist())),
         drag=Drag(*list(scene.get(DRAG_KEY, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT)))) if settings.use_drag else None,
         gravity_mps2=float(scene.get(GRAVITY_KEY, GRAVITY_MPS2)),
-        normal_radius_m=double(settings.normal_radius_m) or None,
+        normal_radius_m=_exact(scene, NORMAL_RADIUS_KEY, settings.normal_radius_m) or None,
         site=str(scene.get(SITE_KEY, "")),
         flights=settings.flights_join,
     )
@@ -50,8 +52,7 @@ def ground(scene: bpy.types.Scene) -> Surface | None:
 
 def blocks_of(scene: bpy.types.Scene, names: set[str]) -> dict[str, Block]:
     """The block of each trajectory: its own, or that of the settings."""
-    settings = scene.rockfall
-    default = Block(*[double(settings.block_diameter_m)] * 3, density=double(settings.density_kgpm3))
+    default = Block(*_default_block(scene))
     own = json.loads(scene.get(BLOCKS_KEY, "{}"))
     return {name: Block(*own[name]) if name in own else default for name in names}
 
@@ -100,8 +101,47 @@ def keep_settings(scene: bpy.types.Scene, project: Project, names: list[str]) ->
     scene[DRAG_KEY] = [how.air_density_kgpm3, how.drag_coefficient]
     blocks = {name: project.block_of(name) for name in names}
     scene[BLOCKS_KEY] = json.dumps({n: [b.d1_m, b.d2_m, b.d3_m, b.density_kgpm3] for n, b in blocks.items()})
+    default = project.block
+    scene[DEFAULT_BLOCK_KEY] = [default.d1_m, default.d2_m, default.d3_m, default.density_kgpm3]
+    scene[NORMAL_RADIUS_KEY] = how.normal_radius_m or 0.0
     settings.block_diameter_m = (project.block.d1_m + project.block.d2_m + project.block.d3_m) / 3
     settings.density_kgpm3 = project.block.density_kgpm3
     settings.normal_radius_m = how.normal_radius_m or 0.0
     settings.use_drag = how.drag
     settings.flights_join = how.flights
+
+
+def project_settings(scene: bpy.types.Scene, names: list[str]) -> Project:
+    """The settings as a project keeps them; blocks for the trajectories that have their own."""
+    settings = scene.rockfall
+    own = json.loads(scene.get(BLOCKS_KEY, "{}"))
+    density, coefficient = scene.get(DRAG_KEY, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))
+    return Project(
+        block=BlockEntry("", *_default_block(scene)),
+        blocks=tuple(BlockEntry(name, *own[name]) for name in dict.fromkeys(names) if name in own),
+        reconstruction=ReconstructionSettings(
+            normal_radius_m=_exact(scene, NORMAL_RADIUS_KEY, settings.normal_radius_m) or None,
+            gravity_mps2=float(scene.get(GRAVITY_KEY, GRAVITY_MPS2)),
+            drag=settings.use_drag,
+            drag_coefficient=coefficient,
+            air_density_kgpm3=density,
+            flights=settings.flights_join,
+        ),
+    )
+
+
+def _exact(scene: bpy.types.Scene, key: str, shown: float) -> float:
+    """The double that is kept for a setting, unless the setting was changed since."""
+    kept = scene.get(key)
+    return double(shown) if kept is None or np.float32(kept) != np.float32(shown) else float(kept)
+
+
+def _default_block(scene: bpy.types.Scene) -> list[float]:
+    """d1, d2, d3 [m] and density [kg/m³] of the blocks that have none of their own."""
+    settings = scene.rockfall
+    d1, d2, d3, density = scene.get(DEFAULT_BLOCK_KEY, (0.0, 0.0, 0.0, 0.0))
+    if np.float32((d1 + d2 + d3) / 3) != np.float32(settings.block_diameter_m):
+        d1 = d2 = d3 = double(settings.block_diameter_m)
+    if np.float32(density) != np.float32(settings.density_kgpm3):
+        density = double(settings.density_kgpm3)
+    return [d1, d2, d3, density]

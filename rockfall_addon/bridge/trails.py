@@ -93,8 +93,9 @@ def trail(
         mesh.attributes.new(materials.SPEED_COLOUR, "FLOAT_COLOR", "POINT")
         mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.SPEED_COLOUR
     mesh.update()
-    if thing.modifiers.get("Trail") is None:
-        thing.modifiers.new("Trail", "NODES").node_group = materials.trail_group()
+    modifier = thing.modifiers.get("Trail") or thing.modifiers.new("Trail", "NODES")
+    if modifier.node_group is None:
+        modifier.node_group = materials.trail_group()
     return thing
 
 

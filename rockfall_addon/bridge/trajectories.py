@@ -144,6 +144,7 @@ def _show_flights(
         tick=np.concatenate([tick for _, tick in sampled]),
     )
     new = thing is None
+    bare = new or "Trail" not in thing.modifiers or thing.modifiers["Trail"].node_group is None
     thing = trails.trail(f"{name} flights", state.FLIGHTS_ROLE, pieces, marks, thing)
     thing[picks.TRAJECTORY_KEY] = name
     thing[trails.MASS_KEY] = _block_of(result, name).mass_kg
@@ -152,6 +153,7 @@ def _show_flights(
     thing.pop(trails.STALE_KEY, None)
     if new:
         state.collection(scene, "Trajectories", name).objects.link(thing)
+    if bare:
         trails.set_trail(scene.rockfall, thing)
     return thing
 

@@ -9,7 +9,7 @@ from bpy.props import StringProperty
 from ...core.exchange.output import output_folder
 from ...core.exchange.tables import write_impacts, write_picks, write_trajectories
 from ...core.reconstruction.sampling import sample_trajectories
-from ..bridge import reconstruction, state, terrain
+from ..bridge import project, reconstruction, state, terrain
 from .reporting import reported
 
 TRAJECTORY_STEP_S = 0.02
@@ -49,4 +49,32 @@ class ROCKFALL_OT_export_tables(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_export_tables,)
+class ROCKFALL_OT_export_project(bpy.types.Operator):
+    """Write project.toml with the picks and the terrain: all that the command line, or another file, needs"""
+
+    bl_idname = "rockfall.export_project"
+    bl_label = "Export Project"
+    bl_options = {"REGISTER"}
+
+    directory: StringProperty(subtype="DIR_PATH")
+    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if state.with_role(context.scene, state.PICK_ROLE):
+            return True
+        cls.poll_message_set("There is nothing to export: import picks first, or load the demo")
+        return False
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        written = project.save_project(context.scene, Path(bpy.path.abspath(self.directory)))
+        self.report({"INFO"}, f"{written.name} is in {self.directory}.")
+        return {"FINISHED"}
+
+
+CLASSES = (ROCKFALL_OT_export_tables, ROCKFALL_OT_export_project)

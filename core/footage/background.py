@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion of the background: how every frame of hand-held or stabilised footage lies on the first one.
 
-Corners are followed by pyramidal Lucas–Kanade (Bouguet 2001) with a forward-backward check (Kalal et al. 2010). They are
-always compared with the frame in which they were found, not with the one before, so that errors do not add up; a
+Corners are followed by pyramidal Lucas–Kanade (Bouguet 2001) with a forward-backward check (Kalal et al. 2010). They
+are always compared with the frame in which they were found, not with the one before, so that errors do not add up; a
 homography to the reference frame is estimated robustly (MAGSAC++, Barath et al. 2020), then by least squares.
 """
 
@@ -85,7 +85,7 @@ def stabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
 
 def destabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
     """(n, 2) pixels of the reference frame as they lie in frames (n,); undoes `stabilise`."""
-    return _through(np.linalg.inv(_of(motion, frame)), pixels)
+    return _through(np.linalg.inv(_of(motion, frame)).astype(np.float64), pixels)
 
 
 def background_motion(
@@ -141,7 +141,8 @@ class _Follower:
         self.homography, self.rms = np.eye(3), 0.0
         self.names = np.zeros(0, dtype=np.intp)
         self.pixel = self.reference = np.zeros((0, 2))
-        self.count = 0
+        self.count = self.key_count = 0
+        self.key, self.key_pixel = grey, self.pixel
         self.small = opencv().pyrDown(grey)
         self._renew(grey)
         if self.names.size < FEWEST:
@@ -208,7 +209,9 @@ def _cell(pixel: Array, width: int, height: int) -> Indices:
     return row * GRID[0] + column
 
 
-def _flow(before: np.ndarray, after: np.ndarray, pixel: Array, guess: Array | None, levels: int) -> tuple[Array, np.ndarray]:
+def _flow(
+    before: np.ndarray, after: np.ndarray, pixel: Array, guess: Array | None, levels: int
+) -> tuple[Array, np.ndarray]:
     """Places in the picture after, NaN where they are lost, and whether they are found."""
     cv2 = opencv()
     moved, status, _ = cv2.calcOpticalFlowPyrLK(

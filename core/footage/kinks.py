@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Impacts proposed from a track: the times at which a path that is smooth in every flight changes its velocity at once.
 
-The track is cut into pieces, each a polynomial of second or third degree in time (a flight's image is a parabola but for
-perspective and distortion), so that the sum of squares and a price for every piece are least: optimal partitioning
+The track is cut into pieces, each a polynomial of second or third degree in time (a flight's image is a parabola but
+for perspective and distortion), so that the sum of squares and a price for every piece are least: optimal partitioning
 (Jackson et al. 2005) with the Bayesian information criterion. Neighbouring pieces meet between two frames.
 """
 
@@ -28,6 +28,8 @@ REACH = 15
 """Sightings on either side of a kink that tell its time."""
 AROUND = 2.5
 """Frames around a cut in which the pieces may meet."""
+FARTHER = 0.02
+"""Price of each squared frame between the cut and the meeting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,36 +140,35 @@ def _meet(
     before = _piece(time_s, pixel, sigma, max(cuts[i - 1], cut - REACH), cut, middle)
     after = _piece(time_s, pixel, sigma, cut, min(cuts[i + 1], cut + REACH), middle)
     span = 0.5 * (time_s[cut] - time_s[cut - 1]) + AROUND * frame
-    when = np.linspace(-span, span, 401)
-    grade = when[:, None] ** np.arange(3)
-    slope = np.column_stack([np.zeros_like(when), np.ones_like(when), 2 * when])
-    gap = grade @ (after[0] - before[0])
-    variance = np.einsum("ti,ij,tj->t", grade, before[1] + after[1], grade)
-    k = int(np.argmin(np.sum(gap**2, axis=1) / variance + 0.02 * (when / frame) ** 2))
-    turn = slope[k] @ (after[0] - before[0])
-    speed = max(float(np.hypot(*(slope[k] @ piece[0]))) for piece in (before, after))
-    turned = float(np.hypot(*turn))
-    unlike = max(1.0, float(np.sum(gap[k] ** 2) / variance[k]))
-    spread = float(slope[k] @ (before[1] + after[1]) @ slope[k])
-    share = float(grade[k] @ before[1] @ grade[k]) / variance[k]
-    place = grade[k] @ ((1 - share) * before[0] + share * after[0])
+    both, change = before[1] + after[1], after[0] - before[0]
+    trial = np.linspace(-span, span, 201)
+    grades = trial[:, None] ** np.arange(3)
+    apart = np.sum((grades @ change) ** 2, axis=1) / np.einsum("ti,ij,tj->t", grades, both, grades)
+    when = float(trial[np.argmin(apart + FARTHER * (trial / frame) ** 2)])
+    turn = np.array([0, 1, 2 * when]) @ change
+    nearer = np.array([1, when, when**2]) @ change @ turn / max(float(turn @ turn), 1e-12)
+    when -= float(np.clip(nearer, trial[0] - trial[1], trial[1] - trial[0]))
+
+    grade, slope = np.array([1, when, when**2]), np.array([0, 1, 2 * when])
+    gap, turned = grade @ change, float(np.hypot(*(slope @ change)))
+    variance = float(grade @ both @ grade)
+    unlike = max(1.0, float(gap @ gap) / variance)
+    share = float(grade @ before[1] @ grade) / variance
+    velocities = slope @ before[0], slope @ after[0]
     return (
-        float(middle + when[k]),
-        float(np.sqrt(variance[k] * unlike) / max(turned, 1e-9)),
-        place,
-        slope[k] @ before[0],
-        slope[k] @ after[0],
-        turned / np.sqrt(spread),
-        turned / max(speed, 1e-9),
+        middle + when,
+        float(np.sqrt(variance * unlike)) / max(turned, 1e-9),
+        grade @ ((1 - share) * before[0] + share * after[0]),
+        *velocities,
+        turned / float(np.sqrt(slope @ both @ slope)),
+        turned / max([1e-9, *(float(np.hypot(*velocity)) for velocity in velocities)]),
     )
 
 
-def _piece(
-    time_s: Array, pixel: Array, sigma: Array, begin: int, end: int, origin: float
-) -> tuple[Array, Array]:
+def _piece(time_s: Array, pixel: Array, sigma: Array, begin: int, end: int, origin: float) -> tuple[Array, Array]:
     """Coefficients (3, 2) of the parabola through sightings about a time, and their covariance (3, 3).
 
-    The two sightings nearest to the kink count less: the block may touch the ground while the shutter is open.
+    The sighting nearest to the kink counts less: the block may touch the ground while the shutter is open.
     """
     part = slice(begin, end)
     when = time_s[part] - origin

@@ -29,8 +29,9 @@ def draw_track(
 ) -> np.ndarray:
     """The path as seen from one frame, (h, w, 3) BGR uint8.
 
-    The line is coloured by time, dots stand for frames (each, or every 2, 5, 10, … where these would touch), rings with labels for proposed impacts. Where the camera
-    follows the block, the picture is continued by the first and the last frame of the track.
+    The line is coloured by time; dots stand for frames (each, or every 2, 5, 10, … where these would touch), rings with
+    labels for proposed impacts. Where the camera follows the block, the picture is continued by the first and the last
+    frame of the track.
     """
     cv2 = opencv()
     path = destabilise(motion, np.full(len(track.stable), frame), track.stable)

@@ -43,9 +43,7 @@ class Plate:
 class Plates:
     """Plates of a video, made where they are needed; the two latest are kept."""
 
-    def __init__(
-        self, source: Source, motion: BackgroundMotion, progress: Callable[[str], None] | None = None
-    ) -> None:
+    def __init__(self, source: Source, motion: BackgroundMotion, progress: Callable[[str], None] | None = None) -> None:
         self._source, self._motion, self._progress = source, motion, progress
         self._kept: list[Plate] = []
 

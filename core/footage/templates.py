@@ -3,7 +3,8 @@
 
 A pixel of which the block covers the share α shows (1 − α) · background + α · block. With the background known and the
 block's colours learnt, α follows by least squares (matting with a known background, Smith & Blinn 1996), whether the
-block is lighter or darker than what is behind it. Its shape is a disc, swept along its motion while the shutter is open.
+block is lighter or darker than what is behind it. Its shape is a disc, swept along its motion while the shutter is
+open.
 """
 
 from dataclasses import dataclass, replace
@@ -101,7 +102,7 @@ def cover(picture: np.ndarray, frame: int, plates: Plates, looks: Appearance, ce
 def _shares(
     change: np.ndarray, behind: np.ndarray, sigma: np.ndarray, colours: Array
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each pixel: the share covered by the colour that explains it best, its variance by noise, what is left over."""
+    """Of each pixel: share covered by the colour that explains it best, its variance by noise, what is left over."""
     variance = sigma**2
     total = np.einsum("ijk,ijk->ij", change, change) / variance
     best: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
@@ -189,8 +190,8 @@ def search(here: Cover, looks: Appearance, streak: Array, reach: float) -> tuple
     grown = cv2.dilate(score, np.ones((2 * int(diameter // 3) + 1,) * 2))
     rows, columns = np.nonzero((score >= grown) & (score > 0.3))
     order = np.argsort(-score[rows, columns])[:8]
-    pixel = np.column_stack([columns[order], rows[order]]) + (here.left - pad + 0.5, here.top - pad + 0.5)
-    return pixel, score[rows[order], columns[order]]
+    place = np.column_stack([columns[order], rows[order]]).astype(np.float64)
+    return place + np.array([here.left, here.top]) - pad + 0.5, score[rows[order], columns[order]]
 
 
 def fit(here: Cover, looks: Appearance, centre: Array, streak: Array) -> Sighting | None:
@@ -224,7 +225,9 @@ def fit(here: Cover, looks: Appearance, centre: Array, streak: Array) -> Sightin
         residual = (alpha - now).ravel()
         robust = weight.ravel() / np.maximum(1, np.abs(residual) / np.sqrt(noise.ravel() + 0.25**2))
         normal = (slope * robust) @ slope.T + np.diag(prior)
-        moved = np.linalg.solve(normal + 1e-9 * np.eye(4), (slope * robust) @ residual - prior * (values - (*centre, 0, 1)))
+        moved = np.linalg.solve(
+            normal + 1e-9 * np.eye(4), (slope * robust) @ residual - prior * (values - (*centre, 0, 1))
+        )
         values = values + np.clip(moved, -far / 2, far / 2)
         if (np.abs(values - (*centre, 0.0, 1.0)) > far).any():
             return None

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,7 +32,7 @@ LARGEST_JUMP = 1.6
 SHUTTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LEARNING = 0.12
 VISIBLE = 0.4
-CONTRAST = 1.2
+CONTRAST = 2.0
 """With the background, in standard deviations of a pixel, at least."""
 KINK_SIGMAS = 4.0
 NEIGHBOURS = 8
@@ -77,6 +78,16 @@ class _Row:
 
 
 @dataclass(frozen=True, eq=False)
+class _Memory:
+    """What was known before a sighting that may be wrong."""
+
+    rows: list[_Row]
+    past: list[tuple[float, Array, float]]
+    looks: Appearance
+    missed: int
+
+
+@dataclass(frozen=True, eq=False)
 class _Start:
     frame: int
     pixel: Array
@@ -119,7 +130,9 @@ def track_block(
     first, last = 0 if first is None else first, video.time_s.size - 1 if last is None else last
     marks = sorted({int(f): (float(u), float(v)) for f, u, v in [*clicks, (frame, *pixel)]}.items())
     _check(video, marks, first, last)
-    motion = background_motion(video, first=first, last=last, progress=progress)[0] if background is None else background
+    motion = (
+        background_motion(video, first=first, last=last, progress=progress)[0] if background is None else background
+    )
     plates = Plates(video, motion, progress)
     starts = [_start(video, plates, motion, at, np.array(place), diameter_px) for at, place in marks]
 
@@ -128,7 +141,7 @@ def track_block(
 
     rows, before = follow(starts[0], first)
     rows = rows[::-1]
-    for start, following in zip(starts, starts[1:], strict=False):
+    for start, following in pairwise(starts):
         rows += _between(follow, start, following)[bool(rows) :]
     forwards, after = follow(starts[-1], last)
     rows += forwards[bool(rows) :]
@@ -157,7 +170,7 @@ def _start(
 ) -> _Start:
     """What is at a click, and how fast it moves."""
     low, high = int(motion.frames[0]), int(motion.frames[-1])
-    around = {i: picture for i, picture in frames(video, range(max(frame - 1, low), min(frame + 1, high) + 1))}
+    around = dict(frames(video, range(max(frame - 1, low), min(frame + 1, high) + 1)))
     found = first_looks(around[frame], frame, plates, click, diameter_px)
     if found is None:
         raise InputError(
@@ -250,6 +263,7 @@ class _State:
         self.votes = np.zeros(len(SHUTTERS))
         self.before: np.ndarray | None = None
         self.leaving = False
+        self.doubtful: _Memory | None = None
         self.why = ""
 
     def advance(self, frame: int, picture: np.ndarray, plates: Plates) -> str:
@@ -263,7 +277,7 @@ class _State:
         centre = destabilise(self.motion, np.array([frame]), stable[None])[0]
         diameter = self.looks.diameter_px
         step = velocity * self._step_s(frame)
-        self.leaving = self._outside(centre, 0.0)
+        self.leaving = self._outside(centre, 0.0) and (self.leaving or self.missed <= 2)
         centre = np.clip(centre, 0.0, (self.video.width, self.video.height))
         tight = 0.5 * diameter + 3 * sigma
         wide = diameter + LARGEST_JUMP * float(np.hypot(*step)) * (1 + min(self.missed, JUMP_FRAMES))
@@ -275,6 +289,7 @@ class _State:
         here = cover(picture, frame, plates, self.looks, centre, reach)
         seen, jumped = self._choose(here, centre, step, tight, wide)
         if seen is None:
+            self._take_back()
             self.missed += 1
             return self._given_up(sigma, velocity, frame)
         self._accept(frame, time, picture, plates, here, seen, jumped, (stable, sigma), step)
@@ -286,7 +301,7 @@ class _State:
         here = cover(picture, frame, plates, self.looks, self.start.pixel, 2 * diameter + float(np.hypot(*step)) + 3)
         self._vote(here, self.start.pixel, step)
         seen = fit(here, self.looks, self.start.pixel, step * self.looks.shutter)
-        if seen is not None and seen.contrast < 2 * CONTRAST:
+        if seen is not None and seen.contrast < 1.5 * CONTRAST:
             raise InputError(
                 f"The block hardly stands out from the background in frame {frame}",
                 advice="Click on it in a frame in which it does",
@@ -333,7 +348,13 @@ class _State:
                     continue
                 own = (place - last) / (1 + self.missed) * self.looks.shutter
                 seen = fit(here, self.looks, place, own)
-                if seen is not None and seen.score > SURE and seen.amplitude > 0.6 and seen.visible > VISIBLE and seen.contrast > CONTRAST:
+                if (
+                    seen is not None
+                    and seen.score > SURE
+                    and seen.amplitude > 0.6
+                    and seen.visible > VISIBLE
+                    and seen.contrast > CONTRAST
+                ):
                     found.append(seen)
         found.sort(key=lambda seen: -seen.score)
         rivals = [
@@ -364,13 +385,18 @@ class _State:
             self._vote(here, seen.pixel, step)
         innovation = float(np.hypot(*(stable - predicted[0])))
         usual = np.sqrt(predicted[1] ** 2 + seen.sigma_px**2 + (0.06 * seen.diameter_px + 0.2) ** 2)
+        if jumped or self.missed:
+            self._take_back()
+            self.doubtful = _Memory(self.rows, self.past, self.looks, self.missed)
+            self.since = 0
+        else:
+            self.since += 1
         if jumped or innovation > KINK_SIGMAS * usual:
             when, where, _ = self.past[-1]
             self.past = [(when, where, 0.3 * seen.diameter_px + 0.3 * float(np.hypot(*step)))]
-        self.since = 0 if jumped or self.missed else self.since + 1
         self.missed = 0
         self.past = [*self.past[1 - MEMORY :], (time, stable, max(seen.sigma_px, 0.1))]
-        self.rows.append(_Row(frame, time, seen, stable))
+        self.rows = [*self.rows, _Row(frame, time, seen, stable)]
         if seen.score > 0.75 and seen.visible > 0.9 and self.since >= CONFIRMED:
             blurred = float(np.hypot(*step)) * self.looks.shutter > 0.6 * seen.diameter_px
             if not blurred:
@@ -426,10 +452,20 @@ class _State:
 
     def credible(self) -> list[_Row]:
         """Rows without the last few that come after a gap or a jump and lead nowhere."""
-        return self.rows[: -(self.since + 1)] if self.since < CONFIRMED and len(self.rows) > 1 else self.rows
+        return self.doubtful.rows if self.doubtful is not None and self.since < CONFIRMED else self.rows
+
+    def _take_back(self) -> None:
+        """Sightings after a gap or a jump that lead nowhere have not been the block."""
+        if self.doubtful is not None and self.since < CONFIRMED:
+            kept, wrong = self.doubtful, len(self.rows) - len(self.doubtful.rows)
+            self.rows, self.past, self.looks = kept.rows, kept.past, kept.looks
+            self.missed += kept.missed + wrong
+        self.doubtful, self.since = None, CONFIRMED
 
     def _outside(self, centre: Array, margin: float) -> bool:
-        return bool((centre < -margin).any() or (centre > np.array([self.video.width, self.video.height]) + margin).any())
+        return bool(
+            (centre < -margin).any() or (centre > np.array([self.video.width, self.video.height]) + margin).any()
+        )
 
     def _repeated(self, picture: np.ndarray, centre: Array, reach: float) -> bool:
         """The same picture once more, as some cameras and converters write it."""

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motion of the background: made clips whose homographies are known, a tripod, and what cannot be followed."""
+
+import cv2
+import numpy as np
+import pytest
+from rockfall.core.errors import InputError
+from rockfall.core.footage.background import background_motion, destabilise, no_motion, stabilise
+from rockfall.core.footage.sources import Pictures
+
+SIZE = (400, 300)
+CORNER = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+
+
+def ground(seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    total = np.zeros((700, 1100))
+    for scale in (1.5, 4, 12):
+        layer = cv2.GaussianBlur(rng.normal(size=total.shape), (0, 0), scale)
+        total += layer / layer.std()
+    return 120 + 22 * total
+
+
+def hand(frame: int) -> np.ndarray:
+    """(3, 3) frame → ground, with shaking, panning, turning, zooming and a little perspective."""
+    angle, zoom = 0.01 * np.sin(frame / 9), 1 + 0.03 * np.sin(frame / 20)
+    u, v = 8 * np.sin(frame / 3) + 4.5 * frame, 6 * np.cos(frame / 4)
+    c, s = zoom * np.cos(angle), zoom * np.sin(angle)
+    return np.array([[c, -s, 150 + u], [s, c, 150 + v], [2e-5 * np.sin(frame / 15), 0, 1]])
+
+
+def film(count: int, *, still: bool = False, noise: float = 3.0) -> list[np.ndarray]:
+    rng, texture = np.random.default_rng(1), ground()
+    flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
+    pictures = []
+    for frame in range(count):
+        picture = cv2.warpPerspective(texture, hand(0 if still else frame), SIZE, flags=flags)
+        cv2.circle(picture, (40 + 7 * frame, 60 + 3 * frame), 14, 230.0, -1)  # a block
+        pictures.append(np.clip(picture + rng.normal(scale=noise, size=picture.shape), 0, 255).astype(np.uint8))
+    return pictures
+
+
+def clip(pictures: list[np.ndarray]) -> Pictures:
+    return Pictures(pictures, np.arange(len(pictures)) / 30)
+
+
+def true_places(frame: int, pixel: np.ndarray) -> np.ndarray:
+    across = CORNER @ np.linalg.inv(hand(0)) @ hand(frame) @ np.linalg.inv(CORNER)
+    moved = np.column_stack([pixel, np.ones(len(pixel))]) @ across.T
+    return moved[:, :2] / moved[:, 2:]
+
+
+def test_hand_held_panning_is_followed_without_drift() -> None:
+    """Half of the picture is new at the end, and corners and centre are still in their places."""
+    count = 45
+    motion, features = background_motion(clip(film(count)))
+    assert not motion.still
+    points = np.array([[0.0, 0.0], [400, 0], [0, 300], [400, 300], [200, 150]])
+    worst = 0.0
+    for frame in range(count):
+        found = stabilise(motion, np.full(5, frame), points)
+        worst = max(worst, float(np.hypot(*(found - true_places(frame, points)).T).max()))
+        assert destabilise(motion, np.full(5, frame), found) == pytest.approx(points, abs=1e-9)
+    assert worst < 0.35
+    assert motion.rms_px.max() < 0.3
+
+    apart = []
+    for feature in np.unique(features.feature):
+        seen = features.feature == feature
+        if seen.sum() > 10:
+            places = [
+                true_places(f, p[None])[0] for f, p in zip(features.frame[seen], features.pixel[seen], strict=True)
+            ]
+            apart.append(np.std(places, axis=0).max())
+    assert len(apart) > 50  # corners that last
+    assert np.median(apart) < 0.1
+    assert motion.inliers.min() > 100
+
+
+def test_a_tripod_is_the_identity() -> None:
+    motion, _ = background_motion(clip(film(20, still=True)))
+    assert motion.still
+    assert (motion.homography == np.eye(3)).all()
+
+
+def test_a_camera_that_settles_slowly_is_no_tripod() -> None:
+    texture = ground()
+    pictures = []
+    for frame in range(25):
+        shift = np.array([[1, 0, 200 + 0.04 * frame], [0, 1, 200.0], [0, 0, 1]])
+        picture = cv2.warpPerspective(texture, shift, SIZE, flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP)
+        pictures.append(np.clip(picture, 0, 255).astype(np.uint8))
+    motion, _ = background_motion(clip(pictures))
+    assert not motion.still
+    assert stabilise(motion, np.array([24]), np.array([[200.0, 150.0]]))[0] == pytest.approx([200.96, 150.0], abs=0.05)
+
+
+@pytest.mark.parametrize("what", ["blackout", "cut", "sky"])
+def test_what_cannot_be_followed_is_told_with_its_frame(what: str) -> None:
+    pictures = film(12)
+    if what == "blackout":
+        pictures[7][:] = 4
+    elif what == "cut":
+        other = np.clip(ground(9)[:300, :400], 0, 255).astype(np.uint8)
+        pictures[7:] = [other] * 5
+    else:
+        pictures = [np.full((300, 400), 180, np.uint8)] * 12
+    with pytest.raises(InputError, match="frame 0" if what == "sky" else "frame 7"):
+        background_motion(clip(pictures))
+
+
+def test_frames_beyond_what_is_known() -> None:
+    with pytest.raises(InputError, match="frame 12"):
+        stabilise(no_motion(3, 9), np.array([12]), np.zeros((1, 2)))

@@ -97,7 +97,10 @@ def open_footage(project: Project, shift: GlobalShift | None = None, name: str =
     )
     frame = np.concatenate([track.frame for track in tracks])
     row = np.concatenate([track.row for track in tracks])
-    return Footage(entries, tuple(cameras), tuple(views), observations, frame, row, notes)
+    posed = np.concatenate([_has_pose(camera, track.time_s) for camera, track in zip(cameras, tracks, strict=True)])
+    if not posed.all():
+        notes += (f"{int((~posed).sum())} pixels are not used: the pose of the camera is not known in their frames.",)
+    return Footage(entries, tuple(cameras), tuple(views), observations.take(posed), frame[posed], row[posed], notes)
 
 
 def take_trajectories(footage: Footage, names: Collection[str]) -> Footage:
@@ -269,6 +272,15 @@ def _file_rate(entry: VideoEntry, frame: Indices, time_s: Array) -> float:
         file=entry.file,
         advice="Correct the path of the video in the project, or give the column frame in its track",
     )
+
+
+def _has_pose(camera: CameraFile, time_s: Array) -> Mask:
+    """(m,) the frame was recognised: its pose has a standard deviation."""
+    path = camera.camera
+    near = np.clip(np.searchsorted(path.time_s, time_s), 0, path.time_s.size - 1)
+    before = np.maximum(near - 1, 0)
+    near = np.where(np.abs(path.time_s[before] - time_s) < np.abs(path.time_s[near] - time_s), before, near)
+    return np.isfinite(path.sigma_position_m[near]) & np.isfinite(path.sigma_rotation[near])
 
 
 def _check_inside(track: Track, camera: CameraFile, entry: VideoEntry) -> None:

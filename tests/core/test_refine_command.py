@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
-from rockfall.core.camera.motion import fixed
+from rockfall.core.camera.motion import MovingCamera, fixed
 from rockfall.core.cli import main
 from rockfall.core.exchange.cameras import read_camera, write_camera
 from rockfall.core.exchange.csv_text import read_table
@@ -282,6 +282,28 @@ def test_a_camera_that_is_a_little_off_is_put_right(site, tmp_path):
     assert found.pose_covariance[0, 0] < covariance[0, 0]
     assert read_project(tmp_path / "out" / "project.toml").videos[1].camera.name == "camera_right.toml"
     assert not (tmp_path / "out" / "camera_left.toml").exists()
+
+
+def test_a_camera_that_turns_and_loses_a_frame(site, tmp_path, capsys):
+    """The left camera turns back and forth; in some frames nothing was recognised, and their poses are wrong."""
+    camera, rng = cameras()["left"], np.random.default_rng(4)
+    lines = [line.split(",") for line in (site / "left.csv").read_text().splitlines()]
+    time = np.array([float(line[2]) for line in lines[1:]])
+    turn = rotation_from_vector(np.outer(np.sin(2 * time), [0.0, 0.03, 0.01])) @ camera.rotation
+    for line, common, rotation in zip(lines[1:], time + OFFSET["left"], turn, strict=True):
+        seen = project(replace(camera, rotation=rotation), centre_at(line[0], np.array([common])))[0]
+        line[3:5] = map(repr, (seen + NOISE_PX * rng.normal(size=2)).tolist())
+    (site / "left.csv").write_text("\n".join(map(",".join, lines)) + "\n")
+    order, lost = np.argsort(time), np.zeros(time.size)
+    lost[order[10:13]] = np.inf
+    turn[order[10:13]] = camera.rotation
+    place = np.repeat(camera.position[None], time.size, axis=0)
+    write_camera(
+        site / "left.toml", MovingCamera(camera, time[order], place, turn[order], np.zeros(time.size), lost[order])
+    )
+    assert main(["refine", str(site / "project.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "3 pixels are not used" in capsys.readouterr().out
+    check_picks(tmp_path / "out")
 
 
 @pytest.mark.parametrize(

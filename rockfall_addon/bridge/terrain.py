@@ -198,8 +198,8 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
     drawn = sum(terrain_view.drawn_triangles(tile) for tile in grounds)
     if drawn < faces:
         said.append(
-            f"The 3-D view draws {drawn / 1e6:.2g} of {faces / 1e6:.2g} million triangles. Rays, normals and renders "
-            "use them all."
+            f"The 3-D view draws {grouped(drawn)} of {grouped(faces)} triangles. "
+            "Rays, normals and renders use them all."
         )
     thin = [(len(tile.data.vertices), float(tile.get(THIN_KEY, 0.0))) for tile in grounds]
     share = sum(count * part for count, part in thin) / max(1, sum(count for count, _ in thin))
@@ -212,6 +212,11 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
     if scale != 1.0:
         said.append(f"Blender shows lengths × {scale:g} (the scene's unit scale); Rockfall computes in metres.")
     return said
+
+
+def grouped(count: int) -> str:
+    """A count with its thousands set apart."""
+    return f"{count:,}".replace(",", "\u202f")
 
 
 def _read(thing: bpy.types.Object) -> Surface:

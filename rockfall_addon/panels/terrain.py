@@ -6,8 +6,6 @@ import bpy
 from ..bridge import shown, state, terrain, terrain_view
 from .base import RockfallPanel, advise, facts, paragraph
 
-NARROW_SPACE = "\u202f"
-
 
 class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     bl_label = "1  Terrain"
@@ -45,13 +43,10 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     def _list_tiles(self, grounds: list[bpy.types.Object]) -> None:
         column = self.layout.box().column(align=True)
         for ground in grounds:
-            row = column.split(factor=0.62)
-            row.label(text=ground.name, icon="MESH_GRID", translate=False)
-            faces = len(ground.data.polygons) if ground.type == "MESH" else 0
-            row.label(text=f"{faces:,} triangles".replace(",", NARROW_SPACE))
-            file = str(ground.get(terrain.FILE_KEY, ""))
-            if file and file != ground.name:
-                column.label(text=f"from {file}", icon="BLANK1", translate=False)
+            column.label(text=ground.name, icon="MESH_GRID", translate=False)
+            count = terrain.grouped(len(ground.data.polygons) if ground.type == "MESH" else 0)
+            file = str(ground.get(terrain.FILE_KEY, ground.name))
+            column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")
 
     def _relief(self, scene: bpy.types.Scene) -> None:
         settings = scene.rockfall_terrain
@@ -66,8 +61,10 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
             column.prop(settings, name)
         layout.operator("rockfall.reset_relief", icon="LOOP_BACK")
         if terrain_view.is_coarse(scene):
-            layout.prop(settings, "full_resolution", toggle=True, icon="MESH_GRID")
-            layout.prop(settings, "view_limit")
+            self.layout.prop(settings, "full_resolution", toggle=True, icon="MESH_GRID")
+            column = self.layout.column()
+            column.use_property_split, column.use_property_decorate = True, False
+            column.prop(settings, "view_limit")
 
 
 CLASSES = (ROCKFALL_PT_terrain,)

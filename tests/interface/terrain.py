@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 
@@ -30,3 +31,85 @@ def case_import_vegetated_tile_after_asking(window):
     yield from window.wait_for(lambda: any("rockfall_role" in o for o in bpy.context.scene.objects), what="imported")
     yield 3.0
     window.screenshot("lareunion")
+
+
+def case_relief_sliders_at_their_ends(window):
+    yield from window.show_sidebar()
+    scene = bpy.context.scene
+    with window.override():
+        assert bpy.ops.rockfall.import_terrain(filepath=str(DATA / "las_chablais3.laz")) == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="terrain")
+    yield 2.0
+    window.screenshot("usual")
+    before = colour_sum()
+    for name, values in {
+        "flat": {"hillshade": 0.0, "eye_dome": 0.0, "thin": 0.0},
+        "full": {"hillshade": 1.0, "eye_dome": 1.0, "thin": 1.0},
+        "contrast": {"hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "contrast": 2.5},
+    }.items():
+        for slider, value in values.items():
+            setattr(scene.rockfall_terrain, slider, value)
+        yield 1.5
+        window.screenshot(name)
+    with window.override():
+        bpy.ops.ed.undo_push(message="sliders")
+        bpy.ops.ed.undo()
+    yield 1.5
+    assert bpy.context.scene.rockfall_terrain.contrast == 1.0
+    assert colour_sum() == before, "undo takes the colours back with the sliders"
+    nodes = bpy.data.materials["Rockfall terrain"].node_tree.nodes
+    assert nodes["contrast"].outputs[0].default_value == 1.0
+    with window.override():
+        bpy.ops.ed.redo()
+    yield 1.0
+    assert bpy.context.scene.rockfall_terrain.contrast == 2.5
+    assert colour_sum() != before
+
+
+def case_coarse_view_switched_and_undone(window):
+    yield from window.show_sidebar()
+    with window.override():
+        assert bpy.ops.rockfall.import_terrain(filepath=str(DATA / "las_chablais3.laz")) == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="terrain")
+    yield 2.0
+    full = drawn()
+    bpy.context.scene.rockfall_terrain.view_limit = full // 2
+    with window.override():
+        bpy.ops.ed.undo_push(message="limit")
+    yield 2.0
+    window.screenshot("coarse")
+    coarse = drawn()
+    assert coarse < full / 4
+    with window.override():
+        bpy.ops.rockfall.toggle_full_terrain()
+        bpy.ops.ed.undo_push(message="full")
+    yield 1.0
+    assert drawn() == full
+    window.screenshot("full")
+    for expected in (coarse, full):
+        with window.override():
+            bpy.ops.ed.undo()
+        yield 1.0
+        assert drawn() == expected
+    with window.override():
+        bpy.ops.ed.redo()
+    yield 1.0
+    assert drawn() == coarse
+    (ground,) = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "terrain"]
+    region = window.region()
+    with window.override():
+        bpy.ops.object.select_all(action="DESELECT")
+        bpy.ops.view3d.select(location=(region.width // 2, region.height // 2))
+    assert ground.select_get(), "a click on the coarse view selects the terrain"
+
+
+def colour_sum():
+    (ground,) = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "terrain"]
+    colours = np.empty(4 * len(ground.data.vertices), dtype=np.float32)
+    ground.data.attributes["relief"].data.foreach_get("color", colours)
+    return colours.tobytes()
+
+
+def drawn():
+    (ground,) = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "terrain"]
+    return len(ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)

@@ -20,6 +20,7 @@ WANDERED = 0.1
 NOISE_FLOOR = 2.0
 """Grey levels; compressed video shows none where nothing happens."""
 IQR_TO_SIGMA = 1.349
+QUARTILES = (0.5, 0.25, 0.75)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,17 +119,15 @@ def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> P
         layer[~there] = 255
     ordered = _sorted(layers)
     count = len(ordered)
-    if not known:
-        middle, low, high = (ordered[int(q * (count - 1))] for q in (0.5, 0.25, 0.75))
-        seen = np.full(middle.shape[:2], 255, np.uint8)
-    else:
-        number = np.sum(known, axis=0)
-        stack = np.stack(ordered)
-        middle, low, high = (
-            np.take_along_axis(stack, (q * np.maximum(number - 1, 0)).astype(np.intp)[None, :, :, None], axis=0)[0]
-            for q in (0.5, 0.25, 0.75)
-        )
-        seen = np.where(number >= max(3, count // 3), 255, 0).astype(np.uint8)
+    middle, low, high = (ordered[int(q * (count - 1))].copy() for q in QUARTILES)
+    seen = np.full(middle.shape[:2], 255, np.uint8)
+    if known:
+        number = np.sum(known, axis=0, dtype=np.int16)
+        seen[number < max(3, count // 3)] = 0
+        part = number < count
+        rest, fewer = np.stack([layer[part] for layer in ordered]), np.maximum(number[part] - 1, 0)
+        for picture, q in zip((middle, low, high), QUARTILES, strict=True):
+            picture[part] = rest[(q * fewer).astype(np.intp), np.arange(fewer.size)]
     spread = (high.astype(np.float32) - low) / IQR_TO_SIGMA
     variance = opencv().blur(np.mean(spread**2, axis=2), (5, 5))
     return Plate(anchor, middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen)

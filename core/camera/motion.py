@@ -238,7 +238,8 @@ def _walk(
         origins, directions = rays(
             camera, pixel[first], position=position[frame[first]], rotation=rotation[frame[first]]
         )
-        points[feature[first]], tried[feature[first]] = points_of(origins, directions), True
+        if first.size:
+            points[feature[first]], tried[feature[first]] = points_of(origins, directions), True
         known = np.isfinite(points[feature, 0]) & ~solved[frame]
         count = np.bincount(frame[known], minlength=frames)
         if count.max(initial=0) < LEAST_POINTS:

@@ -15,10 +15,10 @@ import numpy as np
 from ..vectors import Array, norm, unit
 from .model import Camera, project_with_derivatives, rotation_from_vector, undistort
 
-TRIPLES = 40
+TRIPLES = 32
 KEPT = 8
 STEPS = 25
-CULLED = {6: 14, 12: 8}
+CULLED = {5: 12, 11: 6}
 """After so many steps the best so many candidates go on."""
 FOCAL_WIDTHS = (0.35, 30.0)
 """The focal lengths that are tried, in diagonals of the image; 0.35 is 130° wide, 30 is 1300 mm on full frame."""
@@ -69,7 +69,7 @@ def find_starts(
     diagonal = float(np.hypot(*camera.size))
     focals = np.array([camera.fx])
     if free_focal:
-        focals = np.append(diagonal * np.geomspace(*FOCAL_WIDTHS, 28), camera.fx)
+        focals = np.append(diagonal * np.geomspace(*FOCAL_WIDTHS, 24), camera.fx)
     bearings = _bearings(camera, pixels, focals)
     position, rotation, focal = _poses_of_triples(bearings, points, focals, _triples(pixels, points))
     if with_pose:

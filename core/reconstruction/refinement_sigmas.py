@@ -9,7 +9,6 @@ from .node_motion import NodeMotion
 from .picks import Indices
 from .refinement_problem import NODE, Problem
 
-NUDGE = 1e-6
 SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
 
 
@@ -49,38 +48,41 @@ def impact_sigmas(impacts: Impacts, covariance: Array, spread: Array) -> dict[st
 
     Notes
     -----
-    To first order, by differences. The normal is tilted by spread/√2 about each of two axes at right angles to it,
-    independent of everything else.
+    The root mean square deviation from the value over pairs of points √3 standard deviations to either side along each
+    axis of the covariance, with a weight of 1/6 each (Julier & Uhlmann 2004): first-order propagation where a column is
+    linear, but true for R_N at grazing impacts too, where a small tilt of the normal changes it by half. The normal is
+    tilted by spread/√2 about each of two axes at right angles to it, independent of everything else.
     """
-    n = len(impacts)
-    full = np.zeros((n, 8, 8))
-    full[:, :6, :6] = covariance
-    full[:, 6, 6] = full[:, 7, 7] = np.nan_to_num(spread) ** 2 / 2
-    step = np.maximum(1.0, np.maximum(np.nan_to_num(norm(impacts.v1)), np.nan_to_num(norm(impacts.v2)))) * NUDGE
-
-    def values(row: int, sign: float) -> Array:
-        v1, v2, normal = impacts.v1.copy(), impacts.v2.copy(), impacts.normal
-        if row < 3:
-            v1[:, row] += sign * step
-        elif row < 6:
-            v2[:, row - 3] += sign * step
-        else:
-            tilt = _across(normal)[row - 6]
-            normal = normal + sign * step[:, None] * tilt
-            normal = normal / norm(normal)[:, None]
-        found = apparent(v1, v2, normal)
-        energies = [0.5 * impacts.mass_kg * dot(v, v) for v in (v1, v2)]
-        return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
-
+    usable = np.nan_to_num(covariance)
+    size, axes = np.linalg.eigh(usable)
+    reach = np.sqrt(3 * np.maximum(size, 0.0))
+    tilt = np.sqrt(1.5) * np.nan_to_num(spread)
+    here = _values(impacts, impacts.v1, impacts.v2, impacts.normal)
+    squares = np.zeros_like(here)
     with np.errstate(invalid="ignore", divide="ignore"):
-        slope = np.stack([(values(i, 1.0) - values(i, -1.0)) / (2 * step[:, None]) for i in range(8)], axis=2)
-        # What a column does not depend on must not make it undefined.
-        slope = np.where(np.isfinite(slope), slope, 0.0)
-        deviation = np.sqrt(np.maximum(np.einsum("nci,nij,ncj->nc", slope, full, slope), 0.0))
-        result = {name: deviation[:, i] for i, name in enumerate((*SCALARS, "kinetic1_j", "kinetic2_j"))}
-        diagonal = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
+        for axis in range(6):
+            away = reach[:, axis, None] * axes[:, :, axis]
+            for sign in (-1.0, 1.0):
+                v1, v2 = impacts.v1 + sign * away[:, :3], impacts.v2 + sign * away[:, 3:]
+                squares += np.nan_to_num(_values(impacts, v1, v2, impacts.normal) - here) ** 2 / 6
+        for direction in _across(impacts.normal):
+            for sign in (-1.0, 1.0):
+                normal = np.cos(tilt)[:, None] * impacts.normal + sign * np.sin(tilt)[:, None] * direction
+                squares += np.nan_to_num(_values(impacts, impacts.v1, impacts.v2, normal) - here) ** 2 / 6
+    deviation = np.sqrt(squares)
+    result = {name: deviation[:, i] for i, name in enumerate((*SCALARS, "kinetic1_j", "kinetic2_j"))}
+    diagonal = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
     result["v1"], result["v2"] = diagonal[:, :3], diagonal[:, 3:]
+    known = np.isfinite(covariance[:, 0, 0])
+    result = {name: np.where(known if sd.ndim == 1 else known[:, None], sd, np.nan) for name, sd in result.items()}
     return {name: np.where(np.isfinite(getattr(impacts, name)), sd, np.nan) for name, sd in result.items()}
+
+
+def _values(impacts: Impacts, v1: Array, v2: Array, normal: Array) -> Array:
+    """(n, 11) the scalar columns."""
+    found = apparent(v1, v2, normal)
+    energies = [0.5 * impacts.mass_kg * dot(v, v) for v in (v1, v2)]
+    return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
 
 
 def _across(normal: Array) -> tuple[Array, Array]:

@@ -34,7 +34,9 @@ MOST_ITERATIONS, MOST_ROUNDS = 100, 5
 HEAVIEST = 1e10
 """A damping with which no step gets anywhere."""
 SETTLED = 1e-7
-"""A last step of this part of a standard deviation ends the search."""
+"""A last step of this part of a standard deviation ends the search,"""
+NO_GAIN = 1e-10
+"""and so does a step that takes less than this part off the cost."""
 MEDIAN_LENGTH = float(np.sqrt(2 * np.log(2)))
 """Median length of a normal vector of two dimensions."""
 
@@ -91,11 +93,13 @@ def _search(problem: Problem, state: Unknowns, chain: Indices, loss: Loss, *, re
             settled = float(step @ information @ step) < SETTLED**2
             trial_state = moved(problem, state, step)
             trial = evaluate(problem, trial_state, chain)
-            improved = trial.valid and _cost(trial, weight) <= _cost(here, weight)
+            before = _cost(here, weight)
+            after = _cost(trial, weight) if trial.valid else np.inf
+            improved = after <= before
             if settled:
                 break
             damping *= 0.1 if improved else 10
-        settled = settled or not improved
+        settled = settled or not improved or before - after < NO_GAIN * before
         if improved:
             state, here, damping = trial_state, trial, max(damping, 1e-12)
             weight, outlier = _weights(here, loss, reject)

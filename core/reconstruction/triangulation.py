@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Single points from pixels: on the terrain from one view, in the air from several."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..camera.model import Camera, project, project_with_derivatives, rays
+from ..errors import InputError
+from ..terrain.raycast import cast_rays
+from ..terrain.surface import Surface
+from ..vectors import Array, dot, norm, unit
+
+GRAZING_DEG = 5.0
+ITERATIONS = 20
+SETTLED_M = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class TerrainPicks:
+    """n pixels on the terrain.
+
+    Attributes
+    ----------
+    point, normal : (n, 3) where the ray meets the terrain [m], and the normal of the face there; NaN when it misses.
+    covariance : (n, 3, 3) of the point, from the pixel's standard deviation, in the plane of the face [m²].
+    ellipse : (n, 2, 3) half axes of the ellipse of one standard deviation, the longer one first [m].
+    grazing : (n,) angle between the ray and the terrain [rad].
+    warning : n sentences, empty where all is well.
+    """
+
+    point: Array
+    normal: Array
+    covariance: Array
+    ellipse: Array
+    grazing: Array
+    warning: tuple[str, ...]
+
+
+def pick_on_terrain(
+    camera: Camera,
+    pixels: Array,
+    surface: Surface,
+    sigma_px: Array | float = 1.0,
+    *,
+    position: Array | None = None,
+    rotation: Array | None = None,
+) -> TerrainPicks:
+    """Where the rays through pixels meet the terrain first.
+
+    Parameters
+    ----------
+    pixels : (n, 2) [px].
+    sigma_px : (n,) standard deviation of u and of v [px].
+    position, rotation : (n, 3) and (n, 3, 3), a pose for each pixel instead of the camera's own.
+
+    Notes
+    -----
+    First order: the point slides on the plane of its face. At grazing angles a pixel covers metres of terrain, and the
+    ray may as well meet the hump in front or the one behind: that is warned of below 5°.
+    """
+    pixel = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+    n = len(pixel)
+    sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), n)
+    origin, direction = rays(camera, pixel, position=position, rotation=rotation)
+    point, normal = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    seen = np.flatnonzero(np.isfinite(direction).all(axis=1))
+    hits = cast_rays(surface, origin[seen], direction[seen])
+    met = seen[hits.face >= 0]
+    point[met], normal[met] = hits.point[hits.face >= 0], surface.face_normals[hits.face[hits.face >= 0]]
+    grazing = np.arcsin(np.minimum(np.abs(dot(direction, normal)), 1.0))
+
+    covariance, ellipse = np.full((n, 3, 3), np.nan), np.full((n, 2, 3), np.nan)
+    if met.size:
+        place = None if position is None else position[met]
+        turn = None if rotation is None else rotation[met]
+        by_point = project_with_derivatives(camera, point[met], position=place, rotation=turn).d_point
+        along = unit(direction[met] - dot(direction[met], normal[met])[:, None] * normal[met])
+        bare = ~np.isfinite(along[:, 0])  # looking straight down on the face: any axis does
+        helper = np.where(np.abs(normal[met, :1]) < 0.8, [[1.0, 0, 0]], [[0, 1.0, 0]])
+        along = np.where(bare[:, None], unit(np.cross(normal[met], helper)), along)
+        plane = np.stack([along, np.cross(normal[met], along)], axis=2)
+        inverse = np.linalg.inv(by_point @ plane) * sigma[met, None, None]
+        spread = plane @ inverse
+        covariance[met] = spread @ np.swapaxes(spread, 1, 2)
+        left, size, _ = np.linalg.svd(inverse)
+        ellipse[met] = np.swapaxes((plane @ left) * size[:, None, :], 1, 2)
+    warnings = tuple(
+        "The ray misses the terrain."
+        if np.isnan(angle)
+        else f"The ray grazes the terrain at {np.degrees(angle):.1f}°: its place is known to {norm(axes[0]):.1f} m."
+        if angle < np.radians(GRAZING_DEG)
+        else ""
+        for angle, axes in zip(grazing, ellipse, strict=True)
+    )
+    return TerrainPicks(point, normal, covariance, ellipse, grazing, warnings)
+
+
+@dataclass(frozen=True, eq=False)
+class SpacePoints:
+    """n points seen from several views at one time.
+
+    Attributes
+    ----------
+    point : (n, 3) [m]; NaN where fewer than two views see it.
+    covariance : (n, 3, 3) [m²].
+    miss_distance : (n,) root mean square distance of the rays from the point [m].
+    residual_px : (v, n, 2) observed less projected [px]; NaN where not seen.
+    """
+
+    point: Array
+    covariance: Array
+    miss_distance: Array
+    residual_px: Array
+
+
+def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | float = 1.0) -> SpacePoints:
+    """Points from their pixels in v views at one common time.
+
+    Parameters
+    ----------
+    cameras : v, with their poses at that time.
+    pixels : (v, n, 2) [px]; NaN where a view does not see the point.
+    sigma_px : (v, n) or a number, standard deviation of u and of v [px].
+
+    Raises
+    ------
+    InputError : fewer than two views, or the shapes do not match.
+
+    Notes
+    -----
+    The start is the point of least squared distances from the rays; then Gauss–Newton on the weighted squares of the
+    pixels, which is the maximum of likelihood (Hartley & Sturm 1997).
+    """
+    pixel = np.asarray(pixels, dtype=np.float64)
+    if len(cameras) < 2 or pixel.ndim != 3 or pixel.shape[::2] != (len(cameras), 2):
+        raise InputError(
+            f"{len(cameras)} views with pixels of the shape {pixel.shape} cannot be triangulated",
+            advice="Give two views or more, and pixels (views, points, 2)",
+        )
+    v, n = pixel.shape[:2]
+    sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), (v, n))
+    beams = [rays(camera, rows) for camera, rows in zip(cameras, pixel, strict=True)]
+    origin, direction = np.stack([beam[0] for beam in beams]), np.stack([beam[1] for beam in beams])
+    seen = np.isfinite(direction).all(axis=2)
+    enough = np.flatnonzero(seen.sum(axis=0) >= 2)
+    point = np.full((n, 3), np.nan)
+    across = np.where(seen[:, :, None, None], np.eye(3) - direction[..., :, None] * direction[..., None, :], 0.0)
+    pull = np.einsum("vnij,vnj->vni", across, np.where(seen[:, :, None], origin, 0.0)).sum(axis=0)
+    point[enough] = np.linalg.solve(across.sum(axis=0)[enough], pull[enough, :, None])[:, :, 0]
+
+    information = np.zeros((n, 3, 3))
+    residual = np.full((v, n, 2), np.nan)
+    for _ in range(ITERATIONS):
+        information[:], gradient = 0.0, np.zeros((n, 3))
+        for i, camera in enumerate(cameras):
+            use = enough[seen[i, enough]]
+            found = project_with_derivatives(camera, point[use])
+            residual[i, use] = pixel[i, use] - found.pixel
+            slope = found.d_point / sigma[i, use, None, None]
+            information[use] += np.swapaxes(slope, 1, 2) @ slope
+            gradient[use] += np.einsum("nij,ni->nj", slope, residual[i, use] / sigma[i, use, None])
+        good = enough[np.isfinite(information[enough]).all(axis=(1, 2))]
+        step = np.linalg.solve(information[good], gradient[good, :, None])[:, :, 0]
+        point[good] += step
+        if not step.size or np.abs(step).max() < SETTLED_M:
+            break
+    covariance = np.full((n, 3, 3), np.nan)
+    covariance[good] = np.linalg.inv(information[good])
+    away = point - origin
+    beside = norm(away - dot(away, direction)[..., None] * direction)
+    count = np.maximum(seen.sum(axis=0), 1)
+    miss = np.sqrt(np.where(seen, beside**2, 0.0).sum(axis=0) / count)
+    return SpacePoints(point, covariance, np.where(np.isfinite(point[:, 0]), miss, np.nan), residual)
+
+
+def epipolar_curve(
+    camera1: Camera,
+    pixel: Array,
+    camera2: Camera,
+    near_m: float,
+    far_m: float,
+    surface: Surface | None = None,
+    samples: int = 100,
+) -> Array:
+    """Where a pixel of one view may lie in another: the ray through it, projected, (k, 2) [px].
+
+    Parameters
+    ----------
+    near_m, far_m : the part of the ray that is drawn, by distance from the first camera [m].
+    surface : the ray ends on the terrain.
+    samples : points along it, evenly spread over the inverse of the distance; those that the second camera cannot see
+        are left out.
+
+    Raises
+    ------
+    InputError : the distances do not ascend from above zero, or the pixel has no ray.
+    """
+    if not 0 < near_m < far_m:
+        raise InputError(f"The ray cannot run from {near_m} m to {far_m} m", advice="Give 0 < near < far")
+    origin, direction = rays(camera1, np.asarray(pixel, dtype=np.float64).reshape(1, 2))
+    if not np.isfinite(direction).all():
+        raise InputError("The pixel is outside of what the lens can see, so that it has no ray")
+    end = far_m
+    if surface is not None:
+        end = min(far_m, float(cast_rays(surface, origin, direction).distance[0]))
+        near_m = min(near_m, end)
+    distance = 1 / np.linspace(1 / near_m, 1 / end, samples)
+    curve = project(camera2, origin + distance[:, None] * direction)
+    return curve[np.isfinite(curve).all(axis=1)]

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trajectories fitted to pixels: exact data come back exactly, noise as the standard deviations say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rockfall.core.camera.model import look_at, project, rotation_from_vector
+from rockfall.core.camera.motion import MovingCamera, fixed
+from rockfall.core.errors import InputError, RockfallError
+from rockfall.core.footage.clock import Clock
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.block import Block
+from rockfall.core.reconstruction.drag import Drag
+from rockfall.core.reconstruction.node_motion import join_nodes, places_at
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.refinement import PixelObservations, View, refine
+from rockfall.core.reconstruction.refinement_problem import evaluate, moved
+from rockfall.core.reconstruction.refinement_setup import prepare, set_up
+from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.terrain.surface import Surface
+
+DIP = np.radians(35)
+DOWN, OUT = np.array([np.cos(DIP), 0, -np.sin(DIP)]), np.array([np.sin(DIP), 0, np.cos(DIP)])
+SURFACE = Surface(
+    np.array([60 * a * DOWN + [0, 60 * b, 0] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]),
+    np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32),
+    GlobalShift(),
+    "plane",
+)
+BLOCK = Block()
+RADIUS = BLOCK.radius_m
+TIME = np.array([2.013, 2.609, 3.317, 3.921, 4.602])
+PLACE = np.array([-16.0, -11, -4.5, 3.0, 12.0])[:, None] * DOWN + np.array([0, 0.4, -0.3, 0.5, 1.0])[:, None] * [
+    0,
+    1,
+    0,
+]
+EXACT = {"sigma_time_s": np.full(5, 1e3), "sigma_position_m": np.full(5, 1e4)}
+COVARIANCE = np.diag([4e-4, 4e-4, 4e-4, 0.1, 0.1, 0.1]) ** 2
+
+
+def camera_at(degrees, distance=120.0):
+    a = np.radians(degrees)
+    return look_at(3840, 2160, distance * np.array([np.cos(a), np.sin(a), 0.3]), (0, 0, 0), focal_px=6500.0)
+
+
+def view(degrees=50.0, **more):
+    return View(f"from {degrees:.0f}°", fixed(camera_at(degrees)), **more)
+
+
+def states(time, drag=0.0, gravity=9.81):
+    centre = PLACE + RADIUS * OUT
+    k = len(TIME) - 1
+    motion = join_nodes(centre[:-1], centre[1:], TIME[:-1], TIME[1:], np.full(k, gravity), np.full(k, drag))
+    which = np.clip(np.searchsorted(TIME, time, side="right") - 1, 0, k - 1)
+    return motion, places_at(motion, which, time).position
+
+
+def observe(views, *, rate=30.0, sigma=1.0, noise=0.0, seed=0, drag=0.0, gravity=9.81):
+    """Pixels of the true motion: exact, or with noise."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for number, one in enumerate(views):
+        common = np.arange(TIME[0] + 0.01 + 0.004 * number, TIME[-1], 1 / rate)
+        video = np.asarray(one.clock.to_video(common))
+        position, rotation = one.camera.poses_at(video)
+        exposed, pixel = common, None
+        for _ in range(8):
+            pixel = project(one.camera.camera, states(exposed, drag, gravity)[1], position=position, rotation=rotation)
+            exposed = common + one.row_time_s * (pixel[:, 1] - one.camera.camera.height / 2)
+        keep = (exposed > TIME[0]) & (exposed < TIME[-1])
+        rows.append((np.full(keep.sum(), number), video[keep], pixel[keep]))
+    index, video, pixel = (np.concatenate(column) for column in zip(*rows, strict=True))
+    pixel = pixel + noise * rng.normal(size=pixel.shape)
+    return PixelObservations(index, np.full(index.size, "a"), video, pixel, np.full(index.size, sigma))
+
+
+def marked(seed=1, off_m=0.15, off_s=0.03, **more):
+    rng = np.random.default_rng(seed)
+    n = len(TIME)
+    plane = np.stack([DOWN, [0, 1, 0]])
+    position = PLACE + off_m * rng.normal(size=(n, 2)) @ plane
+    return make_picks(["a"] * n, TIME + off_s * rng.uniform(-1, 1, n), position, **more)
+
+
+def run(views, pixels, picks=None, **more):
+    options = {"surface": SURFACE, "block": BLOCK, "sigma_terrain_m": 0.02, **more}
+    return refine(marked(**EXACT) if picks is None else picks, views, pixels, **options)
+
+
+def check_exact(result, atol=1e-9, drag=0.0, gravity=9.81):
+    motion, _ = states(TIME, drag, gravity)
+    flights, inner = result.reconstruction.flights, slice(1, 4)
+    np.testing.assert_allclose(result.picks.time_s[inner], TIME[inner], atol=atol)
+    np.testing.assert_allclose(result.picks.position[inner], PLACE[inner], atol=10 * atol)
+    np.testing.assert_allclose(flights.end_velocity[:-1], motion.end_velocity[:-1], atol=100 * atol)
+    np.testing.assert_allclose(flights.start_velocity[1:], motion.start_velocity[1:], atol=100 * atol)
+    assert result.rmse_px < 1e-6
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_exact_pixels_give_the_exact_motion(count):
+    views = [view(50.0), view(-20.0)][:count]
+    result = run(views, observe(views))
+    check_exact(result)
+    assert result.rmse_px_before > 3
+    assert not result.outlier.any()
+
+
+def test_from_picks_that_are_ten_pixels_and_two_frames_off():
+    views = [view()]
+    check_exact(run(views, observe(views), marked(3, off_m=0.3, off_s=0.066, **EXACT)))
+
+
+def test_without_a_terrain_two_views_are_enough():
+    views = [view(50.0), view(-20.0)]
+    normals = np.tile(OUT, (5, 1))
+    check_exact(run(views, observe(views), marked(normal=normals, **EXACT), surface=None), atol=1e-8)
+
+
+def test_rolling_shutter():
+    views = [view(row_time_s=1.2e-5)]
+    pixels = observe(views)
+    check_exact(run(views, pixels))
+    ignored = run([replace(views[0], row_time_s=0.0)], pixels)
+    assert np.abs(ignored.picks.time_s - TIME)[1:4].max() > 1e-3
+
+
+def test_a_camera_that_moves():
+    camera, frames = camera_at(40.0), np.linspace(0, 6, 181)
+    shake = 0.01 * np.sin(np.outer(frames, [3.0, 4.0, 5.0]))
+    path = MovingCamera(
+        camera,
+        frames,
+        camera.position + shake,
+        rotation_from_vector(shake) @ camera.rotation,
+        np.zeros(181),
+        np.zeros(181),
+    )
+    views = [View("hand", path)]
+    check_exact(run(views, observe(views)))
+
+
+def test_drag_of_a_light_block_is_found():
+    """A table-tennis ball: k about 0.11 1/m, which a vacuum's flights cannot imitate."""
+    ball = Block(RADIUS * 2, RADIUS * 2, RADIUS * 2, 22.0)
+    law = Drag(coefficient=0.47)
+    k = law.per_metre(ball)
+    assert k == pytest.approx(0.05, rel=0.3)
+    views = [view(50.0), view(-20.0)]
+    pixels = observe(views, drag=k)
+    check_exact(run(views, pixels, block=ball, drag=law), drag=k, atol=1e-8)
+    free = run(views, pixels, block=ball, drag=Drag(coefficient=0.9), free=("drag",))
+    assert free.unknowns["drag_coefficient"][0] == pytest.approx(0.47, abs=1e-6)
+    check_exact(free, drag=k, atol=1e-8)
+
+
+def test_gravity_is_found():
+    views = [view(50.0), view(-20.0)]
+    result = run(views, observe(views, gravity=9.5), free=("gravity",))
+    assert result.unknowns["gravity_mps2"][0] == pytest.approx(9.5, abs=1e-7)
+    check_exact(result, gravity=9.5, atol=1e-8)
+
+
+def test_a_clock_is_found_from_far_off():
+    views = [view(50.0), view(-20.0, clock=Clock(1.3))]
+    pixels = observe(views)
+    result = run([views[0], replace(views[1], clock=Clock(1.3 + 0.41))], pixels, free=("clock",))
+    value, sigma = result.unknowns["offset_s from -20°"]
+    assert value == pytest.approx(1.3, abs=1e-8)
+    assert 0 < sigma < 0.01
+    assert result.views[1].clock.offset_s == value
+    check_exact(result)
+    held = run([views[0], replace(views[1], clock=Clock(1.35))], pixels)
+    assert any("fit the clocks" in sentence for sentence in held.advice)
+
+
+def test_a_pose_is_corrected_by_the_other_view():
+    camera = camera_at(-20.0)
+    turned = replace(camera, rotation=rotation_from_vector([3e-4, -2e-4, 1e-4]) @ camera.rotation)
+    views = [view(50.0), view(-20.0)]
+    pixels = observe(views)
+    tight = 1e-12 * np.eye(6)
+    off = [replace(views[0], pose_covariance=tight), View("off", fixed(turned), pose_covariance=COVARIANCE)]
+    result = run(off, pixels, free=("camera",), loss="linear")
+    centres = PLACE + RADIUS * OUT
+    true, before = project(camera, centres), project(turned, centres)
+    after = project(result.views[1].camera.camera, centres)
+    assert np.abs(before - true).max() > 1.5
+    assert np.abs(after - true).max() < 0.3
+    assert np.sqrt(np.diag(result.views[1].pose_covariance))[0] < 4e-4
+    assert result.rmse_px < 0.2 < run(off, pixels, loss="linear").rmse_px
+
+
+@pytest.mark.parametrize("drag", [None, Drag(coefficient=30.0)])
+def test_the_derivatives_are_right(drag):
+    views = [view(50.0, pose_covariance=COVARIANCE), view(-20.0, pose_covariance=COVARIANCE)]
+    free = {"camera", "clock", "clock_drift", "gravity"} | ({"drag"} if drag else set())
+    kinds = ["impact", "impact", "pass", "impact", "impact", "stop"]
+    time = np.insert(TIME, 2, 3.0)
+    place = np.insert(PLACE, 2, states(np.array([3.0]))[1], axis=0)
+    picks = make_picks(["a"] * 6, time, place, kind=kinds, sigma_position_m=np.full(6, 0.1))
+    ground = prepare(picks, SURFACE, BLOCK, drag, None, 0.02)
+    setup = set_up(ground, tuple(views), observe(views, rate=12.0), ["a"], 9.81, frozenset(free))
+    problem = setup.problem
+    rng = np.random.default_rng(4)
+    state = moved(problem, setup.state, 1e-3 * rng.normal(size=problem.columns.size))
+    here = evaluate(problem, state)
+    chain = np.where(here.segment >= 0, 0, -1)
+
+    def stacked(step):
+        found = evaluate(problem, moved(problem, state, step), chain)
+        return np.concatenate([rows.residual.ravel() for rows in (found.pixels, *found.others)])
+
+    dense = []
+    for rows in (here.pixels, *here.others):
+        full = np.zeros((*rows.residual.shape, problem.columns.size + 1))
+        for i in range(len(full)):
+            for j, column in enumerate(rows.columns[i]):
+                full[i, :, column] += rows.jacobian[i, :, j]
+        dense.append(full[:, :, :-1].reshape(-1, problem.columns.size))
+    analytic = np.concatenate(dense)
+    for column in range(problem.columns.size):
+        step = np.zeros(problem.columns.size)
+        step[column] = 1e-6
+        numeric = (stacked(step) - stacked(-step)) / 2e-6
+        size = 1 + np.abs(numeric).max()
+        np.testing.assert_allclose(analytic[:, column] / size, numeric / size, atol=3e-6, err_msg=str(column))
+
+
+def test_intervals_cover_the_truth():
+    views = [view(50.0)]
+    motion, _ = states(TIME)
+    inside, ratio = [], []
+    for seed in range(60):
+        rng = np.random.default_rng(100 + seed)
+        picks = marked(seed, sigma_time_s=np.full(5, 0.01))
+        picks = replace(picks, time_s=TIME + 0.01 * rng.normal(size=5))
+        result = run(views, observe(views, noise=1.0, seed=seed), picks)
+        impacts = result.reconstruction.impacts
+        for found, true, sigma in (
+            (impacts.v1[1:], motion.end_velocity, impacts.sigma["v1"][1:]),
+            (impacts.v2[:-1], motion.start_velocity, impacts.sigma["v2"][:-1]),
+        ):
+            inside += (np.abs(found - true) < 1.96 * sigma).ravel().tolist()
+            ratio += ((found - true) / sigma).ravel().tolist()
+    assert 0.92 < np.mean(inside) < 0.98
+    assert 0.85 < np.std(ratio) < 1.15
+
+
+def test_outliers_are_left_out():
+    views = [view()]
+    pixels = observe(views, noise=1.0, seed=5)
+    clean = run(views, pixels, marked())
+    wrong = np.arange(7, len(pixels), 9)
+    spoilt = pixels.pixel.copy()
+    spoilt[wrong] += np.random.default_rng(6).choice([-60.0, 45.0], size=(wrong.size, 2))
+    result = run(views, replace(pixels, pixel=spoilt), marked())
+    assert set(np.flatnonzero(result.outlier)) == set(wrong)
+    far = np.abs(result.reconstruction.impacts.v1 - clean.reconstruction.impacts.v1)[1:]
+    assert (far < 2.5 * clean.reconstruction.impacts.sigma["v1"][1:]).all()
+    assert not run(views, replace(pixels, pixel=spoilt), marked(), loss="cauchy").outlier[0]
+
+
+def test_more_noise_than_stated_enlarges_the_standard_deviations():
+    views = [view()]
+    honest = run(views, observe(views, sigma=3.0, noise=3.0), marked())
+    boasting = run(views, observe(views, sigma=1.0, noise=3.0), marked())
+    assert boasting.noise_scale == pytest.approx(3, rel=0.25)
+    assert any("as large as the stated" in sentence for sentence in boasting.advice)
+    np.testing.assert_allclose(
+        boasting.reconstruction.impacts.sigma["v1"][1:], honest.reconstruction.impacts.sigma["v1"][1:], rtol=0.35
+    )
+
+
+def test_the_refined_picks_give_the_same_flights():
+    views = [view()]
+    result = run(views, observe(views, noise=1.0), marked(extra={"note": np.array(list("abcde"))}))
+    again = reconstruct(result.picks, surface=SURFACE, block=BLOCK, flights="centres")
+    np.testing.assert_allclose(again.flights.start_velocity, result.reconstruction.flights.start_velocity, atol=1e-9)
+    np.testing.assert_allclose(again.impacts.rn, result.reconstruction.impacts.rn, atol=1e-9)
+    assert result.picks.extra["note"].tolist() == list("abcde")
+    np.testing.assert_allclose(np.abs(result.picks.position @ OUT), 0, atol=0.05)
+    assert (result.picks.sigma_time_s < 0.05).all()
+    assert result.reconstruction.ends == "centres"
+    assert np.isfinite(result.reconstruction.impacts.sigma["kinetic1_j"][1:]).all()
+
+
+def test_a_flight_without_pixels_rests_on_its_picks():
+    views = [view()]
+    pixels = observe(views, noise=1.0)
+    dark = (pixels.time_s > TIME[1] - 0.05) & (pixels.time_s < TIME[2] + 0.05)
+    picks = marked(sigma_time_s=np.full(5, 0.01), sigma_position_m=np.full(5, 0.2))
+    result = run(views, pixels.take(~dark), picks)
+    assert sum("has no pixels" in sentence for sentence in result.advice) == 1
+    seen = run(views, pixels, picks).reconstruction.impacts.sigma
+    sigma = result.reconstruction.impacts.sigma
+    assert (sigma["v1"][2] > 1.1 * seen["v1"][2]).all()
+    assert (sigma["v2"][1] > 1.1 * seen["v2"][1]).all()
+
+
+def test_what_cannot_be_refined():
+    views = [view()]
+    pixels = observe(views)
+    with pytest.raises(InputError, match="trajectory b: The block was tracked"):
+        run(views, replace(pixels, trajectory=np.full(len(pixels), "b")))
+    with pytest.raises(InputError, match="clocks do not overlap: the picks run from"):
+        run(views, replace(pixels, time_s=pixels.time_s + 100))
+    with pytest.raises(InputError, match="no pixels of the block"):
+        run(views, pixels.take(np.zeros(0, dtype=int)))
+    away = look_at(3840, 2160, (120, 0, 40), (240, 0, 40), focal_px=6500.0)
+    with pytest.raises(InputError, match="behind the camera of view away"):
+        run([View("away", fixed(away))], pixels)
+    with pytest.raises(InputError, match="no view has a covariance"):
+        run(views, pixels, free=("camera",))
+    with pytest.raises(RockfallError, match="cannot be fitted"):
+        run(views, pixels, free=("wind",))
+    with pytest.raises(InputError, match="two picks or more"):
+        run(views, pixels, make_picks(["a"], TIME[:1], PLACE[:1]))
+    late = run(views, replace(pixels, time_s=pixels.time_s + 0.5))
+    assert any("outside of the marked motion" in sentence for sentence in late.advice)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Single points from pixels, against geometry by hand and draws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rockfall.core.camera.model import look_at, project
+from rockfall.core.errors import InputError
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.triangulation import epipolar_curve, pick_on_terrain, triangulate
+from rockfall.core.terrain.surface import Surface
+
+GROUND = Surface(
+    np.array([[-500.0, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]]),
+    np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32),
+    GlobalShift(),
+    "ground",
+)
+
+
+def test_the_ellipse_on_level_ground_is_that_of_the_geometry():
+    """At 45° from 100√2 m, a pixel of 1/1000 rad is 0.1414 m across and 0.1414/sin 45° along."""
+    camera = look_at(2000, 1000, (0, -100, 100), (0, 0, 0), focal_px=1000.0)
+    found = pick_on_terrain(camera, [[1000.0, 500.0]], GROUND, 1.0)
+    np.testing.assert_allclose(found.point, [[0, 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(found.grazing, np.pi / 4)
+    np.testing.assert_allclose(np.abs(found.ellipse[0]), [[0, 0.2, 0], [0.1 * np.sqrt(2), 0, 0]], atol=1e-9)
+    np.testing.assert_allclose(found.covariance[0], np.diag([0.02, 0.04, 0]), atol=1e-9)
+    assert found.warning == ("",)
+
+
+def test_the_ellipse_is_the_spread_of_draws():
+    camera = replace(look_at(2000, 1000, (30, -100, 40), (0, 0, 0), focal_px=1500.0), k1=-0.1, p1=1e-3)
+    rng = np.random.default_rng(1)
+    draws = np.array([700.0, 420.0]) + 0.5 * rng.normal(size=(20_000, 2))
+    found = pick_on_terrain(camera, [[700.0, 420.0]], GROUND, 0.5)
+    np.testing.assert_allclose(np.cov(pick_on_terrain(camera, draws, GROUND).point.T), found.covariance[0], atol=3e-4)
+
+
+def test_grazing_and_missing_rays_are_told():
+    camera = look_at(2000, 1000, (0, -100, 5), (0, 0, 0), focal_px=1000.0)
+    found = pick_on_terrain(camera, [[1000.0, 500.0], [1000.0, 100.0]], GROUND)
+    assert "2.9°" in found.warning[0]
+    assert "misses" in found.warning[1]
+    assert np.isnan(found.point[1]).all()
+
+
+CAMERAS = [
+    look_at(1920, 1080, (100, -10, 20), (0, 0, 0), focal_px=2000.0),
+    replace(look_at(1920, 1080, (10, -120, 10), (0, 0, 0), focal_px=1800.0), k1=-0.05),
+    look_at(1920, 1080, (-60, -80, 30), (0, 0, 0), focal_px=2500.0),
+]
+
+
+def test_exact_rays_meet():
+    points = np.random.default_rng(2).uniform(-8, 8, (50, 3))
+    pixels = np.stack([project(camera, points) for camera in CAMERAS])
+    found = triangulate(CAMERAS, pixels)
+    np.testing.assert_allclose(found.point, points, atol=1e-9)
+    np.testing.assert_allclose(found.miss_distance, 0, atol=1e-8)
+
+
+def test_the_covariance_is_the_spread_of_draws():
+    point = np.array([[3.0, -2.0, 4.0]])
+    rng = np.random.default_rng(3)
+    pixels = np.stack([np.repeat(project(camera, point), 20_000, axis=0) for camera in CAMERAS])
+    sigma = np.array([0.5, 1.0, 2.0])[:, None]
+    found = triangulate(CAMERAS, pixels + sigma[:, :, None] * rng.normal(size=pixels.shape), sigma)
+    np.testing.assert_allclose(np.cov(found.point.T), found.covariance[0], atol=4e-5)
+    np.testing.assert_allclose(found.point.mean(axis=0), point[0], atol=1e-3)
+
+
+def test_a_view_may_be_blind():
+    points = np.array([[1.0, 2, 3], [4, 5, 6]])
+    pixels = np.stack([project(camera, points) for camera in CAMERAS])
+    pixels[1, 0] = np.nan
+    pixels[:2, 1] = np.nan
+    found = triangulate(CAMERAS, pixels)
+    np.testing.assert_allclose(found.point[0], points[0], atol=1e-9)
+    assert np.isnan(found.point[1]).all()
+    with pytest.raises(InputError, match="cannot be triangulated"):
+        triangulate(CAMERAS[:1], pixels[:1])
+
+
+def test_the_point_lies_on_the_epipolar_curve():
+    point = np.array([[3.0, -2.0, 4.0]])
+    pixel, other = project(CAMERAS[0], point)[0], project(CAMERAS[1], point)[0]
+    curve = epipolar_curve(CAMERAS[0], pixel, CAMERAS[1], 50.0, 150.0, samples=20_000)
+    assert np.linalg.norm(curve - other, axis=1).min() < 0.1
+    low = epipolar_curve(CAMERAS[0], pixel, CAMERAS[1], 50.0, 1e4, GROUND)
+    end = pick_on_terrain(CAMERAS[0], pixel[None], GROUND).point
+    np.testing.assert_allclose(low[-1], project(CAMERAS[1], end)[0], atol=1e-6)
+    with pytest.raises(InputError, match="near"):
+        epipolar_curve(CAMERAS[0], pixel, CAMERAS[1], 5.0, 1.0)

@@ -559,7 +559,8 @@ def _snooped(problem: _Problem, solution: _Solution, used: Mask) -> tuple[_Solut
 def _suspicion(problem: _Problem, solution: _Solution, used: Mask) -> Array:
     """(n,) each pair's squared residual against what the others predict, over the limit for a wrong pair.
 
-    The variance is that of the others, together with the stated one as if `PRIOR_FREEDOM` observations had shown it.
+    The variance is that of the others, together with the stated one as if `PRIOR_FREEDOM` observations had shown it,
+    and no less than the stated one.
     """
     spread = _inverse(solution.normal)
     around = solution.slopes @ spread @ np.swapaxes(solution.slopes, 1, 2)
@@ -575,7 +576,7 @@ def _suspicion(problem: _Problem, solution: _Solution, used: Mask) -> Array:
         rest = max(total - squared, 0.0) if used[i] else total
         others = freedom - 2 if used[i] else freedom
         limit = 2 * fdtri(2, others, 1 - FALSE_ALARM / len(used))
-        suspicion[i] = squared / ((PRIOR_FREEDOM + rest) / others) / limit
+        suspicion[i] = squared / max(1.0, (PRIOR_FREEDOM + rest) / others) / limit
     return suspicion
 
 

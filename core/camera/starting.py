@@ -17,6 +17,9 @@ from .model import Camera, project_with_derivatives, rotation_from_vector, undis
 
 TRIPLES = 32
 KEPT = 8
+TURNED_OVER = 5
+"""Of so many candidates the mirrored twin is tried too."""
+
 STEPS = 25
 CULLED = {5: 12, 11: 6}
 """After so many steps the best so many candidates go on."""
@@ -85,10 +88,13 @@ def find_starts(
             [_best_and_various(_robust_cost(residual / width), focal) for width in (loose, loose / 6, loose / 36)]
         )
     )
+    best = chosen[np.argsort(_robust_cost(residual[chosen] / loose), kind="stable")[:TURNED_OVER]]
+    over_position, over_rotation = _turned_over(points, position[best], rotation[best])
+    position = np.concatenate([position[chosen], over_position])
+    rotation = np.concatenate([rotation[chosen], over_rotation])
+    chosen = np.append(chosen, best)
     width = np.clip(2 * np.median(residual[chosen], axis=1), loose / 16, loose)
-    return _improved(
-        camera, pixels, points, sigma_px, sigma_m, position[chosen], rotation[chosen], focal[chosen], free_focal, width
-    )
+    return _improved(camera, pixels, points, sigma_px, sigma_m, position, rotation, focal[chosen], free_focal, width)
 
 
 def poses_from_three(bearings: Array, points: Array) -> tuple[Array, Array, Array]:
@@ -213,6 +219,17 @@ def _poses_of_triples(bearings: Array, points: Array, focals: Array, triples: np
     usable = np.isfinite(rays).all(axis=(1, 2))
     row, position, rotation = poses_from_three(rays[usable], corners[usable])
     return position, rotation, np.repeat(focals, t)[usable][row]
+
+
+def _turned_over(points: Array, position: Array, rotation: Array) -> tuple[Array, Array]:
+    """The poses that see a flat set of points nearly alike from far: mirrored in its plane and across the view."""
+    centre = points.mean(axis=0)
+    normal = np.linalg.svd(points - centre)[2][2]
+    seen = np.einsum("kij,kj->ki", rotation, centre - position)
+    sight = unit(seen)
+    across = np.eye(3) - 2 * sight[:, :, None] * sight[:, None, :]
+    over = across @ rotation @ (np.eye(3) - 2 * np.outer(normal, normal))
+    return centre - np.einsum("kji,kj->ki", over, seen), over
 
 
 def _normalised_residuals(

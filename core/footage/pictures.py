@@ -68,7 +68,7 @@ def draw_track(
         _dot(picture, place, radius, DARK, round(4 * unit))
         _dot(picture, place, radius, RING, max(1, round(1.8 * unit)))
         _label(picture, place, label, radius + 6 * unit, 0.5 * unit, taken)
-    _scale(picture, track, unit)
+    _scale(picture, track, where, unit)
     return cv2.convertScaleAbs(picture)
 
 
@@ -153,16 +153,23 @@ def _text(picture: np.ndarray, text: str, left: float, bottom: float, scale: flo
         )
 
 
-def _scale(picture: np.ndarray, track: BlockTrack, unit: float) -> None:
-    """Colours of the times, at the bottom left."""
+def _scale(picture: np.ndarray, track: BlockTrack, where: Array, unit: float) -> None:
+    """Colours of the times, in the corner that is farthest from the path."""
     cv2 = opencv()
-    height = picture.shape[0]
-    left, top, wide, tall = round(24 * unit), height - round(34 * unit), round(200 * unit), max(round(7 * unit), 3)
+    height, width = picture.shape[:2]
+    wide, tall = round(200 * unit), max(round(7 * unit), 3)
+    corners = [
+        (left, top)
+        for top in (height - round(34 * unit), round(44 * unit))
+        for left in (round(24 * unit), width - wide - round(24 * unit))
+    ]
+    free = [float(np.hypot(*(where - (left + wide / 2, top)).T).min()) for left, top in corners]
+    left, top = corners[0] if free[0] > wide else corners[int(np.argmax(free))]
     times = np.linspace(track.time_s[0], track.time_s[-1], wide)
     strip = scale_colours(times, times[0], times[-1])[:, ::-1] * 255
     cv2.rectangle(picture, (left - 2, top - 2), (left + wide + 1, top + tall + 1), DARK, -1)
     picture[top : top + tall, left : left + wide] = np.round(strip)
     _text(picture, f"{times[0]:.2f} s", left, top - 8 * unit, 0.45 * unit)
     last = f"{times[-1]:.2f} s"
-    (width, _), _ = cv2.getTextSize(last, cv2.FONT_HERSHEY_SIMPLEX, 0.45 * unit, 1)
-    _text(picture, last, left + wide - width, top - 8 * unit, 0.45 * unit)
+    (long, _), _ = cv2.getTextSize(last, cv2.FONT_HERSHEY_SIMPLEX, 0.45 * unit, 1)
+    _text(picture, last, left + wide - long, top - 8 * unit, 0.45 * unit)

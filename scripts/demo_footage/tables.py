@@ -13,7 +13,10 @@ from . import scene, shot
 
 Array = NDArray[np.float64]
 
-REFERENCE_FRAME = 0
+REFERENCE_FRAMES = {"pairs.csv": 0, "pairs_middle.csv": 90}
+"""The frame that each table of ground control is measured in."""
+
+EDGE_PX = 20.0
 SURVEY_NOISE_M = 0.01
 CLICK_NOISE_PX = 1.2
 CLICK_FRAMES = (54, 75)
@@ -23,7 +26,8 @@ def write(take: shot.Shot, tree: BVHTree, targets: Array, film: Path, shift: tup
     """All tables, into the film's folder and ``truth`` in it."""
     folder, truth = film.parent, film.parent / "truth"
     truth.mkdir(exist_ok=True)
-    write_pairs(folder / "pairs.csv", take, targets, film, shift)
+    for name, frame in REFERENCE_FRAMES.items():
+        write_pairs(folder / name, take, targets, film, frame, shift)
     write_clicks(folder / "clicks.csv", take)
     write_camera(truth / "camera.csv", take, shift)
     write_block(truth / "block.csv", take, tree, shift)
@@ -36,15 +40,19 @@ def block_pixels(take: shot.Shot) -> Array:
     return shot.projected(shot.block_centre(take, times), *shot.camera_path(take, times))
 
 
-def write_pairs(path: Path, take: shot.Shot, targets: Array, film: Path, shift: tuple[float, float, float]) -> None:
+def write_pairs(
+    path: Path, take: shot.Shot, targets: Array, film: Path, frame: int, shift: tuple[float, float, float]
+) -> None:
     """Survey coordinates to the centimetre; pixels are the centres of the orange blobs in the film's own picture."""
-    rng = np.random.default_rng([shot.SEED, 1])
-    image = decoded(film, REFERENCE_FRAME).astype(float)
-    position, rotation = (one[0] for one in shot.camera_path(take, np.array([REFERENCE_FRAME / shot.FPS])))
+    rng = np.random.default_rng([shot.SEED, 1])  # the same survey for each frame
+    image = decoded(film, frame).astype(float)
+    position, rotation = (one[0] for one in shot.camera_path(take, np.array([frame / shot.FPS])))
     true = shot.projected(targets, position, rotation)
     surveyed = targets + SURVEY_NOISE_M * rng.standard_normal(targets.shape) + np.array(shift)
     rows = []
     for number, (pixel, place) in enumerate(zip(true, surveyed, strict=True), 1):
+        if not np.all((pixel > EDGE_PX) & (pixel < np.array([shot.WIDTH, shot.HEIGHT]) - EDGE_PX)):
+            continue
         click = np.rint(pixel + rng.uniform(-4.0, 4.0, 2))
         u, v = orange_centre(image, click)
         rows.append([f"{u:.2f}", f"{v:.2f}", *(f"{value:.2f}" for value in place), f"T{number:02d}"])

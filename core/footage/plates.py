@@ -13,6 +13,8 @@ from .sources import Source, frames, opencv
 SAMPLES = 15
 REACH = 300
 """Frames on either side from which samples are taken."""
+FEWEST = 3
+"""Samples that show a place, at least."""
 SHARED = 0.5
 """Share of the view that a sample has in common with the plate, at least."""
 WANDERED = 0.1
@@ -25,7 +27,7 @@ QUARTILES = (0.5, 0.25, 0.75)
 
 @dataclass(frozen=True, eq=False)
 class Plate:
-    """The background as seen in one frame.
+    """The background as seen in one frame; where the camera moves, with a margin around it.
 
     Attributes
     ----------
@@ -47,6 +49,7 @@ class Plates:
     def __init__(self, source: Source, motion: BackgroundMotion, progress: Callable[[str], None] | None = None) -> None:
         self._source, self._motion, self._progress = source, motion, progress
         self._kept: list[Plate] = []
+        self._margin = tuple(int(np.ceil(WANDERED * size)) for size in (source.width, source.height))
 
     def window(
         self, frame: int, left: int, top: int, width: int, height: int
@@ -58,7 +61,7 @@ class Plates:
             return tuple(a[part].astype(np.float32) for a in (plate.picture, plate.sigma, plate.seen > 0))  # type: ignore[return-value]
         cv2 = opencv()
         shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
-        across = _centred(self._between(frame, plate.anchor)) @ shift
+        across = self._onto(frame, plate.anchor) @ shift
         size, flags = (width, height), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         picture = cv2.warpPerspective(plate.picture, across, size, flags=flags)
         sigma = cv2.warpPerspective(plate.sigma, across, size, flags=flags)
@@ -85,8 +88,8 @@ class Plates:
         layers, known = [], []
         for frame, picture in frames(self._source, chosen):
             if not self._motion.still:
-                size = picture.shape[1::-1]
-                across = _centred(self._between(frame, anchor))
+                size = (picture.shape[1] + 2 * self._margin[0], picture.shape[0] + 2 * self._margin[1])
+                across = self._onto(frame, anchor)
                 full = np.full(picture.shape[:2], 255, np.uint8)
                 known.append(cv2.warpPerspective(full, across, size) > 250)
                 picture = cv2.warpPerspective(picture, across, size)
@@ -101,6 +104,11 @@ class Plates:
         corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
         moved = np.column_stack([corners, np.ones(4)]) @ self._between(frame, anchor).T
         return float(np.abs((moved[:, :2] / moved[:, 2:] - corners) / size).max())
+
+    def _onto(self, frame: int, anchor: int) -> Array:
+        """Frame → plate, which is larger than a frame all around, for OpenCV."""
+        shift = np.array([[1.0, 0.0, self._margin[0]], [0.0, 1.0, self._margin[1]], [0.0, 0.0, 1.0]])
+        return shift @ _centred(self._between(frame, anchor))
 
     def _between(self, frame: int, anchor: int) -> Array:
         first = int(self._motion.frames[0])
@@ -123,7 +131,7 @@ def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> P
     seen = np.full(middle.shape[:2], 255, np.uint8)
     if known:
         number = np.sum(known, axis=0, dtype=np.int16)
-        seen[number < max(3, count // 3)] = 0
+        seen[number < FEWEST] = 0
         part = number < count
         rest, fewer = np.stack([layer[part] for layer in ordered]), np.maximum(number[part] - 1, 0)
         for picture, q in zip((middle, low, high), QUARTILES, strict=True):

@@ -34,9 +34,10 @@ def _loaded(_path: str, _unused: object = None) -> None:
 @persistent
 @problems.guarded
 def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
+    """At once: Blender stores a step before the edit is absorbed, and its animation would take the edit back."""
     terrain.forget_surfaces()
     _keep_rate(scene)
-    live.touch(scene)
+    live.sync(scene)
 
 
 @persistent

@@ -11,14 +11,14 @@ from ...core.colours import srgb_to_linear
 ROCK_COLOUR = (0.47, 0.43, 0.38)
 THIN_COLOUR = (0.30, 0.42, 0.60)
 RELIEF_BRIGHTNESS = 1.2
-RELIEF_MIDDLE = 0.4  # the light that contrast leaves as it is
+RELIEF_MIDDLE = 0.55  # the light that contrast leaves as it is
 SUN_DIRECTION = (-0.5, -0.5, 0.7071)  # from the north-west as on maps would be behind a camera that looks up the slope
 TRAIL_GROUP = "Rockfall trail"
 TIME_ATTRIBUTE = "display_time_s"
 SPEED_ATTRIBUTE = "speed_mps"
 SPEED_COLOUR = "speed_colour"
 TICK_ATTRIBUTE = "tick"
-TICK_RADII = 2.2
+TICK_RADII = 1.5
 RELIEF_COLOUR = "relief"
 TERRAIN_MATERIAL = "Rockfall terrain"
 TERRAIN_VALUES = {"hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "brightness": 1.0, "contrast": 1.0}
@@ -138,8 +138,8 @@ def trail_group() -> bpy.types.GeometryNodeTree:
     bare = new("GeometryNodeDeleteGeometry")
     bare.domain, bare.mode = "EDGE", "EDGE_FACE"
     link(cut.outputs[0], bare.inputs["Geometry"])
-    link(bare.outputs[0], join.inputs[0])
     link(_beads(group, source, cut.outputs[0], material.inputs["Material"].default_value), join.inputs[0])
+    link(bare.outputs[0], join.inputs[0])  # the last one: its active colour is the whole's
     link(join.outputs[0], result.inputs[0])
     return group
 

@@ -41,10 +41,15 @@ class ROCKFALL_OT_impact_table(bpy.types.Operator):
         return False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_popup(self, width=WIDE)
+        return context.window_manager.invoke_popup(self, width=self._width(context))
 
     def draw(self, context: bpy.types.Context) -> None:
-        bpy.types.ROCKFALL_PT_impact_table.draw_table(self.layout, context, WIDE)
+        bpy.types.ROCKFALL_PT_impact_table.draw_table(self.layout, context, self._width(context))
+
+    @staticmethod
+    def _width(context: bpy.types.Context) -> int:
+        room = context.window.width / context.preferences.system.ui_scale - 40
+        return int(min(WIDE, room))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         return {"FINISHED"}

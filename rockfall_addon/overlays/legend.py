@@ -8,7 +8,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ...core.colours import OBSERVED_COLOUR, SPEED_SCALE, model_colour
 from ...core.impact_models.registry import MODELS
-from ..bridge import state, twins
+from ..bridge import problems, state, trails, twins
 
 _handles: list[object] = []
 
@@ -25,6 +25,7 @@ def unregister() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
 
+@problems.guarded
 def _draw() -> None:
     context = bpy.context
     scene = context.scene
@@ -71,12 +72,16 @@ def _draw_speeds(settings: bpy.types.PropertyGroup, left: float, scale: float) -
         colours += [(*colour, 1.0)] * 2
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     batch_for_shader(shader, "TRI_STRIP", {"pos": places, "color": colours}).draw(shader)
-    top = settings.speed_top_mps
+    top, title = {
+        "SPEED": (settings.speed_top_mps, "Block speed [m/s]"),
+        "ENERGY": (settings.energy_top_kj, "Kinetic energy [kJ]"),
+        "DOUBT": (100 * trails.DOUBTFUL_SIGMA, "Standard deviation of the speed [%], or flagged"),
+    }[settings.colour_by]
     for part in (0.0, 0.5, 1.0):
         text = f"{top * part:g}"
         _text(left + width * part - blf.dimensions(0, text)[0] / 2, bottom - (TEXT + 4) * scale, text)
     size = f", blocks drawn {settings.block_scale:g}× their size" if settings.block_scale != 1 else ""
-    _text(left, bottom + height + 6 * scale, f"Block speed [m/s]{size}")
+    _text(left, bottom + height + 6 * scale, f"{title}{size}; red: below the terrain")
 
 
 def _text(x: float, y: float, text: str) -> None:

@@ -119,8 +119,8 @@ def _cells(layout: bpy.types.UILayout, columns: Sequence[str]) -> list[tuple[str
     cells, rest, total = [], layout, sum(WIDTHS[name] for name in columns)
     for name in columns[:-1]:
         split = rest.split(factor=WIDTHS[name] / total, align=True)
-        cells.append((name, split))
-        rest, total = split, total - WIDTHS[name]
+        cells.append((name, split.row(align=True)))
+        rest, total = split.row(align=True), total - WIDTHS[name]
     return [*cells, (columns[-1], rest)]
 
 
@@ -142,9 +142,7 @@ class ROCKFALL_UL_impacts(bpy.types.UIList):
         index: int = 0,
         flt_flag: int = 0,
     ) -> None:
-        scale = context.preferences.system.ui_scale
-        width = context.region.width / scale if context.region.type == "UI" else 10_000.0
-        for name, cell in _cells(layout, columns_for(width)):
+        for name, cell in _cells(layout, columns_for(float(self.list_id))):
             cell.label(text=_text(item, name), icon="ERROR" if name == "trajectory" and _alarming(item) else "NONE")
 
     def filter_items(self, context: bpy.types.Context, data: bpy.types.Scene, name: str) -> tuple[list[int], list[int]]:
@@ -185,7 +183,14 @@ class ROCKFALL_PT_impact_table(RockfallPanel, bpy.types.Panel):
             icon = ("TRIA_DOWN" if settings.table_descending else "TRIA_UP") if sorted_here else "NONE"
             cell.operator("rockfall.sort_impacts", text=HEADINGS[name], icon=icon, depress=sorted_here).column = name
         layout.template_list(
-            "ROCKFALL_UL_impacts", "", scene, "rockfall_impacts", settings, "impact_index", rows=6, maxrows=14
+            "ROCKFALL_UL_impacts",
+            f"{width:.0f}",
+            scene,
+            "rockfall_impacts",
+            settings,
+            "impact_index",
+            rows=6,
+            maxrows=14,
         )
 
 

@@ -378,8 +378,9 @@ def test_below_the_terrain_is_red_and_frames_are_ticks(slope: bpy.types.Scene, p
 
 def test_beads_are_geometry(scene: bpy.types.Scene) -> None:
     def corners() -> int:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        return len(trail(scene, "A").evaluated_get(depsgraph).data.vertices)
+        tube = trail(scene, "A").evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        assert tube.attributes.active_color_name == "speed_colour", "else the 3-D view shows them white"
+        return len(tube.vertices)
 
     bare = corners()
     scene.rockfall.show_ticks = True

@@ -64,9 +64,9 @@ def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping
     """A smooth mesh with the terrain's material, the shading values (n,) as attributes, and a relief to be painted."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(vertices))
-    mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
+    mesh.attributes["position"].data.foreach_set("vector", vertices.astype(np.float32).ravel())
     mesh.loops.add(3 * len(faces))
-    mesh.loops.foreach_set("vertex_index", faces.astype(np.int32).ravel())
+    mesh.attributes[".corner_vert"].data.foreach_set("value", faces.astype(np.int32).ravel())
     mesh.polygons.add(len(faces))
     mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(faces), 3, dtype=np.int32))
     mesh.update(calc_edges=True)
@@ -83,10 +83,10 @@ def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping
 def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) in single precision and triangles (m, 3) of a mesh, in its own coordinates."""
     vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", vertices)
+    mesh.attributes["position"].data.foreach_get("vector", vertices)  # many times as quick as mesh.vertices
     if len(mesh.loops) == 3 * len(mesh.polygons):
         faces = np.empty(len(mesh.loops), dtype=np.int32)
-        mesh.loops.foreach_get("vertex_index", faces)
+        mesh.attributes[".corner_vert"].data.foreach_get("value", faces)
     else:
         mesh.calc_loop_triangles()
         faces = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)

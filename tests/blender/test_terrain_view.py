@@ -68,7 +68,7 @@ def test_each_slider_does_its_own(part, slope) -> None:
     settings.thin, settings.brightness = 0.0, 0.5
     np.testing.assert_allclose(colours(ground.data)[:, :3], 0.5 * flat[:, :3], rtol=1e-5)
     settings.contrast, settings.brightness = 2.0, 1.0
-    np.testing.assert_allclose(colours(ground.data)[:, 0], np.minimum(flat[:, 0] * (1 / 0.4), 1.0), rtol=1e-5)
+    np.testing.assert_allclose(colours(ground.data)[:, 0], np.minimum(flat[:, 0] / 0.55, 1.0), rtol=1e-5)
     np.testing.assert_allclose(list(values().values()), [0.0, 0.0, 0.0, 1.0, 2.0])
     assert bpy.ops.rockfall.reset_relief() == {"FINISHED"}
     look = asdict(part("rockfall_addon.bridge.terrain_look").look_of(bpy.context.scene))

@@ -2,6 +2,7 @@
 """Refinement: whole trajectories fitted to the block's pixels in every frame."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ from .placement import check_placement
 from .refinement_problem import evaluate
 from .refinement_result import Refinement, summarise
 from .refinement_setup import Setup, prepare, set_up
-from .refinement_solver import LOSSES, Loss, find_clocks, solve
+from .refinement_solver import LOSSES, Loss, Solution, find_clocks, pixel_noise, solve
 from .views import PixelObservations, View, check_observations
 
 if TYPE_CHECKING:
@@ -92,15 +93,23 @@ def refine(
     names = [name for name in dict.fromkeys(picks.trajectory.tolist()) if name in set(observations.trajectory.tolist())]
     groups = [names] if free_set else [[name] for name in names]
     setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set) for group in groups]
-    solutions = []
-    for setup in setups:
-        _check_start(setup)
-        state = find_clocks(setup.problem, setup.state) if "clock" in free_set else setup.state
-        solutions.append(solve(setup.problem, state, loss))
+    solved = [_solve(setup, loss, free_set) for setup in setups]
     return summarise(
-        ground, moved_views, observations, setups, solutions, block=block, drag=drag, gravity_mps2=gravity_mps2,
-        normal_radius_m=normal_radius_m, site=site,
+        ground, moved_views, observations, [pair[0] for pair in solved], [pair[1] for pair in solved],
+        block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, site=site,
     )  # fmt: skip
+
+
+def _solve(setup: Setup, loss: Loss, free: frozenset[str]) -> tuple[Setup, Solution]:
+    """Solve, once more with larger standard deviations of the pixels if these scatter more than stated."""
+    _check_start(setup)
+    problem = setup.problem
+    solution = solve(problem, find_clocks(problem, setup.state) if "clock" in free else setup.state, loss)
+    noise = pixel_noise(problem, solution)
+    if noise > 1:
+        problem = replace(problem, sigma_px=noise * problem.sigma_px)
+        solution = solve(problem, solution.state, loss)
+    return replace(setup, problem=problem, noise=noise), solution
 
 
 def _check_parameters(

@@ -18,15 +18,13 @@ from .placement import GroundNormals, pick_normals
 from .refinement_problem import NODE, evaluate
 from .refinement_setup import Ground, Setup
 from .refinement_sigmas import impact_sigmas, velocity_rows
-from .refinement_solver import Solution
+from .refinement_solver import UNEXPLAINED, Solution
 from .trajectory import Reconstruction, reconstruct
 from .views import PixelObservations, View
 
 GRAZING_DEG = 5.0
 PULLED = 3.0
 CLOCK_SIGNIFICANCE = 6.0
-TOO_NOISY = 0.999
-"""Probability below which a sum of squares counts as explained by the stated noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +43,9 @@ class Refinement:
     rmse_px_before, rmse_px : root mean square length of the residuals, of the marked and of the fitted motion, outliers
         left out of the latter [px].
     rmse_px_by_view : (v,) of the fitted motion [px]; NaN for a view without pixels.
-    noise_scale : by how much the residuals are larger than stated; 1 where they are not. It has enlarged the standard
-        deviations. The largest of the trajectories.
+    noise_scale : by how much the residuals are larger than stated, and by which the standard deviations of the pixels
+        (of everything, where these do not explain it) were enlarged; 1 where they are not. The largest of all
+        trajectories.
     unknowns : fitted values with their standard deviations: gravity_mps2, drag_coefficient, "offset_s NAME",
         "drift NAME".
     iterations : the most that a trajectory took.
@@ -125,7 +124,7 @@ def summarise(
         rmse_px_before=_rms(before),
         rmse_px=_rms(residual[good]),
         rmse_px_by_view=np.array(by_view),
-        noise_scale=max(fit.scale for fit in fits),
+        noise_scale=max(fit.scale * fit.setup.noise for fit in fits),
         unknowns=_unknowns(views, fits[0]),
         iterations=max(fit.solution.iterations for fit in fits),
         advice=_advice(ground, observations, residual, fits),
@@ -148,7 +147,7 @@ def _fit(setup: Setup, solution: Solution) -> _Fit:
         count += rows.residual.size
     spare = count - setup.problem.columns.size
     scale = 1.0
-    if spare > 0 and squares > chi2.ppf(TOO_NOISY, spare):
+    if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
         scale = float(np.sqrt(squares / spare))
     information = solution.information
     size = np.sqrt(np.diag(information))
@@ -303,9 +302,10 @@ def _fit_advice(fit: _Fit) -> list[str]:
     sentences: list[str] = []
     if not solution.settled:
         sentences.append(f"The fit of {_names(setup)} did not settle: check the picks with the largest changes.")
-    if fit.scale > 1:
+    scale = fit.scale * setup.noise
+    if scale > 1:
         sentences.append(
-            f"{_names(setup)}: the residuals are {fit.scale:.1f} times as large as the stated standard deviations "
+            f"{_names(setup)}: the residuals are {scale:.1f} times as large as the stated standard deviations "
             "allow, which were enlarged by this factor."
         )
     count = np.bincount(solution.evaluation.segment[solution.weight > 0], minlength=len(problem.first))

@@ -43,6 +43,7 @@ class Setup:
     rows : (m,) which of the given pixels.
     radius_m : (n,) of the block of each pick.
     normals : of the picks.
+    noise : factor on the stated standard deviations of the pixels.
     """
 
     problem: Problem
@@ -55,6 +56,7 @@ class Setup:
     rows: Indices
     radius_m: Array
     normals: GroundNormals
+    noise: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

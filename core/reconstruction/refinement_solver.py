@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.stats import chi2
 
 from ..camera.model import project
 from ..vectors import Array, norm
@@ -37,6 +38,8 @@ SETTLED = 1e-7
 """A last step of this part of a standard deviation ends the search,"""
 NO_GAIN = 1e-10
 """and so does a step that takes less than this part off the cost."""
+UNEXPLAINED = 0.999
+"""A sum of squares that chance exceeds only in one of a thousand cases is not explained by the stated noise."""
 MEDIAN_LENGTH = float(np.sqrt(2 * np.log(2)))
 """Median length of a normal vector of two dimensions."""
 
@@ -105,6 +108,13 @@ def _search(problem: Problem, state: Unknowns, chain: Indices, loss: Loss, *, re
             weight, outlier = _weights(here, loss, reject)
             information, gradient = normal_equations(problem, here, weight)
     return Solution(state, here, weight, outlier, information, iteration, settled)
+
+
+def pixel_noise(problem: Problem, solution: Solution) -> float:
+    """By how much the pixels scatter more than stated; 1 where chance may explain it."""
+    squares = float(solution.weight @ (solution.evaluation.pixels.residual**2).sum(axis=1))
+    spare = 2 * int((solution.weight > 0).sum()) - problem.columns.size
+    return float(np.sqrt(squares / spare)) if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare) else 1.0
 
 
 def _lengths(evaluation: Evaluation) -> Array:

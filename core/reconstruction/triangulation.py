@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
 from ..vectors import Array, dot, norm, unit
+from .picks import Mask
 
 GRAZING_DEG = 5.0
 ITERATIONS = 20
@@ -143,7 +144,7 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
     sigma = np.broadcast_to(np.asarray(sigma_px, dtype=np.float64), (v, n))
     beams = [rays(camera, rows) for camera, rows in zip(cameras, pixel, strict=True)]
     origin, direction = np.stack([beam[0] for beam in beams]), np.stack([beam[1] for beam in beams])
-    seen = np.isfinite(direction).all(axis=2)
+    seen: Mask = np.asarray(np.isfinite(direction).all(axis=2))
     enough = np.flatnonzero(seen.sum(axis=0) >= 2)
     point = np.full((n, 3), np.nan)
     across = np.where(seen[:, :, None, None], np.eye(3) - direction[..., :, None] * direction[..., None, :], 0.0)

@@ -49,15 +49,15 @@ def view(degrees=50.0, **more):
     return View(f"from {degrees:.0f}°", fixed(camera_at(degrees)), **more)
 
 
-def states(time, drag=0.0, gravity=9.81):
-    centre = PLACE + RADIUS * OUT
+def states(time, drag=0.0, gravity=9.81, lift=0.0):
+    centre = PLACE + (RADIUS + np.reshape(lift, (-1, 1))) * OUT
     k = len(TIME) - 1
     motion = join_nodes(centre[:-1], centre[1:], TIME[:-1], TIME[1:], np.full(k, gravity), np.full(k, drag))
     which = np.clip(np.searchsorted(TIME, time, side="right") - 1, 0, k - 1)
     return motion, places_at(motion, which, time).position
 
 
-def observe(views, *, rate=30.0, sigma=1.0, noise=0.0, seed=0, drag=0.0, gravity=9.81):
+def observe(views, *, rate=30.0, sigma=1.0, noise=0.0, seed=0, drag=0.0, gravity=9.81, lift=0.0):
     """Pixels of the true motion: exact, or with noise."""
     rng = np.random.default_rng(seed)
     rows = []
@@ -67,7 +67,9 @@ def observe(views, *, rate=30.0, sigma=1.0, noise=0.0, seed=0, drag=0.0, gravity
         position, rotation = one.camera.poses_at(video)
         exposed, pixel = common, None
         for _ in range(8):
-            pixel = project(one.camera.camera, states(exposed, drag, gravity)[1], position=position, rotation=rotation)
+            pixel = project(
+                one.camera.camera, states(exposed, drag, gravity, lift)[1], position=position, rotation=rotation
+            )
             exposed = common + one.row_time_s * (pixel[:, 1] - one.camera.camera.height / 2)
         keep = (exposed > TIME[0]) & (exposed < TIME[-1])
         rows.append((np.full(keep.sum(), number), video[keep], pixel[keep]))
@@ -231,13 +233,14 @@ def test_the_derivatives_are_right(drag):
 
 def test_intervals_cover_the_truth():
     views = [view(50.0)]
-    motion, _ = states(TIME)
     inside, ratio = [], []
     for seed in range(60):
         rng = np.random.default_rng(100 + seed)
         picks = marked(seed, sigma_time_s=np.full(5, 0.01))
         picks = replace(picks, time_s=TIME + 0.01 * rng.normal(size=5))
-        result = run(views, observe(views, noise=1.0, seed=seed), picks)
+        lift = 0.02 * rng.normal(size=5)
+        motion, _ = states(TIME, lift=lift)
+        result = run(views, observe(views, noise=1.0, seed=seed, lift=lift), picks)
         impacts = result.reconstruction.impacts
         for found, true, sigma in (
             (impacts.v1[1:], motion.end_velocity, impacts.sigma["v1"][1:]),
@@ -298,6 +301,39 @@ def test_a_flight_without_pixels_rests_on_its_picks():
     sigma = result.reconstruction.impacts.sigma
     assert (sigma["v1"][2] > 1.1 * seen["v1"][2]).all()
     assert (sigma["v2"][1] > 1.1 * seen["v2"][1]).all()
+
+
+@pytest.mark.parametrize("free", [(), ("gravity", "clock")])
+def test_several_trajectories(free):
+    """Together where they share unknowns; one without pixels, and a shattered block's chains, stay what they are."""
+    views = [view(50.0), view(-20.0)]
+    pixels = observe(views)
+    both = PixelObservations(
+        np.tile(pixels.view, 2),
+        np.repeat(["a", "c"], len(pixels)),
+        np.tile(pixels.time_s, 2),
+        np.tile(pixels.pixel, (2, 1)),
+        np.tile(pixels.sigma_px, 2),
+    )
+    one, other = marked(1), marked(2)
+    sigma = {"sigma_time_s": np.full(15, 1e3), "sigma_position_m": np.full(15, 1e4)}
+    status = ["ok"] * 10 + ["ok", "ok", "shattered", "ok", "ok"]
+    picks = make_picks(
+        np.repeat(["a", "b", "c"], 5),
+        np.concatenate([one.time_s, one.time_s, other.time_s]),
+        np.concatenate([one.position, one.position, other.position]),
+        status=status,
+        **sigma,
+    )
+    result = run(views, both, picks, free=free)
+    np.testing.assert_allclose(result.picks.time_s[1:4], TIME[1:4], atol=1e-8)
+    np.testing.assert_allclose(result.picks.time_s[11], TIME[1], atol=1e-8)
+    np.testing.assert_array_equal(result.picks.time_s[5:10], one.time_s)
+    np.testing.assert_array_equal(result.picks.position[5:10], one.position)
+    assert any("Trajectory b has no pixels" in sentence for sentence in result.advice)
+    assert np.isnan(result.reconstruction.impacts.sigma["v1"][5:10]).all()
+    if free:
+        assert result.unknowns["gravity_mps2"][0] == pytest.approx(9.81, abs=1e-6)
 
 
 def test_what_cannot_be_refined():

@@ -142,11 +142,11 @@ def case_live_key_in_the_dope_sheet(window):
     yield from window.press("G", x, y)
     frame = pick["rockfall_key_frame"]
     for step in range(1, 6):
-        yield from window.move(x + 4 * step, y)
+        yield from window.move(x + step, y)
     assert picks_of("B03")[3]["rockfall_time_s"] == before, "while the key is held nothing is written"
     consistent(window, "B03", held=True)
     window.screenshot("key-held")
-    yield from window.click(x + 20, y)
+    yield from window.click(x + 5, y)
     yield 1.0
     rate = bpy.context.scene.render.fps
     pick = picks_of("B03")[3]

@@ -26,7 +26,7 @@ from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.placement import terrain_normals
 from rockfall.core.reconstruction.refinement import PixelObservations, Refinement, View, refine
 from rockfall.core.reconstruction.refinement_problem import Unknowns, evaluate
-from rockfall.core.reconstruction.refinement_setup import Setup, prepare, set_up
+from rockfall.core.reconstruction.refinement_setup import prepare, set_up
 from rockfall.core.reconstruction.refinement_sigmas import velocity_rows
 from rockfall.core.reconstruction.refinement_solver import normal_equations
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -263,11 +263,12 @@ def marked(surface: Surface, truth: Fall, true: View, solved: View, rng: np.rand
         if np.isfinite(hit.distance).all() and (np.linalg.norm(hit.point - truth.contact, axis=1) < 10).all():
             break
     times = np.asarray(solved.clock.to_common(path.time_s[frame]))
-    return make_picks(["a"] * len(frame), times, hit.point)
+    sigma = np.full(len(frame), float(np.diff(path.time_s).mean()) / np.sqrt(12))
+    return make_picks(["a"] * len(frame), times, hit.point, sigma_time_s=sigma)
 
 
-def bound(surface: Surface, footage: Footage, free: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray, Setup]:
-    """Cramér–Rao: covariances (n, 3, 3) of v1 and v2 at the truth, all nuisance parameters included."""
+def bound(surface: Surface, footage: Footage, free: tuple[str, ...]) -> tuple[np.ndarray, ...]:
+    """Cramér–Rao: covariances (n, 3, 3) of v1 and v2 and (v, 3, 3) of the cameras' places, nuisance included."""
     ground = prepare(footage.picks, surface, BLOCK, None, None, SIGMA_TERRAIN)
     setup = set_up(ground, footage.true_views, footage.pixels, ["a"], GRAVITY, frozenset(free))
     zeros = np.zeros((len(footage.views), 3))
@@ -280,7 +281,10 @@ def bound(surface: Surface, footage: Footage, free: tuple[str, ...]) -> tuple[np
     n = len(truth.time_s)
     segment = np.arange(-1, n - 1), np.r_[np.arange(n - 1), -1]
     slopes = [velocity_rows(problem, there.motion, segment[i], at_end=i == 0) for i in range(2)]
-    return *(slope @ covariance @ np.swapaxes(slope, 1, 2) for slope in slopes), setup
+    pose = problem.columns.pose[:, 3:]
+    return *(slope @ covariance @ np.swapaxes(slope, 1, 2) for slope in slopes), covariance[
+        pose[:, :, None], pose[:, None]
+    ]
 
 
 @dataclass
@@ -298,6 +302,7 @@ class Tally:
     rn_sigma: list
     camera: list
     camera_before: list
+    camera_best: list
     seconds: list
     iterations: list
     unsettled: int = 0
@@ -306,7 +311,7 @@ class Tally:
 def measure(case: Case, surface: Surface, falls: list[Fall], seed: int) -> Tally:
     """Film, mark, refine and compare all falls."""
     rng = np.random.default_rng(seed)
-    tally = Tally(*([] for _ in range(13)))
+    tally = Tally(*([] for _ in range(14)))
     free = ("camera",) if case.views == 1 else ("camera", "clock")
     for truth in falls:
         footage = film(case, surface, truth, rng)
@@ -348,6 +353,10 @@ def add(tally: Tally, truth: Fall, raw, result: Refinement, footage: Footage, be
         place = true.camera.camera.position
         tally.camera_before.append(np.linalg.norm(solved.camera.camera.position - place) / case.distance_m)
         tally.camera.append(np.linalg.norm(refined.camera.camera.position - place) / case.distance_m)
+    draws = np.random.default_rng(0).normal(size=(100, 3))
+    for covariance in best[2]:
+        away = draws @ np.linalg.cholesky(covariance).T
+        tally.camera_best += (np.linalg.norm(away, axis=1) / case.distance_m).tolist()
     tally.unsettled += any("did not settle" in sentence for sentence in result.advice)
 
 
@@ -371,6 +380,7 @@ def row_of(case: Case, tally: Tally, rng: np.random.Generator) -> dict[str, str]
         "coverage R_N %": f"{100 * np.mean(np.abs(rn[known]) < 1.96 * rn_sigma[known]):.1f}",
         "camera before %": f"{100 * np.median(tally.camera_before):.3f}",
         "camera after %": f"{100 * np.median(tally.camera):.3f}",
+        "camera Cramér–Rao %": f"{100 * np.median(tally.camera_best):.3f}",
         "time ms": f"{1e3 * statistics.median(tally.seconds):.0f}",
         "iterations": f"{statistics.median(tally.iterations):.0f}",
         "unsettled": str(tally.unsettled),

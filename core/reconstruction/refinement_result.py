@@ -228,7 +228,11 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[_Fit], normals: GroundNorm
         normal_spread=spread,
         normal_radius_m=np.where(given, normals.radius_m[own], impacts.normal_radius_m),
     )
-    return replace(made, impacts=replace(impacts, sigma=impact_sigmas(impacts, covariance, spread)))
+    sigma = impact_sigmas(impacts, covariance, spread)
+    fitted = np.isfinite(covariance[:, 0, 0])
+    for name, propagated in impacts.sigma.items():  # of trajectories without pixels
+        sigma[name] = np.where(fitted if propagated.ndim == 1 else fitted[:, None], sigma[name], propagated)
+    return replace(made, impacts=replace(impacts, sigma=sigma))
 
 
 def _refined_views(views: tuple[View, ...], fit: _Fit) -> tuple[View, ...]:

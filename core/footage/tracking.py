@@ -126,6 +126,10 @@ def track_block(
     The block is looked for where a motion of constant acceleration over the last frames puts it; where it is not
     there, around its last place, as an impact may have turned it. A sighting must look like the block: a disc or
     streak of its colour and size in front of the background. It is not looked for beyond a gap of a few frames.
+
+    `sigma_px` tells the scatter from frame to frame. Where one side of the block is in the shade and as dark as the
+    ground, the centre is that of the side that shows: an offset of up to a fifth of the diameter, the same in all
+    frames, which `sigma_px` does not hold; times of impacts hardly feel it.
     """
     first, last = 0 if first is None else first, video.time_s.size - 1 if last is None else last
     marks = sorted({int(f): (float(u), float(v)) for f, u, v in [*clicks, (frame, *pixel)]}.items())

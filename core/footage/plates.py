@@ -130,7 +130,7 @@ def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> P
     middle, low, high = (ordered[int(q * (count - 1))].copy() for q in QUARTILES)
     seen = np.full(middle.shape[:2], 255, np.uint8)
     if known:
-        number = np.sum(known, axis=0, dtype=np.int16)
+        number = np.stack(known).sum(axis=0, dtype=np.int16)
         seen[number < FEWEST] = 0
         part = number < count
         rest, fewer = np.stack([layer[part] for layer in ordered]), np.maximum(number[part] - 1, 0)

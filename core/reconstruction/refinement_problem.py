@@ -74,6 +74,7 @@ class Problem:
     view, obs_group : (m,) of the pixels: the view, the trajectory.
     video_s : (m,) video time [s]; row_s (m,) readout delay of the pixel's row [s].
     pixel : (m, 2); sigma_px (m,) [px].
+    position, rotation : (m, 3), (m, 3, 3) prior pose of the camera when each pixel was taken.
     time_s, sigma_time_s : (n,) prior times of the nodes.
     centre, sigma_centre_m : (n, 3), (n,) prior places.
     grounded : (g,) nodes on the ground; radius_m (g,) of the block, sigma_ground_m (g,) of their distance from it.
@@ -96,6 +97,8 @@ class Problem:
     row_s: Array
     pixel: Array
     sigma_px: Array
+    position: Array
+    rotation: Array
     time_s: Array
     sigma_time_s: Array
     centre: Array
@@ -309,12 +312,14 @@ def _pixel_rows(problem: Problem, state: Unknowns, motion: NodeMotion, segment: 
         if not mine.size:
             continue
         here = rows[mine]
-        position, rotation = view.camera.poses_at(problem.video_s[here])
         reference = view.camera.camera.rotation
-        to_frame = rotation @ reference.T
+        to_frame = problem.rotation[here] @ reference.T
         rotation = to_frame @ rotation_from_vector(state.turn[number]) @ reference
         seen = project_with_derivatives(
-            view.camera.camera, places.position[mine], position=position + state.move[number], rotation=rotation
+            view.camera.camera,
+            places.position[mine],
+            position=problem.position[here] + state.move[number],
+            rotation=rotation,
         )
         residual[here] = problem.pixel[here] - seen.pixel
         jacobian[here, :, :10] = -seen.d_point @ by_nodes[mine]

@@ -155,6 +155,9 @@ def set_up(
     passes = _passes(picks, segments, chosen)
     delay = np.array([view.row_time_s for view in views])[seen.view]
     height = np.array([view.camera.camera.height for view in views])[seen.view]
+    position, rotation = np.empty((rows.size, 3)), np.empty((rows.size, 3, 3))
+    for i, view in enumerate(views):
+        position[seen.view == i], rotation[seen.view == i] = view.camera.poses_at(seen.time_s[seen.view == i])
     on_ground = np.flatnonzero(ground.grounded[nodes])
     given_time, given_place = picks.sigma_time_s[nodes], picks.sigma_position_m[nodes]
     problem = Problem(
@@ -172,6 +175,8 @@ def set_up(
         row_s=delay * (seen.pixel[:, 1] - height / 2),
         pixel=seen.pixel,
         sigma_px=_pixel_sigmas(views, seen, centre.mean(axis=0)),
+        position=position,
+        rotation=rotation,
         time_s=picks.time_s[nodes],
         sigma_time_s=np.where(given_time > 0, given_time, SIGMA_FRAMES * _frame_s(views, seen)),
         centre=centre,

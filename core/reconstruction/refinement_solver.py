@@ -194,17 +194,17 @@ def find_clocks(problem: Problem, state: Unknowns) -> Unknowns:
     for number in np.flatnonzero(problem.columns.clock[:, 0] >= 0):
         mine = np.flatnonzero(problem.view == number)
         mine = mine[:: max(1, mine.size // CLOCK_PIXELS)]
-        view = problem.views[number]
-        position, rotation = view.camera.poses_at(problem.video_s[mine])
-        best = np.inf
-        for offset in offsets:
-            segment = segments_at(problem, state, times[mine] + offset, problem.obs_group[mine])
-            used = np.flatnonzero(segment >= 0)
-            if used.size < 0.5 * mine.size:
-                continue
-            places = places_at(motion, segment[used], times[mine[used]] + offset).position
-            pixel = project(view.camera.camera, places, position=position[used], rotation=rotation[used])
-            miss = float(np.median(norm(pixel - problem.pixel[mine[used]])))
-            if miss < best:
-                best, shift[number] = miss, state.offset_s[number] + offset
+        each = np.tile(mine, offsets.size)
+        time = times[each] + np.repeat(offsets, mine.size)
+        segment = segments_at(problem, state, time, problem.obs_group[each])
+        used = np.flatnonzero(segment >= 0)
+        places = places_at(motion, segment[used], time[used]).position
+        camera, here = problem.views[number].camera.camera, each[used]
+        pixel = project(camera, places, position=problem.position[here], rotation=problem.rotation[here])
+        miss = np.full(each.size, np.nan)
+        miss[used] = norm(pixel - problem.pixel[here])
+        table = miss.reshape(offsets.size, mine.size)
+        enough = np.flatnonzero(np.isfinite(table).sum(axis=1) >= 0.5 * mine.size)
+        if enough.size:
+            shift[number] += offsets[enough[np.argmin(np.nanmedian(table[enough], axis=1))]]
     return replace(state, offset_s=shift)

@@ -32,7 +32,7 @@ DRAGGING = ("TRANSFORM_OT_", "ROCKFALL_OT_drag")
 REACH_RADII = 1.0
 """A pick nearer to the terrain than this many radii of its block lies on it, and stays on it when it is moved."""
 LEAST_REACH_M = 0.1
-POLL_S = 0.04
+POLL_S = 0.015
 
 _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajectories to look at, None for all
 
@@ -58,8 +58,6 @@ def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
 
 def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """From Blender's list of updates, find what to look at."""
-    if state.KEYED_RATE_KEY not in scene and migration.version(scene) is None:
-        return
     names: set[str] | None = set()
     for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
         thing = update.id
@@ -75,7 +73,7 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             names = None
         if names is None:
             break
-    if names is None or names:
+    if names or (names is None and migration.version(scene) is not None):
         touch(scene, names)
 
 
@@ -120,45 +118,34 @@ def sync(
     done = Done([], [])
     if migration.is_newer(scene):
         return done
-    things = picks.things_of(scene, names)
+    wanted = None if names is None else set(names)
+    things = picks.things_of(scene, wanted)
     if not things and shown.SHOWN_KEY not in scene:
         return done
     if dragging:
-        things = _originals(things)
+        things, resample = _originals(things), False
     else:
         _heal(scene, things)
-    again = again or (not dragging and _ground_changed(scene))
-    if again and names is not None:
-        names, things = None, picks.things_of(scene)
+        again, resample = again or _ground_changed(scene), _rate_changed(scene)
+        if (again or resample) and wanted is not None:
+            wanted, things = None, picks.things_of(scene)
     groups = shown.by_trajectory(things)
-    prints, rate = shown.remembered(scene), timing.keyed_rate(scene)
-    parts = trajectories.parts_of(scene, None if names is None else list(groups))
-    gone = [name for name in prints if name not in groups and (names is None or name in set(names))]
-    said = problems.of_trajectories(scene)
+    prints, said = shown.remembered(scene), problems.of_trajectories(scene)
+    gone = [name for name in prints if name not in groups and (wanted is None or name in wanted)]
     for name in gone:
-        _forget(scene, name, parts)
+        _forget(scene, name)
         prints.pop(name), said.pop(name, None)
+    parts = trajectories.parts_of(scene, None if wanted is None else list(groups))
+    altered = again or bool(gone)
     for name, members in groups.items():
-        edited = not dragging and any(picks.moved(one) or picks.frames_moved(one) for one in members)
-        before = prints.get(name, "")
-        same = before.rstrip(shown.COMPLETE) == shown.fingerprint(members, rate)
-        if same and not (again or edited or (before.endswith(shown.COMPLETE) and not _complete(name, parts))):
-            continue
-        mark = ""
-        try:
-            said[name] = _rebuild(scene, name, members, parts, dragging)
-            done.rebuilt.append(name)
-            parts = parts | trajectories.parts_of(scene, [name])
-            mark = shown.COMPLETE if _complete(name, parts) else ""
-        except RockfallError as error:
-            said[name] = [str(error)]
-            _grey(scene, name, parts)
-            done.failed.append(name)
-        prints[name] = shown.fingerprint(members, rate) + mark
+        changed = _has_changed(name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging)
+        if changed or again or resample:
+            altered = altered or changed
+            prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, done)
     shown.remember(scene, prints)
     problems.keep_trajectories(scene, said)
-    if not dragging:
-        _finish(scene, bool(done.rebuilt or gone))
+    if altered and not dragging:
+        _finish(scene)
     problems.tell(scene)
     return done
 
@@ -179,6 +166,38 @@ def nudge(scene: bpy.types.Scene, thing: bpy.types.Object, frames: float) -> Non
     """Move a pick in time by (parts of) a frame of the scene."""
     thing[picks.TIME_KEY] = float(thing[picks.TIME_KEY]) + frames / timing.frame_rate(scene)
     sync(scene, [thing[picks.TRAJECTORY_KEY]])
+
+
+def _has_changed(
+    name: str, members: list[bpy.types.Object], before: str, parts: trajectories.Parts, rate: float, dragging: bool
+) -> bool:
+    """Whether the picks differ from what is shown, hold an edit to be absorbed, or what is shown is damaged."""
+    if not dragging and any(picks.moved(one) or picks.frames_moved(one) for one in members):
+        return True
+    if before.endswith(shown.COMPLETE) and not _complete(name, parts):
+        return True
+    return before.rstrip(shown.COMPLETE) != shown.fingerprint(members, rate)
+
+
+def _try_rebuild(
+    scene: bpy.types.Scene,
+    name: str,
+    members: list[bpy.types.Object],
+    parts: trajectories.Parts,
+    dragging: bool,
+    done: Done,
+) -> tuple[str, list[str]]:
+    """Compute one trajectory and show it, or keep the last good flights; its fingerprint, and what there is to say."""
+    mark = ""
+    try:
+        said = _rebuild(scene, name, members, parts, dragging)
+        done.rebuilt.append(name)
+        mark = shown.COMPLETE if _complete(name, trajectories.parts_of(scene, [name])) else ""
+    except RockfallError as error:
+        said = [str(error)]
+        _grey(scene, name, parts)
+        done.failed.append(name)
+    return shown.fingerprint(members, timing.keyed_rate(scene)) + mark, said
 
 
 def _rebuild(
@@ -227,22 +246,21 @@ def _grey(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:
         trails.paint_observed(scene, [trail])
 
 
-def _forget(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:
+def _forget(scene: bpy.types.Scene, name: str) -> None:
     """All picks of a trajectory are gone, so is what was made of them."""
-    roles = (state.FLIGHTS_ROLE, state.BLOCK_ROLE)
-    found = trajectories.parts_of(scene, [name]) | {key: thing for key, thing in parts.items() if key[1] == name}
-    state.remove_objects([found[role, name] for role in roles if (role, name) in found])
+    state.remove_objects(list(trajectories.parts_of(scene, [name]).values()))
     offsets = timing.kept_offsets(scene)
     if offsets.pop(name, None) is not None:
         timing.keep_offsets(scene, offsets)
     impact_rows.fill(scene, name)
 
 
-def _finish(scene: bpy.types.Scene, changed: bool) -> None:
-    """What concerns all trajectories, once nothing moves: colour scales, end of the animation, twins of the models."""
-    if not changed:
-        return
+def _finish(scene: bpy.types.Scene) -> None:
+    """What concerns all trajectories, once nothing moves: the ends of the colour scales, the twins of the models."""
     scene[migration.SCHEMA_KEY] = migration.SCHEMA
+    last = max((float(thing.get(picks.KEY_FRAME_KEY, 0.0)) for thing in picks.things_of(scene)), default=0.0)
+    if last > scene.frame_end:
+        scene.frame_end = int(np.ceil(last + timing.frame_rate(scene)))
     if trails.set_tops(scene):
         trails.paint_observed(scene)
     if twins.shown_models(scene):
@@ -258,6 +276,15 @@ def _ground_changed(scene: bpy.types.Scene) -> bool:
     if not now or now == scene.get(shown.GROUND_KEY, ""):
         return False
     scene[shown.GROUND_KEY] = now
+    return True
+
+
+def _rate_changed(scene: bpy.types.Scene) -> bool:
+    """Whether the flights have their ticks at another frame rate than the scene's."""
+    rate = timing.frame_rate(scene)
+    if scene.get(shown.TICK_RATE_KEY) == rate:
+        return False
+    scene[shown.TICK_RATE_KEY] = rate
     return True
 
 

@@ -52,6 +52,8 @@ def things_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None)
         for thing in scene.objects
         if thing.get(state.ROLE_KEY) == state.PICK_ROLE
         and TRAJECTORY_KEY in thing
+        and TIME_KEY in thing
+        and POSITION_KEY in thing
         and (names is None or thing[TRAJECTORY_KEY] in names)
     ]
 

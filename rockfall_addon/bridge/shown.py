@@ -15,6 +15,7 @@ from . import picks, state, timing
 SHOWN_KEY = "rockfall_shown"
 GROUND_KEY = "rockfall_ground"
 """The terrain that the trajectories were computed on; empty or missing without."""
+TICK_RATE_KEY = "rockfall_tick_rate_hz"
 COMPLETE = "+"
 """Behind the fingerprint of a trajectory that has flights and a block."""
 _KEPT = (
@@ -52,7 +53,7 @@ def fingerprint(things: Sequence[bpy.types.Object], rate: float) -> str:
         if picks.moved(thing):
             row.append(tuple(thing.location))
         rows.append(repr(row))
-    return hashlib.sha1("\n".join([f"{rate:.6f}", *sorted(rows)]).encode(), usedforsecurity=False).hexdigest()
+    return hashlib.sha1("\n".join(sorted(rows)).encode(), usedforsecurity=False).hexdigest()
 
 
 def remembered(scene: bpy.types.Scene) -> dict[str, str]:
@@ -73,7 +74,7 @@ def remember_all(scene: bpy.types.Scene) -> None:
     groups = by_trajectory(picks.things_of(scene))
     flying = {o[picks.TRAJECTORY_KEY] for o in scene.objects if o.get(state.ROLE_KEY) == state.FLIGHTS_ROLE}
     remember(scene, {n: fingerprint(things, rate) + (COMPLETE if n in flying else "") for n, things in groups.items()})
-    scene[GROUND_KEY] = ground(scene)
+    scene[GROUND_KEY], scene[TICK_RATE_KEY] = ground(scene), timing.frame_rate(scene)
 
 
 def ground(scene: bpy.types.Scene) -> str:

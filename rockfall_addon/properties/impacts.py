@@ -20,7 +20,8 @@ def _edited(thing: bpy.types.Object) -> None:
 
 
 def _get_kind(self: bpy.types.PropertyGroup) -> int:
-    return KINDS.index(self.id_data.get("rockfall_kind", "impact"))
+    kind = self.id_data.get("rockfall_kind", "impact")
+    return KINDS.index(kind) if kind in KINDS else 0
 
 
 def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
@@ -29,7 +30,8 @@ def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
 
 
 def _get_status(self: bpy.types.PropertyGroup) -> int:
-    return STATUSES.index(self.id_data.get("rockfall_status", "ok"))
+    status = self.id_data.get("rockfall_status", "ok")
+    return STATUSES.index(status) if status in STATUSES else 0
 
 
 def _set_status(self: bpy.types.PropertyGroup, value: int) -> None:

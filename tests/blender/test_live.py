@@ -473,3 +473,49 @@ def test_a_new_pick(slope: bpy.types.Scene, part) -> None:
     live.sync(slope)
     check_shown(slope, part)
     assert len(json.loads(slope["rockfall_shown"])) == 3
+
+
+def test_twins_follow_an_edit(slope: bpy.types.Scene, part) -> None:
+    assert bpy.ops.rockfall.show_twins(models={"noel_2017"}) == {"FINISHED"}
+
+    def landing() -> list[float]:
+        thing = next(o for o in slope.objects if o.get("rockfall_role") == "twin_flights")
+        return list(thing.data.vertices[-1].co)
+
+    before = landing()
+    picks_of(slope, "B")[3].location.x += 0.7
+    update()
+    assert landing() != before
+    check_shown(slope, part)
+
+
+@pytest.mark.parametrize("key", ["rockfall_time_s", "rockfall_position_m", "rockfall_id", "rockfall_extra"])
+def test_a_pick_that_lost_a_property(scene: bpy.types.Scene, part, key: str) -> None:
+    pick = picks_of(scene, "A")[2]
+    del pick[key]
+    pick.location.y += 0.2
+    update()
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("other", None))
+    update()
+    assert part("rockfall_addon.bridge.problems").sentences(scene) == []
+    check_shown(scene, part)
+    assert len([row for row in scene.rockfall_impacts if row.trajectory == "A"]) == (
+        2 if key in ("rockfall_time_s", "rockfall_position_m") else 3
+    )
+
+
+def test_an_unknown_kind_is_told(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    pick["rockfall_kind"] = "impakt"
+    pick.location.y += 0.2
+    update()
+    assert "trajectory A: Unknown kind 'impakt'. Did you mean impact?" in scene["rockfall_problem"]
+    pick.rockfall_pick.kind = "impact"
+    assert scene["rockfall_problem"] == ""
+    check_shown(scene, part)
+
+
+def test_a_key_beyond_the_end_moves_the_end(scene: bpy.types.Scene) -> None:
+    end = scene.frame_end
+    move_key(picks_of(scene, "B")[-1], 200.0)
+    assert scene.frame_end > end

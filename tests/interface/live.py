@@ -185,6 +185,10 @@ def case_live_table_and_numbers(window):
     yield from zoom_to(window, pick)
     region.tag_redraw()
     yield 1.0
+    with bpy.context.temp_override(window=window.window, area=window.area(), region=region):
+        for _ in range(9):
+            bpy.ops.view2d.scroll_down(deltay=60)
+    yield 1.0
     window.screenshot("numbers")
     with window.override():
         bpy.ops.rockfall.impact_table("INVOKE_DEFAULT")

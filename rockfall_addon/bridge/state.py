@@ -19,6 +19,7 @@ BLOCK_ROLE = "block"
 FLIGHTS_ROLE = "flights"
 TWIN_ROLE = "twin"
 TWIN_FLIGHTS_ROLE = "twin_flights"
+CAMERA_ROLE = "camera"
 
 
 def double(value: float) -> float:

@@ -244,7 +244,7 @@ def _summary(before: "Picks", footage: "Footage", refined: "Refinement") -> list
     if len(footage.views) > 1:
         each = [f"{view.name} {rmse:.2f} px" for view, rmse in zip(refined.views, refined.rmse_px_by_view, strict=True)]
         sentences.append(f"By video: {', '.join(each)}.")
-    moved = np.isin(refined.picks.trajectory, np.unique(seen.trajectory))
+    moved = np.isin(refined.picks.trajectory, np.unique(seen.trajectory)) & (refined.picks.kind != "pass")
     shift = norm(refined.picks.position - before.in_shift(refined.picks.shift).position)[moved]
     late = np.abs(refined.picks.time_s - before.time_s)[moved]
     if shift.size:
@@ -279,11 +279,10 @@ def _impact_lines(impacts: "Impacts") -> list[str]:
 
 
 def _speed_sigma(impacts: "Impacts") -> Array:
-    """(n,) standard deviation of the incident speed, as if its normal and tangential parts were independent."""
-    nothing = np.full(len(impacts), np.nan)
-    normal, tangential = (impacts.sigma.get(name, nothing) for name in ("vn1", "vt1"))
+    """(n,) standard deviation of the incident speed, from that of the energy ½mv²."""
+    energy = impacts.sigma.get("kinetic1_j", np.full(len(impacts), np.nan))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.hypot(impacts.vn1 * normal, impacts.vt1 * tangential) / norm(impacts.v1))
+        return np.asarray(energy / (impacts.mass_kg * norm(impacts.v1)))
 
 
 def _with(value: float, sigma: float, digits: int) -> str:

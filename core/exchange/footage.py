@@ -13,6 +13,7 @@ from ..footage.clock import Clock
 from ..georeference import GlobalShift
 from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
 from ..reconstruction.placement import terrain_normals
+from ..reconstruction.ray_flight import flight_through_rays
 from ..reconstruction.views import PixelObservations, View
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
@@ -26,8 +27,16 @@ SIGMA_PX = 1.0
 """Of a tracked pixel without a standard deviation of its own."""
 MARGIN = 0.1
 """A tracked block may leave the image by this part of its size."""
+END_FRAMES = 6
+"""Pixels before the first event, or after the last one, that make a flight."""
+END_MISS_PX, END_MISS_SIGMAS = 2.0, 4.0
+"""Pixels that miss a free flight by more than the larger of these, root mean square, are not of a flight."""
+SIGMA_END_S = 1e-4
+"""Of a pass at a tracked pixel: it is where the block was in that frame."""
 SETTLED_M = 1e-4
 SETTLING = 20
+
+Columns = dict[str, Names | Array]
 
 EXAMPLE = 'name = "left", camera = "camera.toml", track = "track.csv", offset_s = 0.0'
 
@@ -139,7 +148,8 @@ def picks_from_events(project: Project, surface: Surface | None, *, name: str = 
 
     Notes
     -----
-    Events are pixels of the block's centre. A trajectory is taken from the video that has most events of it.
+    Events are pixels of the block's centre. A trajectory is taken from the video that has most events of it. Where the
+    block was tracked in free flight before its first event or after its last one, a pass closes that flight.
     """
     entries = [video for video in project.videos if video.camera is not None and video.events is not None]
     if not entries:
@@ -150,11 +160,11 @@ def picks_from_events(project: Project, surface: Surface | None, *, name: str = 
     if surface is None:
         raise RockfallError('Picks can be made from events on a terrain only: add [terrain] file = "…" to the project.')
     found = [(entry, read_events(Path(str(entry.events)))) for entry in entries]
-    parts = [
-        _event_picks(project, entry, events, rows, surface, name)
-        for (entry, events), rows in zip(found, _best_views([events for _, events in found]), strict=True)
-        if rows.any()
-    ]
+    parts = []
+    for (entry, events), rows in zip(found, _best_views([events for _, events in found]), strict=True):
+        if rows.any():
+            marked, normals = _event_picks(project, entry, events, rows, surface, name)
+            parts += [marked, *_open_ends(project, entry, marked, normals, surface, name)]
     columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     return make_picks(
         columns["trajectory"],
@@ -208,7 +218,8 @@ def _event_picks(
     rows: Mask,
     surface: Surface,
     name: str,
-) -> dict[str, Names | Array]:
+) -> tuple[Columns, Array]:
+    """Columns of the picks, and the normals (n, 3) there."""
     chosen = np.flatnonzero(rows)
     camera = read_camera(Path(str(entry.camera)), surface.shift).camera
     clock = clock_of(entry, events.frame, events.time_s)
@@ -219,8 +230,8 @@ def _event_picks(
     sizes = {one: block_of(project, one).diameter_m for one in set(names.tolist())}
     diameter = np.array([sizes[one] for one in names.tolist()])
     seen = np.isfinite(directions).all(axis=1)
-    point = np.full((chosen.size, 3), np.nan)
-    point[seen], _ = contact_points(
+    point, normal = np.full((chosen.size, 3), np.nan), np.full((chosen.size, 3), np.nan)
+    point[seen], normal[seen] = contact_points(
         surface, origins[seen], directions[seen], diameter[seen], project.reconstruction.normal_radius_m
     )
     for i in np.flatnonzero(np.isnan(point[:, 0])):
@@ -230,18 +241,74 @@ def _event_picks(
             "Check the camera and the event, or give a larger terrain",
         )
     late = entry.row_time_s * (pixel[:, 1] - camera.camera.height / 2)
-    frames = events.frame[chosen].tolist()
-    return {
+    columns: Columns = {
         "trajectory": names,
         "time_s": clock.to_common(events.time_s[chosen]) + late,
         "position": point,
         "kind": events.kind[chosen],
         "sigma_time_s": events.sigma_time_s[chosen] * clock.rate,
-        "video": np.full(chosen.size, entry.name),
-        "frame": np.array([str(frame) if frame >= 0 else "" for frame in frames], dtype=np.str_),
+        **_seen_at(entry, events.frame[chosen], pixel),
+    }
+    return columns, normal
+
+
+def _seen_at(entry: VideoEntry, frame: Indices, pixel: Array) -> Columns:
+    """Columns that tell where in the video a pick was seen."""
+    return {
+        "video": np.full(frame.size, entry.name),
+        "frame": np.array([str(number) if number >= 0 else "" for number in frame.tolist()], dtype=np.str_),
         "u_px": np.array(list(map(repr, pixel[:, 0].tolist())), dtype=np.str_),
         "v_px": np.array(list(map(repr, pixel[:, 1].tolist())), dtype=np.str_),
     }
+
+
+def _open_ends(
+    project: Project, entry: VideoEntry, marked: Columns, normals: Array, surface: Surface, name: str
+) -> list[Columns]:
+    """Passes that close the flights before the first and after the last event of each trajectory, if there are any."""
+    if entry.track is None:
+        return []
+    track, camera = read_track(entry.track), read_camera(Path(str(entry.camera)), surface.shift).camera
+    clock = clock_of(entry, track.frame, track.time_s)
+    names = np.where(track.trajectory == "", name, track.trajectory)
+    row_s = entry.row_time_s * (track.pixel[:, 1] - camera.camera.height / 2)
+    times = np.asarray(clock.to_common(track.time_s)) + row_s
+    sigma = np.where(np.isnan(track.sigma_px), SIGMA_PX, track.sigma_px)
+    ends = []
+    for one in dict.fromkeys(marked["trajectory"].tolist()):
+        picks = np.flatnonzero(marked["trajectory"] == one)
+        order = picks[np.argsort(marked["time_s"][picks])]
+        radius = block_of(project, one).radius_m
+        for pick, before in ((order[0], True), (order[-1], False)):
+            moment = float(marked["time_s"][pick])
+            beyond = times < moment if before else times > moment
+            rows = np.flatnonzero((names == one) & beyond)
+            if rows.size < END_FRAMES:
+                continue
+            position, rotation = camera.poses_at(track.time_s[rows])
+            origins, directions = rays(camera.camera, track.pixel[rows], position=position, rotation=rotation)
+            if not np.isfinite(directions).all():
+                continue
+            centre = marked["position"][pick] + radius * normals[pick]
+            flight = flight_through_rays(
+                centre, moment, origins, directions, times[rows], project.reconstruction.gravity_mps2
+            )
+            miss_px = camera.camera.fx * np.sqrt(np.mean(flight.miss**2))
+            if not miss_px <= max(END_MISS_PX, END_MISS_SIGMAS * float(np.median(sigma[rows]))):
+                continue
+            i = int(np.argmin(times[rows]) if before else np.argmax(times[rows]))
+            row = rows[i : i + 1]
+            ends.append(
+                {
+                    "trajectory": np.array([one]),
+                    "time_s": times[row],
+                    "position": flight.position[i : i + 1],
+                    "kind": np.array(["pass"]),
+                    "sigma_time_s": np.array([SIGMA_END_S]),
+                    **_seen_at(entry, track.frame[row], track.pixel[row]),
+                }
+            )
+    return ends
 
 
 def _best_views(tables: list[Events]) -> list[Mask]:

@@ -63,6 +63,8 @@ _MORE: tuple[Column, ...] = (
     ),
 )
 _NUMBERS = (*_BEFORE, *_DERIVED, *_BLOCK)
+_UNCERTAIN = (*_DERIVED, *(column for column in _MORE if column[1] in ("kinetic1_j", "kinetic2_j")))
+"""What can have a standard deviation, in a column of its own."""
 IMPACTS_COLUMNS = ("site", "trajectory", "impact", *(column[0] for column in _NUMBERS), "flags")
 """The columns of impacts.csv that are always there, in order."""
 
@@ -123,7 +125,7 @@ def write_impacts(impacts: Impacts, path: str | Path) -> None:
     columns: Columns = {"site": impacts.site, "trajectory": impacts.trajectory, "impact": impacts.impact}
     columns |= {column[0]: _of(impacts, column) for column in _NUMBERS}
     columns["flags"] = impacts.flag_text()
-    for name, attribute, component, degrees in _DERIVED:
+    for name, attribute, component, degrees in _UNCERTAIN:
         if attribute in impacts.sigma:
             sigma = impacts.sigma[attribute]
             values = sigma if component is None else sigma[:, component]
@@ -146,7 +148,7 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     ------
     InputError : anything that is wrong with the table, with the row.
     """
-    sigma_names = [f"sigma_{column[0]}" for column in _DERIVED]
+    sigma_names = [f"sigma_{column[0]}" for column in _UNCERTAIN]
     known = (*IMPACTS_COLUMNS, *sigma_names, *SPIN, *(column[0] for column in _MORE))
     table = read_table(path, ("trajectory", *NORMAL, *V1, *V2), known)
     n = len(table)
@@ -159,7 +161,7 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
             else:
                 of.setdefault(attribute, np.empty((n, 3)))[:, component] = values
     sigma: dict[str, Array] = {}
-    for name, attribute, component, degrees in _DERIVED:
+    for name, attribute, component, degrees in _UNCERTAIN:
         if f"sigma_{name}" in table.columns:
             values = table.numbers(f"sigma_{name}")
             values = np.radians(values) if degrees else values

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array, dot
+from ..vectors import Array, dot, norm
 from .block import per_pick
 from .impact import DeviationForm, Impacts, apparent
 from .motion import Motion
@@ -53,6 +53,8 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
     sigma: dict[str, Array] = {}
     if np.isfinite(picks.sigma_time_s).any() or np.isfinite(picks.sigma_position_m).any():
         sigma = propagate(picks, flights, incident, restituted, own, values, normal)
+        sigma["kinetic1_j"] = mass * norm(v1) * sigma.pop("speed1")
+        sigma["kinetic2_j"] = mass * norm(v2) * sigma.pop("speed2")
     judged = ("rn", "rt", "r", "theta1", "theta_dev")
     leaving = np.flatnonzero(departing)
     for column in (*(getattr(values, name) for name in judged), *(sigma[name] for name in judged if sigma)):

@@ -81,7 +81,7 @@ def solve_motion(
 
 
 def block_centres(picks: Picks, normals: GroundNormals, radius_m: Array) -> Picks:
-    """The picks on the ground moved to the block's centre there; those in flight mark it already.
+    """The picks on the ground moved to the block's centre there; those in the air mark it already.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def block_centres(picks: Picks, normals: GroundNormals, radius_m: Array) -> Pick
     ------
     InputError : a pick on the ground has no normal.
     """
-    grounded = np.isin(picks.kind, GROUNDED)
+    grounded = np.isin(picks.kind, GROUNDED) & (np.isfinite(normals.normal[:, 0]) | (picks.kind != "release"))
     bare = np.flatnonzero(grounded & np.isnan(normals.normal[:, 0]) & (picks.status != "discarded"))
     if bare.size:
         raise picks.error(

@@ -96,7 +96,7 @@ def summarise(
     if columns.law[0] >= 0 and drag is not None:
         drag = replace(drag, coefficient=max(state.coefficient, 0.0))
     fitted_gravity = state.gravity if columns.law[1] >= 0 else gravity_mps2
-    on_ground = np.isfinite(normals.normal[:, 0]) | ~np.isin(picks.kind, ("release", "impact", "contact", "stop"))
+    on_ground = np.isfinite(normals.normal[:, 0]) | ~np.isin(picks.kind, ("impact", "contact", "stop"))
     ends: FlightEnds = "centres" if bool(on_ground[picks.status != "discarded"].all()) else "contacts"
     made = reconstruct(
         picks, surface=ground.surface, block=block, gravity_mps2=fitted_gravity, drag=drag,

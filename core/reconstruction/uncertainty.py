@@ -48,8 +48,8 @@ def propagate(
 
     Returns
     -------
-    "v1", "v2" (n, 3); "vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev" (n,); NaN where undefined or
-    where a pick of the flights has no standard deviation.
+    "v1", "v2" (n, 3); "speed1", "speed2", "vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev" (n,); NaN
+    where undefined or where a pick of the flights has no standard deviation.
 
     Notes
     -----
@@ -93,6 +93,8 @@ def propagate(
         result = {
             "v1": np.stack([sigma((along(i), nothing), "1") for i in range(3)], axis=1),
             "v2": np.stack([sigma((nothing, along(i)), "2") for i in range(3)], axis=1),
+            "speed1": sigma((v1 / speed1, nothing), "1"),
+            "speed2": sigma((nothing, v2 / speed2), "2"),
             "vn1": sigma((normal1, nothing), "1"),
             "vt1": sigma((tangent1, nothing), "1"),
             "vn2": sigma((nothing, normal2), "2"),

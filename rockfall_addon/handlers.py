@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .bridge import impact_rows, live, migration, picks, problems, terrain, timing
+from .bridge import footage, impact_rows, live, migration, picks, problems, terrain, timing, videos
 
 _owner = object()
 
@@ -13,12 +13,14 @@ _owner = object()
 @problems.guarded
 def _follow_rate(scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None = None) -> None:
     _keep_rate(scene)
+    footage.follow(scene)
 
 
 @persistent
 @problems.guarded
 def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _keep_rate(scene)
+    footage.follow(scene)
     live.notice(scene, depsgraph)
 
 
@@ -26,6 +28,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @problems.guarded
 def _loaded(_path: str, _unused: object = None) -> None:
     terrain.forget_surfaces()
+    videos.forget_files()
     problems.forget()
     _listen()  # subscriptions do not survive loading
     _catch_up()
@@ -37,6 +40,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     """At once: Blender stores a step before the edit is absorbed, and its animation would take the edit back."""
     terrain.forget_surfaces()
     _keep_rate(scene)
+    footage.follow(scene)
     live.sync(scene)
 
 

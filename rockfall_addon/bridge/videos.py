@@ -40,6 +40,7 @@ COLLECTION = "Cameras"
 GUESSED_FOCAL = 1.2
 """In widths of the image: 45°, as phones and camcorders have before zooming."""
 MOST_FPS = 32_000
+SAME_RATE = 1e-5
 FAR_M, NEAR_M = 20_000.0, 0.1
 KEPT_PICTURES = 6
 
@@ -86,7 +87,7 @@ def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None
     RockfallError : the file is no video that can be used. The scene is as it was.
     """
     migration.refuse_newer(scene)
-    video = open_video(path)
+    video = opened(path)
     first = not cameras(scene)
     camera = add_camera(scene, video)
     if matrix is not None:
@@ -208,10 +209,7 @@ def video_of(camera: bpy.types.Object) -> Video:
             f"The video {path.name} is not at {path.parent} any more. Nothing is lost: use Find the File in the "
             "Videos panel."
         )
-    key = (str(path), path.stat().st_mtime)
-    if key not in _videos:
-        _videos[key] = open_video(path)
-    return _videos[key]
+    return opened(path)
 
 
 def picture(camera: bpy.types.Object, index: int) -> Image:
@@ -229,6 +227,20 @@ def picture(camera: bpy.types.Object, index: int) -> Image:
             _pictures.popitem(last=False)
     _pictures.move_to_end(key)
     return _pictures[key]
+
+
+def opened(path: str | Path) -> Video:
+    """A video file, opened; it is opened once.
+
+    Raises
+    ------
+    RockfallError : the file is no video that can be used.
+    """
+    path = Path(path)
+    key = (str(path), path.stat().st_mtime if path.is_file() else 0.0)
+    if key not in _videos:
+        _videos[key] = open_video(path)
+    return _videos[key]
 
 
 def forget_files() -> None:
@@ -457,26 +469,23 @@ def lens_of(camera: bpy.types.Object, pixel_aspect: float = 1.0) -> BlenderLens:
 
 
 def set_scene_rate(scene: bpy.types.Scene, rate_hz: float) -> None:
-    """Give the scene a frame rate, exactly where it is a ratio as 30 000 / 1 001; our keys keep their times."""
-    ratio = Fraction(rate_hz).limit_denominator(1001)
-    for family in (Fraction(round(rate_hz)), Fraction(round(rate_hz * 1.001) * 1000, 1001)):
-        if family and abs(float(family) / rate_hz - 1) < 1e-5:
-            ratio = family
-            break
-    whole = ratio.denominator == 1
-    if not whole and ratio.denominator <= 1001 and abs(float(ratio) / rate_hz - 1) < 1e-5:
-        halvings = 1
-        while ratio.numerator / halvings > MOST_FPS:
-            halvings *= 2
-        fps, base = ratio.numerator / halvings, ratio.denominator / halvings
-    else:
-        fps, base = float(ratio), 1.0
-    if fps != round(fps) or not 1 <= fps <= MOST_FPS:
-        base *= max(1, round(fps)) / fps
-        fps = max(1, round(fps))
+    """Give the scene a frame rate, exactly where it is a ratio like 30 000 / 1 001; our keys keep their times."""
+    fps, base = scene_rate(rate_hz)
     if abs(timing.frame_rate(scene) - fps / base) > 1e-9:
-        scene.render.fps, scene.render.fps_base = round(fps), base
+        scene.render.fps, scene.render.fps_base = fps, base
         timing.follow_frame_rate(scene)
+
+
+def scene_rate(rate_hz: float) -> tuple[int, float]:
+    """`fps` and `fps_base` of a rate: whole numbers and those of television are exact."""
+    for ratio in (Fraction(round(rate_hz)), Fraction(1000 * round(1.001 * rate_hz), 1001)):
+        if ratio and abs(float(ratio) / rate_hz - 1) < SAME_RATE:
+            doublings = 0
+            while ratio.numerator > MOST_FPS << doublings:
+                doublings += 1  # exact in single precision
+            return ratio.numerator >> doublings, ratio.denominator / (1 << doublings)
+    fps = max(1, round(rate_hz))
+    return fps, fps / rate_hz
 
 
 def remember(scene: bpy.types.Scene) -> None:
@@ -486,6 +495,20 @@ def remember(scene: bpy.types.Scene) -> None:
     text = json.dumps(known)
     if scene.get(VIDEOS_KEY) != text:
         scene[VIDEOS_KEY] = text
+
+
+def forget_id(scene: bpy.types.Scene, identifier: str) -> None:
+    """A camera that is gone is not missed any more."""
+    known = json.loads(scene.get(VIDEOS_KEY, "{}"))
+    known.pop(identifier, None)
+    scene[VIDEOS_KEY] = json.dumps(known)
+
+
+def deleted(scene: bpy.types.Scene) -> dict[str, str]:
+    """Id → name of the video, of cameras that someone deleted."""
+    there = {thing[ID_KEY] for thing in cameras(scene)}
+    known = json.loads(scene.get(VIDEOS_KEY, "{}"))
+    return {identifier: name for identifier, name in known.items() if identifier not in there}
 
 
 def _begin_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:

@@ -3,11 +3,12 @@
 
 import bpy
 
-from . import demo, film, impacts, look, models, picks, share, terrain
+from . import demo, film, impacts, look, models, picking, picks, share, terrain
 
 CLASSES = (
     *terrain.CLASSES,
     *picks.CLASSES,
+    *picking.CLASSES,
     *impacts.CLASSES,
     *look.CLASSES,
     *models.CLASSES,
@@ -16,12 +17,18 @@ CLASSES = (
     *share.CLASSES,
 )
 
+TOOLS = (*picking.TOOLS,)
+
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    for tool in TOOLS:
+        bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=tool is TOOLS[0])
 
 
 def unregister() -> None:
+    for tool in reversed(TOOLS):
+        bpy.utils.unregister_tool(tool)
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

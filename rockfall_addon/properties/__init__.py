@@ -4,10 +4,11 @@
 import bpy
 
 from .impacts import ImpactRow, PickProperties
+from .picking import PickingSettings
 from .settings import SceneSettings
 from .terrain import TerrainSettings
 
-GROUPS = {"rockfall": SceneSettings, "rockfall_terrain": TerrainSettings}
+GROUPS = {"rockfall": SceneSettings, "rockfall_terrain": TerrainSettings, "rockfall_picking": PickingSettings}
 """Property of a scene → its group."""
 
 

@@ -1,0 +1,290 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Picks from pixels of the demo's footage, against its truth."""
+
+import csv
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+DEMO = Path(__file__).resolve().parents[2] / "assets" / "demo"
+FOOTAGE = DEMO / "footage"
+OFFSET_S = 465.499
+"""Common time of the footage's first frame."""
+ORIGIN = np.array([988400.0, 6375600.0, 1500.0])
+
+
+def rows(name: str) -> list[dict[str, str]]:
+    with (FOOTAGE / "truth" / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def local(row: dict[str, str], *names: str) -> np.ndarray:
+    return np.array([float(row[name]) for name in names]) - ORIGIN
+
+
+@pytest.fixture(scope="session")
+def impacts() -> list[dict[str, str]]:
+    """The true impacts that are in the picture."""
+    return [row for row in rows("impacts.csv") if float(row["time_s"]) > 1.3]
+
+
+@pytest.fixture
+def site(part) -> bpy.types.Scene:
+    """The demo's terrain and footage, the camera as it truly was."""
+    scene = bpy.context.scene
+    videos = part("rockfall_addon.bridge.videos")
+    surface = part("core.terrain.readers").read_terrain(
+        DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
+    )
+    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    poses = rows("camera.csv")
+    model = part("core.camera.model")
+    place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
+    turn = np.array([[float(row[f"r{i}{j}"]) for i in "123" for j in "123"] for row in poses]).reshape(-1, 3, 3)
+    lens = model.Camera(
+        1280, 720, 2100.0, 2100.0, 640.0, 360.0, position=place[0], rotation=turn[0], shift=surface.shift
+    )
+    times = np.array([float(row["time_s"]) for row in poses])
+    nothing = np.zeros(len(poses))
+    path = part("core.camera.motion").MovingCamera(lens, times, place, turn, nothing, nothing)
+    scene["rockfall_time_origin_s"] = OFFSET_S
+    videos.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
+    videos.set_moving_camera(scene, camera, path)
+    scene.camera = camera
+    scene.rockfall.block_diameter_m = 0.39
+    return scene
+
+
+def camera_of(scene: bpy.types.Scene, part) -> bpy.types.Object:
+    (camera,) = part("rockfall_addon.bridge.videos").cameras(scene)
+    return camera
+
+
+def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    found = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
+    return sorted(found, key=lambda thing: thing["rockfall_time_s"])
+
+
+def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str = "B10", **how) -> bpy.types.Object:
+    picking = part("rockfall_addon.bridge.picking")
+    scene.frame_set(frame)
+    camera = camera_of(scene, part)
+    place = picking.in_picture(scene, camera, pixel, name, **how)
+    thing, _ = picking.put(scene, camera, place, name, scene.rockfall_picking.kind)
+    picking.finish(scene, thing)
+    return thing
+
+
+def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -> None:
+    """A true contact point, projected by hand, is found again."""
+    picking = part("rockfall_addon.bridge.picking")
+    camera, poses = camera_of(site, part), rows("camera.csv")
+    for row in impacts[:5]:
+        frame = round(float(row["time_s"]) * 30)
+        site.frame_set(frame)
+        truth = local(row, "contact_x_m", "contact_y_m", "contact_z_m")
+        pose = poses[frame]
+        turn = np.array([[float(pose[f"r{i}{j}"]) for j in "123"] for i in "123"])
+        x, y, z = turn @ (truth - local(pose, "x_m", "y_m", "z_m"))
+        pixel = np.array([640 + 2100 * x / z, 360 + 2100 * y / z])
+        place = picking.in_picture(site, camera, pixel, "B10", centre=False)
+        assert np.linalg.norm(place.position - truth) < 0.05, "truth lies on the terrain but for its roughness"
+        assert place.frame == frame
+        assert place.time_s == pytest.approx(OFFSET_S + frame / 30, abs=1e-6)
+        assert place.sigma_time_s == pytest.approx(1 / 30 / np.sqrt(12), rel=1e-6)
+        axes = np.linalg.norm(place.ellipse, axis=1)
+        assert 0.03 < axes[1] <= axes[0] < 0.2, "a pixel is 4 cm wide there"
+
+
+def test_the_middle_of_the_block_is_a_radius_from_the_ground(site, part, impacts) -> None:
+    """The block's centre at the impact, as pixel → the contact that the truth has."""
+    picking = part("rockfall_addon.bridge.picking")
+    camera, motion = camera_of(site, part), part("core.camera.motion")
+    path = part("rockfall_addon.bridge.videos").moving_camera(camera)
+    assert isinstance(path, motion.MovingCamera)
+    for row in impacts[:5]:
+        frame = round(float(row["time_s"]) * 30)
+        site.frame_set(frame)
+        _, video_s = picking.picture_time(site, camera)
+        centre = local(row, "x_m", "y_m", "z_m")
+        pixel = part("core.camera.model").project(picking.posed(camera, video_s), centre[None])[0]
+        place = picking.in_picture(site, camera, pixel, "B10", centre=True)
+        truth = local(row, "contact_x_m", "contact_y_m", "contact_z_m")
+        assert np.linalg.norm(place.position - truth) < 0.12
+        assert np.linalg.norm(place.position - centre) == pytest.approx(0.195, abs=0.05)
+
+
+def test_clicks_become_picks_and_trajectories(site, part, impacts) -> None:
+    block = {int(row["frame"]): row for row in rows("block.csv")}
+    frames = [round(float(row["time_s"]) * 30) for row in impacts[:3]]
+    for frame in frames:
+        pick(site, part, frame, np.array([float(block[frame]["u_px"]), float(block[frame]["v_px"])]))
+    made = picks_of(site)
+    assert [thing["rockfall_trajectory"] for thing in made] == ["B10"] * 3
+    assert [thing["rockfall_extra"]["frame"] for thing in made] == [str(frame) for frame in frames]
+    assert all(thing["rockfall_sigma_position_m"][0] > 0 for thing in made)
+    flights = [thing for thing in site.objects if thing.get("rockfall_role") == "flights"]
+    assert len(flights) == 1, "the trajectory follows by itself"
+    assert len(site.rockfall_impacts) == 3
+    table = part("rockfall_addon.bridge.picks").picks_of(site)
+    assert set(table.extra["video"].tolist()) == {"footage"}
+    assert float(table.extra["u_px"][0]) == float(block[frames[0]]["u_px"])
+
+
+def test_a_second_click_in_one_picture_moves_the_pick(site, part) -> None:
+    first = pick(site, part, 60, np.array([700.0, 300.0]))
+    identifier, before = first["rockfall_id"], list(first["rockfall_position_m"])
+    again = pick(site, part, 60, np.array([720.0, 300.0]))
+    assert again["rockfall_id"] == identifier
+    assert len(picks_of(site)) == 1
+    assert 0.3 < np.linalg.norm(np.subtract(again["rockfall_position_m"], before)) < 3.0
+    pick(site, part, 62, np.array([720.0, 300.0]))
+    assert len(picks_of(site)) == 2
+
+
+def test_what_was_seen_is_forgotten_when_the_pick_is_moved(site, part) -> None:
+    picking = part("rockfall_addon.bridge.picking")
+    thing = pick(site, part, 60, np.array([700.0, 300.0]))
+    (seen,) = picking.sightings(thing).values()
+    assert (seen.frame, seen.pixel.tolist(), seen.centre) == (60, [700.0, 300.0], True)
+    bpy.context.view_layer.update()
+    thing.location.x += 0.5
+    bpy.context.view_layer.update()
+    assert picking.sightings(thing) == {}
+
+
+def test_a_cancelled_click_leaves_the_pick_as_it_was(site, part) -> None:
+    picking = part("rockfall_addon.bridge.picking")
+    thing = pick(site, part, 60, np.array([700.0, 300.0]))
+    kept = picking.snapshot(thing)
+    camera = camera_of(site, part)
+    picking.put(site, camera, picking.in_picture(site, camera, np.array([500.0, 300.0]), "B10"), "B10", "impact")
+    assert picking.snapshot(thing) != kept
+    picking.restore(thing, kept)
+    assert picking.snapshot(thing) == kept
+    assert np.allclose(thing.location, thing["rockfall_position_m"], atol=1e-5)
+
+
+def test_grazing_rays_are_warned_of(part) -> None:
+    """A camera 2 m above a plane, looking along it."""
+    scene = bpy.context.scene
+    surface = part("core.terrain.surface").Surface(
+        np.array([[-200.0, -200, 0], [200, -200, 0], [200, 200, 0], [-200, 200, 0]]),
+        np.array([[0, 1, 2], [0, 2, 3]]), part("core.georeference").GlobalShift(), "plane", (),
+    )  # fmt: skip
+    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    videos, picking = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.picking")
+    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    lens = part("core.camera.model").look_at(1280, 720, (0, -60, 2), (0, 0, 0), focal_px=1000)
+    videos.set_moving_camera(scene, camera, part("core.camera.motion").fixed(lens))
+    place = picking.in_picture(scene, camera, np.array([640.0, 360.0]), "B01", centre=False)
+    assert place.grazing_deg == pytest.approx(np.degrees(np.arctan2(2, 60)), abs=1e-6)
+    assert "grazes the terrain at 1.9°" in place.warning
+    along, across = np.linalg.norm(place.ellipse, axis=1)
+    assert along == pytest.approx(60**2 / 2 / 1000, rel=0.01), "distance² / (height · focal length) for 1 px"
+    assert across == pytest.approx(60 / 1000, rel=0.01)
+    thing, new = picking.put(scene, camera, place, "B01", "impact")
+    assert new
+    assert "grazes" in picking.grazing_warning(thing)
+
+
+def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
+    picking, errors = part("rockfall_addon.bridge.picking"), part("core.errors")
+    camera = camera_of(site, part)
+    site.frame_set(90)
+    part("rockfall_addon.bridge.videos").unsolve(camera)
+    with pytest.raises(errors.RockfallError, match="not aligned"):
+        picking.in_picture(site, camera, np.array([640.0, 360.0]), "B10")
+    place = picking.on_ray(site, np.array([8.0, 60.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
+    assert place.time_s == pytest.approx(OFFSET_S + 3.0)
+    thing, _ = picking.put(site, None, place, "B10", "impact")
+    assert thing["rockfall_position_m"][:2] == pytest.approx([8.0, 60.0])
+    with pytest.raises(errors.RockfallError, match="no terrain under"):
+        picking.on_ray(site, np.array([9000.0, 0.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
+
+
+def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
+    picking = part("rockfall_addon.bridge.picking")
+    bpy.data.objects.remove(camera_of(site, part))
+    del site["rockfall_time_origin_s"]
+    for frame, y in ((30, 60.0), (60, 55.0)):
+        site.frame_set(frame)
+        place = picking.on_ray(site, np.array([8.0, y, 200.0]), np.array([0.0, 0.0, -1.0]), "B01")
+        thing, _ = picking.put(site, None, place, "B01", "impact")
+        picking.finish(site, thing)
+    rate = site.render.fps / site.render.fps_base
+    assert [thing["rockfall_time_s"] for thing in picks_of(site)] == pytest.approx([30 / rate, 60 / rate])
+    assert [thing["rockfall_key_frame"] for thing in picks_of(site)] == pytest.approx([30, 60])
+
+
+def test_two_views_make_one_point(site, part) -> None:
+    picking, videos = part("rockfall_addon.bridge.picking"), part("rockfall_addon.bridge.videos")
+    model = part("core.camera.model")
+    truth = np.array(local(rows("impacts.csv")[3], "x_m", "y_m", "z_m"))
+    first = camera_of(site, part)
+    second = videos.add_video(site, FOOTAGE / "footage.mp4")
+    videos.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
+    lens = model.look_at(1280, 720, np.add(truth, (70, -40, 30)), truth, focal_px=2000)
+    videos.set_moving_camera(site, second, part("core.camera.motion").fixed(lens))
+    frame = round(float(rows("impacts.csv")[3]["time_s"]) * 30)
+    site.frame_set(frame)
+    for camera in (first, second):
+        _, video_s = picking.picture_time(site, camera)
+        pixel = model.project(picking.posed(camera, video_s), truth[None])[0]
+        if camera == second:
+            (thing,) = picks_of(site)
+            curve = picking.epipolar(site, thing, second)
+            assert np.linalg.norm(curve - pixel, axis=1).min() < 20
+            assert picking.triangulated(site, thing) is None
+        place = picking.in_picture(site, camera, pixel, "B10")
+        thing, new = picking.put(site, camera, place, "B10", "impact")
+        assert new is (camera == first)
+    found = picking.triangulated(site, thing)
+    assert np.linalg.norm(found.point[0] - truth) < 1e-3
+    assert found.miss_distance[0] < 1e-3
+    assert picking.use_triangulated(site, thing) < 1e-3
+    assert np.linalg.norm(np.array(thing["rockfall_position_m"]) - truth) == pytest.approx(0.195, abs=0.05)
+    assert len(picking.sightings(thing)) == 2
+
+
+def test_clicked_and_proposed_observations(site, part) -> None:
+    """The true pixels, as a track: its kinks are the true impacts."""
+    observations, tracking = part("rockfall_addon.bridge.observations"), part("core.footage.tracking")
+    camera = camera_of(site, part)
+    block = [row for row in rows("block.csv") if row["visible"] == "1" and float(row["time_s"]) < 5.0]
+    pixel = np.array([[float(row["u_px"]), float(row["v_px"])] for row in block])
+    frame, time = np.array([int(row["frame"]) for row in block]), np.array([float(row["time_s"]) for row in block])
+    one = np.ones(len(block))
+    with pytest.raises(part("core.errors").RockfallError, match="Nothing tells where"):
+        observations.clicks_for(site, camera, "B10")
+    observations.click(camera, "B10", int(frame[3]), float(time[3]), pixel[3] + 0.25, 0.5)
+    assert observations.clicks_for(site, camera, "B10") == [(int(frame[3]), *(pixel[3] + 0.25))]
+    track = tracking.BlockTrack(frame, time, pixel, 0.1 * one, one, pixel, 9 * one, ("", ""))
+    observations.keep_track(camera, "B10", track)
+    seen = observations.seen_in(camera, "B10")
+    assert len(seen) == len(block)
+    np.testing.assert_array_equal(seen.pixel[0], pixel[0])
+    assert seen.by_hand.sum() == 1
+    np.testing.assert_array_equal(seen.pixel[seen.by_hand][0], pixel[3] + 0.25)
+
+    made = observations.propose(site, camera, "B10")
+    truth = np.array([[float(row["time_s"]), float(row["leave_time_s"])] for row in rows("impacts.csv")]).ravel()
+    times = np.array([thing["rockfall_time_s"] for thing in made]) - OFFSET_S
+    assert len(made) >= 3
+    off = np.abs(truth[:, None] - times[None]).min(axis=0)
+    assert off.max() < 0.02, "each proposal is a true impact"
+    assert observations.propose(site, camera, "B10") == [], "those that are there stay"
+    assert observations.clear(camera, "B10") == len(block)
+    assert observations.names_in(camera) == []
+
+
+def test_operators_tell_what_is_missing(part) -> None:
+    scene = bpy.context.scene
+    assert not bpy.ops.rockfall.remove_pick.poll()
+    assert not bpy.ops.rockfall.drag_pick.poll()
+    picking = part("rockfall_addon.bridge.picking")
+    with pytest.raises(part("core.errors").RockfallError, match="no terrain to pick on"):
+        picking.on_ray(scene, np.zeros(3), np.array([0.0, 0, -1]), "B01")

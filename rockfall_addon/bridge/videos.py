@@ -19,7 +19,7 @@ from ...core.camera.blender_lens import BlenderLens, from_blender_lens, pose_to_
 from ...core.camera.model import INTRINSICS, Camera
 from ...core.camera.motion import MovingCamera, fixed
 from ...core.errors import RockfallError
-from ...core.footage.advice import content_advice
+from ...core.footage.advice import content_advice, rate_advice
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import FRAME_AT_TOLERANCE_S, Image, Video, open_video, read_frame
 from ...core.vectors import Array
@@ -33,7 +33,7 @@ CAMERA_KEY, SOLVED_KEY, RMSE_KEY = "rockfall_camera", "rockfall_solved", "rockfa
 POSE_TIMES_KEY, POSES_KEY = "rockfall_pose_times_s", "rockfall_poses"
 POSE_SIGMA_KEY, COVARIANCE_KEY = "rockfall_pose_sigma", "rockfall_pose_covariance"
 SHIFT_KEY, ASPECT_KEY, REFERENCE_KEY = "rockfall_camera_shift_m", "rockfall_aspect", "rockfall_reference_pose"
-VIDEOS_KEY = "rockfall_videos"
+VIDEOS_KEY = "rockfall_known_videos"
 """Id → name of the file, of the cameras that a scene has had; tells when one is deleted."""
 
 COLLECTION = "Cameras"
@@ -132,6 +132,7 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
         "pixel_aspect": video.pixel_aspect,
         "rate_hz": video.rate_hz if np.isfinite(video.rate_hz) else 0.0,
         "remarks": content_advice(video),
+        "advice": rate_advice(video, capture_rate_hz=capture_rate_of(camera)),
     }
     camera[FACTS_KEY] = json.dumps(facts)
     clip = bpy.data.movieclips.load(camera[FILE_KEY])
@@ -148,6 +149,13 @@ def clip_of(camera: bpy.types.Object) -> bpy.types.MovieClip | None:
     """The footage behind a camera; None when someone removed it."""
     clips = (b.clip for b in camera.data.background_images if b.source == "MOVIE_CLIP")
     return next((clip for clip in clips if clip is not None), None)
+
+
+def summary(camera: bpy.types.Object) -> str:
+    """One sentence about a video that was added."""
+    (width, height), known = size_of(camera), facts_of(camera)
+    rate = f" at {known['rate_hz']:.4g} a second" if known.get("rate_hz") else ""
+    return f"{camera.name}: {width} × {height} px, {len(camera[TIMES_KEY])} frames{rate}."
 
 
 def facts_of(camera: bpy.types.Object) -> dict:
@@ -272,6 +280,8 @@ def set_capture_rate(camera: bpy.types.Object, capture_rate_hz: float | None) ->
     clock = clock_for(video, capture_rate_hz or None, offset_s=old.offset_s, drift=old.drift, origin_s=old.origin_s)
     set_clock(camera, clock)
     camera[CAPTURE_KEY] = float(capture_rate_hz or 0.0)
+    known = facts_of(camera) | {"advice": rate_advice(video, capture_rate_hz=capture_rate_hz or None)}
+    camera[FACTS_KEY] = json.dumps(known)
 
 
 def capture_rate_of(camera: bpy.types.Object) -> float | None:

@@ -3,10 +3,12 @@
 
 import bpy
 
-from . import demo, film, impacts, look, models, picking, picks, share, terrain
+from . import alignment, demo, film, impacts, look, models, picking, picks, share, terrain, videos
 
 CLASSES = (
     *terrain.CLASSES,
+    *videos.CLASSES,
+    *alignment.CLASSES,
     *picks.CLASSES,
     *picking.CLASSES,
     *impacts.CLASSES,
@@ -17,17 +19,19 @@ CLASSES = (
     *share.CLASSES,
 )
 
-TOOLS = (*picking.TOOLS,)
+TOOLS = (*alignment.TOOLS, *picking.TOOLS)
 
 
 def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    videos.register_keys()
     for tool in TOOLS:
         bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=tool is TOOLS[0])
 
 
 def unregister() -> None:
+    videos.unregister_keys()
     for tool in reversed(TOOLS):
         bpy.utils.unregister_tool(tool)
     for cls in reversed(CLASSES):

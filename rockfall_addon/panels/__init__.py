@@ -3,10 +3,11 @@
 
 import bpy
 
-from . import film, impact, impact_table, models, picks, playback, share, terrain
+from . import film, impact, impact_table, models, picks, playback, share, terrain, videos
 
 CLASSES = (
     *terrain.CLASSES,
+    *videos.CLASSES,
     *picks.CLASSES,
     *impact.CLASSES,
     *impact_table.CLASSES,

@@ -7,8 +7,14 @@ from .impacts import ImpactRow, PickProperties
 from .picking import PickingSettings
 from .settings import SceneSettings
 from .terrain import TerrainSettings
+from .videos import VideoProperties, VideoSettings
 
-GROUPS = {"rockfall": SceneSettings, "rockfall_terrain": TerrainSettings, "rockfall_picking": PickingSettings}
+GROUPS = {
+    "rockfall": SceneSettings,
+    "rockfall_terrain": TerrainSettings,
+    "rockfall_videos": VideoSettings,
+    "rockfall_picking": PickingSettings,
+}
 """Property of a scene → its group."""
 
 
@@ -20,9 +26,13 @@ def register() -> None:
     bpy.types.Scene.rockfall_impacts = bpy.props.CollectionProperty(type=ImpactRow)
     bpy.utils.register_class(PickProperties)
     bpy.types.Object.rockfall_pick = bpy.props.PointerProperty(type=PickProperties)
+    bpy.utils.register_class(VideoProperties)
+    bpy.types.Object.rockfall_video = bpy.props.PointerProperty(type=VideoProperties)
 
 
 def unregister() -> None:
+    del bpy.types.Object.rockfall_video
+    bpy.utils.unregister_class(VideoProperties)
     del bpy.types.Object.rockfall_pick
     bpy.utils.unregister_class(PickProperties)
     del bpy.types.Scene.rockfall_impacts

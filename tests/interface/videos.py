@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A person adds footage, looks through its camera and steps through it."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+ROOT = Path(__file__).resolve().parents[2]
+FOOTAGE = ROOT / "assets" / "demo" / "footage" / "footage.mp4"
+DATA = ROOT / "tests" / "data" / "videos"
+
+
+def add(window, *names, directory=DATA):
+    with window.override():
+        done = bpy.ops.rockfall.add_video(directory=str(directory), files=[{"name": name} for name in names])
+    assert done == {"FINISHED"}
+
+
+def case_footage_behind_the_camera(window):
+    yield from window.show_sidebar(width=420)
+    window.screenshot("nothing")
+    add(window, FOOTAGE.name, directory=FOOTAGE.parent)
+    yield 2.0
+    scene = bpy.context.scene
+    window.screenshot("first")
+    x, y = window.centre()
+    for _ in range(3):
+        yield from window.press("RIGHT_ARROW", x, y)
+    assert scene.frame_current == 3
+    yield from window.press("RIGHT_ARROW", x, y, ctrl=True)
+    assert scene.frame_current == 13
+    yield from window.press("LEFT_ARROW", x, y)
+    assert scene.frame_current == 12
+    scene.frame_set(150)
+    yield 1.5
+    window.screenshot("later")
+
+
+def case_every_picture_on_the_screen(window):
+    """The bars that are seen behind the camera are those of the true frame, whatever the file's rates."""
+    yield 0.5
+    space = window.area().spaces.active
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+    space.overlay.show_text = space.show_gizmo = space.overlay.show_cursor = False
+    space.shading.background_type = "VIEWPORT"
+    videos = window.part("rockfall_addon.bridge.videos")
+    scene = bpy.context.scene
+    for name in ("constant.mp4", "variable.mp4"):
+        add(window, name)
+        camera = videos.active_camera(scene)
+        camera.data.show_passepartout = False
+        yield 1.0
+        wrong = {}
+        for index in range(1, 14):
+            with window.override():
+                bpy.ops.rockfall.step_frame(step=1)
+            yield 0.4
+            path = window.screenshot(f"{Path(name).suffix[1:]}-{Path(name).stem}")
+            assert videos.true_frame(scene, camera) == index
+            if (found := bars(window, camera, path)) != index:
+                wrong[index] = found
+        assert not wrong, f"{name}: {wrong}"
+        scene.frame_set(0)
+
+
+def case_pixels_of_the_view(window):
+    """Where the core sees points is where Blender draws them, zoomed and shifted."""
+    yield 0.5
+    add(window, FOOTAGE.name, directory=FOOTAGE.parent)
+    view, videos = window.part("rockfall_addon.bridge.image_view"), window.part("rockfall_addon.bridge.videos")
+    scene = bpy.context.scene
+    camera = videos.active_camera(scene)
+    camera.location = (12.0, -30.0, 8.0)
+    camera.rotation_euler = (1.4, 0.05, 0.3)
+    camera.data.shift_x, camera.data.shift_y = 0.08, -0.05
+    region, space = window.region(), window.area().spaces.active
+    rv3d, size = space.region_3d, videos.size_of(camera)
+    for zoom, offset in ((0.0, (0.0, 0.0)), (28.0, (0.12, -0.08))):
+        rv3d.view_camera_zoom, rv3d.view_camera_offset = zoom, offset
+        window.redraw()
+        yield 1.0
+        rectangle = view.image_rectangle(region, rv3d, scene, camera)
+        pixels = np.random.default_rng(1).uniform((40, 40), (1240, 680), (30, 2))
+        back = view.to_pixel(rectangle, size, view.to_region(rectangle, size, pixels))
+        np.testing.assert_allclose(back, pixels, atol=1e-9)
+        origins, directions = view.ray(scene, camera, pixels, 0.0)
+        points = origins + directions * np.random.default_rng(2).uniform(20, 90, (30, 1))
+        drawn = np.array([location_3d_to_region_2d(region, rv3d, Vector(point)) for point in points.tolist()])
+        ours = view.to_region(rectangle, size, view.project(scene, camera, points, 0.0))
+        print("largest difference", np.abs(drawn - ours).max(), "px of the screen", flush=True)
+        np.testing.assert_allclose(ours, drawn, atol=0.05)
+    rv3d.view_perspective = "PERSP"
+    assert view.image_rectangle(region, rv3d, scene, camera) is None
+
+
+def bars(window, camera, path):
+    """The number that the bars on the screen tell."""
+    view, videos = window.part("rockfall_addon.bridge.image_view"), window.part("rockfall_addon.bridge.videos")
+    region, space = window.region(), window.area().spaces.active
+    rectangle = view.image_rectangle(region, space.region_3d, bpy.context.scene, camera)
+    image = bpy.data.images.load(str(path))
+    width, height = image.size
+    grey = np.array(image.pixels[:], np.float32).reshape(height, width, 4)[:, :, :3].mean(axis=2)
+    bpy.data.images.remove(image)
+    size = videos.size_of(camera)
+    places = view.to_region(rectangle, size, [[(i + 0.5) * size[0] / 8, size[1] / 3] for i in range(8)])
+    values = [grey[round(region.y + y), round(region.x + x)] for x, y in places]
+    code = sum(int(value > 0.4) << i for i, value in enumerate(values))
+    number = 0
+    while code:
+        number ^= code
+        code >>= 1
+    return number

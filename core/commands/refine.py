@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError, RockfallError
 from ..vectors import Array, norm
-from .options import add_out, known_names, positive
+from .options import add_out, known_names, not_negative, positive
 from .progress import Progress
 from .reconstruct import DEFAULT_STEP_S
 
@@ -43,6 +43,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--loss", choices=LOSSES, help="how pixels that do not fit count (default: as the project says, else huber)"
+    )
+    parser.add_argument(
+        "--sigma-aim",
+        type=not_negative,
+        metavar="PART",
+        help="standard deviation of the tracked spot about the block's centre, in parts of its diameter; 0: the pixels "
+        "are the centre's (default: as the project says, else 0.15)",
     )
     parser.add_argument(
         "--trajectory", action="extend", nargs="+", metavar="NAME", help="only these (default: all of the project)"
@@ -88,6 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
             normal_radius_m=project.reconstruction.normal_radius_m,
             free=how.free,
             sigma_terrain_m=how.sigma_terrain_m,
+            sigma_aim=how.sigma_aim,
             loss=cast(Loss, how.loss),
             site=project.site.name,
         )
@@ -104,7 +112,8 @@ def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> 
     from ..exchange.project import FREE
 
     free = settings.free if arguments.free is None else known_names(arguments.free, FREE, "--free")
-    return replace(settings, free=free, loss=arguments.loss or settings.loss)
+    aim = settings.sigma_aim if arguments.sigma_aim is None else arguments.sigma_aim
+    return replace(settings, free=free, loss=arguments.loss or settings.loss, sigma_aim=aim)
 
 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
@@ -256,6 +265,12 @@ def _summary(before: "Picks", footage: "Footage", refined: "Refinement") -> list
         sentences.append(
             f"The residuals are {refined.noise_scale:.2f} times what was stated; the deviations allow for it."
         )
+    if refined.aim:
+        off = [100 * float(norm(aim)) for aim, _ in refined.aim.values()]
+        sentences.append(
+            f"The tracked spot lies {np.median(off):.0f} % of the block's diameter off its centre"
+            + (f" (median; at most {max(off):.0f} %)." if len(off) > 1 else ".")
+        )
     sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in refined.unknowns.items()]
     return [*sentences, *_impact_lines(refined.reconstruction.impacts), *refined.advice]
 
@@ -264,25 +279,31 @@ def _impact_lines(impacts: "Impacts") -> list[str]:
     """The impacts as a table for people."""
     if not len(impacts):
         return ["No impacts."]
-    speed, speed_sigma = norm(impacts.v1), _speed_sigma(impacts)
-    rn, rn_sigma = impacts.rn, impacts.sigma.get("rn", np.full(len(impacts), np.nan))
+    columns = [
+        (norm(impacts.v1), _speed_sigma(impacts, "kinetic1_j", impacts.v1), 2),
+        (norm(impacts.v2), _speed_sigma(impacts, "kinetic2_j", impacts.v2), 2),
+        (impacts.rn, _sigma(impacts, "rn"), 3),
+        (impacts.r, _sigma(impacts, "r"), 3),
+    ]
     width = max(len("trajectory"), *map(len, impacts.trajectory.tolist()[:MOST_ROWS]))
-    lines = [f"{'trajectory':<{width}}  impact    time s  incident speed m/s             R_N"]
+    heads = "".join(f"  {name:>14}" for name in ("incident m/s", "restituted m/s", "R_N", "R"))
+    lines = [f"{'trajectory':<{width}}  impact    time s{heads}"]
     for i in range(min(len(impacts), MOST_ROWS)):
-        lines.append(
-            f"{impacts.trajectory[i]:<{width}}  {impacts.impact[i]:>6}  {impacts.time_s[i]:>8.3f}  "
-            f"{_with(speed[i], speed_sigma[i], 2):>18}  {_with(rn[i], rn_sigma[i], 3):>14}"
-        )
+        cells = "".join(f"  {_with(value[i], sigma[i], digits):>14}" for value, sigma, digits in columns)
+        lines.append(f"{impacts.trajectory[i]:<{width}}  {impacts.impact[i]:>6}  {impacts.time_s[i]:>8.3f}{cells}")
     if len(impacts) > MOST_ROWS:
         lines.append(f"… and {len(impacts) - MOST_ROWS} more impacts, in impacts.csv.")
     return lines
 
 
-def _speed_sigma(impacts: "Impacts") -> Array:
-    """(n,) standard deviation of the incident speed, from that of the energy ½mv²."""
-    energy = impacts.sigma.get("kinetic1_j", np.full(len(impacts), np.nan))
+def _sigma(impacts: "Impacts", name: str) -> Array:
+    return impacts.sigma.get(name, np.full(len(impacts), np.nan))
+
+
+def _speed_sigma(impacts: "Impacts", energy: str, velocity: Array) -> Array:
+    """(n,) standard deviation of a speed, from that of the energy ½mv²."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(energy / (impacts.mass_kg * norm(impacts.v1)))
+        return np.asarray(_sigma(impacts, energy) / (impacts.mass_kg * norm(velocity)))
 
 
 def _with(value: float, sigma: float, digits: int) -> str:

@@ -21,6 +21,7 @@ UP_AXES = ("auto", "z", "y")
 FLIGHTS = ("contacts", "centres")
 FREE = ("camera", "clock", "clock_drift", "drag", "gravity")
 LOSSES = ("huber", "cauchy", "linear")
+SIGMA_AIM = 0.15
 
 Extra = Mapping[str, Any]
 
@@ -130,11 +131,13 @@ class RefinementSettings:
     ----------
     free : what is fitted beside the picks, of `FREE`.
     sigma_terrain_m : standard deviation of the terrain across itself [m]; None for the default.
+    sigma_aim : standard deviation of the tracked spot about the block's centre, in parts of its diameter.
     loss : one of `LOSSES`, how pixels that do not fit count.
     """
 
     free: tuple[str, ...] = ()
     sigma_terrain_m: float | None = None
+    sigma_aim: float = SIGMA_AIM
     loss: str = "huber"
     extra: Extra = field(default_factory=dict)
 
@@ -370,6 +373,7 @@ def _refinement(table: TomlTable) -> RefinementSettings:
     return RefinementSettings(
         free=table.choices("free", FREE),
         sigma_terrain_m=table.optional_number("sigma_terrain_m"),
+        sigma_aim=table.number("sigma_aim", SIGMA_AIM, zero_allowed=True),
         loss=table.choice("loss", LOSSES, "huber"),
         extra=table.rest(),
     )

@@ -22,9 +22,12 @@ from .views import PixelObservations, View, check_observations
 if TYPE_CHECKING:
     from ..terrain.surface import Surface
 
-__all__ = ["FREE", "PixelObservations", "Refinement", "View", "refine"]
+__all__ = ["FREE", "SIGMA_AIM", "PixelObservations", "Refinement", "View", "refine"]
 
 FREE = ("camera", "clock", "clock_drift", "drag", "gravity")
+SIGMA_AIM = 0.15
+"""Standard deviation of the tracked spot about the block's centre, in parts of its diameter: its sunlit side draws the
+eye of people and of trackers."""
 
 
 def refine(
@@ -39,6 +42,7 @@ def refine(
     normal_radius_m: float | None = None,
     free: Sequence[str] = (),
     sigma_terrain_m: float | None = None,
+    sigma_aim: float = SIGMA_AIM,
     loss: Loss = "huber",
     site: str = "",
 ) -> Refinement:
@@ -57,6 +61,8 @@ def refine(
     sigma_terrain_m : standard deviation of the centre's distance from the terrain at a contact, about its radius. None
         takes, for each pick, a tenth of the radius (blocks are no spheres) and a quarter of the point spacing times
         the spread of the terrain's normals (what lies between the points), as one root of squares.
+    sigma_aim : standard deviation of what all pixels of a trajectory in a view are off the block's centre by, alike, in
+        parts of its diameter; 0 takes the pixels for the centre's.
     loss : how pixels that do not fit count; "linear" trusts all of them.
 
     Raises
@@ -70,12 +76,15 @@ def refine(
     Unknowns are the centre's place and the time at every release, impact, contact and stop (the nodes of
     `find_segments`); free flights run between them in closed form, or with drag; rolling is straight and even. All
     are found at once, with the residuals: pixels at the time of their row (rolling shutter) against the projected
-    centre; the centre's distance from the terrain against the radius; the marked times, and the places where they
-    have a standard deviation; places marked in flight that have one; the poses against their covariance. A flight thus
-    counts with all its frames, and an impact is where and when two flights meet.
+    centre and what is aimed off it, one part of the block's apparent diameter for each trajectory and view, itself
+    against `sigma_aim`; the centre's distance from the terrain against the radius; the marked times, and the places
+    where they have a standard deviation; places marked in flight that have one; the poses against their covariance. A
+    flight thus counts with all its frames, and an impact is where and when two flights meet.
     """
     block = block if block is not None else Block()
     free_set = _check_parameters(free, loss, gravity_mps2, sigma_terrain_m, normal_radius_m)
+    if not (np.isfinite(sigma_aim) and sigma_aim >= 0):
+        raise RockfallError(f"The standard deviation of the aim must be a number not below zero, not {sigma_aim}.")
     if surface is not None:
         picks = picks.in_shift(surface.shift)
         check_placement(picks, surface, per_pick(picks, block, lambda one: one.diameter_m))
@@ -92,7 +101,7 @@ def refine(
     ground = prepare(picks, surface, block, drag, normal_radius_m, sigma_terrain_m)
     names = [name for name in dict.fromkeys(picks.trajectory.tolist()) if name in set(observations.trajectory.tolist())]
     groups = [names] if free_set else [[name] for name in names]
-    setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set) for group in groups]
+    setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set, sigma_aim) for group in groups]
     solved = [_solve(setup, loss, free_set) for setup in setups]
     return summarise(
         ground, moved_views, observations, [pair[0] for pair in solved], [pair[1] for pair in solved],

@@ -15,6 +15,8 @@ from .views import View
 
 NODE = 4
 """Unknowns of a node: x, y, z of the block's centre [m] and the time [s]."""
+CLOCK_COLUMN = 16
+"""Of the pixels' derivatives: by the offset of the view's clock, there even when it is held."""
 SHORTEST_S = 1e-4
 """A segment does not become shorter than this."""
 
@@ -29,6 +31,8 @@ class Unknowns:
     turn, move : (v, 3) rotation vector, about the axes of the solved frame's camera [rad], and displacement [m] of each
         camera path.
     offset_s, drift : (v,) added to the clocks.
+    aim : (v, t, 2) where the spot that was tracked lies off the block's centre in the image (u, v), for each view and
+        trajectory, in parts of the block's diameter.
     coefficient : of drag [-], relative to what each block's drag per metre is for 1.
     gravity : [m/s²].
     """
@@ -39,6 +43,7 @@ class Unknowns:
     move: Array
     offset_s: Array
     drift: Array
+    aim: Array
     coefficient: float
     gravity: float
 
@@ -49,13 +54,14 @@ class Columns:
 
     Attributes
     ----------
-    pose : (v, 6), clock : (v, 2) offset and drift, law : (2,) drag coefficient and gravity.
+    pose : (v, 6), clock : (v, 2) offset and drift, law : (2,) drag coefficient and gravity, aim : (v, t, 2).
     size : number of free unknowns.
     """
 
     pose: Indices
     clock: Indices
     law: Indices
+    aim: Indices
     size: int
 
 
@@ -74,6 +80,8 @@ class Problem:
     view, obs_group : (m,) of the pixels: the view, the trajectory.
     video_s : (m,) video time [s]; row_s (m,) readout delay of the pixel's row [s].
     pixel : (m, 2); sigma_px (m,) [px].
+    block_px : (m,) how large the block appears [px], from the marked motion.
+    sigma_aim : standard deviation of the aim, in parts of the block's diameter.
     position, rotation : (m, 3), (m, 3, 3) prior pose of the camera when each pixel was taken.
     time_s, sigma_time_s : (n,) prior times of the nodes.
     centre, sigma_centre_m : (n, 3), (n,) prior places.
@@ -97,6 +105,8 @@ class Problem:
     row_s: Array
     pixel: Array
     sigma_px: Array
+    block_px: Array
+    sigma_aim: float
     position: Array
     rotation: Array
     time_s: Array
@@ -150,13 +160,14 @@ class Evaluation:
     motion: NodeMotion
 
 
-def free_columns(nodes: int, free: frozenset[str], posed: Mask, timed: Mask) -> Columns:
+def free_columns(nodes: int, free: frozenset[str], posed: Mask, timed: Mask, aimed: Mask) -> Columns:
     """Number the free unknowns: nodes first, then what trajectories share.
 
     Parameters
     ----------
     free : of "camera", "clock", "clock_drift", "drag", "gravity".
     posed, timed : (v,) the view's pose, and its clock, can be told.
+    aimed : (v, t) the aim at a trajectory is sought in this view.
     """
     size, views = NODE * nodes, posed.size
     pose, clock, law = np.full((views, 6), -1), np.full((views, 2), -1), np.full(2, -1)
@@ -171,7 +182,9 @@ def free_columns(nodes: int, free: frozenset[str], posed: Mask, timed: Mask) -> 
         if name in free:
             law[row] = size
             size += 1
-    return Columns(pose, clock, law, size)
+    aim = np.full((*aimed.shape, 2), -1)
+    aim[aimed] = size + np.arange(2 * aimed.sum()).reshape(-1, 2)
+    return Columns(pose, clock, law, aim, size + 2 * int(aimed.sum()))
 
 
 def moved(problem: Problem, state: Unknowns, step: Array) -> Unknowns:
@@ -187,6 +200,7 @@ def moved(problem: Problem, state: Unknowns, step: Array) -> Unknowns:
         move=state.move + pose[:, 3:],
         offset_s=state.offset_s + clock[:, 0],
         drift=state.drift + clock[:, 1],
+        aim=state.aim + padded[columns.aim],
         coefficient=state.coefficient + float(law[0]),
         gravity=state.gravity + float(law[1]),
     )
@@ -276,6 +290,8 @@ def evaluate(problem: Problem, state: Unknowns, chain: Indices | None = None) ->
         others.append(_pass_rows(problem, motion))
     if (problem.columns.pose >= 0).any():
         others.append(_pose_rows(problem, state))
+    if (problem.columns.aim >= 0).any():
+        others.append(_aim_rows(problem, state))
     valid = all(bool(np.isfinite(rows.residual).all()) for rows in (pixels, *others))
     return Evaluation(pixels, tuple(others), segment, valid, motion)
 
@@ -299,13 +315,15 @@ def _by_nodes(places: Places, motion: NodeMotion, problem: Problem, segment: Ind
 
 def _pixel_rows(problem: Problem, state: Unknowns, motion: NodeMotion, segment: Indices, time: Array) -> Rows:
     m = segment.size
-    residual, jacobian = np.zeros((m, 2)), np.zeros((m, 2, 18))
-    columns = np.full((m, 18), -1)
+    residual, jacobian = np.zeros((m, 2)), np.zeros((m, 2, 20))
+    columns = np.full((m, 20), -1)
     rows = np.flatnonzero(segment >= 0)
     places = places_at(motion, segment[rows], time[rows])
     by_nodes, columns[rows, :10] = _by_nodes(places, motion, problem, segment[rows])
     columns[:, 10:16] = problem.columns.pose[problem.view]
-    columns[:, 16:] = problem.columns.clock[problem.view]
+    columns[:, 16:18] = problem.columns.clock[problem.view]
+    columns[:, 18:] = problem.columns.aim[problem.view, problem.obs_group]
+    aim = state.aim[problem.view, problem.obs_group] * problem.block_px[:, None]
     elapsed = _clock_times(problem)
     for number, view in enumerate(problem.views):
         mine = np.flatnonzero(problem.view[rows] == number)
@@ -321,13 +339,14 @@ def _pixel_rows(problem: Problem, state: Unknowns, motion: NodeMotion, segment: 
             position=problem.position[here] + state.move[number],
             rotation=rotation,
         )
-        residual[here] = problem.pixel[here] - seen.pixel
+        residual[here] = problem.pixel[here] - seen.pixel - aim[here]
         jacobian[here, :, :10] = -seen.d_point @ by_nodes[mine]
         jacobian[here, :, 10:13] = -seen.d_rotation @ to_frame @ _left_jacobian(state.turn[number])
         jacobian[here, :, 13:16] = -seen.d_position
         by_time = -(seen.d_point @ places.velocity[mine][:, :, None])
         jacobian[here, :, 16:17] = by_time
         jacobian[here, :, 17:18] = by_time * elapsed[here, None, None]
+        jacobian[here, :, 18:] = -problem.block_px[here, None, None] * np.eye(2)
     return Rows(residual / problem.sigma_px[:, None], jacobian / problem.sigma_px[:, None, None], columns)
 
 
@@ -385,3 +404,10 @@ def _pose_rows(problem: Problem, state: Unknowns) -> Rows:
     deviation = np.concatenate([state.turn, state.move], axis=1)[free]
     whitening = problem.pose_whitening[free]
     return Rows(np.einsum("vij,vj->vi", whitening, deviation), whitening, problem.columns.pose[free])
+
+
+def _aim_rows(problem: Problem, state: Unknowns) -> Rows:
+    free = problem.columns.aim[:, :, 0] >= 0
+    residual = state.aim[free] / problem.sigma_aim
+    slope = np.broadcast_to(np.eye(2) / problem.sigma_aim, (len(residual), 2, 2))
+    return Rows(residual, slope, problem.columns.aim[free])

@@ -8,22 +8,24 @@ import numpy as np
 from scipy.stats import chi2
 
 from ..camera.model import rotation_from_vector
-from ..vectors import Array, dot, unit
+from ..vectors import Array, dot, norm, unit
 from .block import Block
 from .drag import Drag
 from .motion import FlightEnds
 from .node_motion import places_at
 from .picks import SAME_TIME_S, Mask, Picks
 from .placement import GroundNormals, pick_normals
-from .refinement_problem import NODE, evaluate
+from .refinement_problem import CLOCK_COLUMN, NODE, evaluate
 from .refinement_setup import Ground, Setup
 from .refinement_sigmas import impact_sigmas, velocity_rows
-from .refinement_solver import UNEXPLAINED, Solution
+from .refinement_solver import UNEXPLAINED, Solution, normal_equations
 from .trajectory import Reconstruction, reconstruct
 from .views import PixelObservations, View
 
 GRAZING_DEG = 5.0
 PULLED = 3.0
+HELD = 0.7
+"""A time whose standard deviation stays above this part of the marked one is told by the mark for the most part."""
 CLOCK_SIGNIFICANCE = 6.0
 
 
@@ -46,6 +48,8 @@ class Refinement:
     noise_scale : by how much the residuals are larger than stated, and by which the standard deviations of the pixels
         (of everything, where these do not explain it) were enlarged; 1 where they are not. The largest of all
         trajectories.
+    aim : by the names of view and trajectory, where the tracked spot lies off the block's centre in the image (u, v),
+        and its standard deviations, in parts of the block's diameter; empty where it was not sought.
     unknowns : fitted values with their standard deviations: gravity_mps2, drag_coefficient, "offset_s NAME",
         "drift NAME".
     iterations : the most that a trajectory took.
@@ -61,6 +65,7 @@ class Refinement:
     rmse_px: float
     rmse_px_by_view: Array
     noise_scale: float
+    aim: Mapping[tuple[str, str], tuple[Array, Array]]
     unknowns: Mapping[str, tuple[float, float]]
     iterations: int
     advice: tuple[str, ...]
@@ -125,6 +130,7 @@ def summarise(
         rmse_px=_rms(residual[good]),
         rmse_px_by_view=np.array(by_view),
         noise_scale=max(fit.scale * fit.setup.noise for fit in fits),
+        aim={key: value for fit in fits for key, value in _aim(views, fit).items()},
         unknowns=_unknowns(views, fits[0]),
         iterations=max(fit.solution.iterations for fit in fits),
         advice=_advice(ground, observations, residual, fits),
@@ -263,6 +269,15 @@ def _refined_views(views: tuple[View, ...], fit: _Fit) -> tuple[View, ...]:
     return tuple(refined)
 
 
+def _aim(views: tuple[View, ...], fit: _Fit) -> dict[tuple[str, str], tuple[Array, Array]]:
+    aim, columns = fit.solution.state.aim, fit.setup.problem.columns.aim
+    deviation = np.sqrt(np.diag(fit.covariance))
+    return {
+        (views[i].name, _group_name(fit.setup, j)): (aim[i, j], deviation[columns[i, j]])
+        for i, j in np.argwhere(columns[:, :, 0] >= 0)
+    }
+
+
 def _unknowns(views: tuple[View, ...], fit: _Fit) -> dict[str, tuple[float, float]]:
     columns, state, variance = fit.setup.problem.columns, fit.solution.state, np.diag(fit.covariance)
     found: dict[str, tuple[float, float]] = {}
@@ -290,7 +305,10 @@ def _advice(ground: Ground, observations: PixelObservations, residual: Array, fi
             sentences.append(f"Trajectory {name} has no pixels: its picks are as they were.")
     outside = int(np.isnan(residual[:, 0]).sum())
     if outside:
-        sentences.append(f"{outside} of {len(residual)} pixels lie outside of the marked motion and were not used.")
+        sentences.append(
+            f"{outside} of {len(residual)} pixels lie outside of the marked motion and were not used: mark one pick "
+            "further, impact or pass, on each side."
+        )
     for fit in fits:
         sentences += _fit_advice(fit)
     return tuple(sentences)
@@ -325,12 +343,46 @@ def _fit_advice(fit: _Fit) -> list[str]:
         sentences.append(
             f"The {at(int(node))} was moved by {change:+.0f} ms, more than its time allows: check the pick."
         )
-    sentences += _grazing(fit, at) + _late_views(fit)
+    sentences += _open_ends(fit) + _off_centre(fit) + _grazing(fit, at) + _late_views(fit)
     return sentences
+
+
+def _open_ends(fit: _Fit) -> list[str]:
+    """Trajectories whose motion ends in picks that no pixels beyond, and no terrain, tell the time of."""
+    setup, problem = fit.setup, fit.setup.problem
+    nodes = np.arange(setup.nodes.size)
+    end = ~(np.isin(nodes, problem.first) & np.isin(nodes, problem.last)) & (setup.picks.kind[setup.nodes] != "pass")
+    found = np.sqrt(np.diag(fit.covariance)[: NODE * nodes.size].reshape(-1, NODE)[:, 3])
+    held = np.flatnonzero(end & (found > HELD * fit.scale * problem.sigma_time_s))
+    owner = setup.picks.trajectory[setup.nodes[held]]
+    sentences = []
+    for name in dict.fromkeys(owner.tolist()):
+        times = [f"{time:.3f} s" for time in fit.solution.state.time_s[held[owner == name]]]
+        sentences.append(
+            f"Where the motion of trajectory {name} begins or ends, at {' and '.join(times)}, little but the "
+            "pick's own time holds it: mark one pick further, impact or pass, on each side."
+        )
+    return sentences
+
+
+def _off_centre(fit: _Fit) -> list[str]:
+    """Views in which what was tracked is hardly the block."""
+    problem, aim = fit.setup.problem, fit.solution.state.aim
+    far = np.argwhere(np.abs(aim).max(axis=2) > PULLED * problem.sigma_aim) if problem.sigma_aim > 0 else ()
+    return [
+        f"What was tracked of trajectory {_group_name(fit.setup, j)} in view {problem.views[i].name} lies "
+        f"{100 * float(norm(aim[i, j])):.0f} % of the block's diameter off its centre: check the track, the camera, "
+        "its clock and the block's size."
+        for i, j in far
+    ]
 
 
 def _name(setup: Setup, node: int) -> str:
     return str(setup.picks.trajectory[setup.nodes[node]])
+
+
+def _group_name(setup: Setup, group: int) -> str:
+    return _name(setup, setup.problem.first[np.argmax(setup.problem.group == group)])
 
 
 def _names(setup: Setup) -> str:
@@ -356,22 +408,26 @@ def _grazing(fit: _Fit, at: Callable[[int], str]) -> list[str]:
 
 
 def _late_views(fit: _Fit) -> list[str]:
-    """Views whose residuals lie along the motion, as those of a clock that is off do."""
+    """Views whose clock would be another if it were free, as one step of the search tells."""
     problem, solution = fit.setup.problem, fit.solution
-    rows, weight = solution.evaluation.pixels, solution.weight
-    slope = rows.jacobian[:, :, 16]
+    seen, size = np.unique(problem.view[solution.weight > 0]), problem.columns.size
     sentences: list[str] = []
-    if len(np.unique(problem.view)) < 2:
-        return sentences
-    for i in np.unique(problem.view):
-        mine = np.flatnonzero((problem.view == i) & (weight > 0))
-        if problem.columns.clock[i, 0] >= 0 or not mine.size:
+    for i in seen[1:]:
+        if problem.columns.clock[i, 0] >= 0:
             continue
-        information = float((weight[mine, None] * slope[mine] ** 2).sum())
-        late = -float((weight[mine, None] * slope[mine] * rows.residual[mine]).sum()) / max(information, 1e-300)
-        if abs(late) * np.sqrt(information) > CLOCK_SIGNIFICANCE * fit.scale:
+        rows = solution.evaluation.pixels
+        columns = rows.columns.copy()
+        columns[problem.view == i, CLOCK_COLUMN] = size
+        freed = replace(problem, columns=replace(problem.columns, size=size + 1))
+        evaluation = replace(solution.evaluation, pixels=replace(rows, columns=columns))
+        information, gradient = normal_equations(freed, evaluation, solution.weight)
+        scale = np.sqrt(np.diag(information))
+        scale[scale == 0] = 1.0
+        inverse = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        late = -float(inverse[-1] @ gradient)
+        if abs(late) > CLOCK_SIGNIFICANCE * fit.scale * float(np.sqrt(inverse[-1, -1])):
             sentences.append(
-                f"{_names(fit.setup)}: the clock of view {problem.views[i].name} seems to be off by "
-                f"{-1e3 * late:+.0f} ms or more: fit the clocks too."
+                f"{_names(fit.setup)}: the clock of view {problem.views[i].name} seems to be off by about "
+                f"{1e3 * late:+.0f} ms: fit the clocks too."
             )
     return sentences

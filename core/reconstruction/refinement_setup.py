@@ -128,6 +128,7 @@ def set_up(
     names: list[str],
     gravity_mps2: float,
     free: frozenset[str],
+    sigma_aim: float = 0.0,
 ) -> Setup:
     """The joint problem of some trajectories.
 
@@ -151,6 +152,8 @@ def set_up(
     timed = np.bincount(seen.view, minlength=len(views)) > 0
     timed[np.argmax(timed)] = False
     posed = np.array([view.pose_covariance is not None for view in views])
+    aimed = np.zeros((len(views), len(names)), dtype=np.bool_)
+    aimed[seen.view, groups] = sigma_aim > 0
     centre = picks.position[nodes] + np.nan_to_num(ground.radius_m[:, None] * ground.normals.normal)[nodes]
     passes = _passes(picks, segments, chosen)
     delay = np.array([view.row_time_s for view in views])[seen.view]
@@ -168,13 +171,15 @@ def set_up(
         reference_drag=ground.reference_drag[first_pick],
         group=group_of_pick[first_pick],
         chain=segments.chain[first_pick],
-        columns=free_columns(nodes.size, free, posed, timed),
+        columns=free_columns(nodes.size, free, posed, timed, aimed),
         view=seen.view,
         obs_group=groups,
         video_s=seen.time_s,
         row_s=delay * (seen.pixel[:, 1] - height / 2),
         pixel=seen.pixel,
         sigma_px=_pixel_sigmas(views, seen, centre.mean(axis=0)),
+        block_px=_block_sizes(ground, views, seen, nodes, centre, position),
+        sigma_aim=sigma_aim,
         position=position,
         rotation=rotation,
         time_s=picks.time_s[nodes],
@@ -199,6 +204,7 @@ def set_up(
         move=np.zeros((v, 3)),
         offset_s=np.zeros(v),
         drift=np.zeros(v),
+        aim=np.zeros((v, len(names), 2)),
         coefficient=ground.coefficient,
         gravity=gravity_mps2,
     )
@@ -246,6 +252,28 @@ def _pixel_sigmas(views: tuple[View, ...], seen: PixelObservations, middle: Arra
         shift = np.interp(seen.time_s[mine], path.time_s, path.sigma_position_m)
         variance[mine] += focal**2 * (turn**2 + (shift / distance) ** 2)
     return np.sqrt(variance)
+
+
+def _block_sizes(
+    ground: Ground,
+    views: tuple[View, ...],
+    seen: PixelObservations,
+    nodes: Indices,
+    centre: Array,
+    position: Array,
+) -> Array:
+    """(m,) diameter of the block in the image [px], at the distance of the marked motion."""
+    focal = np.array([(view.camera.camera.fx + view.camera.camera.fy) / 2 for view in views])
+    common = np.empty(len(seen))
+    for i, view in enumerate(views):
+        common[seen.view == i] = view.clock.to_common(seen.time_s[seen.view == i])
+    size = np.empty(len(seen))
+    for name in np.unique(seen.trajectory):
+        rows, own = np.flatnonzero(seen.trajectory == name), np.flatnonzero(ground.picks.trajectory[nodes] == name)
+        time = ground.picks.time_s[nodes[own]]
+        place = np.stack([np.interp(common[rows], time, centre[own, axis]) for axis in range(3)], axis=1)
+        size[rows] = 2 * ground.radius_m[nodes[own[0]]] / np.maximum(norm(place - position[rows]), 1e-3)
+    return size * focal[seen.view]
 
 
 def _check_overlap(picks: Picks, views: tuple[View, ...], seen: PixelObservations) -> None:

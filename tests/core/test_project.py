@@ -244,6 +244,7 @@ def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
 
 def test_a_project_knows_what_a_refinement_knows() -> None:
     assert formats.FREE == refinement.FREE
+    assert formats.SIGMA_AIM == refinement.SIGMA_AIM
     assert set(formats.LOSSES) == set(refinement_solver.LOSSES)
     assert set(formats.FLIGHTS) == set(get_args(FlightEnds))
 

@@ -117,6 +117,8 @@ file = "picks.csv"
 d1_m = 0.5
 d2_m = 0.5
 d3_m = 0.5
+[refinement]
+sigma_aim = 0.0
 [[videos]]
 name = "left"
 file = "moved/away.mp4"
@@ -232,6 +234,23 @@ def test_one_video_is_enough_and_a_track_need_not_name_the_only_trajectory(site,
     assert main(["refine", str(site / "project.toml"), "--out", str(tmp_path / "out")]) == 0
     assert read_picks(tmp_path / "out" / "picks.csv").trajectory.tolist() == ["B1"] * 4
     check_picks(tmp_path / "out", ("B1",))
+
+
+def test_pixels_that_may_lie_off_the_centre_leave_the_places_less_known(site, tmp_path, capsys):
+    """The table of impacts stays within a terminal."""
+    sigma = []
+    for number, aim in enumerate(("0", "0.15")):
+        argv = ["refine", str(site / "project.toml"), "--sigma-aim", aim, "--out", str(tmp_path / str(number))]
+        assert main(argv) == 0
+        said = capsys.readouterr().out
+        assert ("The tracked spot lies" in said) == (aim != "0")
+        table = [line for line in said.splitlines() if line.startswith(("trajectory", "B1  ", "B2  "))]
+        assert len(table) == 8
+        assert max(map(len, table)) <= 100
+        assert "restituted m/s" in table[0]
+        sigma.append(read_picks(tmp_path / str(number) / "picks.csv", SHIFT).sigma_position_m)
+        assert read_project(tmp_path / str(number) / "project.toml").refinement.sigma_aim == float(aim)
+    assert (sigma[1] > 1.2 * sigma[0])[[1, 2, 5]].all()
 
 
 def test_one_trajectory_alone(site, tmp_path):

@@ -175,7 +175,9 @@ def test_a_clock_is_found_from_far_off():
     assert result.views[1].clock.offset_s == value
     check_exact(result)
     held = run([views[0], replace(views[1], clock=Clock(1.35))], pixels)
-    assert any("fit the clocks" in sentence for sentence in held.advice)
+    told = [sentence for sentence in held.advice if "fit the clocks" in sentence]
+    assert len(told) == 1
+    assert float(told[0].split("about ")[1].split(" ms")[0]) == pytest.approx(-50, abs=10)
 
 
 def test_a_pose_is_corrected_by_the_other_view():
@@ -205,7 +207,7 @@ def test_the_derivatives_are_right(drag):
     place = np.insert(PLACE, 2, states(np.array([3.0]))[1], axis=0)
     picks = make_picks(["a"] * 6, time, place, kind=kinds, sigma_position_m=np.full(6, 0.1))
     ground = prepare(picks, SURFACE, BLOCK, drag, None, 0.02)
-    setup = set_up(ground, tuple(views), observe(views, rate=12.0), ["a"], 9.81, frozenset(free))
+    setup = set_up(ground, tuple(views), observe(views, rate=12.0), ["a"], 9.81, frozenset(free), 0.15)
     problem = setup.problem
     rng = np.random.default_rng(4)
     state = moved(problem, setup.state, 1e-3 * rng.normal(size=problem.columns.size))
@@ -232,16 +234,75 @@ def test_the_derivatives_are_right(drag):
         np.testing.assert_allclose(analytic[:, column] / size, numeric / size, atol=3e-6, err_msg=str(column))
 
 
-def test_intervals_cover_the_truth():
+def patches(normals):
+    """A terrain of five squares of 2 m that the block touches at its contacts, each with its normal."""
+    vertices, faces = [], []
+    for place, normal in zip(PLACE + RADIUS * OUT - RADIUS * normals, normals, strict=True):
+        along = np.cross([0, 1, 0], normal)
+        along /= np.linalg.norm(along)
+        across = np.cross(normal, along)
+        faces += (np.array([[0, 1, 2], [0, 2, 3]]) + len(vertices)).tolist()
+        vertices += [place + a * along + b * across for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    return Surface(np.array(vertices), np.array(faces, dtype=np.int32), GlobalShift(), "patches")
+
+
+def aimed(views, pixels, parts):
+    """Pixels whose spot is a part of the block's diameter off its centre, (v, 2)."""
+    off = np.empty_like(pixels.pixel)
+    for number, one in enumerate(views):
+        mine = pixels.view == number
+        place = states(np.asarray(one.clock.to_common(pixels.time_s[mine])))[1]
+        size = one.camera.camera.fx * 2 * RADIUS / np.linalg.norm(place - one.camera.camera.position, axis=1)
+        off[mine] = size[:, None] * parts[number]
+    return replace(pixels, pixel=pixels.pixel + off)
+
+
+def test_contacts_with_an_uneven_terrain_tell_where_the_tracked_spot_is():
+    tilt = np.array([[0.2, 0.3], [-0.3, -0.4], [0.4, -0.3], [-0.2, 0.5], [0.3, -0.2]])
+    normals = OUT + tilt @ np.stack([DOWN, [0, 1, 0]])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    touched = PLACE + RADIUS * (OUT - normals)
+    views, parts = [view(50.0), view(-20.0)], np.array([[0.3, -0.2], [-0.1, 0.2]])
+    pixels = aimed(views, observe(views, sigma=0.2), parts)
+    picks = make_picks(["a"] * 5, TIME + 0.01, touched, **EXACT)
+    options = {"surface": patches(normals), "sigma_terrain_m": 0.001, "normal_radius_m": 0.3}
+    result = run(views, pixels, picks, sigma_aim=1.0, **options)
+    assert list(result.aim) == [("from 50°", "a"), ("from -20°", "a")]
+    np.testing.assert_allclose([found for found, _ in result.aim.values()], parts, atol=0.002)
+    assert max(sigma.max() for _, sigma in result.aim.values()) < 0.02
+    assert np.linalg.norm(result.picks.position - touched, axis=1)[1:-1].max() < 0.002
+    ignored = run(views, pixels, picks, sigma_aim=0.0, **options)
+    assert ignored.aim == {}
+    assert np.linalg.norm(ignored.picks.position - touched, axis=1)[1:-1].min() > 0.05
+    far = run(views, pixels, picks, sigma_aim=0.05, **options)
+    assert any("of the block's diameter off its centre" in sentence for sentence in far.advice)
+
+
+def test_ends_that_only_their_marks_hold_are_told():
+    views = [view(50.0), view(-20.0)]
+    picks = marked(normal=np.tile(OUT, (5, 1)))
+    floating = run(views, observe(views, noise=1.0), picks, surface=None)
+    (told,) = [sentence for sentence in floating.advice if "begins or ends" in sentence]
+    assert "2.0" in told
+    assert "4.59" in told
+    lying = run(views, observe(views, noise=1.0), picks)
+    assert not any("begins or ends" in sentence for sentence in lying.advice)
+
+
+@pytest.mark.parametrize("sigma_aim", [0.0, 0.15])
+def test_intervals_cover_the_truth(sigma_aim):
     views = [view(50.0)]
-    inside, ratio = [], []
+    inside, ratio, places = [], [], []
     for seed in range(60):
         rng = np.random.default_rng(100 + seed)
         picks = marked(seed, sigma_time_s=np.full(5, 0.01))
         picks = replace(picks, time_s=TIME + 0.01 * rng.normal(size=5))
         lift = 0.02 * rng.normal(size=5)
         motion, _ = states(TIME, lift=lift)
-        result = run(views, observe(views, noise=1.0, seed=seed, lift=lift), picks)
+        pixels = observe(views, noise=1.0, seed=seed, lift=lift)
+        result = run(views, aimed(views, pixels, sigma_aim * rng.normal(size=(1, 2))), picks, sigma_aim=sigma_aim)
+        away = result.picks.position - PLACE - lift[:, None] * OUT
+        places += (away / result.picks.sigma_position_m[:, None])[1:-1].ravel().tolist()
         impacts = result.reconstruction.impacts
         for found, true, sigma in (
             (impacts.v1[1:], motion.end_velocity, impacts.sigma["v1"][1:]),
@@ -251,6 +312,7 @@ def test_intervals_cover_the_truth():
             ratio += ((found - true) / sigma).ravel().tolist()
     assert 0.92 < np.mean(inside) < 0.98
     assert 0.85 < np.std(ratio) < 1.15
+    assert 0.85 < np.sqrt(np.mean(np.square(places))) < 1.15
 
 
 def test_outliers_are_left_out():

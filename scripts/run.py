@@ -4,6 +4,7 @@
     python3.13 scripts/run.py demo [rockfall arguments]            # the whole job on the bundled site, into out/demo
     python3.13 scripts/run.py test [core|blender|browser] [pytest arguments]
     python3.13 scripts/run.py rockfall COMMAND ...                 # any command of Rockfall
+    python3.13 scripts/run.py footage                              # the demo's video to impacts, against the truth
     python3.13 scripts/run.py lint                                 # ruff and mypy
     python3.13 scripts/run.py extension [arguments]                # the zips for Blender, see build_extension.py
     python3.13 scripts/run.py interface [cases]                    # clicks in a real window, see interface_tests.py
@@ -180,6 +181,10 @@ def test(arguments: list[str]) -> int:
     return int(failed)
 
 
+def footage(arguments: list[str]) -> int:
+    return start(PYTHON, "scripts/compare_demo_footage.py", *arguments)[0]
+
+
 def lint(arguments: list[str]) -> int:
     checks = ([SCRIPTS / "ruff", "check"], [SCRIPTS / "ruff", "format", "--check"], [PYTHON, "-m", "mypy"])
     return max([abs(start(*check, *arguments)[0]) for check in checks])
@@ -198,7 +203,7 @@ def setup(arguments: list[str]) -> int:
     return 0
 
 
-COMMANDS = (demo, test, rockfall, lint, extension, interface, setup)
+COMMANDS = (demo, test, rockfall, footage, lint, extension, interface, setup)
 
 
 def main() -> int:

@@ -532,6 +532,7 @@ def _begin_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
         scene.rockfall.playback = "REAL"
     scene.frame_start = int(np.floor(scene_frame_of(scene, camera, 0)))
     scene.frame_end = max(int(np.ceil(scene_frame_of(scene, camera, video.frames - 1))), scene.frame_start + 1)
+    scene.frame_set(scene.frame_start)
 
 
 def _keyed_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[float]:

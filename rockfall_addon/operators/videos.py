@@ -341,7 +341,7 @@ def register_keys() -> None:
     config = bpy.context.window_manager.keyconfigs.addon if bpy.context.window_manager else None
     if config is None:
         return
-    keymap = config.keymaps.new(name="3D View", space_type="VIEW_3D")
+    keymap = config.keymaps.new(name="Frames")  # Blender's own steps are there, and come before those of the 3-D view
     for key, modifiers, step in KEYS:
         item = keymap.keymap_items.new("rockfall.step_frame", key, "PRESS", repeat=True, head=True, **modifiers)
         item.properties.step, item.properties.in_camera_view = step, True

@@ -27,13 +27,15 @@ def case_footage_behind_the_camera(window):
     scene = bpy.context.scene
     window.screenshot("first")
     x, y = window.centre()
+    scene.render.fps = 45  # so that a picture is more than a frame
     for _ in range(3):
         yield from window.press("RIGHT_ARROW", x, y)
-    assert scene.frame_current == 3
+    assert (scene.frame_current, scene.frame_subframe) == (4, 0.5), "the third picture is at 4.5 frames of this scene"
     yield from window.press("RIGHT_ARROW", x, y, ctrl=True)
-    assert scene.frame_current == 13
+    assert scene.frame_current == 19
     yield from window.press("LEFT_ARROW", x, y)
-    assert scene.frame_current == 12
+    assert scene.frame_current == 18
+    scene.render.fps = 30
     scene.frame_set(150)
     yield 1.5
     window.screenshot("later")
@@ -42,6 +44,7 @@ def case_footage_behind_the_camera(window):
 def case_every_picture_on_the_screen(window):
     """The bars that are seen behind the camera are those of the true frame, whatever the file's rates."""
     yield 0.5
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
     space = window.area().spaces.active
     space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
     space.overlay.show_text = space.show_gizmo = space.overlay.show_cursor = False

@@ -3,11 +3,12 @@
 
 import bpy
 
-from . import film, impact, impact_table, models, picks, playback, share, terrain, videos
+from . import alignment, film, impact, impact_table, models, picks, playback, share, terrain, videos
 
 CLASSES = (
     *terrain.CLASSES,
     *videos.CLASSES,
+    *alignment.CLASSES,
     *picks.CLASSES,
     *impact.CLASSES,
     *impact_table.CLASSES,

@@ -3,6 +3,7 @@
 
 import bpy
 
+from . import alignment
 from .impacts import ImpactRow, PickProperties
 from .picking import PickingSettings
 from .settings import SceneSettings
@@ -28,9 +29,11 @@ def register() -> None:
     bpy.types.Object.rockfall_pick = bpy.props.PointerProperty(type=PickProperties)
     bpy.utils.register_class(VideoProperties)
     bpy.types.Object.rockfall_video = bpy.props.PointerProperty(type=VideoProperties)
+    alignment.register()
 
 
 def unregister() -> None:
+    alignment.unregister()
     del bpy.types.Object.rockfall_video
     bpy.utils.unregister_class(VideoProperties)
     del bpy.types.Object.rockfall_pick

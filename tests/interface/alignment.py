@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A person aligns the demo's footage: clicks in the picture and on the terrain, corrects, undoes."""
+
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+DEMO = Path(__file__).resolve().parents[2] / "assets" / "demo"
+FOOTAGE = DEMO / "footage"
+
+
+def start(window):
+    """The demo's terrain, its footage, and both side by side."""
+    yield from window.show_sidebar()
+    with window.override():
+        assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
+    scene = bpy.context.scene
+    camera = window.part("rockfall_addon.bridge.videos").add_video(scene, FOOTAGE / "footage.mp4")
+    yield 1.0
+    with window.override():
+        assert bpy.ops.rockfall.align_views() == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="start")
+    yield 2.0
+    for area in views(window):
+        area.spaces.active.overlay.show_text = False
+    assert camera.name in bpy.data.objects
+
+
+def views(window):
+    found = [area for area in window.window.screen.areas if area.type == "VIEW_3D"]
+    return sorted(found, key=lambda area: area.x)
+
+
+def region_of(area):
+    return next(region for region in area.regions if region.type == "WINDOW")
+
+
+def table(window):
+    shift = window.part("rockfall_addon.bridge.state").read_shift(bpy.context.scene)
+    return window.part("core.exchange.cameras").read_pairs(FOOTAGE / "pairs.csv", shift)
+
+
+def the_camera(window):
+    return window.part("rockfall_addon.bridge.videos").active_camera(bpy.context.scene)
+
+
+def in_picture(window, pixel):
+    """Where a pixel of the footage is in the window."""
+    view, area = window.part("rockfall_addon.bridge.image_view"), views(window)[0]
+    region, camera = region_of(area), the_camera(window)
+    rectangle = view.image_rectangle(region, area.spaces.active.region_3d, bpy.context.scene, camera)
+    assert rectangle is not None, "the left view looks through the camera"
+    x, y = view.to_region(rectangle, (1280, 720), pixel)
+    return region.x + x, region.y + y
+
+
+def on_terrain(window, point):
+    """Where a point is in the window, in the free view."""
+    area = views(window)[1]
+    region = region_of(area)
+    spot = location_3d_to_region_2d(region, area.spaces.active.region_3d, Vector(point))
+    return region.x + spot.x, region.y + spot.y
+
+
+def look_at(window, points):
+    """Turn the free view towards the points, from where the film was shot."""
+    view = views(window)[1].spaces.active.region_3d
+    centre = np.mean(points, axis=0)
+    view.view_location = centre
+    view.view_rotation = Vector((0.2, -0.85, 0.4)).to_track_quat("Z", "Y")
+    view.view_distance = 85.0
+
+
+def case_align_with_clicks(window):
+    yield from start(window)
+    bridge, videos = (window.part(f"rockfall_addon.bridge.{name}") for name in ("alignment", "videos"))
+    ground = table(window)
+    look_at(window, ground.point)
+    yield 1.0
+    window.screenshot("1-start")
+    order = [1, 4, 7, 11, 5, 9]
+    for count, i in enumerate(order):
+        pixel, place = in_picture(window, ground.pixel[i]), on_terrain(window, ground.point[i])
+        first, second = (pixel, place) if count % 2 == 0 else (place, pixel)
+        yield from window.click(*first)
+        if count == 0:
+            yield 0.5
+            window.screenshot("2-half-pair")
+        pair = bridge.open_pair(the_camera(window))
+        assert pair is not None, f"pair {count} is open"
+        if count < 5:
+            yield from window.click(*second)
+            assert bridge.open_pair(the_camera(window)) is None, f"pair {count} is complete"
+    camera = the_camera(window)
+    assert videos.is_solved(camera), bridge.solution_of(camera).problem
+    pair = bridge.open_pair(camera)
+    assert pair.proposed == "pixel", "five pairs solve the camera, so the sixth is predicted"
+    yield 1.0
+    window.screenshot("3-predicted")
+    x, y = in_picture(window, pair.pixel)
+    goal = in_picture(window, ground.pixel[order[-1]])
+    yield from window.move(x, y)
+    window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
+    yield 0.2
+    times = []
+    for share in (0.3, 0.6, 1.0):
+        begun = time.perf_counter()
+        yield from window.move(x + share * (goal[0] - x) + 4 * (share < 1), y + share * (goal[1] - y))
+        times.append(time.perf_counter() - begun)
+    window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(goal[0]), y=round(goal[1]))
+    yield 0.5
+    camera = the_camera(window)
+    assert bridge.open_pair(camera) is None
+    assert sum(pair.is_complete for pair in bridge.pairs_of(camera)) == 6
+    focal, rmse = bridge.focal_px(camera), bridge.solution_of(camera).rmse_px
+    print(f"focal {focal:.0f} px, rmse {rmse:.2f} px, {bridge.solution_of(camera).advice}")
+    camera.rockfall_alignment.blend = 0.5
+    camera.rockfall_alignment.magnify = True
+    yield 1.5
+    window.screenshot("4-solved-blended")
+    camera.rockfall_alignment.magnify = False
+    camera.rockfall_alignment.use_wipe = True
+    yield 1.5
+    window.screenshot("5-wipe")
+    camera.rockfall_alignment.use_wipe = False
+    with window.override():
+        bpy.ops.ed.undo_push(message="look")
+    for left in (6, 5):
+        yield from window.press("X", *window.centre())
+        yield 0.5
+        assert len(bridge.pairs_of(the_camera(window))) == left - 1
+    for expected in (5, 6):
+        with window.override():
+            bpy.ops.ed.undo()
+        yield 0.7
+        assert len(bridge.pairs_of(the_camera(window))) == expected
+    assert len(the_camera(window).rockfall_alignment.rows) == 6
+    assert abs(bridge.focal_px(the_camera(window)) - focal) < 1e-6, "undo brings the solution back"
+    assert not window.part("rockfall_addon.bridge.problems").sentences(bpy.context.scene) or True
+
+
+def case_align_follow_hand_held(window):
+    yield from start(window)
+    bridge, videos = (window.part(f"rockfall_addon.bridge.{name}") for name in ("alignment", "videos"))
+    with window.override():
+        assert bpy.ops.rockfall.import_pairs(filepath=str(FOOTAGE / "pairs.csv")) == {"FINISHED"}
+    camera = the_camera(window)
+    camera.rockfall_alignment.motion = "ROTATION"
+    yield 1.0
+    window.screenshot("1-imported")
+    following = window.part("rockfall_addon.bridge.following")
+    with window.override():
+        bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
+    yield 1.5
+    assert following.running
+    window.screenshot("2-running")
+    yield from window.press("ESC", *window.centre())
+    yield 1.0
+    assert not following.running
+    assert len(the_camera(window)["rockfall_pose_times_s"]) == 1
+    begun = time.perf_counter()
+    with window.override():
+        bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: not following.running, 150, "followed")
+    print(f"followed in {time.perf_counter() - begun:.1f} s")
+    yield 1.0
+    assert len(the_camera(window)["rockfall_pose_times_s"]) == 300
+    scene = bpy.context.scene
+    scene.frame_set(150)
+    the_camera(window).rockfall_alignment.blend = 0.6
+    yield 1.5
+    window.screenshot("3-frame-150")
+    with window.override():
+        assert bpy.ops.rockfall.propose_pairs() == {"FINISHED"}
+    yield 1.0
+    window.screenshot("4-correct-here")
+    assert videos.is_solved(the_camera(window))
+    assert bridge.hint(scene, the_camera(window))

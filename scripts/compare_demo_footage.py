@@ -2,8 +2,8 @@
 """From the demo's rendered footage to impacts, with no truth given; then against the truth.
 
 Runs ``rockfall align``, ``rockfall track`` and ``rockfall refine`` on assets/demo/footage as a user would, and prints
-how far camera, track, times, places and speeds are off. With --ship, what align and track wrote is put beside the
-footage, where its project uses it.
+how far camera, track, times, places (beside their standard deviations, of each axis) and speeds are off. With --ship,
+what align and track wrote is put beside the footage, where its project uses it.
 """
 
 import argparse
@@ -104,7 +104,10 @@ def report(out: Path) -> int:
     late = found_at - at[match]
     contact = numbers([true[i] for i in match], *(f"contact_{axis}_m" for axis in AXES))
     off = norm(numbers(found, "x_m", "y_m", "z_m") - contact)
-    print("  impact   time       place     incident speed            restituted speed          contacts")
+    picks = rows_of(out / "refined" / "picks.csv")
+    nearest = np.argmin(np.abs(numbers(picks, "time_s")[:, 0] - found_at[:, None]), axis=1)
+    sigma = numbers(picks, "sigma_position_m")[nearest, 0]
+    print("  impact   time       place (σ)      incident speed            restituted speed          contacts")
     errors = []
     for i, row in enumerate(found):
         cells = []
@@ -117,12 +120,13 @@ def report(out: Path) -> int:
             )
         contacts = true[match[i]]["contacts"]
         print(
-            f"  {i + 1:>6}   {1e3 * late[i]:+5.1f} ms   {100 * off[i]:4.0f} cm   {cells[0]:<26}{cells[1]:<26}{contacts}"
+            f"  {i + 1:>6}   {1e3 * late[i]:+5.1f} ms   {100 * off[i]:4.0f} cm ({100 * sigma[i]:2.0f})   {cells[0]:<26}"
+            f"{cells[1]:<26}{contacts}"
         )
     single = np.array([true[i]["contacts"] == "1" for i in match])
     print(
-        f"  median   {1e3 * np.median(np.abs(late)):5.1f} ms   {100 * np.median(off):4.0f} cm   speeds "
-        f"{100 * np.nanmedian(errors):.2f} %; where one contact makes the impact, time "
+        f"  median   {1e3 * np.median(np.abs(late)):5.1f} ms   {100 * np.median(off):4.0f} cm ({100 * np.median(sigma):2.0f})   "
+        f"speeds {100 * np.nanmedian(errors):.2f} %; where one contact makes the impact, time "
         f"{1e3 * np.median(np.abs(late[single])):.1f} ms"
     )
     good = (

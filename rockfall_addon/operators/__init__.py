@@ -3,7 +3,21 @@
 
 import bpy
 
-from . import alignment, demo, film, impacts, look, models, picking, picks, share, terrain, videos
+from . import (
+    alignment,
+    demo,
+    film,
+    impacts,
+    look,
+    models,
+    picking,
+    picks,
+    refinement,
+    share,
+    terrain,
+    tracking,
+    videos,
+)
 
 CLASSES = (
     *terrain.CLASSES,
@@ -11,6 +25,8 @@ CLASSES = (
     *alignment.CLASSES,
     *picks.CLASSES,
     *picking.CLASSES,
+    *tracking.CLASSES,
+    *refinement.CLASSES,
     *impacts.CLASSES,
     *look.CLASSES,
     *models.CLASSES,

@@ -3,15 +3,17 @@
 
 import bpy
 
-from . import alignment, film, impact, impact_table, models, picks, playback, share, terrain, videos
+from . import alignment, film, impact, impact_table, models, picking, picks, playback, refinement, share, terrain, videos
 
 CLASSES = (
     *terrain.CLASSES,
     *videos.CLASSES,
     *alignment.CLASSES,
     *picks.CLASSES,
+    *picking.CLASSES,
     *impact.CLASSES,
     *impact_table.CLASSES,
+    *refinement.CLASSES,
     *models.CLASSES,
     *playback.CLASSES,
     *film.CLASSES,

@@ -126,8 +126,8 @@ def report(out: Path) -> int:
     single = np.array([true[i]["contacts"] == "1" for i in match])
     print(
         f"  median   {1e3 * np.median(np.abs(late)):5.1f} ms   {100 * np.median(off):4.0f} cm "
-        f"({100 * np.median(sigma):2.0f})   speeds {100 * np.nanmedian(errors):.2f} %; where one contact makes the impact, time "
-        f"{1e3 * np.median(np.abs(late[single])):.1f} ms"
+        f"({100 * np.median(sigma):2.0f})   speeds {100 * np.nanmedian(errors):.2f} %; "
+        f"where one contact makes the impact, time {1e3 * np.median(np.abs(late[single])):.1f} ms"
     )
     good = (
         len(found) == len(true) - 1

@@ -134,7 +134,7 @@ def set_up(
 
     Raises
     ------
-    InputError : the pixels of a trajectory lie outside the time of its picks, or a block is behind a camera.
+    InputError : the pixels of a trajectory lie outside the time of its picks, or no two of its picks are joined.
     """
     picks, segments = ground.picks, ground.segments
     number = {name: i for i, name in enumerate(names)}
@@ -147,7 +147,7 @@ def set_up(
     rows = np.flatnonzero(np.isin(observations.trajectory, names))
     seen = observations.take(rows)
     groups = np.array([number[name] for name in seen.trajectory.tolist()], dtype=np.intp)
-    _check_overlap(picks, views, seen)
+    _check_overlap(picks, views, seen, set(picks.trajectory[nodes].tolist()))
 
     timed = np.bincount(seen.view, minlength=len(views)) > 0
     timed[np.argmax(timed)] = False
@@ -276,13 +276,13 @@ def _block_sizes(
     return size * focal[seen.view]
 
 
-def _check_overlap(picks: Picks, views: tuple[View, ...], seen: PixelObservations) -> None:
+def _check_overlap(picks: Picks, views: tuple[View, ...], seen: PixelObservations, joined: set[str]) -> None:
     for name in np.unique(seen.trajectory):
         mine = seen.trajectory == name
         marked = picks.time_s[(picks.trajectory == name) & (picks.status != "discarded")]
-        if marked.size < 2:
+        if name not in joined:
             raise InputError(
-                "A trajectory needs two picks or more to be fitted to pixels",
+                "A trajectory needs two picks or more that nothing interrupts to be fitted to pixels",
                 trajectory=str(name),
                 advice="Mark the impacts before and after the flight",
             )

@@ -418,5 +418,7 @@ def test_what_cannot_be_refined():
         run(views, pixels, free=("wind",))
     with pytest.raises(InputError, match="two picks or more"):
         run(views, pixels, make_picks(["a"], TIME[:1], PLACE[:1]))
+    with pytest.raises(InputError, match="that nothing interrupts"):
+        run(views, pixels, make_picks(["a"] * 2, TIME[:2], PLACE[:2], status=["shattered", "ok"]))
     late = run(views, replace(pixels, time_s=pixels.time_s + 0.5))
     assert any("outside of the marked motion" in sentence for sentence in late.advice)

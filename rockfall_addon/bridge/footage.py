@@ -226,6 +226,7 @@ def _heal(things: list[bpy.types.Object]) -> None:
                 background.clip = background.clip.copy()
         still = _background(thing, "IMAGE")
         if still is not None:
+            still.image = None
             thing.data.background_images.remove(still)
         if thing.animation_data is not None and thing.animation_data.action is not None:
             thing.animation_data.action = thing.animation_data.action.copy()

@@ -138,6 +138,7 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
     clip = bpy.data.movieclips.load(camera[FILE_KEY])
     clip.name = camera.name
     for old in list(camera.data.background_images):
+        old.clip = old.image = None  # removing does not count down their users
         camera.data.background_images.remove(old)
     background = camera.data.background_images.new()
     background.source, background.clip = "MOVIE_CLIP", clip

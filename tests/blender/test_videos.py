@@ -139,3 +139,315 @@ def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object,
     scene().camera = camera
     for index in range(0, 40, 1):
         assert seen(camera, videos.scene_frame_of(scene(), camera, index)) == index
+
+
+def add(part: Part, name: str) -> bpy.types.Object:
+    return part("rockfall_addon.bridge.videos").add_video(scene(), DATA / name)
+
+
+@pytest.fixture
+def pair(part: Part) -> tuple[bpy.types.Object, bpy.types.Object]:
+    """A video of 30 pictures a second, and one that varies and begins elsewhere."""
+    return add(part, "constant.mp4"), add(part, "variable.mp4")
+
+
+@pytest.mark.parametrize("fit_drift", [False, True])
+def test_events_synchronise(part: Part, fit_drift: bool) -> None:
+    """Events at pictures whose times are known lead back to the clock that was made up for the second video."""
+    videos, times = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_times")
+    reference, other = (add(part, "slower.mp4") for _ in range(2))
+    assert times.reference_camera(scene()) == reference
+    drift = 0.02 if fit_drift else 0.0
+    seen = videos.times_of(reference)[[30, 80, 110, 130]]
+    truth = part("core.footage.clock").Clock(-0.3, drift, 0.2)
+    other_s = videos.times_of(other)
+    step = 0.0
+    for number, common in enumerate(seen, start=1):
+        times.go_to(scene(), videos.frame_at(scene(), common))
+        times.mark_event(scene(), reference, number)
+        index = int(np.abs(other_s - truth.to_video(common)).argmin())
+        step = max(step, abs(float(other_s[index] - truth.to_video(common))))
+        times.go_to(scene(), videos.scene_frame_of(scene(), other, index))
+        assert times.mark_event(scene(), other, number) == pytest.approx(other_s[index], abs=1e-9)
+    said = times.synchronise_cameras(scene(), fit_drift=fit_drift)
+    found = videos.clock_of(other)
+    np.testing.assert_allclose(found.to_common(other_s), truth.to_common(other_s), atol=4 * step)
+    assert "4 events" in said[0]
+    assert other["rockfall_synchronised"].startswith(said[0])
+    assert videos.clock_of(reference).offset_s == 0.0
+
+
+def test_nothing_to_synchronise(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
+    times, errors = part("rockfall_addon.bridge.video_times"), part("core.errors")
+    with pytest.raises(errors.RockfallError, match="same event"):
+        times.synchronise_cameras(scene(), fit_drift=False)
+    part("rockfall_addon.bridge.footage").remove(scene(), pair[1])
+    with pytest.raises(errors.RockfallError, match="one video only"):
+        times.synchronise_cameras(scene(), fit_drift=False)
+
+
+def test_stepping_lands_on_true_frames(part: Part) -> None:
+    videos, times = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_times")
+    camera = add(part, "variable.mp4")
+    scene().render.fps = 24
+    stamps = videos.times_of(camera)
+    scene().frame_set(0)
+    for index in range(1, 40):
+        assert bpy.ops.rockfall.step_frame(step=1) == {"FINISHED"}
+        assert videos.true_frame(scene(), camera) == index
+        assert videos.video_time(scene(), camera) == pytest.approx(stamps[index], abs=2e-7)
+    bpy.ops.rockfall.step_frame(step=-10)
+    assert videos.true_frame(scene(), camera) == 29
+    times.go_to(scene(), videos.frame_at(scene(), float(stamps[10] + 0.4 * (stamps[11] - stamps[10]))))
+    bpy.ops.rockfall.step_frame(step=-1)
+    assert videos.video_time(scene(), camera) == pytest.approx(stamps[10], abs=2e-7), "back to the picture's own time"
+    bpy.ops.rockfall.step_frame(step=-100)
+    bpy.ops.rockfall.step_frame(step=1000)
+    assert videos.true_frame(scene(), camera) == stamps.size - 1
+    scene().frame_set(-40)
+    bpy.ops.rockfall.step_frame(step=1)
+    assert videos.video_time(scene(), camera) == pytest.approx(stamps[0], abs=2e-7), (
+        "from before the video to its start"
+    )
+
+
+def test_time_origin(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
+    videos = part("rockfall_addon.bridge.videos")
+    camera, other = pair
+    scene().camera = camera
+    scene().frame_set(12)
+    assert bpy.ops.rockfall.time_origin_here(what="SCENE") == {"FINISHED"}
+    assert (scene().frame_current, videos.true_frame(scene(), camera)) == (0, 12)
+    assert videos.common_time(scene()) == pytest.approx(0.4)
+    assert bpy.ops.rockfall.time_origin_here(what="CLOCK") == {"FINISHED"}
+    assert videos.common_time(scene()) == 0.0
+    assert videos.true_frame(scene(), camera) == 12
+    assert videos.clock_of(other).to_common(0.4) == pytest.approx(0.0), "all clocks are set"
+
+
+def test_common_clock_stays_with_picks(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
+    bpy.ops.rockfall.load_demo()
+    with pytest.raises(RuntimeError, match="common clock"):
+        bpy.ops.rockfall.time_origin_here(what="CLOCK")
+
+
+def test_render_size_follows_the_active_camera(part: Part) -> None:
+    """Cameras of other sizes do not spoil each other."""
+    view = part("rockfall_addon.bridge.image_view")
+    wide, tall = add(part, "constant.mp4"), add(part, "rotated.mov")
+    render = scene().render
+    for camera, size in ((wide, (64, 48)), (tall, (48, 64)), (wide, (64, 48))):
+        bpy.ops.rockfall.look_through(identifier=camera["rockfall_id"])
+        assert scene().camera == camera
+        assert (render.resolution_x, render.resolution_y) == size
+        assert view.shape_agrees(scene(), camera)
+    scene().camera = tall
+    bpy.context.view_layer.update()
+    scene().frame_set(1)
+    assert (render.resolution_x, render.resolution_y) == (48, 64), "also when the camera is chosen in Blender's own way"
+    render.resolution_x = 100
+    scene().frame_set(2)
+    assert not view.shape_agrees(scene(), tall)
+    bpy.ops.rockfall.use_video_size()
+    assert (render.resolution_x, render.resolution_y) == (48, 64)
+
+
+def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
+    """A made-up path with all numbers in use."""
+    model, motion = part("core.camera.model"), part("core.camera.motion")
+    one = model.look_at(64, 48, (3.0, -20.0, 5.0), (0, 0, 1), focal_px=80)
+    one = model.with_intrinsics(one, [80.1, 79.7, 31.2, 24.9, 0.01, -0.002, 0.0, 1e-4, 2e-4])
+    if frames == 1:
+        return motion.fixed(one)
+    time = part("rockfall_addon.bridge.videos").times_of(camera)[:frames]
+    turn = model.rotation_from_vector(np.outer(np.sin(5 * time), [0.02, -0.03, 0.01])) @ one.rotation
+    place = one.position + np.outer(time, [0.1, 0.0, 0.05])
+    return motion.MovingCamera(one, time, place, turn, 0.01 * np.ones(frames), 1e-4 * np.ones(frames))
+
+
+@pytest.mark.parametrize("frames", [1, 20])
+def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
+    """Its doubles come back exactly, also from a file, and Blender's camera sees what ours does."""
+    videos, model = part("rockfall_addon.bridge.videos"), part("core.camera.model")
+    camera = add(part, "variable.mp4")
+    moving = solved(part, camera, frames)
+    videos.set_moving_camera(scene(), camera, moving, rmse_px=0.4, pose_covariance=np.diag(np.arange(1.0, 7.0)))
+    scene().camera = camera
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "solved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "solved.blend"))
+    (camera,) = videos.cameras(scene())
+    back = videos.moving_camera(camera)
+    for name in ("time_s", "position", "rotation", "sigma_position_m", "sigma_rotation"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(moving, name))
+    np.testing.assert_array_equal(back.camera.intrinsics, moving.camera.intrinsics)
+    np.testing.assert_array_equal(videos.pose_covariance(camera), np.diag(np.arange(1.0, 7.0)))
+    straight = model.with_intrinsics(moving.camera, [*moving.camera.intrinsics[:4], 0, 0, 0, 0, 0])
+    points = np.random.default_rng(3).uniform((-3, -3, -1), (3, 3, 3), (10, 3))
+    for rate, index in ((30, 0), (30, 7), (24, 13)):
+        scene().render.fps = rate
+        frame = videos.scene_frame_of(scene(), camera, index if frames > 1 else 0)
+        scene().frame_set(int(frame // 1), subframe=frame % 1)
+        position, rotation = moving.poses_at([moving.time_s[index if frames > 1 else 0]])
+        ours = model.project(straight, points, position=position.repeat(10, 0), rotation=rotation.repeat(10, 0))
+        matrix = camera.calc_matrix_camera(
+            bpy.context.evaluated_depsgraph_get(),
+            x=64,
+            y=48,
+            scale_x=scene().render.pixel_aspect_x,
+            scale_y=scene().render.pixel_aspect_y,
+        )
+        clip = np.column_stack([points, np.ones(10)]) @ np.array(matrix @ camera.matrix_world.inverted()).T
+        theirs = (clip[:, :2] / clip[:, 3:] * [1, -1] + 1) / 2 * [64, 48]
+        np.testing.assert_allclose(theirs, ours, atol=2e-3)
+    assert videos.is_solved(camera)
+    place = np.array(camera.matrix_world)
+    videos.unsolve(camera)
+    np.testing.assert_allclose(np.array(camera.matrix_world), place, atol=1e-5)
+    np.testing.assert_allclose(videos.moving_camera(camera).camera.fx, 80.1, rtol=1e-6)
+
+
+def test_solved_camera_of_another_size(part: Part) -> None:
+    camera = add(part, "rotated.mov")
+    with pytest.raises(part("core.errors").RockfallError, match="64 × 48"):
+        part("rockfall_addon.bridge.videos").set_moving_camera(scene(), camera, solved(part, camera, 1))
+
+
+def test_pixels_and_rays(part: Part) -> None:
+    videos, view = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.image_view")
+    camera = add(part, "variable.mp4")
+    videos.set_clock(camera, part("core.footage.clock").Clock(5.0, 1e-3, 0.1, 0.25))
+    videos.set_moving_camera(scene(), camera, solved(part, camera, 20))
+    pixels = np.random.default_rng(4).uniform((5, 5), (59, 43), (12, 2))
+    common = np.linspace(5.0, 5.1, 12)
+    origins, directions = view.ray(scene(), camera, pixels, common)
+    back = view.project(scene(), camera, origins + 30 * directions, common)
+    np.testing.assert_allclose(back, pixels, atol=1e-6)
+    origin, direction = view.ray(scene(), camera, pixels[3], common[3])
+    np.testing.assert_array_equal(direction, directions[3])
+    assert origin.shape == (3,)
+
+
+def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
+    videos = part("rockfall_addon.bridge.videos")
+    camera = add(part, "constant.mp4")
+    copy = camera.copy()  # linked data, as Alt D makes it
+    camera.users_collection[0].objects.link(copy)
+    scene().frame_set(3)
+    assert copy["rockfall_id"] != camera["rockfall_id"]
+    assert copy.data != camera.data
+    assert videos.clip_of(copy) != videos.clip_of(camera)
+    videos.set_clock(copy, part("core.footage.clock").Clock(0.1))
+    scene().frame_set(9)
+    offsets = [videos.clip_of(each).frame_offset for each in (camera, copy)]
+    assert offsets[0] - offsets[1] == 3, "one shows picture 9, the other picture 6"
+    camera.name = "Left"
+    assert videos.by_id(scene(), camera["rockfall_id"]) == camera
+
+
+def test_camera_deleted(part: Part) -> None:
+    videos = part("rockfall_addon.bridge.videos")
+    camera, other = add(part, "constant.mp4"), add(part, "variable.mp4")
+    identifier = camera["rockfall_id"]
+    bpy.data.objects.remove(camera)
+    scene().frame_set(2)
+    assert videos.deleted(scene()) == {identifier: "constant.mp4"}
+    assert videos.active_camera(scene()) == other
+    assert bpy.ops.rockfall.remove_video(identifier=identifier) == {"FINISHED"}
+    assert videos.deleted(scene()) == {}
+    assert len(bpy.data.movieclips) == 1
+    assert bpy.ops.rockfall.remove_video(identifier=other["rockfall_id"]) == {"FINISHED"}
+    assert (len(bpy.data.movieclips), len(bpy.data.cameras), videos.cameras(scene())) == (0, 0, [])
+
+
+def test_file_moved(part: Part, tmp_path: Path) -> None:
+    videos, words = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_words")
+    errors = part("core.errors")
+    there = tmp_path / "there.mp4"
+    there.write_bytes((DATA / "constant.mp4").read_bytes())
+    camera = videos.add_video(scene(), there)
+    camera["rockfall_events"] = '{"1": 0.4}'
+    there.rename(tmp_path / "elsewhere.mp4")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "moved.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved.blend"))
+    (camera,) = videos.cameras(scene())
+    assert words.is_missing(camera)
+    assert "there.mp4" in words.missing(camera)
+    with pytest.raises(errors.RockfallError, match="Find the File"):
+        videos.picture(camera, 0)
+    scene().frame_set(12)
+    assert videos.true_frame(scene(), camera) == 12, "times are known without the file"
+    assert not scene().get("rockfall_problem")
+    with pytest.raises(RuntimeError, match="another one"):
+        bpy.ops.rockfall.relink_video(filepath=str(DATA / "rotated.mov"))
+    assert words.is_missing(camera)
+    assert "frames" in part("rockfall_addon.bridge.footage").relink(camera, DATA / "variable.mp4")[0]
+    assert bpy.ops.rockfall.relink_video(filepath=str(tmp_path / "elsewhere.mp4")) == {"FINISHED"}
+    assert not words.is_missing(camera)
+    assert part("rockfall_addon.bridge.video_times").events_of(camera) == {1: 0.4}
+    assert number_in(videos.picture(camera, 12)) == 12
+    assert len(bpy.data.movieclips) == 1
+
+
+@pytest.mark.parametrize("name", ["interlaced.mp4", "sound.mp4", "nothing.mp4"])
+def test_bad_videos(part: Part, name: str) -> None:
+    with pytest.raises(RuntimeError):
+        bpy.ops.rockfall.add_video(filepath=str(DATA / name))
+    assert len(bpy.data.cameras) == len(bpy.data.movieclips) == 0
+
+
+def test_good_among_bad(part: Part) -> None:
+    names = [{"name": name} for name in ("interlaced.mp4", "constant.mp4", "rotated.mov")]
+    assert bpy.ops.rockfall.add_video(directory=str(DATA), files=names) == {"FINISHED"}
+    cameras = part("rockfall_addon.bridge.videos").cameras(scene())
+    assert [camera.name for camera in cameras] == ["constant", "rotated"]
+    assert scene().camera == cameras[0]
+
+
+def test_scene_rate_changed(part: Part) -> None:
+    videos, words = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_words")
+    camera = add(part, "constant.mp4")
+    assert words.rates(scene(), camera) == ""
+    scene().render.fps = 24
+    assert "24" in words.rates(scene(), camera)
+    scene().frame_set(12)
+    assert videos.true_frame(scene(), camera) == 15
+    assert bpy.ops.rockfall.use_video_rate() == {"FINISHED"}
+    assert (scene().render.fps, scene().frame_current) == (30, 15)
+
+
+def test_slow_motion(part: Part) -> None:
+    """240 pictures a second stored at 30: the fall takes an eighth of the file's duration."""
+    videos = part("rockfall_addon.bridge.videos")
+    camera = add(part, "constant.mp4")
+    camera.rockfall_video.capture_rate_hz = 240
+    assert videos.clock_of(camera).to_common(0.8) == pytest.approx(0.1)
+    assert camera.rockfall_video.capture_rate_hz == 240
+    assert bpy.ops.rockfall.use_video_rate() == {"FINISHED"}
+    assert scene().render.fps == 240
+    scene().frame_set(17)
+    assert videos.true_frame(scene(), camera) == 17
+    camera.rockfall_video.offset_s = 0.35
+    assert videos.clock_of(camera).offset_s == 0.35, "as typed, not its single precision"
+
+
+def test_words_about_videos(part: Part) -> None:
+    words = part("rockfall_addon.bridge.video_words")
+    for name in ("rotated.mov", "single.mp4", "repeated.avi", "variable.mp4"):
+        camera = add(part, name)
+        rows = dict(words.facts(camera))
+        assert rows["Size"] == ("48 × 64 px" if name == "rotated.mov" else "64 × 48 px")
+        said = " ".join(words.remarks(camera))
+    for word in ("varies", "missing", "Blender's player"):
+        assert word in said
+    scene().frame_set(5000)
+    assert "beyond" in words.now(scene(), camera)[0][1]
+
+
+def test_disabled_and_enabled(part: Part, installation: object) -> None:
+    add(part, "constant.mp4")
+    installation.disable()
+    installation.enable()
+    videos = installation.part("rockfall_addon.bridge.videos")
+    (camera,) = videos.cameras(scene())
+    scene().frame_set(20)
+    assert videos.true_frame(scene(), camera) == 20

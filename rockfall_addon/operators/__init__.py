@@ -17,6 +17,7 @@ from . import (
     terrain,
     tracking,
     videos,
+    workspace,
 )
 
 CLASSES = (
@@ -33,6 +34,7 @@ CLASSES = (
     *demo.CLASSES,
     *film.CLASSES,
     *share.CLASSES,
+    *workspace.CLASSES,
 )
 
 TOOLS = (*alignment.TOOLS, *picking.TOOLS)
@@ -47,6 +49,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    workspace.forget()
     videos.unregister_keys()
     for tool in reversed(TOOLS):
         bpy.utils.unregister_tool(tool)

@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Load the bundled demo site."""
+"""Load the bundled demo site: with its campaign of picks, or with its footage."""
 
 from pathlib import Path
 
 import bpy
 
 from ..bridge import project as project_bridge
-from ..bridge import state
-from . import look
+from ..bridge import state, videos
+from . import look, workspace
 from .reporting import reported
 
 DEMO = Path(__file__).parents[2] / "assets" / "demo" / "project.toml"
+FOOTAGE = DEMO.parent / "footage" / "project.toml"
+START_S = 1.3
+"""Of the demo's video: the block comes into the picture."""
 
 
-class ROCKFALL_OT_load_demo(bpy.types.Operator):
-    """Load the demo site: a synthetic gully, fifteen blocks, a hundred timed impacts"""
+class _OfDemo:
+    """Mix-in: only a scene without terrain takes a demo."""
 
-    bl_idname = "rockfall.load_demo"
-    bl_label = "Load Demo"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -27,16 +28,50 @@ class ROCKFALL_OT_load_demo(bpy.types.Operator):
         cls.poll_message_set("This scene has a terrain already: open a new scene or file for the demo")
         return False
 
+
+class ROCKFALL_OT_load_demo(_OfDemo, bpy.types.Operator):
+    """Load the demo site: a synthetic gully, fifteen blocks, a hundred timed impacts"""
+
+    bl_idname = "rockfall.load_demo"
+    bl_label = "Load Demo"
+
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        for thing in [o for o in scene.objects if o.name in ("Cube", "Light")]:  # of Blender's own start-up scene
-            thing.hide_set(True)
-            thing.hide_render = True
+        _hide_start_up(scene)
         result = project_bridge.load_project(scene, DEMO)
         look.show_relief(context, frame_all=True)
         self.report({"INFO"}, f"{len(result.impacts.rn)} impacts on the demo site. Press play to see the blocks fall.")
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_load_demo,)
+class ROCKFALL_OT_load_footage_demo(_OfDemo, bpy.types.Operator):
+    """Load the demo site with ten seconds of footage, its aligned camera and the tracked block, ready to be picked"""
+
+    bl_idname = "rockfall.load_footage_demo"
+    bl_label = "Load Footage Demo"
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        _hide_start_up(scene)
+        project_bridge.load_project(scene, FOOTAGE)
+        camera = videos.active_camera(scene)
+        if camera is not None:
+            scene.camera = camera
+            common_s = videos.clock_of(camera).to_common(START_S)
+            scene.frame_set(round(videos.frame_at(scene, float(common_s))))
+        look.show_relief(context, frame_all=True)
+        workspace.open_workspace(context, arrange=True)
+        self.report({"INFO"}, "The demo's footage is aligned and its block tracked. Go on with step 4: pick impacts.")
+        return {"FINISHED"}
+
+
+def _hide_start_up(scene: bpy.types.Scene) -> None:
+    """Put away what Blender's own start-up scene holds."""
+    for thing in [o for o in scene.objects if o.name in ("Cube", "Light")]:
+        thing.hide_set(True)
+        thing.hide_render = True
+
+
+CLASSES = (ROCKFALL_OT_load_demo, ROCKFALL_OT_load_footage_demo)

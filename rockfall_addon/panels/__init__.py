@@ -3,9 +3,24 @@
 
 import bpy
 
-from . import alignment, film, impact, impact_table, models, picking, picks, playback, refinement, share, terrain, videos
+from . import (
+    alignment,
+    film,
+    impact,
+    impact_table,
+    models,
+    picking,
+    picks,
+    playback,
+    refinement,
+    share,
+    start,
+    terrain,
+    videos,
+)
 
 CLASSES = (
+    *start.CLASSES,
     *terrain.CLASSES,
     *videos.CLASSES,
     *alignment.CLASSES,

@@ -6,7 +6,7 @@ import math
 import bpy
 
 from ..bridge import alignment, following, state, videos
-from .base import RockfallPanel, advise, facts, paragraph
+from .base import RockfallPanel, State, advise, facts, paragraph
 
 COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, alignment.COLOURS + 1))
 
@@ -35,24 +35,30 @@ class ROCKFALL_UL_pairs(bpy.types.UIList):
         cells = row.split(factor=0.4, align=True)
         cells.prop(item, "name", text="", emboss=False)
         right = cells.row(align=True)
-        right.alignment = "RIGHT"
         right.active = item.enabled
         if item.missing:
             right.label(text="terrain?" if item.missing == alignment.POINT else "picture?")
         else:
-            right.label(text=residuals(item.residual_px, item.residual_m))
+            for value in (item.residual_px, item.residual_m):
+                right.label(text=short(value))
 
 
-def residuals(pixels: float, metres: float) -> str:
-    """What is left of a pair, in the picture and on the terrain."""
-    if math.isnan(pixels):
-        return "–" if math.isnan(metres) else "not in view"
-    return f"{pixels:.{2 if pixels < 10 else 0}f} px  {metres:.{2 if metres < 10 else 0}f} m"
+def short(value: float) -> str:
+    """A residual with no more digits than it deserves."""
+    return "–" if math.isnan(value) else f"{value:.{2 if value < 10 else 0}f}"
 
 
 class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
     bl_label = "3  Alignment"
     bl_idname = "ROCKFALL_PT_alignment"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        camera = videos.active_camera(context.scene)
+        if camera is None or not alignment.placement(camera):
+            return "TO_DO"
+        solution = alignment.solution_of(camera)
+        return "ATTENTION" if solution.problem or solution.wrong else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
@@ -104,6 +110,10 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
 
     def _pairs(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         if len(settings.rows):
+            head = layout.split(factor=0.52, align=True)
+            head.label(text="Pairs")
+            for unit in ("px", "m"):
+                head.label(text=unit)
             row = layout.row()
             row.template_list("ROCKFALL_UL_pairs", "", settings, "rows", settings, "active", rows=4, maxrows=12)
             column = row.column(align=True)
@@ -111,7 +121,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
             column.operator("rockfall.go_to_pair", text="", icon="VIEWZOOM")
             column.separator()
             column.prop(settings, "show_pairs", text="", icon="HIDE_OFF")
-            column.prop(settings, "magnify", text="×10", toggle=True)
+            column.prop(settings, "magnify", text="", icon="FULLSCREEN_ENTER")
         row = layout.row(align=True)
         row.operator("rockfall.import_pairs", text="Pairs", icon="IMPORT")
         if len(settings.rows):

@@ -2,16 +2,36 @@
 """What all panels share."""
 
 import textwrap
+from typing import Literal
 
 import bpy
 
+type State = Literal["TO_DO", "READY", "ATTENTION"]
+"""How a step stands."""
+
+MARKS: dict[State, str] = {"TO_DO": "RADIOBUT_OFF", "READY": "CHECKMARK", "ATTENTION": "ERROR"}
+
 
 class RockfallPanel:
-    """Mix-in: where the panels live."""
+    """Mix-in: where the panels live, and the mark in the header of those that are a step."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Rockfall"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State | None:
+        """How this step stands, as stored; None for a panel that is no step."""
+        return None
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        state_mark(self.layout, self.step_state(context))
+
+
+def state_mark(layout: bpy.types.UILayout, state: State | None) -> None:
+    """The mark of a step: to do, ready, or needs attention."""
+    if state is not None:
+        layout.label(text="", icon=MARKS[state])
 
 
 def advise(context: bpy.types.Context, layout: bpy.types.UILayout, ready: bool, sentence: str) -> None:

@@ -5,17 +5,21 @@ import bpy
 
 from ..bridge import state
 from ..film import remembered
-from .base import RockfallPanel
+from .base import RockfallPanel, State
 
 
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
-    bl_label = "5  Film"
+    bl_label = "8  Film"
     bl_idname = "ROCKFALL_PT_film"
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return bool(state.with_role(context.scene, state.FLIGHTS_ROLE))
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        return "READY" if remembered.is_set_up(context.scene) else "TO_DO"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

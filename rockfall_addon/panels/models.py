@@ -5,19 +5,23 @@ import bpy
 
 from ...core.impact_models.registry import COMPARED, MODELS
 from ..bridge import state, twins
-from .base import RockfallPanel, paragraph
+from .base import RockfallPanel, State, paragraph
 
 QUESTION = "Where would the blocks fly if a model were right? Same impacts, same incident velocity."
 
 
 class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
-    bl_label = "3  Models"
+    bl_label = "6  Models"
     bl_idname = "ROCKFALL_PT_models"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         scene = context.scene
         return bool(state.with_role(scene, state.FLIGHTS_ROLE) and state.with_role(scene, state.TERRAIN_ROLE))
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        return "READY" if twins.shown_models(context.scene) else "TO_DO"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, shown = self.layout, twins.shown_models(context.scene)

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Step 2: picks and trajectories."""
+"""Step 4: picks and trajectories."""
 
 import bpy
 
 from ..bridge import problems, state
-from .base import RockfallPanel, advise, paragraph
+from .base import RockfallPanel, State, advise, paragraph
 
 
 class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
-    bl_label = "2  Picks and Trajectories"
+    bl_label = "4  Picks and Trajectories"
     bl_idname = "ROCKFALL_PT_picks"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        if not state.with_role(context.scene, state.PICK_ROLE):
+            return "TO_DO"
+        return "ATTENTION" if problems.sentences(context.scene) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

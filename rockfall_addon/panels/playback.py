@@ -4,16 +4,20 @@
 import bpy
 
 from ..bridge import state
-from .base import RockfallPanel
+from .base import RockfallPanel, State
 
 
 class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
-    bl_label = "4  Playback and Look"
+    bl_label = "7  Playback and Look"
     bl_idname = "ROCKFALL_PT_playback"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return bool(state.with_role(context.scene, state.FLIGHTS_ROLE))
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        return "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.rockfall

@@ -4,7 +4,7 @@
 import bpy
 
 from ..bridge import refinement
-from .base import RockfallPanel, advise, facts, paragraph
+from .base import RockfallPanel, State, advise, facts, paragraph
 
 MOST_ROWS = 12
 
@@ -12,6 +12,12 @@ MOST_ROWS = 12
 class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
     bl_label = "5  Refinement"
     bl_idname = "ROCKFALL_PT_refinement"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        if refinement.ready(context.scene):
+            return "TO_DO"
+        return "ATTENTION" if context.scene.get(refinement.PROPOSAL_KEY) else "READY"  # it waits for a decision
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

@@ -4,16 +4,20 @@
 import bpy
 
 from ..bridge import state
-from .base import RockfallPanel, advise
+from .base import RockfallPanel, State, advise
 
 
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
-    bl_label = "6  Share"
+    bl_label = "9  Share"
     bl_idname = "ROCKFALL_PT_share"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return bool(state.with_role(context.scene, state.PICK_ROLE))
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        return "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         advise(context, self.layout, True, "Tables in survey coordinates, with units.")

@@ -4,12 +4,19 @@
 import bpy
 
 from ..bridge import shown, state, terrain, terrain_view
-from .base import RockfallPanel, advise, facts, paragraph
+from .base import RockfallPanel, State, advise, facts, paragraph
 
 
 class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     bl_label = "1  Terrain"
     bl_idname = "ROCKFALL_PT_terrain"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        scene = context.scene
+        if not state.with_role(scene, state.TERRAIN_ROLE):
+            return "ATTENTION" if scene.get(shown.GROUND_KEY) else "TO_DO"
+        return "ATTENTION" if terrain.warnings(scene) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
@@ -21,6 +28,7 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
                 advise(context, layout, False, "Import your scan, or begin with the demo.")
             column = layout.column(align=True)
             column.scale_y = 1.4
+            column.operator("rockfall.load_footage_demo", icon="FILE_MOVIE")
             column.operator("rockfall.load_demo", icon="PLAY")
             column.operator("rockfall.import_terrain", icon="IMPORT")
             return
@@ -35,7 +43,6 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("rockfall.show_relief", text="Show relief", icon="SHADING_SOLID")
         row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
-        self._relief(scene)
         shift = state.read_shift(scene)
         rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
         facts(layout, [*rows, ("System", shift.crs or "unknown")])
@@ -48,8 +55,19 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
             file = str(ground.get(terrain.FILE_KEY, ground.name))
             column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")
 
-    def _relief(self, scene: bpy.types.Scene) -> None:
-        settings = scene.rockfall_terrain
+
+class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
+    bl_label = "Relief"
+    bl_idname = "ROCKFALL_PT_relief"
+    bl_parent_id = "ROCKFALL_PT_terrain"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(state.with_role(context.scene, state.TERRAIN_ROLE))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.rockfall_terrain
         layout = self.layout.column()
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -60,11 +78,11 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         for name in ("brightness", "contrast"):
             column.prop(settings, name)
         layout.operator("rockfall.reset_relief", icon="LOOP_BACK")
-        if terrain_view.is_coarse(scene):
+        if terrain_view.is_coarse(context.scene):
             self.layout.prop(settings, "full_resolution", toggle=True, icon="MESH_GRID")
             column = self.layout.column()
             column.use_property_split, column.use_property_decorate = True, False
             column.prop(settings, "view_limit")
 
 
-CLASSES = (ROCKFALL_PT_terrain,)
+CLASSES = (ROCKFALL_PT_terrain, ROCKFALL_PT_relief)

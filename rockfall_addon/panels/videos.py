@@ -4,12 +4,23 @@
 import bpy
 
 from ..bridge import image_view, proxies, video_times, video_words, videos
-from .base import RockfallPanel, advise, facts, paragraph
+from .base import RockfallPanel, State, advise, facts, paragraph
 
 
 class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
     bl_label = "2  Videos"
     bl_idname = "ROCKFALL_PT_videos"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        scene = context.scene
+        camera = videos.active_camera(scene)
+        if videos.deleted(scene):
+            return "ATTENTION"
+        if camera is None:
+            return "TO_DO"
+        wrong = video_words.is_missing(camera) or video_words.warnings(scene, camera)
+        return "ATTENTION" if wrong or not image_view.shape_agrees(scene, camera) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

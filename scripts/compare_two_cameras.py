@@ -233,7 +233,7 @@ def main() -> None:
     error = g.std(ddof=1) / np.sqrt(g.size)
     print(
         f"g of each run: {spread(g, 2)}, mean {g.mean():.2f} ± {error:.2f}, sd {g.std(ddof=1):.2f}, "
-        f"own {np.median(sigma):.2f}"
+        f"own {np.median(sigma):.2f}, from {g.min():.2f} to {g.max():.2f}"
     )
     serve = np.array(bounced) > 1
     print(
@@ -243,7 +243,11 @@ def main() -> None:
     impacts = both.reconstruction.impacts
     first = np.array([impacts.rn[impacts.trajectory == name][0] for name in names])
     print(f"R_N {spread(impacts.rn, 3)} at {spread(impacts.vn1, 2)} m/s; sigma {np.nanmedian(impacts.sigma['rn']):.3f}")
-    print(f"  its correlation with the g of the run {np.corrcoef(g, first)[0, 1]:.2f}")
+    clean = first > 0.7
+    print(
+        f"  its correlation with the g of the run {np.corrcoef(g[clean], first[clean])[0, 1]:.2f}; "
+        f"left out of it: {np.array(names)[~clean]}"
+    )
 
 
 if __name__ == "__main__":

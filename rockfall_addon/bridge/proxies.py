@@ -28,7 +28,6 @@ def build(context: bpy.types.Context, camera: bpy.types.Object, percent: int) ->
         setattr(clip.proxy, f"build_{size}", size == percent)
     for name in ("build_undistorted_25", "build_undistorted_50", "build_undistorted_75", "build_undistorted_100"):
         setattr(clip.proxy, name, False)
-    clip.proxy.build_record_run = clip.proxy.build_free_run = False
     before = area.ui_type
     area.type = "CLIP_EDITOR"
     try:

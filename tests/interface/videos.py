@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person adds footage, looks through its camera and steps through it."""
 
+import shutil
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -117,3 +119,76 @@ def bars(window, camera, path):
         number ^= code
         code >>= 1
     return number
+
+
+def case_video_undone_and_redone(window):
+    yield from window.show_sidebar()
+    with window.override():
+        bpy.ops.ed.undo_push(message="before")
+        bpy.ops.rockfall.add_video("EXEC_DEFAULT", True, filepath=str(DATA / "constant.mp4"))
+    yield 1.0
+    videos = window.part("rockfall_addon.bridge.videos")
+    (camera,) = videos.cameras(bpy.context.scene)
+    identifier = camera["rockfall_id"]
+    with window.override():
+        camera.rockfall_video.offset_s = 0.25
+        bpy.ops.ed.undo_push(message="offset")
+        bpy.ops.ed.undo()
+    yield 1.0
+    assert videos.clock_of(videos.by_id(bpy.context.scene, identifier)).offset_s == 0.0
+    with window.override():
+        bpy.ops.ed.undo()
+    yield 1.0
+    assert videos.cameras(bpy.context.scene) == []
+    with window.override():
+        bpy.ops.ed.redo()
+        bpy.ops.ed.redo()
+    yield 1.0
+    camera = videos.by_id(bpy.context.scene, identifier)
+    assert videos.clock_of(camera).offset_s == 0.25
+    with window.override():
+        bpy.ops.object.select_all(action="DESELECT")
+        camera.select_set(True)
+        bpy.ops.object.delete("EXEC_DEFAULT", True)
+    yield 2.0
+    assert videos.deleted(bpy.context.scene) == {identifier: "constant.mp4"}
+    window.screenshot("camera-deleted")
+    with window.override():
+        bpy.ops.ed.undo()
+    yield 1.0
+    assert videos.deleted(bpy.context.scene) == {}
+    assert not bpy.context.scene.get("rockfall_problem")
+
+
+def case_video_proxy(window):
+    """The small copies show the same pictures."""
+    yield 0.5
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    space = window.area().spaces.active
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+    space.overlay.show_text = space.show_gizmo = space.overlay.show_cursor = False
+    videos = window.part("rockfall_addon.bridge.videos")
+    for name in ("constant.mp4", "variable.mp4"):
+        folder = Path(tempfile.mkdtemp())
+        shutil.copy(DATA / name, folder)
+        add(window, name, directory=folder)
+        camera = videos.active_camera(bpy.context.scene)
+        yield 1.0
+        with window.override():
+            assert bpy.ops.rockfall.build_proxy(size="50") == {"FINISHED"}
+        assert window.area().type == "VIEW_3D"
+        yield 4.0
+        files = [path for path in folder.rglob("*") if path.is_file()]
+        print(files, flush=True)
+        assert any("proxy" in path.name and path.stat().st_size > 0 for path in files), files
+        wrong = {}
+        for index in range(1, 11):
+            with window.override():
+                bpy.ops.rockfall.step_frame(step=1)
+            yield 0.4
+            found = bars(window, camera, window.screenshot(name.split(".")[0]))
+            if found != index:
+                wrong[index] = found
+        assert not wrong, f"{name}: {wrong}"
+        bpy.context.scene.frame_set(0)
+        shutil.rmtree(folder)

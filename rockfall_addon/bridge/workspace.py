@@ -49,6 +49,17 @@ def camera_views(screen: bpy.types.Screen) -> Iterator[tuple[bpy.types.Area, bpy
             yield area, next(region for region in area.regions if region.type == "WINDOW")
 
 
+def show_tab(screen: bpy.types.Screen) -> None:
+    """Turn the open sidebars of the 3-D views to our tab; a file does not keep which was shown."""
+    for area in screen.areas:
+        if area.type != "VIEW_3D" or not area.spaces.active.show_region_ui:
+            continue
+        for region in area.regions:
+            if region.type == "UI" and region.active_panel_category != "UNSUPPORTED":  # until it is drawn
+                region.active_panel_category = NAME
+                region.tag_redraw()
+
+
 def look_through_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
     """Look through the active video's camera in the largest 3-D view."""
     camera = videos.active_camera(scene)

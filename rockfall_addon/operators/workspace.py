@@ -73,6 +73,7 @@ def _arrange() -> None:
     for window in bpy.context.window_manager.windows:
         if workspace.KEY not in window.workspace:
             continue
+        workspace.show_tab(window.screen)
         with bpy.context.temp_override(window=window):
             if state.with_role(window.scene, state.TERRAIN_ROLE):
                 look.show_relief(bpy.context, frame_all=True)

@@ -32,6 +32,7 @@ PLACED_KEY = "rockfall_placed"
 FOLLOWED_KEY = "rockfall_followed"
 
 COLOURS = 7
+GOOD_PAIRS = 8
 KEY_PAIRS = 4
 """From how many pairs a frame is solved by itself once the lens is known, as on the command line."""
 FULL_FRAME_DIAGONAL_MM = 43.2666
@@ -653,6 +654,8 @@ def hint(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> str:
         )
     if more > 0:
         return f"{len(ready)} {'pair' if len(ready) == 1 else 'pairs'}. {more} more and the camera is solved."
+    if placement(camera) == BY_PAIRS and len(ready) < GOOD_PAIRS:
+        return "Fade the footage to check it. More pairs, out to the edges, make it surer."
     return ""
 
 

@@ -239,7 +239,8 @@ class ROCKFALL_OT_align_views(bpy.types.Operator):
         left.spaces.active.region_3d.view_perspective = "CAMERA"
         if right.spaces.active.region_3d.view_perspective == "CAMERA":
             right.spaces.active.region_3d.view_perspective = "PERSP"
-        left.spaces.active.show_region_ui = False
+        space = left.spaces.active
+        space.show_region_ui = space.show_region_toolbar = False  # they would lie over the picture
         with context.temp_override(area=left, region=_region(left)):
             bpy.ops.wm.tool_set_by_id(name=TOOL)
             if bpy.ops.view3d.view_center_camera.poll():

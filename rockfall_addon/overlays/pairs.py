@@ -3,6 +3,7 @@
 
 import itertools
 import math
+import textwrap
 from collections.abc import Sequence
 
 import blf
@@ -16,9 +17,10 @@ from mathutils import Vector
 from ..bridge import alignment, image_view, problems, videos
 
 TOOL = "rockfall.align_tool"
-RING, CROSS, TEXT, GAP = 8.0, 6.0, 12.0, 12.0  # in pixels at interface scale 1
-SEGMENTS = 24
+RING, CROSS, TEXT, HINT, GAP = 8.0, 6.0, 14.0, 14.0, 12.0  # in pixels at interface scale 1
+SEGMENTS, OUTLINE = 32, 6
 SHADE = (0.0, 0.0, 0.0, 0.65)
+BOX = (0.05, 0.06, 0.08, 0.85)
 WRONG = (1.0, 0.25, 0.2)
 PALETTE_ROOM = 7
 
@@ -127,7 +129,7 @@ def _mark(
         _lines(_ring(place, radius + 4 * scale), (1.0, 1.0, 1.0, 0.9), 1.5 * scale)
     _lines(_ring(place, radius, dashed=dashed), colour, 2.0 * scale)
     _lines([[(place[0] - 1.2 * scale, place[1]), (place[0] + 1.2 * scale, place[1])]], colour, 2.4 * scale)
-    _text(place[0] + GAP * scale, place[1] + 0.5 * GAP * scale, pair.name, colour, scale)
+    _text(place[0] + GAP * scale, place[1] + 0.5 * GAP * scale, pair.name, colour, TEXT * scale)
 
 
 def _colour(pair: alignment.Pair, solution: alignment.Solution) -> Colour:
@@ -140,13 +142,15 @@ def palette(number: int) -> tuple[float, float, float]:
     """The colour of a pair, as the theme's collections have them, which the panel shows as icons."""
     colours = bpy.context.preferences.themes[0].collection_color
     red, green, blue = colours[number % min(PALETTE_ROOM, len(colours))].color
-    return red, green, blue
+    return tuple(0.7 * value + 0.3 for value in (red, green, blue))  # lighter, to be read on any picture
 
 
 def _draw_hint(context: bpy.types.Context, camera: bpy.types.Object, through: bool) -> None:
     """What to do next; the view that waits for a click has a frame in the pair's colour."""
     scene, region = context.scene, context.region
     said, pair = alignment.hint(scene, camera), alignment.open_pair(camera)
+    if pair is None and alignment.placement(camera) == alignment.BY_PAIRS:
+        return  # the panel and the header say what could be better
     scale = context.preferences.system.ui_scale
     colour = (1.0, 1.0, 1.0, 1.0)
     here = True
@@ -160,13 +164,35 @@ def _draw_hint(context: bpy.types.Context, camera: bpy.types.Object, through: bo
         here = through or not _sees(context, camera)
     if not said or not here:
         return
-    blf.size(0, 1.15 * TEXT * scale)
-    width, height = blf.dimensions(0, said)
-    x, y = (region.width - width) / 2, region.height - _covered_top(context.area) - 34 * scale
-    if width > region.width - 20 * scale:
-        x = 10 * scale
-    _box(x - 10 * scale, y - 8 * scale, width + 20 * scale, height + 16 * scale, (0.05, 0.06, 0.08, 0.8))
-    _text(x, y, said, colour, 1.15 * scale)
+    _paragraph(context, said, colour, HINT * scale, scale)
+
+
+def _paragraph(context: bpy.types.Context, said: str, colour: Colour, size: float, scale: float) -> None:
+    """Text in a box at the top, between what lies over the view."""
+    left, right = _free_span(context.area, context.region)
+    blf.size(0, size)
+    room = max(right - left - 40 * scale, 80 * scale)
+    characters = max(12, int(len(said) * room / max(blf.dimensions(0, said)[0], 1.0)))
+    lines = textwrap.wrap(said, characters)
+    widths = [blf.dimensions(0, line)[0] for line in lines]
+    step, middle = 1.45 * size, (left + right) / 2
+    top = context.region.height - _covered_top(context.area) - 10 * scale
+    height = len(lines) * step + 10 * scale
+    _box(middle - max(widths) / 2 - 10 * scale, top - height, max(widths) + 20 * scale, height, BOX)
+    for number, (line, width) in enumerate(zip(lines, widths, strict=True)):
+        _text(middle - width / 2, top - (number + 1) * step, line, colour, size)
+
+
+def _free_span(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float]:
+    """Left and right end of what the toolbar and the sidebar leave free of a view."""
+    left, right = 0.0, float(region.width)
+    for other in area.regions:
+        if other.type in ("TOOLS", "UI") and other.width > 1:
+            if other.x <= region.x + 1:
+                left = max(left, float(other.x - region.x + other.width))
+            else:
+                right = min(right, float(other.x - region.x))
+    return (left, right) if right > left else (0.0, float(region.width))
 
 
 def _sees(context: bpy.types.Context, camera: bpy.types.Object) -> bool:
@@ -254,10 +280,10 @@ def _box(x: float, y: float, width: float, height: float, colour: Colour) -> Non
     batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
 
 
-def _text(x: float, y: float, text: str, colour: Colour, scale: float) -> None:
-    blf.size(0, TEXT * scale)
+def _text(x: float, y: float, text: str, colour: Colour, size: float) -> None:
+    blf.size(0, size)
     blf.enable(0, blf.SHADOW)
-    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
+    blf.shadow(0, OUTLINE, 0.0, 0.0, 0.0, 0.9)
     blf.color(0, *colour)
     blf.position(0, x, y, 0)
     blf.draw(0, text)

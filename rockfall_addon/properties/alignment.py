@@ -134,7 +134,9 @@ class AlignmentSettings(bpy.types.PropertyGroup):
         min=1.0, soft_max=2000.0, precision=1, get=_get_focal_mm, set=_set_focal_mm,
     )  # fmt: skip
     show_pairs: BoolProperty(name="Show marks", description="Draw the pairs over the 3-D views", default=True)
-    magnify: BoolProperty(name="× 10", description="Draw the residuals ten times as long as they are", default=False)
+    magnify: BoolProperty(
+        name="Residuals × 10", description="Draw the residuals ten times as long as they are", default=False
+    )
     blend: FloatProperty(
         name="Footage", description="How much of the footage covers the terrain: 0 shows the terrain, 1 the footage",
         min=0.0, max=1.0, subtype="FACTOR", get=_get_blend, set=_set_blend,

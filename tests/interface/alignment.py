@@ -16,9 +16,12 @@ FOOTAGE = DEMO / "footage"
 def start(window):
     """The demo's terrain, its footage, and both side by side."""
     yield from window.show_sidebar()
-    with window.override():
-        assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
     scene = bpy.context.scene
+    opening, project = window.part("core.exchange.opening"), window.part("core.exchange.project")
+    surface, result = opening.open_project(project.read_project(DEMO / "project.toml"))
+    window.part("rockfall_addon.bridge.state").write_shift(scene, result.picks.shift)
+    shading = window.part("core.terrain.shading").shade(surface)
+    window.part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, shading)
     camera = window.part("rockfall_addon.bridge.videos").add_video(scene, FOOTAGE / "footage.mp4")
     yield 1.0
     with window.override():
@@ -75,6 +78,20 @@ def look_at(window, points):
     view.view_distance = 85.0
 
 
+def sidebar(window, shown):
+    """The sidebar of the free view would lie over the points."""
+    views(window)[1].spaces.active.show_region_ui = shown
+    yield 0.5
+    if shown:
+        region = next(region for region in views(window)[1].regions if region.type == "UI")
+        x, y = region.x + region.width // 2, region.y + region.height // 2
+        yield from window.move(x, y)
+        for _ in range(14):
+            window.window.event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=x, y=y)
+            yield 0.03
+        yield 0.5
+
+
 def case_align_with_clicks(window):
     yield from start(window)
     bridge, videos = (window.part(f"rockfall_addon.bridge.{name}") for name in ("alignment", "videos"))
@@ -82,6 +99,7 @@ def case_align_with_clicks(window):
     look_at(window, ground.point)
     yield 1.0
     window.screenshot("1-start")
+    yield from sidebar(window, False)
     order = [1, 4, 7, 11, 5, 9]
     for count, i in enumerate(order):
         pixel, place = in_picture(window, ground.pixel[i]), on_terrain(window, ground.point[i])
@@ -118,6 +136,8 @@ def case_align_with_clicks(window):
     assert sum(pair.is_complete for pair in bridge.pairs_of(camera)) == 6
     focal, rmse = bridge.focal_px(camera), bridge.solution_of(camera).rmse_px
     print(f"focal {focal:.0f} px, rmse {rmse:.2f} px, {bridge.solution_of(camera).advice}")
+    yield from sidebar(window, True)
+    camera = the_camera(window)
     camera.rockfall_alignment.blend = 0.5
     camera.rockfall_alignment.magnify = True
     yield 1.5
@@ -130,7 +150,7 @@ def case_align_with_clicks(window):
     with window.override():
         bpy.ops.ed.undo_push(message="look")
     for left in (6, 5):
-        yield from window.press("X", *window.centre())
+        yield from window.press("X", *in_picture(window, (640, 600)))
         yield 0.5
         assert len(bridge.pairs_of(the_camera(window))) == left - 1
     for expected in (5, 6):

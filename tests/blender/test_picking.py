@@ -288,3 +288,22 @@ def test_operators_tell_what_is_missing(part) -> None:
     picking = part("rockfall_addon.bridge.picking")
     with pytest.raises(part("core.errors").RockfallError, match="no terrain to pick on"):
         picking.on_ray(scene, np.zeros(3), np.array([0.0, 0, -1]), "B01")
+
+
+def test_the_block_is_tracked(site, part) -> None:
+    """From one rough click, through thirty pictures: the operator as it runs without a window."""
+    observations = part("rockfall_addon.bridge.observations")
+    camera = camera_of(site, part)
+    site.frame_set(60)
+    observations.click(camera, "B10", 60, 2.0, np.array([862.0, 143.0]), 1.0)
+    block = {int(row["frame"]): np.array([float(row["u_px"]), float(row["v_px"])]) for row in rows("block.csv")}
+    observations.click(camera, "B10", 60, 2.0, block[60].round(), 1.0)
+    settings = site.rockfall_picking
+    settings.trajectory, settings.whole_video, settings.track_frames = "B10", False, 15
+    assert bpy.ops.rockfall.track_block() == {"FINISHED"}
+    seen = observations.seen_in(camera, "B10")
+    assert len(seen) > 25
+    off = np.array([np.hypot(*(seen.pixel[i] - block[int(seen.frame[i])])) for i in range(len(seen))])
+    assert np.median(off) < 2.5, "its sunny side is 1 to 2 px from its centre"
+    assert seen.frame.min() >= 45
+    assert seen.frame.max() <= 75

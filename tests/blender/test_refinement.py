@@ -38,8 +38,8 @@ def site(part, truth) -> bpy.types.Scene:
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
     part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    scene["rockfall_time_origin_s"] = OFFSET_S
     camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    scene["rockfall_time_origin_s"] = OFFSET_S
     poses = rows("camera.csv")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
     turn = np.array([[float(row[f"r{i}{j}"]) for i in "123" for j in "123"] for row in poses]).reshape(-1, 3, 3)

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A person picks impacts in the demo's footage, drags one, steps, undoes, and refines."""
+
+import csv
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+FOOTAGE = ROOT / "assets" / "demo" / "footage"
+OFFSET_S = 465.499
+ORIGIN = (988400.0, 6375600.0, 1500.0)
+
+
+def rows(name):
+    with (FOOTAGE / "truth" / name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def local(row, *names):
+    return np.array([float(row[name]) for name in names]) - ORIGIN
+
+
+def camera_of(window):
+    return window.part("rockfall_addon.bridge.videos").cameras(bpy.context.scene)[0]
+
+
+def open_site(window):
+    """Terrain, footage, the camera as it truly was; the view looks through it with our tool."""
+    scene = bpy.context.scene
+    with window.override():
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+    videos, model = window.part("rockfall_addon.bridge.videos"), window.part("core.camera.model")
+    shift = window.part("core.georeference").GlobalShift(*ORIGIN)
+    surface = window.part("core.terrain.readers").read_terrain(ROOT / "assets" / "demo" / "terrain.ply", shift=shift)
+    shading = window.part("core.terrain.shading").shade(surface)
+    window.part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, shading)
+    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    poses = rows("camera.csv")
+    place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
+    turn = np.array([[float(row[f"r{i}{j}"]) for i in "123" for j in "123"] for row in poses]).reshape(-1, 3, 3)
+    lens = model.Camera(1280, 720, 2100.0, 2100.0, 640.0, 360.0, position=place[0], rotation=turn[0], shift=shift)
+    times, nothing = np.array([float(row["time_s"]) for row in poses]), np.zeros(len(poses))
+    scene["rockfall_time_origin_s"] = OFFSET_S
+    videos.set_clock(camera, window.part("core.footage.clock").Clock(OFFSET_S))
+    path = window.part("core.camera.motion").MovingCamera(lens, times, place, turn, nothing, nothing)
+    videos.set_moving_camera(scene, camera, path)
+    scene.camera = camera
+    camera.data.background_images[0].display_depth = "FRONT"
+    camera.data.background_images[0].alpha = 0.9
+    scene.rockfall.block_diameter_m, scene.rockfall.normal_radius_m = 0.39, 0.6
+    scene.rockfall_picking.trajectory = "B10"
+    yield from window.show_sidebar()
+    with window.override():
+        bpy.ops.rockfall.look_through()
+        bpy.ops.view3d.view_center_camera()
+        bpy.ops.wm.tool_set_by_id(name="rockfall.pick_tool")
+        bpy.ops.ed.undo_push(message="site")
+    yield 1.5
+
+
+def on_screen(window, pixel):
+    """Where a pixel of the footage is in the window."""
+    view = window.part("rockfall_addon.bridge.image_view")
+    region, camera = window.region(), camera_of(window)
+    rectangle = view.image_rectangle(region, window.area().spaces.active.region_3d, bpy.context.scene, camera)
+    assert rectangle is not None
+    x, y = view.to_region(rectangle, (1280, 720), np.asarray(pixel, dtype=float))
+    return region.x + x, region.y + y
+
+
+def picks():
+    found = [thing for thing in bpy.context.scene.objects if thing.get("rockfall_role") == "pick"]
+    return sorted(found, key=lambda thing: thing["rockfall_time_s"])
+
+
+def no_trouble(window):
+    said = window.part("rockfall_addon.bridge.problems").sentences(bpy.context.scene)
+    assert not [text for text in said if "went wrong" in text], said
+
+
+def pick_impacts(window, count):
+    block = {int(row["frame"]): row for row in rows("block.csv")}
+    impacts = [row for row in rows("impacts.csv") if float(row["time_s"]) > 1.3][:count]
+    frames = [round(float(row["time_s"]) * 30) for row in impacts]
+    for frame in frames:
+        bpy.context.scene.frame_set(frame)
+        yield 0.5
+        x, y = on_screen(window, [float(block[frame]["u_px"]), float(block[frame]["v_px"])])
+        yield from window.click(x, y)
+        yield 0.5
+    return frames, impacts
+
+
+def case_pick_impacts_in_the_footage(window):
+    yield from open_site(window)
+    scene = bpy.context.scene
+    frames, impacts = yield from pick_impacts(window, 3)
+    window.screenshot("three")
+    assert [thing["rockfall_extra"]["frame"] for thing in picks()] == [str(frame) for frame in frames]
+    for thing, row in zip(picks(), impacts, strict=True):
+        contact = local(row, "contact_x_m", "contact_y_m", "contact_z_m")
+        off = float(np.linalg.norm(np.array(thing["rockfall_position_m"]) - contact))
+        assert off < 0.5, (thing.name, off)
+    no_trouble(window)
+
+    # drag the last one, in its picture
+    thing = picks()[-1]
+    before, identifier = list(thing["rockfall_position_m"]), thing["rockfall_id"]
+    with window.override():
+        pointing = window.part("rockfall_addon.bridge.pointing")
+        spot = pointing.on_screen(bpy.context, [before])[0]
+    x, y = window.region().x + spot[0], window.region().y + spot[1]
+    yield from window.move(x, y)
+    window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
+    yield 0.3
+    for step in range(1, 7):
+        yield from window.move(x + 6 * step, y)
+    window.screenshot("dragging")
+    assert window.part("rockfall_addon.bridge.live").is_dragging()
+    window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x + 36), y=round(y))
+    yield 1.0
+    after = list(picks()[-1]["rockfall_position_m"])
+    way = np.linalg.norm(np.subtract(after, before))
+    assert 0.5 < way < 4.0, way
+    window.screenshot("dragged")
+    with window.override():
+        bpy.ops.ed.undo()
+    yield 1.0
+    (undone,) = [one for one in picks() if one["rockfall_id"] == identifier]
+    assert list(undone["rockfall_position_m"]) == before, "the drag is one step"
+    assert len(picks()) == 3
+    with window.override():
+        bpy.ops.ed.redo()
+    yield 1.0
+    assert list(picks()[-1]["rockfall_position_m"]) == after
+    with window.override():
+        bpy.ops.ed.undo()
+        bpy.ops.ed.undo()
+    yield 1.0
+    assert len(picks()) == 2, "each pick is one step"
+    with window.override():
+        bpy.ops.ed.redo()
+    yield 1.0
+    assert len(picks()) == 3
+    scene = bpy.context.scene
+
+    # keys: a tenth of a frame, kinds, steps, remove
+    x, y = on_screen(window, [300, 500])
+    moment = picks()[-1]["rockfall_time_s"]
+    with window.override():
+        window.part("rockfall_addon.bridge.pointing").select(bpy.context, picks()[-1])
+    yield from window.press("RIGHT_BRACKET", x, y)
+    assert abs(picks()[-1]["rockfall_time_s"] - moment - 0.1 / 30) < 1e-6, picks()[-1]["rockfall_time_s"] - moment
+    yield from window.press("THREE", x, y)
+    assert scene.rockfall_picking.kind == "pass"
+    yield from window.press("ONE", x, y)
+    assert scene.rockfall_picking.kind == "impact"
+    frame = scene.frame_current
+    yield from window.press("RIGHT_ARROW", x, y)
+    assert scene.frame_current == frame + 1
+    yield from window.press("X", x, y)
+    assert len(picks()) == 2
+    window.screenshot("keys")
+    no_trouble(window)
+
+
+def case_pick_refine(window):
+    yield from open_site(window)
+    scene = bpy.context.scene
+    _, impacts = yield from pick_impacts(window, 5)
+    table = window.part("core.exchange.footage_tables").read_track(FOOTAGE / "track.csv")
+    one = np.ones(len(table))
+    track = window.part("core.footage.tracking").BlockTrack(
+        table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
+    )
+    window.part("rockfall_addon.bridge.observations").keep_track(camera_of(window), "B10", track)
+    picks()[1]["rockfall_time_s"] += 0.03
+    window.part("rockfall_addon.bridge.live").sync(scene)
+    with window.override():
+        bpy.ops.ed.undo_push(message="track")
+    scene.frame_set(80)
+    window.redraw()
+    yield 1.5
+    window.screenshot("tracked")
+    with window.override():
+        assert bpy.ops.rockfall.refine() == {"FINISHED"}
+    region = window.region("UI")
+    with bpy.context.temp_override(window=window.window, area=window.area(), region=region):
+        for _ in range(120):
+            bpy.ops.view2d.scroll_down(deltax=0, deltay=60)
+    window.redraw()
+    yield 1.5
+    window.screenshot("proposed")
+    found = window.part("rockfall_addon.bridge.refinement").proposal(scene)
+    assert found["after_px"] < 1.5 < found["before_px"], found
+    with window.override():
+        assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="applied")
+    window.redraw()
+    yield 1.5
+    window.screenshot("applied")
+    no_trouble(window)
+    view = window.part("rockfall_addon.bridge.footage_view")
+    start = time.perf_counter()
+    for _ in range(20):
+        view.draw(scene, camera_of(window), picks()[1])
+    each = (time.perf_counter() - start) / 20
+    assert each < 0.1, f"what is drawn over the footage takes {1000 * each:.1f} ms"
+    # free view: the pick's ball, and a click on the terrain
+    with window.override():
+        space = window.area().spaces.active
+        space.region_3d.view_perspective = "PERSP"
+        window.part("rockfall_addon.bridge.pointing").select(bpy.context, picks()[2])
+        bpy.ops.view3d.view_selected()
+    space.region_3d.view_distance = 8.0
+    yield 1.5
+    window.screenshot("free")
+    count = len(picks())
+    scene.frame_set(230)
+    x, y = window.centre()
+    yield from window.click(x - 150, y - 100)
+    yield 1.0
+    assert len(picks()) == count + 1
+    window.screenshot("free-clicked")
+    no_trouble(window)

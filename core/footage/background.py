@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array
-from .sources import Source, frames, opencv
+from .opencv import opencv
+from .sources import Source, frames
 
 GRID = (16, 10)
 PER_CELL = 4

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array
-from .sources import opencv
+from .opencv import opencv
 
 FINE = 4
 """Bits of a pixel's fraction in OpenCV's drawing."""

@@ -9,7 +9,8 @@ from ..colours import scale_colours
 from ..vectors import Array
 from .background import BackgroundMotion, destabilise
 from .kinks import Kinks
-from .sources import Source, frames, opencv
+from .opencv import opencv
+from .sources import Source, frames
 from .tracking import BlockTrack
 
 WIDTH = 1280

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..vectors import Array
 from .background import BackgroundMotion
-from .sources import Source, frames, opencv
+from .opencv import opencv
+from .sources import Source, frames
 
 SAMPLES = 15
 REACH = 300

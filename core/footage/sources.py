@@ -3,7 +3,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -53,10 +52,3 @@ def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.nda
             yield from reversed(list(read_frames(source, part)))
     else:
         yield from read_frames(source, indices)
-
-
-def opencv() -> Any:
-    """OpenCV, imported when it is first needed."""
-    import cv2
-
-    return cv2

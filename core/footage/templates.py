@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..vectors import Array
+from .opencv import opencv
 from .plates import Plates
-from .sources import opencv
 
 SHAPE_ERROR = 0.15
 """Of the covered share: real blocks have facets and are not discs."""

@@ -5,7 +5,6 @@ The header's rate and number of frames are only reported. Video time counts from
 players show it.
 """
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..vectors import Array
 from .containers import codec_name, container_of, holds_sound, lacks_index
+from .opencv import opencv
 
 type Image = NDArray[np.uint8]
 type Indices = NDArray[np.intp]
@@ -40,7 +40,6 @@ SEEKS = 5
 DAMAGED = 30
 SAMPLE = 4
 """Pictures are compared at every fourth pixel."""
-FFMPEG_QUIET = "-8"
 CONVERT = (
     "Convert it with ffmpeg -i {name} -c:v libx264 -crf 16 -fps_mode passthrough -an {stem}_h264.mp4: "
     "H.264 of constant quality, and the timestamps stay as they are"
@@ -222,7 +221,7 @@ def read_frames(
     ------
     InputError : indices that are not ascending or beyond the video, a frame that cannot be decoded.
     """
-    cv2 = _cv2()
+    cv2 = opencv()
     for index, capture in _grabbed(video, _checked(video, indices)):
         there, picture = capture.retrieve()
         if not there:
@@ -267,7 +266,7 @@ def _seek(video: Video, capture: Any, index: int) -> tuple[Any, int]:
     at the keyframe after `index`, the frames shown just before it would be damaged (an open group of pictures);
     there are never more than 16 (H.264 A.3, H.265 A.4).
     """
-    cv2 = _cv2()
+    cv2 = opencv()
     before, after = _keyframes_about(video, index)
     guess, back = video.time_s[index] * video.header_rate_hz, 1.0
     for _ in range(SEEKS):
@@ -310,7 +309,7 @@ def _described(path: Path) -> Video:
     ------
     InputError : there is no picture.
     """
-    cv2, capture = _cv2(), _capture(path)
+    cv2, capture = opencv(), _capture(path)
     if not _grab(capture):
         raise _no_picture(path)
     there, picture = capture.retrieve()
@@ -337,7 +336,7 @@ def _described(path: Path) -> Video:
 
 def _packets(path: Path) -> tuple[Array, Array]:
     """Timestamps of all packets and of those of keyframes, ascending; nothing is decoded."""
-    cv2 = _cv2()
+    cv2 = opencv()
     capture = _opened(path, [cv2.CAP_PROP_FORMAT, -1])
     times, keys = [], []
     while _grab(capture):
@@ -420,7 +419,7 @@ def _grab(capture: Any) -> bool:
 
 def _time_s(capture: Any) -> float:
     """Timestamp of the frame or packet just grabbed, from the start of the stream [s]."""
-    return float(capture.get(_cv2().CAP_PROP_POS_MSEC)) / 1000
+    return float(capture.get(opencv().CAP_PROP_POS_MSEC)) / 1000
 
 
 def _capture(path: Path) -> Any:
@@ -438,21 +437,13 @@ def _capture(path: Path) -> Any:
 
 def _opened(path: Path, settings: list[int]) -> Any:
     """OpenCV's capture, by FFmpeg alone: other backends take a name with digits for a series of pictures."""
-    cv2 = _cv2()
+    cv2 = opencv()
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         return cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, settings)
     finally:
         cv2.utils.logging.setLogLevel(level)
-
-
-def _cv2() -> Any:
-    """OpenCV; what FFmpeg would print about a damaged file is told by our own messages."""
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)
-    import cv2
-
-    return cv2
 
 
 def _refuse_other_files(path: Path) -> None:
@@ -471,9 +462,9 @@ def _refuse_other_files(path: Path) -> None:
 def _no_picture(path: Path) -> InputError:
     """Why no picture of the file can be had."""
     container = container_of(path)
-    packets = _opened(path, [_cv2().CAP_PROP_FORMAT, -1])
+    packets = _opened(path, [opencv().CAP_PROP_FORMAT, -1])
     if packets.isOpened():
-        codec = codec_name(int(packets.get(_cv2().CAP_PROP_FOURCC)))
+        codec = codec_name(int(packets.get(opencv().CAP_PROP_FOURCC)))
         return InputError(
             f"No picture can be decoded: the video is in {codec}, which is damaged or not supported here",
             file=path,

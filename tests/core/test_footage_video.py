@@ -2,6 +2,7 @@
 """What a video contains, against PyAV's timestamps and the frame numbers that the pictures show."""
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 import rockfall.core.footage.video as module
 from rockfall.core.errors import InputError
+from rockfall.core.footage.opencv import FFMPEG_QUIET
 from rockfall.core.footage.video import frame_at, open_video, read_frame, read_frames
 
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)  # read once a process, by whoever is first
 FOLDER = Path(__file__).parent.parent / "data" / "videos"
 PYAV = json.loads((FOLDER / "times.json").read_text())
 REAL = Path(__file__).parent.parent.parent / "assets" / "examples" / "bouncing_ball" / "balle1-vp9.avi"

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import RockfallError
-from ...core.exchange.opening import open_project
+from ...core.exchange.opening import open_project, open_terrain
 from ...core.exchange.output import output_folder
 from ...core.exchange.parameters import checked_parameters
 from ...core.exchange.project import (
@@ -24,13 +24,19 @@ from ...core.exchange.tables import write_picks
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.shading import shade
 from ...core.terrain.writers import write_ply
-from . import migration, picks, reconstruction, state, terrain, twins
+from . import migration, picks, project_videos, reconstruction, state, terrain, twins
 
 DESCRIPTION_KEY, RENDER_KEY = "rockfall_site_description", "rockfall_render_presets"
 
 
-def load_project(scene: bpy.types.Scene, path: Path) -> Reconstruction:
-    """Show a project in a scene: its terrain, its picks, and what is reconstructed from them.
+def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True) -> Reconstruction | None:
+    """Show a project in a scene: its terrain, its videos, its picks, and what is reconstructed from them.
+
+    Returns None for a project of videos without picks: they are still to be made.
+
+    Parameters
+    ----------
+    with_videos : a film needs none; with them the scene plays at the rate and the times of the first.
 
     Raises
     ------
@@ -38,17 +44,28 @@ def load_project(scene: bpy.types.Scene, path: Path) -> Reconstruction:
     """
     project = read_project(path)
     parameters = checked_parameters(project.extra["models"], path) if "models" in project.extra else {}
-    surface, result = open_project(project)
+    if project.picks is None and project.videos and with_videos:
+        surface, result = open_terrain(project), None
+    else:
+        surface, result = open_project(project)
     shading = None if surface is None else shade(surface)
+    known = surface.shift if surface is not None else None if result is None else result.picks.shift
+    found = project_videos.read_videos(project, known) if with_videos else []
+    cameras = [read.camera.camera.camera.shift for read in found if read.camera is not None]
 
-    state.write_shift(scene, result.picks.shift)
-    reconstruction.keep_settings(scene, project, sorted(set(result.picks.trajectory.tolist())))
+    names = [block.name for block in project.blocks] if result is None else result.picks.trajectory.tolist()
+    shift = result.picks.shift if result is not None else known or next(iter(cameras), None)
+    if shift is not None:
+        state.write_shift(scene, shift)
+    reconstruction.keep_settings(scene, project, sorted(set(names)))
     scene[DESCRIPTION_KEY] = project.site.description
     scene[RENDER_KEY] = json.dumps([asdict(preset) for preset in project.render])
     twins.keep_parameters(scene, parameters)
     if surface is not None and shading is not None:
         terrain.add_terrain(scene, surface, shading)
-    reconstruction.show(scene, result)
+    project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
+    if result is not None:
+        reconstruction.show(scene, result)
     return result
 
 
@@ -79,6 +96,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
             block=settings.block,
             blocks=settings.blocks,
             reconstruction=settings.reconstruction,
+            videos=project_videos.write_videos(scene, place),
             render=tuple(_preset(values) for values in json.loads(scene.get(RENDER_KEY, "[]"))),
             extra={"models": parameters} if parameters else {},
         )

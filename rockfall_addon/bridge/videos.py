@@ -93,7 +93,7 @@ def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None
     if matrix is not None:
         camera.matrix_world = matrix
     if first:
-        _begin_with(scene, camera)
+        begin_with(scene, camera)
     return camera
 
 
@@ -135,11 +135,13 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
         "advice": rate_advice(video, capture_rate_hz=capture_rate_of(camera)),
     }
     camera[FACTS_KEY] = json.dumps(facts)
-    clip = bpy.data.movieclips.load(camera[FILE_KEY])
-    clip.name = camera.name
     for old in list(camera.data.background_images):
         old.clip = old.image = None  # removing does not count down their users
         camera.data.background_images.remove(old)
+    if not video.path.is_file():  # of a project whose video has moved
+        return
+    clip = bpy.data.movieclips.load(camera[FILE_KEY])
+    clip.name = camera.name
     background = camera.data.background_images.new()
     background.source, background.clip = "MOVIE_CLIP", clip
     background.frame_method = "STRETCH"  # fills the frame to the pixel; fitting could leave a seam
@@ -522,7 +524,7 @@ def deleted(scene: bpy.types.Scene) -> dict[str, str]:
     return {identifier: name for identifier, name in known.items() if identifier not in there}
 
 
-def _begin_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
+def begin_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """The first video: the scene plays at its rate, from its origin, as long as it lasts."""
     video = stored_video(camera)
     if np.isfinite(video.rate_hz):

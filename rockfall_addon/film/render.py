@@ -114,7 +114,7 @@ def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Recons
     scene.render.fps, scene.render.fps_base = film.base
     settings.playback = "REAL" if preset.stagger_s is None else "TOGETHER"
     settings.stagger_s = preset.stagger_s or 0.0
-    return load_project(scene, project)
+    return load_project(scene, project, with_videos=False)
 
 
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:

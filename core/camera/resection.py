@@ -92,6 +92,16 @@ class Resection:
         """(6, 6) rotation about the camera's axes [rad], position [m]."""
         return self.covariance[:6, :6]
 
+    @property
+    def pose_covariance_given_lens(self) -> Array:
+        """(6, 6) the same with the lens held as found: for what moves the pose and not the lens.
+
+        With `pose_covariance` it could back away as if the focal length grew along.
+        """
+        pose, lens = self.covariance[:6, :6], self.covariance[6:, 6:]
+        both = self.covariance[:6, 6:]
+        return pose - both @ np.linalg.pinv(lens, hermitian=True) @ both.T if lens.size else pose
+
     def correlation(self, first: str, second: str) -> float:
         """Correlation of two parameters, −1…1; NaN when they are not determined."""
         i, j = self.parameters.index(first), self.parameters.index(second)

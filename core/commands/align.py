@@ -111,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
             path,
             rmse_px=solved.found.rmse_px,
             sigma=solved.found.sigma,
-            pose_covariance=solved.found.pose_covariance,
+            pose_covariance=solved.found.pose_covariance_given_lens,
         )
         write_pair_residuals(folder / "pairs_residuals.csv", pairs, residual_px, residual_m, solved.used)
         written = ["camera.toml", "pairs_residuals.csv"]

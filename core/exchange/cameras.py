@@ -41,7 +41,8 @@ class CameraFile:
     rmse_px : of the pairs it was solved from; None when unknown.
     sigma : standard deviations by name: those of `INTRINSICS` in their units, x, y, z [m], omega, phi, kappa [rad].
     crs : coordinate reference system of the position, empty when unknown.
-    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path; None when unknown.
+    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path, for the lens as it is; None when
+        unknown.
     extra : keys that this version does not know.
     """
 

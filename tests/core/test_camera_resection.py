@@ -145,6 +145,17 @@ def test_the_covariance_is_that_of_finite_differences() -> None:
     assert -1 <= found.correlation("f", "x") <= 1
 
 
+def test_the_pose_for_a_held_lens_is_known_as_if_the_lens_had_been_given() -> None:
+    _, pixels, points = made(3, 14)
+    found = resect(pixels, points, WIDTH, HEIGHT, sigma_px=0.5, robust=False)
+    held = resect(pixels, points, WIDTH, HEIGHT, free=(), camera=found.camera, sigma_px=0.5, robust=False)
+    scale = np.sqrt(np.diag(held.pose_covariance))
+    assert held.camera.position == pytest.approx(found.camera.position, abs=1e-4 * scale[3:].max())
+    ratio = np.sqrt(np.diag(found.pose_covariance_given_lens)) / scale
+    assert ratio == pytest.approx(np.full(6, found.scatter / held.scatter), rel=1e-3)
+    assert np.sqrt(np.diag(found.pose_covariance))[3:].max() > 1.5 * scale[3:].max()
+
+
 @pytest.mark.parametrize("swap", [False, True])
 def test_wrong_pairs_are_named(swap: bool) -> None:
     named = 0

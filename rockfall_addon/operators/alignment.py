@@ -28,6 +28,16 @@ def _camera(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     return False
 
 
+def _pair(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """Whether there is an active pair; if not, what to do."""
+    if not _camera(cls, context):
+        return False
+    if alignment.active_pair(videos.active_camera(context.scene)) is not None:
+        return True
+    cls.poll_message_set("There is no pair yet")
+    return False
+
+
 class ROCKFALL_OT_mark_pair(bpy.types.Operator):
     """Mark a place: in the picture where the view looks through the camera, on the terrain in any other view.
     Drag a mark to correct it, hold Shift to move it finely. Shift-click in the camera view marks the terrain that is
@@ -60,6 +70,11 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
         else:
             self._side = alignment.PIXEL if rectangle is not None and not self._shift else alignment.POINT
             self._place = self._mouse.copy()
+            if rectangle is not None and self._shift and not alignment.is_placed(camera):
+                raise RockfallError(
+                    "The camera has no place yet, so what shines through is not what it sees. Click the terrain in "
+                    "another view, or place the camera by eye with Use This View."
+                )
             place = self._there(context, camera)
             if place is None:
                 raise RockfallError(
@@ -161,12 +176,7 @@ class ROCKFALL_OT_delete_pair(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _camera(cls, context):
-            return False
-        if alignment.active_pair(videos.active_camera(context.scene)) is not None:
-            return True
-        cls.poll_message_set("There is no pair")
-        return False
+        return _pair(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.every:
@@ -230,22 +240,35 @@ class ROCKFALL_OT_align_views(bpy.types.Operator):
         footage_blend.set_blend(camera, footage_blend.blend_of(camera))
         if context.window is None or not _views(context):
             return {"FINISHED"}
-        if len(_views(context)) == 1:
-            (area,) = _views(context)
-            with context.temp_override(area=area, region=_region(area)):
-                bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
-            look.show_relief(context, frame_all=bool(terrain.tiles(scene)))
-        left, right = sorted(_views(context), key=lambda area: (area.x, -area.y))[:2]
-        left.spaces.active.region_3d.view_perspective = "CAMERA"
-        if right.spaces.active.region_3d.view_perspective == "CAMERA":
-            right.spaces.active.region_3d.view_perspective = "PERSP"
-        space = left.spaces.active
-        space.show_region_ui = space.show_region_toolbar = False  # they would lie over the picture
-        with context.temp_override(area=left, region=_region(left)):
+        picture = self._split(context) if len(_views(context)) == 1 else self._choose(context)
+        with context.temp_override(area=picture, region=_region(picture)):
             bpy.ops.wm.tool_set_by_id(name=TOOL)
             if bpy.ops.view3d.view_center_camera.poll():
                 bpy.ops.view3d.view_center_camera()
         return {"FINISHED"}
+
+    def _split(self, context: bpy.types.Context) -> bpy.types.Area:
+        """Make two views of one; returns that of the footage, to the left."""
+        (area,) = _views(context)
+        with context.temp_override(area=area, region=_region(area)):
+            bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+        look.show_relief(context, frame_all=bool(terrain.tiles(context.scene)))
+        left, right = sorted(_views(context), key=lambda area: area.x)
+        left.spaces.active.region_3d.view_perspective = "CAMERA"
+        left.spaces.active.show_region_toolbar = False  # it would lie over the picture, as the sidebar
+        if right.spaces.active.show_region_ui:
+            left.spaces.active.show_region_ui = False
+        return left
+
+    def _choose(self, context: bpy.types.Context) -> bpy.types.Area:
+        """Of several views, the one of the footage: that which is it already, or the largest. Another one is free."""
+        areas = sorted(_views(context), key=lambda area: -area.width * area.height)
+        through = [area for area in areas if area.spaces.active.region_3d.view_perspective == "CAMERA"]
+        picture = (through or areas)[0]
+        picture.spaces.active.region_3d.view_perspective = "CAMERA"
+        if len(through) == len(areas):
+            through[-1].spaces.active.region_3d.view_perspective = "PERSP"
+        return picture
 
 
 def _views(context: bpy.types.Context) -> list[bpy.types.Area]:
@@ -298,7 +321,9 @@ class ROCKFALL_OT_go_to_pair(bpy.types.Operator):
     bl_label = "Go to Pair"
     bl_options = {"REGISTER", "UNDO"}
 
-    poll = ROCKFALL_OT_delete_pair.poll
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _pair(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)

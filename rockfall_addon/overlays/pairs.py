@@ -96,7 +96,7 @@ def _draw_in_picture(context: bpy.types.Context, camera: bpy.types.Object, recta
             cross = _inside(image_view.to_region(rectangle, size, seen[number]), rectangle)
         if not here:
             if cross is not None and pair.is_complete:
-                _cross(cross, CROSS * scale, (*colour[:3], 0.6), scale)
+                _cross(cross, CROSS * scale, (*colour[:3], 0.7), scale)
             continue
         place = _spot(image_view.to_region(rectangle, size, pair.pixel))
         if cross is not None:
@@ -241,10 +241,9 @@ def _spot(place: Sequence[float]) -> tuple[float, float]:
 
 
 def _inside(place: Sequence[float], rectangle: image_view.Rectangle) -> tuple[float, float] | None:
-    """The place, unless it is far outside of the picture."""
+    """The place, unless it is outside of the picture."""
     x, y = _spot(place)
-    wide, high = rectangle.width, rectangle.height
-    inside = -wide < x - rectangle.left < 2 * wide and -high < y - rectangle.bottom < 2 * high
+    inside = 0 <= x - rectangle.left <= rectangle.width and 0 <= y - rectangle.bottom <= rectangle.height
     return (x, y) if inside else None
 
 

@@ -51,14 +51,15 @@ def short(value: float) -> str:
 class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
     bl_label = "3  Alignment"
     bl_idname = "ROCKFALL_PT_alignment"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
         camera = videos.active_camera(context.scene)
-        if camera is None or not alignment.placement(camera):
+        if camera is None or not alignment.is_placed(camera):
             return "TO_DO"
         solution = alignment.solution_of(camera)
-        return "ATTENTION" if solution.problem or solution.wrong else "READY"
+        return "ATTENTION" if solution.problem or solution.wrong or following.is_stale(camera) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

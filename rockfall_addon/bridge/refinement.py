@@ -54,15 +54,15 @@ def propose(scene: bpy.types.Scene, names: Sequence[str] | None, free: Sequence[
     if lacking:
         raise RockfallError(lacking[0])
     cameras = [camera for camera in videos.cameras(scene) if videos.is_solved(camera)]
-    used = _seen(scene, names)
-    if not used:
+    seen = _seen(scene, names)
+    if not seen:
         raise RockfallError(f"The block of {', '.join(names or ())} was not seen in an aligned video. Track it first.")
     live.sync(scene)
     table = picks.trusted(picks.picks_of(scene))
-    chosen = np.isin(table.trajectory, used)
-    if not chosen.any():
-        raise RockfallError(f"There are no picks of {', '.join(used)}. Pick them, or propose them from the track.")
-    table = take(table, chosen)
+    used = [name for name in seen if name in table.trajectory]
+    if not used:
+        raise RockfallError(f"There are no picks of {', '.join(seen)}. Pick them, or propose them from the track.")
+    table = take(table, np.isin(table.trajectory, used))
     how = reconstruction.project_settings(scene, []).reconstruction
     found = refine(
         table,
@@ -126,8 +126,10 @@ def apply(scene: bpy.types.Scene) -> int:
             thing[picks.NORMAL_KEY] = row[6:]
     _apply_shared(scene, kept)
     discard(scene)
+    end = scene.frame_end
     if scene.rockfall.flights_join != kept["ends"]:
         scene.rockfall.flights_join = kept["ends"]
+        scene.frame_end = max(end, scene.frame_end)  # the video may go on
     live.sync(scene, again=bool(kept["free"]))
     return len(kept["ids"])
 
@@ -176,7 +178,8 @@ def _keep(
     moved = norm(new.position - table.position)
     later = new.time_s - table.time_s
     rows = np.column_stack([new.time_s, new.position, new.sigma_position_m, new.sigma_time_s, new.normal])
-    labels = [f"{table.trajectory[i]} {table.kind[i]} {table.time_s[i]:.2f} s" for i in range(len(table))]
+    names = [f"{name} " if len(used) > 1 else "" for name in table.trajectory.tolist()]
+    labels = [f"{names[i]}{table.kind[i]} {table.time_s[i]:.2f}" for i in range(len(table))]
     kept = {
         "names": list(used),
         "prints": _prints(scene, used),

@@ -86,6 +86,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
             self._kept, self._moved, self._place = picking.snapshot(thing), False, None
             spot = pointing.on_screen(context, list(thing[picks.POSITION_KEY]))[0]
             self._xy = (float(spot[0]), float(spot[1]))  # held by its middle: it does not jump
+            scene.rockfall_picking.trajectory = thing[picks.TRAJECTORY_KEY]
         pointing.select(context, thing)
         self._identifier = thing[picks.ID_KEY]
         return True

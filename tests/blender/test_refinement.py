@@ -126,6 +126,7 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
         assert 0 < thing["rockfall_sigma_time_s"][0] < 0.05
     assert np.median(far) < 0.15, "at two of the five the block touches the ground more than once"
     assert tracked.rockfall.flights_join == "centres"
+    assert tracked.frame_end >= 299, "the video's length stays"
     result = picks_of(tracked)[2]["rockfall_result"]
     speed = np.linalg.norm(local(truth[2], "v1x_mps", "v1y_mps", "v1z_mps") + ORIGIN)
     assert np.linalg.norm(list(result["incident_mps"])) == pytest.approx(speed, rel=0.03)

@@ -6,6 +6,7 @@ import bpy
 from . import footage, image_view, timing, video_times, videos
 
 OTHER_RATE = 1e-4
+SOON_S = 1e-3
 
 
 def facts(camera: bpy.types.Object) -> list[tuple[str, str]]:
@@ -54,6 +55,11 @@ def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[str]:
     said = []
     if scene.camera == camera and not image_view.shape_agrees(scene, camera):
         said.append("The scene's render size has another shape than the video: footage and terrain do not fit.")
+    times, time = videos.times_of(camera), videos.video_time(scene, camera)
+    if time < times[0] - SOON_S:
+        said.append("The scene is before this video begins: its first picture is shown.")
+    elif time > times[-1] + videos.stored_step_s(camera) + SOON_S:
+        said.append("The scene is behind the end of this video: its last picture is shown.")
     return said
 
 
@@ -72,10 +78,8 @@ def rates(scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
 def now(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[tuple[str, str]]:
     """Which picture is shown."""
     index, times = videos.true_frame(scene, camera), videos.times_of(camera)
-    time = videos.video_time(scene, camera)
-    outside = time < times[0] - 1e-3 or time > 2 * times[-1] - times[max(times.size - 2, 0)] + 1e-3
     return [
-        ("Picture", f"{index} of {times.size - 1}{' (beyond the video)' if outside else ''}"),
+        ("Picture", f"{index} of {times.size - 1}"),
         ("In the video", f"{times[index]:.3f} s"),
         ("Common time", f"{videos.clock_of(camera).to_common(float(times[index])):.3f} s"),
     ]

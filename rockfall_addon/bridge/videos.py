@@ -88,11 +88,14 @@ def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None
     """
     migration.refuse_newer(scene)
     video = opened(path)
-    first = not cameras(scene)
+    others = cameras(scene)
     camera = add_camera(scene, video)
+    if others:  # until they are synchronised, they begin together
+        starts = [float(clock_of(other).to_common(float(other[TIMES_KEY][0]))) for other in others]
+        set_clock(camera, Clock(min(starts), 0.0, float(video.time_s[0])))
     if matrix is not None:
         camera.matrix_world = matrix
-    if first:
+    if not others:
         begin_with(scene, camera)
     return camera
 
@@ -110,7 +113,7 @@ def add_camera(scene: bpy.types.Scene, video: Video) -> bpy.types.Object:
     camera[SOLVED_KEY] = False
     write_video(camera, video)
     focal = GUESSED_FOCAL * video.width
-    guess = Camera(video.width, video.height, focal, focal / video.pixel_aspect, video.width / 2, video.height / 2)
+    guess = Camera(video.width, video.height, focal, focal * video.pixel_aspect, video.width / 2, video.height / 2)
     write_lens(camera, guess)
     camera.matrix_world = Matrix(pose_to_blender(guess.position, guess.rotation).tolist())
     scene[migration.SCHEMA_KEY] = migration.SCHEMA
@@ -186,6 +189,12 @@ def size_of(camera: bpy.types.Object) -> tuple[int, int]:
 def times_of(camera: bpy.types.Object) -> Array:
     """(f,) timestamps of the frames, video time [s]."""
     return np.array(camera[TIMES_KEY], dtype=np.float64)
+
+
+def stored_step_s(camera: bpy.types.Object) -> float:
+    """Usual time between two pictures, video time [s]; 0 for a single one."""
+    rate = float(facts_of(camera).get("rate_hz", 0.0))
+    return 1 / rate if rate > 0 else 0.0
 
 
 def stored_video(camera: bpy.types.Object) -> Video:

@@ -68,7 +68,7 @@ class ROCKFALL_OT_add_video(bpy.types.Operator, ImportHelper):
         added, errors = [], []
         for path in paths:
             try:
-                added.append(videos.add_video(context.scene, path, matrix=_view_matrix(context)))
+                added.append(videos.add_video(context.scene, path, matrix=_present_matrix(context)))
             except RockfallError as error:
                 errors.append(str(error))
         if not added:
@@ -189,7 +189,8 @@ class ROCKFALL_OT_time_origin_here(_OfVideo, bpy.types.Operator):
     what: EnumProperty(
         name="Set",
         items=[
-            ("SCENE", "The scene's frame 0", "The timeline begins here. Times of picks and videos stay"),
+            ("SCENE", "The scene's frame 0", "The timeline begins here: Blender plays nothing before frame 0. "
+             "Times of picks and videos stay"),
             ("CLOCK", "The common clock", "This is time 0 for all videos. Only before there are picks"),
         ],
     )  # fmt: skip
@@ -316,6 +317,14 @@ def _view_matrix(context: bpy.types.Context) -> Matrix | None:
     if view is None or view.region_3d is None or view.region_3d.view_perspective == "CAMERA":
         return None
     return view.region_3d.view_matrix.inverted()
+
+
+def _present_matrix(context: bpy.types.Context) -> Matrix | None:
+    """Where the view looks from, also when it looks through a camera."""
+    free = _view_matrix(context)
+    if free is not None:
+        return free
+    return context.scene.camera.matrix_world.copy() if context.scene.camera is not None else None
 
 
 def _in_camera_view(context: bpy.types.Context) -> bool:

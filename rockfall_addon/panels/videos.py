@@ -10,6 +10,7 @@ from .base import RockfallPanel, State, advise, facts, paragraph
 class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
     bl_label = "2  Videos"
     bl_idname = "ROCKFALL_PT_videos"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
@@ -89,6 +90,7 @@ class ROCKFALL_PT_video_times(RockfallPanel, bpy.types.Panel):
         row = layout.row(align=True)
         for step, icon in ((-10, "REW"), (-1, "TRIA_LEFT"), (1, "TRIA_RIGHT"), (10, "FF")):
             row.operator("rockfall.step_frame", text=f"{step:+d}", icon=icon).step = step
+        paragraph(context, layout, "In the camera's view: arrow keys, or Alt and the wheel; with Ctrl by ten.")
         rates = video_words.rates(scene, camera)
         if rates:
             paragraph(context, layout, rates, "INFO")

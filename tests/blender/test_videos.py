@@ -177,6 +177,28 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     assert videos.clock_of(reference).offset_s == 0.0
 
 
+def test_next_video_begins_with_the_others(part: Part) -> None:
+    videos = part("rockfall_addon.bridge.videos")
+    camera = add(part, "constant.mp4")
+    videos.set_clock(camera, part("core.footage.clock").Clock(465.5))
+    other = add(part, "variable.mp4")
+    assert videos.clock_of(other).to_common(float(videos.times_of(other)[0])) == 465.5
+
+
+def test_pixels_that_are_not_square(part: Part) -> None:
+    """Of the same angle of view across and up: fx · width of a pixel = fy · height of a pixel."""
+    from dataclasses import replace
+
+    videos = part("rockfall_addon.bridge.videos")
+    video = replace(part("core.footage.video").open_video(DATA / "constant.mp4"), pixel_aspect=1.25)
+    camera = videos.add_camera(scene(), video)
+    one = videos.moving_camera(camera).camera
+    assert one.fy / one.fx == pytest.approx(1.25)
+    scene().camera = camera
+    scene().frame_set(1)
+    assert scene().render.pixel_aspect_x / scene().render.pixel_aspect_y == pytest.approx(1.25)
+
+
 def test_nothing_to_synchronise(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
     times, errors = part("rockfall_addon.bridge.video_times"), part("core.errors")
     with pytest.raises(errors.RockfallError, match="same event"):
@@ -440,7 +462,11 @@ def test_words_about_videos(part: Part) -> None:
     for word in ("varies", "missing", "Blender's player"):
         assert word in said
     scene().frame_set(5000)
-    assert "beyond" in words.now(scene(), camera)[0][1]
+    assert "behind the end" in words.warnings(scene(), camera)[0]
+    scene().frame_set(66)
+    assert words.warnings(scene(), camera) == []
+    scene().frame_set(-5)
+    assert "before" in words.warnings(scene(), camera)[0]
 
 
 def test_disabled_and_enabled(part: Part, installation: object) -> None:

@@ -82,9 +82,9 @@ def no_trouble(window):
     assert not [text for text in said if "went wrong" in text], said
 
 
-def pick_impacts(window, count):
+def pick_impacts(window, count, first=0):
     block = {int(row["frame"]): row for row in rows("block.csv")}
-    impacts = [row for row in rows("impacts.csv") if float(row["time_s"]) > 1.3][:count]
+    impacts = [row for row in rows("impacts.csv") if float(row["time_s"]) > 1.3][first:][:count]
     frames = [round(float(row["time_s"]) * 30) for row in impacts]
     for frame in frames:
         bpy.context.scene.frame_set(frame)
@@ -171,7 +171,7 @@ def case_pick_impacts_in_the_footage(window):
 def case_pick_refine(window):
     yield from open_site(window)
     scene = bpy.context.scene
-    _, impacts = yield from pick_impacts(window, 5)
+    yield from pick_impacts(window, 5)
     table = window.part("core.exchange.footage_tables").read_track(FOOTAGE / "track.csv")
     one = np.ones(len(table))
     track = window.part("core.footage.tracking").BlockTrack(
@@ -226,4 +226,100 @@ def case_pick_refine(window):
     yield 1.0
     assert len(picks()) == count + 1
     window.screenshot("free-clicked")
+    no_trouble(window)
+
+
+def case_pick_fine_and_cancelled(window):
+    """Shift moves a tenth of the way; Esc takes back what the mouse did; Enter ends the tool."""
+    yield from open_site(window)
+    yield from pick_impacts(window, 1, 2)
+    ways = []
+    for modifiers in ({}, {"shift": True}):
+        with window.override():
+            spot = window.part("rockfall_addon.bridge.pointing").on_screen(
+                bpy.context, [list(picks()[0]["rockfall_position_m"])]
+            )[0]
+        x, y = window.region().x + spot[0], window.region().y + spot[1]
+        held = list(picks()[0]["rockfall_position_m"])
+        yield from window.move(x, y)
+        window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y), **modifiers)
+        yield 0.3
+        for step in range(1, 5):
+            window.window.event_simulate(
+                type="MOUSEMOVE", value="NOTHING", x=round(x + 10 * step), y=round(y), **modifiers
+            )
+            yield 0.2
+        window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x + 40), y=round(y), **modifiers)
+        yield 0.7
+        ways.append(np.linalg.norm(np.subtract(picks()[0]["rockfall_position_m"], held)))
+    assert 0.05 < ways[1] / ways[0] < 0.2, ways
+    held = list(picks()[0]["rockfall_position_m"])
+    x, y = on_screen(window, [300, 400])
+    yield from window.move(x, y)
+    window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
+    yield 0.5
+    assert list(picks()[0]["rockfall_position_m"]) != held, "a click elsewhere in the picture moves its pick"
+    yield from window.press("ESC", x, y)
+    window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x), y=round(y))
+    yield 0.5
+    assert list(picks()[0]["rockfall_position_m"]) == held
+    bpy.context.scene.frame_set(80)
+    yield 0.5
+    yield from window.move(x, y)
+    window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
+    yield 0.5
+    assert len(picks()) == 2
+    yield from window.press("ESC", x, y)
+    window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x), y=round(y))
+    yield 0.5
+    assert len(picks()) == 1, "a new pick that is cancelled is gone"
+    yield from window.press("RET", x, y)
+    with window.override():
+        tool = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT")
+    assert tool.idname != "rockfall.pick_tool"
+    no_trouble(window)
+
+
+def case_pick_track_the_block(window):
+    """Two clicks on the block in flight, tracked beside the window's work, stopped by Esc, then proposed impacts."""
+    yield from open_site(window)
+    scene = bpy.context.scene
+    block = {int(row["frame"]): row for row in rows("block.csv")}
+    scene.rockfall_picking.kind = "pass"
+    for frame in (70, 100):
+        scene.frame_set(frame)
+        yield 0.5
+        x, y = on_screen(window, [float(block[frame]["u_px"]), float(block[frame]["v_px"])])
+        yield from window.click(x, y)
+        yield 0.3
+    observations, camera = window.part("rockfall_addon.bridge.observations"), camera_of(window)
+    assert not picks(), "in flight the pixel is kept, not a place"
+    assert observations.seen_in(camera, "B10").frame.tolist() == [70, 100]
+    scene.rockfall_picking.whole_video, scene.rockfall_picking.track_frames = False, 55
+
+    def running():
+        return any(one.bl_idname == "ROCKFALL_OT_track_block" for one in window.window.modal_operators)
+
+    with window.override():
+        assert bpy.ops.rockfall.track_block("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield 1.0
+    assert running()
+    window.screenshot("running")
+    yield from window.press("ESC", x, y)
+    yield from window.wait_for(lambda: not running(), 60.0, "tracking stops")
+    assert len(observations.seen_in(camera, "B10")) == 2, "nothing has changed"
+    with window.override():
+        assert bpy.ops.rockfall.track_block("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    yield from window.wait_for(lambda: not running(), 150.0, "tracking ends")
+    seen = observations.seen_in(camera, "B10")
+    assert len(seen) > 60, len(seen)
+    with window.override():
+        assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
+    window.redraw()
+    yield 1.0
+    window.screenshot("proposed")
+    times = np.array([thing["rockfall_time_s"] for thing in picks()]) - OFFSET_S
+    truth = np.array([[float(row["time_s"]), float(row["leave_time_s"])] for row in rows("impacts.csv")]).ravel()
+    assert len(times)
+    assert np.abs(times[:, None] - truth).min(axis=1).max() < 0.02, times
     no_trouble(window)

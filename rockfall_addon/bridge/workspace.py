@@ -15,6 +15,7 @@ NAME = "Rockfall"
 KEY = "rockfall_workspace"
 """Marks our workspace, which its owner may rename."""
 
+PICK_TOOL = "rockfall.pick_tool"
 MARGIN = 0.97  # share of the free part of the view that the picture fills
 PROBE = 0.1
 
@@ -62,12 +63,25 @@ def show_tab(screen: bpy.types.Screen) -> None:
 
 def look_through_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
     """Look through the active video's camera in the largest 3-D view."""
-    camera = videos.active_camera(scene)
-    areas = [area for area in screen.areas if area.type == "VIEW_3D"]
-    if camera is not None and areas:
+    camera, largest = videos.active_camera(scene), _largest_view(screen)
+    if camera is not None and largest is not None:
         scene.camera = camera
-        largest = max(areas, key=lambda area: area.width * area.height)
         largest.spaces.active.region_3d.view_perspective = "CAMERA"
+
+
+def take_pick_tool(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
+    """With an aligned camera, the next click is a pick. Needs the window in the context."""
+    camera, largest = videos.active_camera(scene), _largest_view(screen)
+    if camera is None or largest is None or not videos.is_solved(camera) or bpy.context.mode != "OBJECT":
+        return
+    region = next(region for region in largest.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(area=largest, region=region):
+        bpy.ops.wm.tool_set_by_id(name=PICK_TOOL)
+
+
+def _largest_view(screen: bpy.types.Screen) -> bpy.types.Area | None:
+    areas = [area for area in screen.areas if area.type == "VIEW_3D"]
+    return max(areas, key=lambda area: area.width * area.height, default=None)
 
 
 def fit_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:

@@ -5,15 +5,16 @@ from pathlib import Path
 
 import bpy
 
+from ..bridge import footage_blend, observations, state, videos
 from ..bridge import project as project_bridge
-from ..bridge import state, videos
 from . import look, workspace
 from .reporting import reported
 
 DEMO = Path(__file__).parents[2] / "assets" / "demo" / "project.toml"
 FOOTAGE = DEMO.parent / "footage" / "project.toml"
-START_S = 1.3
-"""Of the demo's video: the block comes into the picture."""
+FIRST_IMPACT_S = 1.71
+"""Of the demo's video: the first impact in the picture."""
+FOOTAGE_BLEND = 0.9  # the flights behind it still shine through
 
 
 class _OfDemo:
@@ -59,7 +60,9 @@ class ROCKFALL_OT_load_footage_demo(_OfDemo, bpy.types.Operator):
         camera = videos.active_camera(scene)
         if camera is not None:
             scene.camera = camera
-            common_s = videos.clock_of(camera).to_common(START_S)
+            footage_blend.set_blend(camera, FOOTAGE_BLEND)
+            common_s = videos.clock_of(camera).to_common(FIRST_IMPACT_S)
+            scene.rockfall_picking.trajectory = next(iter(observations.names_in(camera)), "")
             scene.frame_set(round(videos.frame_at(scene, float(common_s))))
         look.show_relief(context, frame_all=True)
         workspace.open_workspace(context, arrange=True)

@@ -69,7 +69,7 @@ def open_workspace(context: bpy.types.Context, *, arrange: bool = False) -> None
 
 @problems.guarded
 def _arrange() -> None:
-    """Once the areas are drawn: the footage to the left, the slope to the right."""
+    """Once the areas are drawn: footage to the left, the slope to the right, and the tool of step 4 if it is time."""
     for window in bpy.context.window_manager.windows:
         if workspace.KEY not in window.workspace:
             continue
@@ -79,6 +79,7 @@ def _arrange() -> None:
                 look.show_relief(bpy.context, frame_all=True)
             workspace.look_through_footage(window.scene, window.screen)
             workspace.fit_footage(window.scene, window.screen)
+            workspace.take_pick_tool(window.scene, window.screen)
 
 
 def forget() -> None:

@@ -13,6 +13,7 @@ QUESTION = "Where would the blocks fly if a model were right? Same impacts, same
 class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
     bl_label = "6  Models"
     bl_idname = "ROCKFALL_PT_models"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -10,6 +10,7 @@ from .base import RockfallPanel, State
 class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
     bl_label = "7  Playback and Look"
     bl_idname = "ROCKFALL_PT_playback"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

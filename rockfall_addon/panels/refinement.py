@@ -12,6 +12,7 @@ MOST_ROWS = 12
 class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
     bl_label = "5  Refinement"
     bl_idname = "ROCKFALL_PT_refinement"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

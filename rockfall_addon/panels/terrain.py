@@ -10,6 +10,7 @@ from .base import RockfallPanel, State, advise, facts, paragraph
 class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     bl_label = "1  Terrain"
     bl_idname = "ROCKFALL_PT_terrain"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

@@ -141,6 +141,25 @@ def test_the_file_of_the_workspace(rockfall, part, tmp_path: Path) -> None:
     bpy.data.batch_remove([ours, screen])
 
 
+def test_the_next_step_leads_from_the_footage_to_the_end(rockfall, part) -> None:
+    start, scene = part("rockfall_addon.panels.start"), bpy.context.scene
+    for expected in (
+        "rockfall.load_footage_demo",
+        "rockfall.propose_impacts",
+        "rockfall.refine",
+        "rockfall.apply_refinement",
+    ):
+        sentence, buttons = start.next_step(scene)
+        offered = [identifier for identifier, _, _ in buttons]
+        assert sentence.endswith(".")
+        assert expected in offered, (expected, sentence)
+        for identifier in offered:
+            module, name = identifier.split(".")
+            assert getattr(getattr(bpy.ops, module), name).get_rna_type()
+        assert getattr(bpy.ops.rockfall, expected.removeprefix("rockfall."))() == {"FINISHED"}
+    assert start.next_step(scene)[0].startswith("Play")
+
+
 def test_opening_needs_a_window(rockfall) -> None:
     if not bpy.app.background:
         pytest.skip("has a window")
@@ -153,7 +172,7 @@ def test_footage_demo_is_ready_to_be_picked(rockfall, part) -> None:
     (camera,) = videos.cameras(scene)
     assert videos.is_solved(camera)
     assert scene.camera == camera
-    assert videos.video_time(scene, camera) == pytest.approx(1.3, abs=0.02)
+    assert videos.video_time(scene, camera) == pytest.approx(51 / 30, abs=1e-6)
     observations = part("rockfall_addon.bridge.observations")
     assert observations.names_in(camera) == ["B10"]
     assert part("rockfall_addon.bridge.picking").trajectory(scene) == "B10"

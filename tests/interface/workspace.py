@@ -21,6 +21,13 @@ def open_it(window):
     yield 1.5
 
 
+def arranged(window):
+    """Wait until the demo's footage is arranged; the first drawing takes long without a graphics card."""
+    timer = window.part("rockfall_addon.operators.workspace")._arrange
+    yield from window.wait_for(lambda: not bpy.app.timers.is_registered(timer), 60, "arranged")
+    yield 2.0
+
+
 def check(window):
     """Two views beside each other, the tab open in the left one, the timeline below."""
     seen, free = views(window)
@@ -54,7 +61,7 @@ def case_workspace_with_the_footage(window):
     """One click; the whole picture is seen beside the sidebar; a second opening finds the same workspace."""
     with window.override():
         assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
-    yield 3.0
+    yield from arranged(window)
     window.screenshot("footage")
     check(window)
     scene, (seen, free) = bpy.context.scene, views(window)
@@ -71,3 +78,70 @@ def case_workspace_with_the_footage(window):
     yield 1.0
     yield from open_it(window)
     assert [one.name for one in bpy.data.workspaces if one.name.startswith("Rockfall")] == ["Rockfall"]
+
+
+def case_tutorial_of_the_manual(window):
+    """From the demo's footage to a refined trajectory, by the clicks that docs/manual counts."""
+    scene = bpy.context.scene
+    start = window.part("rockfall_addon.panels.start")
+
+    def press(operator):
+        assert operator in [button[0] for button in start.next_step(scene)[1]], "not offered as the next step"
+        seen, _ = views(window)
+        module, name = operator.split(".")
+        with bpy.context.temp_override(window=window.window, area=seen, region=region(seen, "WINDOW")):
+            assert getattr(getattr(bpy.ops, module), name)() == {"FINISHED"}
+
+    with window.override():
+        bpy.ops.rockfall.load_footage_demo()  # menu Rockfall > Load Footage Demo: 2 clicks
+    yield from arranged(window)
+    window.screenshot("1-loaded")
+    press("rockfall.propose_impacts")
+    yield 3.0
+    window.screenshot("2-proposed")
+    picks = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
+    assert len(picks) >= 7
+    assert [thing for thing in scene.objects if thing.get("rockfall_role") == "flights"]
+    press("rockfall.refine")
+    yield 3.0
+    window.screenshot("3-refined")
+    press("rockfall.apply_refinement")
+    yield 3.0
+    said = window.part("rockfall_addon.bridge.problems").sentences(scene)
+    assert not [text for text in said if "went wrong" in text], said
+    window.screenshot("4-applied")
+    assert start.next_step(scene)[0].startswith("Play")
+
+
+def case_first_clicks_of_the_manual(window):
+    """The menu Rockfall in a fresh Blender, and the first picks by hand, with real clicks."""
+    scene = bpy.context.scene
+    with window.override():
+        bpy.ops.wm.call_menu(name="ROCKFALL_MT_main")
+    yield 1.0
+    window.screenshot("menu")
+    yield from window.press("ESC", *window.centre())
+    with window.override():
+        bpy.ops.rockfall.load_footage_demo()
+    yield from arranged(window)
+    seen, _ = views(window)
+    here = region(seen, "WINDOW")
+    view = window.part("rockfall_addon.bridge.image_view")
+    camera = window.part("rockfall_addon.bridge.videos").active_camera(scene)
+    rectangle = view.image_rectangle(here, seen.spaces.active.region_3d, scene, camera)
+    for pixel, presses in (((921.974, 114.007), 38), ((726.5, 346.1), 0)):  # the first two impacts
+        x, y = view.to_region(rectangle, (1280, 720), pixel)
+        yield from window.click(here.x + x, here.y + y)
+        yield 1.0
+        for _ in range(presses):
+            window.window.event_simulate(type="RIGHT_ARROW", value="PRESS", x=round(here.x + x), y=round(here.y + y))
+            yield 0.05
+            window.window.event_simulate(type="RIGHT_ARROW", value="RELEASE", x=round(here.x + x), y=round(here.y + y))
+            yield 0.05
+        yield 1.0
+    yield 2.0
+    window.screenshot("by-hand")
+    picks = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
+    assert len(picks) == 2
+    assert scene.frame_current == 89
+    assert [thing for thing in scene.objects if thing.get("rockfall_role") == "flights"]

@@ -22,7 +22,9 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
         picks = state.with_role(scene, state.PICK_ROLE)
         flights = state.with_role(scene, state.FLIGHTS_ROLE)
         if not picks:
-            advise(context, layout, False, "Import a table of timed picks (picks.csv).")
+            with_video = bool(state.with_role(scene, state.CAMERA_ROLE))
+            way = "Click the block at its impacts in the footage, or import" if with_video else "Import"
+            advise(context, layout, False, f"{way} a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
         for sentence in problems.sentences(scene):

@@ -53,8 +53,10 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
         ]
     if not picks:
         return _begin_picking(scene, camera)
-    if scene.get(refinement.PROPOSAL_KEY):
-        return "The refined flights are drawn in light blue. Take them, or leave the picks as they are.", [
+    found = refinement.proposal(scene)
+    if found is not None:
+        fit = f"Refined: {found['before_px']:.2f} px from the tracked pixels before, {found['after_px']:.2f} px after."
+        return f"{fit} The new flights are light blue; step 5 has the numbers.", [
             ("rockfall.apply_refinement", "Apply", "CHECKMARK"),
             ("rockfall.discard_refinement", "Discard", "X"),
         ]

@@ -32,11 +32,11 @@ def follow(scene: bpy.types.Scene) -> None:
     if not things:
         return
     _heal(things)
-    videos.remember(scene)
+    videos.remember(scene, things)
     use_size_of_active(scene)
     for camera in things:
         videos.follow_clock(scene, camera)
-    show_pictures(scene)
+    show_pictures(scene, things)
 
 
 def use_size_of_active(scene: bpy.types.Scene, *, again: bool = False) -> None:
@@ -55,9 +55,9 @@ def use_size_of_active(scene: bpy.types.Scene, *, again: bool = False) -> None:
         render.pixel_aspect_x, render.pixel_aspect_y = camera.get(videos.ASPECT_KEY, (1.0, 1.0))
 
 
-def show_pictures(scene: bpy.types.Scene) -> None:
+def show_pictures(scene: bpy.types.Scene, cameras: list[bpy.types.Object]) -> None:
     """Each camera shows the picture of the scene's frame."""
-    for camera in videos.cameras(scene):
+    for camera in cameras:
         clip = videos.clip_of(camera)
         if clip is None:
             continue

@@ -117,7 +117,7 @@ def add_camera(scene: bpy.types.Scene, video: Video) -> bpy.types.Object:
     write_lens(camera, guess)
     camera.matrix_world = Matrix(pose_to_blender(guess.position, guess.rotation).tolist())
     scene[migration.SCHEMA_KEY] = migration.SCHEMA
-    remember(scene)
+    remember(scene, [camera])
     return camera
 
 
@@ -510,10 +510,10 @@ def scene_rate(rate_hz: float) -> tuple[int, float]:
     return fps, fps / rate_hz
 
 
-def remember(scene: bpy.types.Scene) -> None:
+def remember(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:
     """Remember which cameras there are, beside those that are gone."""
     known = json.loads(scene.get(VIDEOS_KEY, "{}"))
-    known |= {thing[ID_KEY]: Path(str(thing[FILE_KEY])).name for thing in cameras(scene)}
+    known |= {thing[ID_KEY]: Path(str(thing[FILE_KEY])).name for thing in things}
     text = json.dumps(known)
     if scene.get(VIDEOS_KEY) != text:
         scene[VIDEOS_KEY] = text

@@ -223,6 +223,14 @@ def in_this_picture(
     return [thing for thing in things if abs(thing[picks.TIME_KEY] - times[thing]) <= SAME_PICTURE * step]
 
 
+def of_this_picture(
+    scene: bpy.types.Scene, camera: bpy.types.Object | None, name: str, time_s: float
+) -> bpy.types.Object | None:
+    """The pick that a trajectory has in the picture, or moment, that is shown: the one nearest to a common time."""
+    near = in_this_picture(scene, camera, name)
+    return min(near, key=lambda one: abs(one[picks.TIME_KEY] - time_s), default=None)
+
+
 def put(
     scene: bpy.types.Scene, camera: bpy.types.Object | None, place: Place, name: str, kind: str
 ) -> tuple[bpy.types.Object, bool]:
@@ -232,9 +240,8 @@ def put(
     -------
     The pick, and whether it is new.
     """
-    near = in_this_picture(scene, camera, name)
-    if near:
-        thing = min(near, key=lambda one: abs(one[picks.TIME_KEY] - place.time_s))
+    thing = of_this_picture(scene, camera, name, place.time_s)
+    if thing is not None:
         if camera is not None and elsewhere(thing, camera):
             keep_sighting(scene, thing, camera, place)  # the same event in a second video: the place stays
         else:
@@ -368,6 +375,18 @@ def triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> SpacePoints
             pixels.append(seen.pixel[None])
             sigmas.append([seen.sigma_px])
     return triangulate(lenses, np.array(pixels), np.array(sigmas)) if len(lenses) > 1 else None
+
+
+def second_view(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:
+    """What a second video says about a pick, in a sentence."""
+    found = triangulated(scene, thing)
+    if found is None or not np.isfinite(found.point).all():
+        return "Kept as this event's pixel in a second video."
+    away = float(np.linalg.norm(found.point[0] - np.array(thing[picks.POSITION_KEY])))
+    return (
+        f"Seen in a second video: the rays miss each other by {100 * found.miss_distance[0]:.1f} cm, {away:.2f} m from "
+        "the pick. The pick stays; Use Triangulated Point moves it there."
+    )
 
 
 def use_triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> float:

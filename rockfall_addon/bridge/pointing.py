@@ -98,6 +98,27 @@ def pick_at(context: bpy.types.Context, xy: Sequence[float], *, any_time: bool =
     return things[nearest] if away[nearest] <= REACH_PX * context.preferences.system.ui_scale else None
 
 
+def handle_of(context: bpy.types.Context, thing: bpy.types.Object) -> tuple[float, float]:
+    """Where a pick is held by the mouse, in the region: by what is clicked in the footage, else by its place."""
+    place, camera = np.array(thing[picks.POSITION_KEY], dtype=np.float64), solved_camera_of(context)
+    if camera is not None and context.scene.rockfall_picking.aim == "CENTRE":
+        seen = picking.sightings(thing).get(camera[videos.ID_KEY])
+        rectangle = image_view.image_rectangle(context.region, context.region_data, context.scene, camera)
+        if (
+            seen is not None
+            and seen.centre
+            and rectangle is not None
+            and thing in picking.in_this_picture(context.scene, camera)
+        ):
+            x, y = image_view.to_region(rectangle, videos.size_of(camera), seen.pixel)
+            return float(x), float(y)
+        normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
+        radius = picking.block_of(context.scene, thing[picks.TRAJECTORY_KEY]).radius_m
+        place = place + radius * normal / max(float(np.linalg.norm(normal)), 1e-9)
+    x, y = on_screen(context, place)[0]
+    return float(x), float(y)
+
+
 def select(context: bpy.types.Context, thing: bpy.types.Object) -> None:
     """Make a pick the active and only selected object."""
     for other in context.selected_objects:

@@ -67,7 +67,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def _begin(self, context: bpy.types.Context, *, any_time: bool) -> bool:
-        """Take the pick under the mouse, or make one; False when an observation was kept instead."""
+        """Take the pick under the mouse, or make one; False when the click was all: nothing is to be dragged."""
         scene = context.scene
         thing = pointing.pick_at(context, self._xy, any_time=any_time)
         if thing is None:
@@ -77,15 +77,19 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
                 return False
             place = pointing.place_at(context, self._xy, name)
             camera = pointing.solved_camera_of(context)
-            there = min(picking.in_this_picture(scene, camera, name), default=None, key=lambda one: one.name)
+            there = picking.of_this_picture(scene, camera, name, place.time_s)
             self._kept = None if there is None else picking.snapshot(there)
+            second = there is not None and camera is not None and picking.elsewhere(there, camera)
             thing, self._new = picking.put(scene, camera, place, name, kind)
             scene.rockfall_picking.trajectory = name
+            if second:
+                pointing.select(context, thing)
+                self.report({"INFO"}, picking.second_view(scene, thing))
+                return False
             self._moved, self._place = True, place
         else:
             self._kept, self._moved, self._place = picking.snapshot(thing), False, None
-            spot = pointing.on_screen(context, list(thing[picks.POSITION_KEY]))[0]
-            self._xy = (float(spot[0]), float(spot[1]))  # held by its middle: it does not jump
+            self._xy = pointing.handle_of(context, thing)  # held by its middle: it does not jump
             scene.rockfall_picking.trajectory = thing[picks.TRAJECTORY_KEY]
         pointing.select(context, thing)
         self._identifier = thing[picks.ID_KEY]
@@ -116,7 +120,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         camera = pointing.solved_camera_of(context)
         if not self._moved:
             return {"FINISHED"}  # a click on a pick selects it
-        if self._place is not None and not (camera is not None and picking.elsewhere(thing, camera)):
+        if self._place is not None:
             picking.move(scene, thing, camera, self._place)
         picking.finish(scene, thing)
         warning = self._place.warning if self._place is not None else ""

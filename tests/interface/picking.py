@@ -234,6 +234,18 @@ def case_pick_fine_and_cancelled(window):
     yield from open_site(window)
     yield from pick_impacts(window, 1, 2)
     ways = []
+    (thing,) = picks()
+    before = list(thing["rockfall_position_m"])
+    with window.override():
+        x, y = window.part("rockfall_addon.bridge.pointing").handle_of(bpy.context, thing)
+    x, y = window.region().x + x, window.region().y + y
+    yield from window.move(x + 3, y)
+    for value, to in (("PRESS", x + 3), ("NOTHING", x + 6), ("NOTHING", x + 3), ("RELEASE", x + 3)):
+        kind = "MOUSEMOVE" if value == "NOTHING" else "LEFTMOUSE"
+        window.window.event_simulate(type=kind, value=value, x=round(to), y=round(y))
+        yield 0.3
+    off = np.linalg.norm(np.subtract(picks()[0]["rockfall_position_m"], before))
+    assert off < 0.03, f"taken and put back it has not jumped: {off} m"
     for modifiers in ({}, {"shift": True}):
         with window.override():
             spot = window.part("rockfall_addon.bridge.pointing").on_screen(

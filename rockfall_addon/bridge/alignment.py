@@ -331,12 +331,12 @@ def _times(camera: bpy.types.Object, frames: Sequence[int]) -> Array:
 
 def is_placed(camera: bpy.types.Object) -> bool:
     """Whether the camera stands somewhere that means something: solved, placed by eye, or from a file."""
-    return bool(camera.get(PLACED_KEY)) or videos.is_solved(camera)
+    return videos.is_solved(camera)
 
 
 def placement(camera: bpy.types.Object) -> str:
     """How the camera came to its place: `BY_PAIRS`, `BY_EYE`, `FROM_FILE`, or empty."""
-    return str(camera.get(PLACED_KEY, ""))
+    return str(camera.get(PLACED_KEY, FROM_FILE)) if videos.is_solved(camera) else ""
 
 
 def free_of(camera: bpy.types.Object) -> tuple[str, ...]:
@@ -432,8 +432,8 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
     try:
         found, keys, reference = _solve(scene, camera, pairs)
     except RockfallError as error:
-        complete = [pair for pair in pairs if pair.is_complete and pair.enabled]
-        keep_check(camera, Solution(problem=str(error) if complete else ""))
+        enough = len(_used_at(pairs, camera, reference_frame(pairs))) >= needed(free_of(camera))
+        keep_check(camera, Solution(problem=str(error) if enough else ""))  # too few is no problem, but the beginning
         return False
     path = _path(camera, found.camera, {frame: key.camera for frame, key in keys.items()}, reference)
     camera[PLACED_KEY] = BY_PAIRS

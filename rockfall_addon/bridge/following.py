@@ -183,11 +183,6 @@ def is_stale(camera: bpy.types.Object) -> bool:
     return known is not None and abs(alignment.focal_px(camera) / known["focal"] - 1) > 0.005
 
 
-def forget() -> None:
-    """Another file was opened."""
-    _tracks.clear()
-
-
 def _posed(camera: Camera, position: Array, rotation: Array) -> Camera:
     return Camera(
         camera.width, camera.height, *camera.intrinsics.tolist(), position=position, rotation=rotation,

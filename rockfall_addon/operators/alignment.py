@@ -242,6 +242,8 @@ class ROCKFALL_OT_align_views(bpy.types.Operator):
             return {"FINISHED"}
         picture = self._split(context) if len(_views(context)) == 1 else self._choose(context)
         with context.temp_override(area=picture, region=_region(picture)):
+            if context.mode != "OBJECT" and bpy.ops.object.mode_set.poll():
+                bpy.ops.object.mode_set(mode="OBJECT")
             bpy.ops.wm.tool_set_by_id(name=TOOL)
             if bpy.ops.view3d.view_center_camera.poll():
                 bpy.ops.view3d.view_center_camera()

@@ -111,12 +111,12 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
 
     def _pairs(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         if len(settings.rows):
-            head = layout.split(factor=0.52, align=True)
+            head = layout.split(factor=0.46, align=True)
             head.label(text="Pairs")
             for unit in ("px", "m"):
                 head.label(text=unit)
             row = layout.row()
-            row.template_list("ROCKFALL_UL_pairs", "", settings, "rows", settings, "active", rows=4, maxrows=12)
+            row.template_list("ROCKFALL_UL_pairs", "", settings, "rows", settings, "active", rows=4, maxrows=8)
             column = row.column(align=True)
             column.operator("rockfall.delete_pair", text="", icon="REMOVE")
             column.operator("rockfall.go_to_pair", text="", icon="VIEWZOOM")
@@ -124,9 +124,9 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
             column.prop(settings, "show_pairs", text="", icon="HIDE_OFF")
             column.prop(settings, "magnify", text="", icon="FULLSCREEN_ENTER")
         row = layout.row(align=True)
-        row.operator("rockfall.import_pairs", text="Pairs", icon="IMPORT")
+        row.operator("rockfall.import_pairs", text="Import", icon="IMPORT")
         if len(settings.rows):
-            row.operator("rockfall.export_pairs", text="Pairs", icon="EXPORT")
+            row.operator("rockfall.export_pairs", text="Export", icon="EXPORT")
             row.operator("rockfall.delete_pair", text="", icon="TRASH").every = True
 
 

@@ -86,7 +86,7 @@ def sidebar(window, shown):
         region = next(region for region in views(window)[1].regions if region.type == "UI")
         x, y = region.x + region.width // 2, region.y + region.height // 2
         yield from window.move(x, y)
-        for _ in range(14):
+        for _ in range(25):
             window.window.event_simulate(type="WHEELDOWNMOUSE", value="PRESS", x=x, y=y)
             yield 0.03
         yield 0.5
@@ -160,7 +160,57 @@ def case_align_with_clicks(window):
         assert len(bridge.pairs_of(the_camera(window))) == expected
     assert len(the_camera(window).rockfall_alignment.rows) == 6
     assert abs(bridge.focal_px(the_camera(window)) - focal) < 1e-6, "undo brings the solution back"
-    assert not window.part("rockfall_addon.bridge.problems").sentences(bpy.context.scene) or True
+    for _ in range(2):
+        with window.override():
+            bpy.ops.ed.undo()
+        yield 0.7
+    assert bridge.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
+    assert not window.part("rockfall_addon.bridge.problems").sentences(bpy.context.scene)
+
+
+def case_align_by_eye(window):
+    """Footage that cannot be solved: the view is taken; then terrain that shines through is dragged into place."""
+    yield from start(window)
+    bridge = window.part("rockfall_addon.bridge.alignment")
+    ground = table(window)
+    yield from sidebar(window, False)
+    window.window.cursor_warp(800, 500)
+    free = views(window)[1]
+    view = free.spaces.active.region_3d
+    place, target = Vector((35.0, -15.0, 62.0)), Vector((20.0, 62.0, 27.0))
+    view.view_rotation = (place - target).to_track_quat("Z", "Y")
+    view.view_distance = (place - target).length
+    view.view_location = target
+    yield 1.0
+    with bpy.context.temp_override(window=window.window, area=free, region=region_of(free)):
+        assert bpy.ops.rockfall.use_view("INVOKE_DEFAULT") == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="by eye")
+    view.view_perspective = "PERSP"
+    look_at(window, ground.point)
+    yield 1.5
+    camera = the_camera(window)
+    assert bridge.placement(camera) == "eye"
+    window.screenshot("1-by-eye")
+    x, y = in_picture(window, (640, 360))
+    yield from window.click(x, y, shift=True)
+    pair = bridge.open_pair(the_camera(window))
+    assert pair.proposed == "pixel"
+    assert np.allclose(pair.pixel, (640, 360), atol=2), "what shines through there"
+    surface = window.part("rockfall_addon.bridge.terrain").surface_of_scene(bpy.context.scene)
+    assert window.part("core.terrain.raycast").closest_points(surface, [pair.point]).distance[0] < 1e-6
+    window.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=round(x), y=round(y))
+    window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
+    yield 0.3
+    window.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=round(x) + 100, y=round(y), shift=True)
+    yield 0.3
+    window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x) + 100, y=round(y))
+    yield 0.5
+    pair = bridge.pairs_of(the_camera(window))[0]
+    assert pair.is_complete
+    width = in_picture(window, (1280, 0))[0] - in_picture(window, (0, 0))[0]
+    assert abs(pair.pixel[0] - 640 - 10 * 1280 / width) < 3, "Shift moves a tenth"
+    yield from sidebar(window, True)
+    window.screenshot("2-one-pair")
 
 
 def case_align_follow_hand_held(window):

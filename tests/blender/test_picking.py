@@ -2,6 +2,7 @@
 """Picks from pixels of the demo's footage, against its truth."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -228,6 +229,7 @@ def test_two_views_make_one_point(site, part) -> None:
     second = videos.add_video(site, FOOTAGE / "footage.mp4")
     videos.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, np.add(truth, (70, -40, 30)), truth, focal_px=2000)
+    lens = replace(lens, shift=part("core.georeference").GlobalShift(*ORIGIN))
     videos.set_moving_camera(site, second, part("core.camera.motion").fixed(lens))
     frame = round(float(rows("impacts.csv")[3]["time_s"]) * 30)
     site.frame_set(frame)

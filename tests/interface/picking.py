@@ -3,6 +3,7 @@
 
 import csv
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -334,4 +335,43 @@ def case_pick_track_the_block(window):
     truth = np.array([[float(row["time_s"]), float(row["leave_time_s"])] for row in rows("impacts.csv")]).ravel()
     assert len(times)
     assert np.abs(times[:, None] - truth).min(axis=1).max() < 0.02, times
+    no_trouble(window)
+
+
+def case_pick_in_two_views(window):
+    """A pick of one video is a curve in the other; clicked there too, the rays meet in a point."""
+    yield from open_site(window)
+    scene = bpy.context.scene
+    _, impacts = yield from pick_impacts(window, 1, 2)
+    truth = local(impacts[0], "x_m", "y_m", "z_m")
+    videos, model = window.part("rockfall_addon.bridge.videos"), window.part("core.camera.model")
+    second = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    videos.set_clock(second, window.part("core.footage.clock").Clock(OFFSET_S))
+    lens = model.look_at(1280, 720, truth + np.array([60.0, -50.0, 30.0]), truth, focal_px=1500)
+    lens = replace(lens, shift=window.part("core.georeference").GlobalShift(*ORIGIN))
+    videos.set_moving_camera(scene, second, window.part("core.camera.motion").fixed(lens))
+    scene.camera = second
+    with window.override():
+        bpy.ops.rockfall.look_through()
+        bpy.ops.view3d.view_center_camera()
+        bpy.ops.ed.undo_push(message="second video")
+    yield 1.0
+    view = window.part("rockfall_addon.bridge.image_view")
+    region = window.region()
+    rectangle = view.image_rectangle(region, window.area().spaces.active.region_3d, scene, second)
+    x, y = view.to_region(rectangle, (1280, 720), model.project(lens, truth[None])[0])
+    window.screenshot("curve")
+    held = list(picks()[0]["rockfall_position_m"])
+    scene.rockfall_picking.show_loupe = False
+    yield from window.click(region.x + x + 12, region.y + y + 6)
+    yield 1.0
+    window.screenshot("diamond")
+    (thing,) = picks()
+    assert list(thing["rockfall_position_m"]) == held, "the pick stays until it is told to move"
+    picking = window.part("rockfall_addon.bridge.picking")
+    found = picking.triangulated(scene, thing)
+    assert 0.001 < found.miss_distance[0] < 2.0, found.miss_distance
+    with window.override():
+        assert bpy.ops.rockfall.use_triangulated() == {"FINISHED"}
+    assert list(picks()[0]["rockfall_position_m"]) != held
     no_trouble(window)

@@ -38,7 +38,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self._button, self._new, self._kept = event.type, False, None
-        self._xy = self._mouse = (event.mouse_region_x, event.mouse_region_y)
+        self._xy = self._mouse = self._press = (event.mouse_region_x, event.mouse_region_y)
         try:
             if not self._begin(context, any_time=event.ctrl):
                 return {"FINISHED"}
@@ -119,6 +119,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         thing = picks.with_id(scene, self._identifier)
         camera = pointing.solved_camera_of(context)
         if not self._moved:
+            self._look_again(context, thing, camera)
             return {"FINISHED"}  # a click on a pick selects it
         if self._place is not None:
             picking.move(scene, thing, camera, self._place)
@@ -129,6 +130,21 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         else:
             self.report({"INFO"}, picking.described(thing))
         return {"FINISHED"}
+
+    def _look_again(self, context: bpy.types.Context, thing: bpy.types.Object, camera: bpy.types.Object | None) -> None:
+        """A click on a pick that was made in another video tells where it is in this one."""
+        scene = context.scene
+        if camera is None or not picking.elsewhere(thing, camera):
+            return
+        if thing not in picking.in_this_picture(scene, camera):
+            return
+        try:
+            place = pointing.place_at(context, self._press, thing[picks.TRAJECTORY_KEY])
+        except RockfallError as error:
+            self.report({"WARNING"}, str(error))
+            return
+        picking.keep_sighting(scene, thing, camera, place)
+        self.report({"INFO"}, picking.second_view(scene, thing))
 
     def _cancel(self, context: bpy.types.Context, thing: bpy.types.Object | None) -> set[str]:
         context.workspace.status_text_set(None)

@@ -12,7 +12,7 @@ from ..bridge.footage_view import Drawing, Mark
 
 _handles: list[object] = []
 
-TEXT = 12
+TEXT, BESIDE = 12, 18
 ROUND = np.linspace(0.0, 2 * np.pi, 33)
 
 
@@ -130,9 +130,9 @@ def _mark(mark: Mark, at: np.ndarray, scale: float) -> None:
         _segments(segments, np.broadcast_to(colour, (*segments.shape[:2], 4)), width * scale)
     if mark.text:
         blf.size(0, TEXT * scale)
-        blf.color(0, *mark.colour)
+        blf.color(0, 1.0, 1.0, 1.0, 1.0)
         blf.enable(0, blf.SHADOW)
-        blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
-        blf.position(0, float(at[0]) + 1.5 * size, float(at[1]) - 4 * scale, 0)
+        blf.shadow(0, 5, 0.0, 0.0, 0.0, 1.0)
+        blf.position(0, float(at[0]) + BESIDE * scale, float(at[1]) - 4 * scale, 0)
         blf.draw(0, mark.text)
         blf.disable(0, blf.SHADOW)

@@ -363,7 +363,7 @@ def case_pick_in_two_views(window):
     window.screenshot("curve")
     held = list(picks()[0]["rockfall_position_m"])
     scene.rockfall_picking.show_loupe = False
-    yield from window.click(region.x + x + 12, region.y + y + 6)
+    yield from window.click(region.x + x + 4, region.y + y + 2)  # on the pick's own ring
     yield 1.0
     window.screenshot("diamond")
     (thing,) = picks()

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..bridge import observations, picking, refinement, state, videos, workspace
+from ..bridge import alignment, observations, picking, refinement, state, videos, workspace
 from ..bridge import picks as picks_bridge
 from .base import RockfallPanel, paragraph
 
@@ -48,7 +48,8 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
             ("rockfall.import_picks", "", "IMPORT"),
         ]
     if camera is not None and not videos.is_solved(camera):
-        return "Align the camera: mark the same places in the footage and on the terrain.", [
+        said = alignment.hint(scene, camera)
+        return said or "Align the camera: mark the same places in the footage and on the terrain.", [
             ("rockfall.align_views", "", "SPLIT_VERTICAL")
         ]
     if not picks:
@@ -60,7 +61,7 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
             ("rockfall.apply_refinement", "Apply", "CHECKMARK"),
             ("rockfall.discard_refinement", "Discard", "X"),
         ]
-    refined = all(picks_bridge.SIGMA_POSITION_KEY in pick for pick in picks)
+    refined = all(picks_bridge.NORMAL_KEY in pick for pick in picks)
     if camera is not None and not refined and not refinement.ready(scene):
         return "Look at each pick and correct it. Refine fits them all to the tracked pixels.", [
             PICK_TOOL,

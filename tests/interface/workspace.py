@@ -91,6 +91,7 @@ def case_tutorial_of_the_manual(window):
         module, name = operator.split(".")
         with bpy.context.temp_override(window=window.window, area=seen, region=region(seen, "WINDOW")):
             assert getattr(getattr(bpy.ops, module), name)() == {"FINISHED"}
+        window.redraw()  # as after a click on the button
 
     with window.override():
         bpy.ops.rockfall.load_footage_demo()  # menu Rockfall > Load Footage Demo: 2 clicks

@@ -94,26 +94,6 @@ class ROCKFALL_OT_look_through(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_use_this_view(_OfVideo, bpy.types.Operator):
-    """Put the camera of the active video where this view looks from; it must not have been aligned"""
-
-    bl_idname = "rockfall.use_this_view"
-    bl_label = "Use This View"
-
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        camera, matrix = videos.active_camera(context.scene), _view_matrix(context)
-        if matrix is None:
-            raise RockfallError(
-                "This is no free 3-D view: turn the view to about what the video shows, then try again."
-            )
-        if videos.is_solved(camera):
-            raise RockfallError(f"{camera.name} is aligned. Remove its alignment first, then place it by hand.")
-        camera.matrix_world = matrix
-        _look_through(context, camera)
-        return {"FINISHED"}
-
-
 class ROCKFALL_OT_remove_video(bpy.types.Operator):
     """Remove a video from the scene: its camera with all that was marked with it. The file stays"""
 
@@ -367,7 +347,6 @@ def unregister_keys() -> None:
 CLASSES = (
     ROCKFALL_OT_add_video,
     ROCKFALL_OT_look_through,
-    ROCKFALL_OT_use_this_view,
     ROCKFALL_OT_remove_video,
     ROCKFALL_OT_relink_video,
     ROCKFALL_OT_step_frame,

@@ -45,7 +45,7 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
         facts(layout, video_words.facts(camera))
         for sentence in video_words.remarks(camera):
             paragraph(context, layout, sentence, "INFO")
-        self._footage(camera)
+        self._proxies(camera)
 
     def _list(self, scene: bpy.types.Scene, active: bpy.types.Object) -> None:
         column = self.layout.box().column(align=True)
@@ -59,19 +59,13 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
             row.label(text="", icon="CHECKMARK" if videos.is_solved(camera) else "BLANK1")
             row.operator("rockfall.remove_video", text="", icon="X").identifier = camera[videos.ID_KEY]
 
-    def _footage(self, camera: bpy.types.Object) -> None:
+    def _proxies(self, camera: bpy.types.Object) -> None:
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        clips = [b for b in camera.data.background_images if b.source == "MOVIE_CLIP"]
-        if clips:
-            column = layout.column(align=True)
-            column.prop(clips[0], "alpha", text="Footage", slider=True)
-            column.row().prop(clips[0], "display_depth", text="Drawn", expand=True)
-        if not videos.is_solved(camera):
-            layout.operator("rockfall.use_this_view", icon="VIEW_PERSPECTIVE")
         layout.operator_menu_enum("rockfall.build_proxy", "size", text="Build Proxy", icon="FILE_CACHE")
-        if proxies.shown(camera) and clips:
-            layout.prop(clips[0].clip_user, "proxy_render_size", text="Show")
+        clip = next((b for b in camera.data.background_images if b.source == "MOVIE_CLIP"), None)
+        if clip is not None and proxies.shown(camera):
+            layout.prop(clip.clip_user, "proxy_render_size", text="Show")
 
 
 class ROCKFALL_PT_video_times(RockfallPanel, bpy.types.Panel):

@@ -9,7 +9,7 @@ import pytest
 
 POINTED = {"rockfall.mark_pair", "rockfall.drag_pick"}
 """What only the tools call: they need a mouse on the terrain or the footage."""
-WITH_PANEL = {"rockfall.sort_impacts", "rockfall.remove_video", "rockfall.use_this_view"}
+WITH_PANEL = {"rockfall.sort_impacts", "rockfall.remove_video"}
 """What works on a row of a panel's list, or is another name of what the menu has."""
 LARGEST_WORKSPACE_BYTES = 200_000
 

@@ -57,7 +57,7 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
     found = refinement.proposal(scene)
     if found is not None:
         fit = f"Refined: {found['before_px']:.2f} px from the tracked pixels before, {found['after_px']:.2f} px after."
-        return f"{fit} The new flights are light blue; step 5 has the numbers.", [
+        return f"{fit} The new flights are light blue in the free view; step 5 has the numbers.", [
             ("rockfall.apply_refinement", "Apply", "CHECKMARK"),
             ("rockfall.discard_refinement", "Discard", "X"),
         ]

@@ -127,6 +127,7 @@ def case_pick_impacts_in_the_footage(window):
     after = list(picks()[-1]["rockfall_position_m"])
     way = np.linalg.norm(np.subtract(after, before))
     assert 0.5 < way < 4.0, way
+    yield 2.0
     window.screenshot("dragged")
     with window.override():
         bpy.ops.ed.undo()

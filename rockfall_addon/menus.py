@@ -3,7 +3,7 @@
 
 import bpy
 
-DEMOS = ("rockfall.load_demo", "rockfall.load_footage_demo")
+DEMOS = ("rockfall.load_demo", "rockfall.load_footage_demo", "rockfall.open_project")
 STEPS = (
     ("terrain", "1  Terrain", (
         "rockfall.import_terrain", "rockfall.show_relief", "rockfall.reset_relief", "rockfall.toggle_full_terrain",
@@ -48,6 +48,7 @@ CHOOSING = {"rockfall.pick_kind": "kind"}
 """Operators whose entry opens the list of a property."""
 
 IMPORTS = (
+    ("rockfall.open_project", "Rockfall Project (.toml)", {}),
     ("rockfall.import_terrain", "Rockfall Terrain (mesh, grid, cloud)", {}),
     ("rockfall.add_video", "Rockfall Video", {}),
     ("rockfall.import_pairs", "Rockfall Pairs (.csv)", {}),

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Load the bundled demo site: with its campaign of picks, or with its footage."""
+"""Load a project into an empty scene: the bundled demo site with its picks or its footage, or one of the user."""
 
 from pathlib import Path
 
 import bpy
+from bpy.props import StringProperty
+from bpy_extras.io_utils import ImportHelper
 
 from ..bridge import footage_blend, observations, state, videos
 from ..bridge import project as project_bridge
@@ -17,8 +19,8 @@ FIRST_IMPACT_S = 1.71
 FOOTAGE_BLEND = 0.9  # the flights behind it still shine through
 
 
-class _OfDemo:
-    """Mix-in: only a scene without terrain takes a demo."""
+class _IntoEmptyScene:
+    """Mix-in: only a scene without terrain takes a project."""
 
     bl_options = {"REGISTER", "UNDO"}
 
@@ -26,11 +28,11 @@ class _OfDemo:
     def poll(cls, context: bpy.types.Context) -> bool:
         if not state.with_role(context.scene, state.TERRAIN_ROLE):
             return True
-        cls.poll_message_set("This scene has a terrain already: open a new scene or file for the demo")
+        cls.poll_message_set("This scene has a terrain already: begin a new scene or file first")
         return False
 
 
-class ROCKFALL_OT_load_demo(_OfDemo, bpy.types.Operator):
+class ROCKFALL_OT_load_demo(_IntoEmptyScene, bpy.types.Operator):
     """Load the demo site: a synthetic gully, fifteen blocks, a hundred timed impacts"""
 
     bl_idname = "rockfall.load_demo"
@@ -46,7 +48,7 @@ class ROCKFALL_OT_load_demo(_OfDemo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_load_footage_demo(_OfDemo, bpy.types.Operator):
+class ROCKFALL_OT_load_footage_demo(_IntoEmptyScene, bpy.types.Operator):
     """Load the demo site with ten seconds of footage, its aligned camera and the tracked block, ready to be picked"""
 
     bl_idname = "rockfall.load_footage_demo"
@@ -70,6 +72,28 @@ class ROCKFALL_OT_load_footage_demo(_OfDemo, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_open_project(_IntoEmptyScene, bpy.types.Operator, ImportHelper):
+    """Open a project.toml: its terrain, videos, cameras, picks and settings"""
+
+    bl_idname = "rockfall.open_project"
+    bl_label = "Open Project"
+
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        result = project_bridge.load_project(scene, Path(self.filepath))
+        _hide_start_up(scene)
+        if (camera := videos.active_camera(scene)) is not None:
+            scene.camera = camera
+        look.show_relief(context, frame_all=True)
+        count = 0 if result is None else len(result.picks)
+        self.report({"INFO"}, f"{count} picks and {len(videos.cameras(scene))} videos.")
+        return {"FINISHED"}
+
+
 def _hide_start_up(scene: bpy.types.Scene) -> None:
     """Put away what Blender's own start-up scene holds."""
     for thing in [o for o in scene.objects if o.name in ("Cube", "Light")]:
@@ -77,4 +101,4 @@ def _hide_start_up(scene: bpy.types.Scene) -> None:
         thing.hide_render = True
 
 
-CLASSES = (ROCKFALL_OT_load_demo, ROCKFALL_OT_load_footage_demo)
+CLASSES = (ROCKFALL_OT_load_demo, ROCKFALL_OT_load_footage_demo, ROCKFALL_OT_open_project)

@@ -41,6 +41,7 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
             ("rockfall.load_footage_demo", "", "FILE_MOVIE"),
             ("rockfall.load_demo", "", "PLAY"),
             ("rockfall.import_terrain", "", "IMPORT"),
+            ("rockfall.open_project", "", "FILE_FOLDER"),
         ]
     if camera is None and not picks:
         return "Add the videos of the fall, or import a table of timed picks.", [

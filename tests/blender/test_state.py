@@ -119,9 +119,9 @@ def test_a_project_goes_out_and_comes_in_the_same(scene: bpy.types.Scene, part, 
     out = tmp_path / "out"
     assert bpy.ops.rockfall.export_project(directory=str(out)) == {"FINISHED"}
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
-    bridge = part("rockfall_addon.bridge.project")
-    bridge.load_project(bpy.context.scene, out / "project.toml")
+    assert bpy.ops.rockfall.open_project(filepath=str(out / "project.toml")) == {"FINISHED"}
     assert everything(bpy.context.scene, part, ids=False) == before
+    bridge = part("rockfall_addon.bridge.project")
     again = tmp_path / "again"
     bridge.save_project(bpy.context.scene, again)
     for name in ("project.toml", "picks.csv", "terrain.ply"):

@@ -25,7 +25,7 @@ BELOW = (1.0, 0.0, 0.0)
 PROPOSED = (0.2, 0.9, 1.0)
 OUTLINE = (1.0, 1.0, 0.35)
 EPIPOLAR = (1.0, 0.55, 0.95)
-SEEN = (0.35, 1.0, 0.45)
+SEEN, SEEN_SIZE = (0.35, 1.0, 0.45), 2.5
 CIRCLE = np.linspace(0.0, 2 * np.pi, 49)
 
 
@@ -252,10 +252,10 @@ def _add_seen(
     place, where = _sightings(scene, camera, name, seen, path)
     pixels, expected = project(lens, place), project(lens, where)
     good = np.isfinite(pixels[:, 0])
-    colours = np.tile([*SEEN, 0.9], (len(pixels), 1))
+    colours = np.tile([*SEEN, 0.55], (len(pixels), 1))
     now = np.abs(seen.time_s - video_s) < 1e-6
     colours[now] = (1.0, 1.0, 1.0, 1.0)
-    found.dots.append((pixels[good], colours[good], 3.5))
+    found.dots.append((pixels[good], colours[good], SEEN_SIZE))
     both = good & np.isfinite(expected[:, 0])
     segments = np.stack([pixels[both], expected[both]], axis=1)
     found.lines.append(Line(segments, np.broadcast_to([*SEEN, 0.8], (*segments.shape[:2], 4)), 1.0))

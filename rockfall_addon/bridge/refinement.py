@@ -126,10 +126,8 @@ def apply(scene: bpy.types.Scene) -> int:
             thing[picks.NORMAL_KEY] = row[6:]
     _apply_shared(scene, kept)
     discard(scene)
-    end = scene.frame_end
     if scene.rockfall.flights_join != kept["ends"]:
         scene.rockfall.flights_join = kept["ends"]
-        scene.frame_end = max(end, scene.frame_end)  # the video may go on
     live.sync(scene, again=bool(kept["free"]))
     return len(kept["ids"])
 

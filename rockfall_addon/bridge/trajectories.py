@@ -54,8 +54,10 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     trails.paint_observed(scene)
     impact_rows.fill(scene)
     scene.frame_start = 0
-    scene.frame_end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
-    if first:
+    end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
+    filmed = bool(state.with_role(scene, state.CAMERA_ROLE))  # a video may go on after the last pick
+    scene.frame_end = max(end, scene.frame_end) if filmed else end
+    if first and not filmed:
         scene.frame_set(0)
 
 

@@ -192,7 +192,7 @@ def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
         assert np.linalg.norm(outlines[0].mean(axis=(0, 1)) - seen) < 1.0
         assert np.ptp(outlines[0][:, 0, 0]) == pytest.approx(9.3, abs=0.6), "39 cm at 88 m"
         assert sum(mark.shape == "ring" for mark in drawing.marks) >= 6
-        dots = np.vstack([pixels for pixels, _, size in drawing.dots if size == 3.5])
+        dots = np.vstack([pixels for pixels, _, size in drawing.dots if size == view.SEEN_SIZE])
         assert np.linalg.norm(dots - seen, axis=1).min() < 1.5
     camera_line = view.path_of(tracked, "B10", None)
     assert camera_line is view.path_of(tracked, "B10", None), "it is kept until the picks change"

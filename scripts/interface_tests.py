@@ -80,7 +80,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
     parser.add_argument("--list", action="store_true")
-    parser.add_argument("--timeout", type=float, default=180.0, help="seconds that one case may take")
+    parser.add_argument("--timeout", type=float, default=480.0, help="seconds that one case may take")
     options = parser.parse_args()
     cases = find_cases(options.words)
     if options.list:

@@ -155,7 +155,7 @@ def main() -> None:
             traceback.print_exc()
             leave(1)
 
-    bpy.app.timers.register(step, first_interval=FIRST_DRAW_S)
+    bpy.app.timers.register(step, first_interval=FIRST_DRAW_S, persistent=True)  # a case may open a file
 
 
 if __name__ == "__main__":

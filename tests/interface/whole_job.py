@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person does the whole job, from an empty window to a refined trajectory in a file that is opened again."""
 
-import os
 import sys
 import tempfile
 import time
-import traceback
 from pathlib import Path
 
 import bpy
@@ -36,26 +34,10 @@ def case_whole_job(window):
     file = Path(tempfile.mkdtemp()) / "job.blend"
     with window.override():
         assert bpy.ops.wm.save_as_mainfile(filepath=str(file)) == {"FINISHED"}
-    go_on(reopened(window, remembered(window)))
+    before = remembered(window)
     bpy.ops.wm.open_mainfile(filepath=str(file))
-    yield 3600.0  # the harness's timer ends with the file that it was started in
-
-
-def go_on(steps):
-    """Run the rest of a case in a timer that survives another file."""
-
-    def step():
-        try:
-            return next(steps)
-        except StopIteration:
-            code = 0
-        except BaseException:  # noqa: BLE001 - as in the harness
-            traceback.print_exc()
-            code = 1
-        sys.stdout.flush()
-        os._exit(code)
-
-    bpy.app.timers.register(step, first_interval=1.0, persistent=True)
+    yield 1.0
+    yield from reopened(window, before)
 
 
 def in_left_view(window):

@@ -15,11 +15,9 @@ from .reporting import reported
 TRAJECTORY_STEP_S = 0.02
 
 
-class ROCKFALL_OT_export_tables(bpy.types.Operator):
-    """Write picks.csv, impacts.csv and trajectories.csv in survey coordinates"""
+class _IntoFolder:
+    """Mix-in: writes what the picks gave into a folder."""
 
-    bl_idname = "rockfall.export_tables"
-    bl_label = "Export Tables"
     bl_options = {"REGISTER"}
 
     directory: StringProperty(subtype="DIR_PATH")
@@ -35,6 +33,13 @@ class ROCKFALL_OT_export_tables(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
+
+
+class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
+    """Write picks.csv, impacts.csv and trajectories.csv in survey coordinates"""
+
+    bl_idname = "rockfall.export_tables"
+    bl_label = "Export Tables"
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -49,26 +54,11 @@ class ROCKFALL_OT_export_tables(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_export_project(bpy.types.Operator):
+class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
     """Write project.toml with the picks and the terrain: all that the command line, or another file, needs"""
 
     bl_idname = "rockfall.export_project"
     bl_label = "Export Project"
-    bl_options = {"REGISTER"}
-
-    directory: StringProperty(subtype="DIR_PATH")
-    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if state.with_role(context.scene, state.PICK_ROLE):
-            return True
-        cls.poll_message_set("There is nothing to export: import picks first, or load the demo")
-        return False
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

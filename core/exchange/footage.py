@@ -12,12 +12,11 @@ from ..errors import InputError, RockfallError
 from ..footage.clock import Clock
 from ..georeference import GlobalShift
 from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
-from ..reconstruction.placement import terrain_normals
 from ..reconstruction.ray_flight import flight_through_rays
+from ..reconstruction.triangulation import contact_points
 from ..reconstruction.views import PixelObservations, View
-from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
-from ..vectors import Array, norm
+from ..vectors import Array
 from .cameras import CameraFile, read_camera
 from .footage_tables import Events, Track, read_events, read_track
 from .opening import block_of
@@ -33,8 +32,6 @@ END_MISS_PX, END_MISS_SIGMAS = 2.0, 4.0
 """Pixels that miss a free flight by more than the larger of these, root mean square, are not of a flight."""
 SIGMA_END_S = 1e-4
 """Of a pass at a tracked pixel: it is where the block was in that frame."""
-SETTLED_M = 1e-4
-SETTLING = 20
 
 Columns = dict[str, Names | Array]
 
@@ -176,39 +173,6 @@ def picks_from_events(project: Project, surface: Surface | None, *, name: str = 
         shift=surface.shift,
         sort=True,
     )
-
-
-def contact_points(
-    surface: Surface, origins: Array, directions: Array, diameter_m: Array, normal_radius_m: float | None = None
-) -> tuple[Array, Array]:
-    """Where blocks touch the terrain, whose centres lie on rays; (n, 3) points and (n, 3) normals, NaN where missed.
-
-    Parameters
-    ----------
-    origins, directions : (n, 3) of the rays.
-    diameter_m : (n,) of the blocks.
-
-    Notes
-    -----
-    The centre is a radius from the contact along the normal, so the contact lies where the ray, moved by that much into
-    the ground, meets the terrain; the normal there is found by iteration. A grazing ray that never settles keeps the
-    mean of its last two contacts.
-    """
-    hits = cast_rays(surface, origins, directions)
-    point = hits.point.copy()
-    normal = np.full_like(point, np.nan)
-    going = np.flatnonzero(hits.face >= 0)
-    for step in range(SETTLING):
-        if not going.size:
-            break
-        normal[going] = terrain_normals(surface, point[going], diameter_m[going], normal_radius_m).normal
-        moved = origins[going] - diameter_m[going, None] / 2 * normal[going]
-        found = cast_rays(surface, moved, directions[going]).point
-        found = np.where(np.isnan(found), point[going], found)
-        moving = norm(found - point[going]) > SETTLED_M
-        point[going] = found if step < SETTLING - 1 else (found + point[going]) / 2
-        going = going[moving]
-    return point, normal
 
 
 def _event_picks(

@@ -12,10 +12,13 @@ from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
 from ..vectors import Array, dot, norm, unit
 from .picks import Mask
+from .placement import terrain_normals
 
 GRAZING_DEG = 5.0
 ITERATIONS = 20
 SETTLED_M = 1e-10
+CONTACT_SETTLED_M = 1e-4
+CONTACT_STEPS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,39 @@ def pick_on_terrain(
         for angle, axes in zip(grazing, ellipse, strict=True)
     )
     return TerrainPicks(point, normal, covariance, ellipse, grazing, warnings)
+
+
+def contact_points(
+    surface: Surface, origins: Array, directions: Array, diameter_m: Array, normal_radius_m: float | None = None
+) -> tuple[Array, Array]:
+    """Where blocks touch the terrain, whose centres lie on rays; (n, 3) points and (n, 3) normals, NaN where missed.
+
+    Parameters
+    ----------
+    origins, directions : (n, 3) of the rays.
+    diameter_m : (n,) of the blocks.
+
+    Notes
+    -----
+    The centre is a radius from the contact along the normal, so the contact lies where the ray, moved by that much into
+    the ground, meets the terrain; the normal there is found by iteration. A grazing ray that never settles keeps the
+    mean of its last two contacts.
+    """
+    hits = cast_rays(surface, origins, directions)
+    point = hits.point.copy()
+    normal = np.full_like(point, np.nan)
+    going = np.flatnonzero(hits.face >= 0)
+    for step in range(CONTACT_STEPS):
+        if not going.size:
+            break
+        normal[going] = terrain_normals(surface, point[going], diameter_m[going], normal_radius_m).normal
+        moved = origins[going] - diameter_m[going, None] / 2 * normal[going]
+        found = cast_rays(surface, moved, directions[going]).point
+        found = np.where(np.isnan(found), point[going], found)
+        moving = norm(found - point[going]) > CONTACT_SETTLED_M
+        point[going] = found if step < CONTACT_STEPS - 1 else (found + point[going]) / 2
+        going = going[moving]
+    return point, normal
 
 
 @dataclass(frozen=True, eq=False)

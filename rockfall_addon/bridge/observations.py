@@ -9,10 +9,10 @@ import numpy as np
 
 from ...core.camera.model import project, rays
 from ...core.errors import RockfallError
-from ...core.exchange.footage import contact_points
 from ...core.footage.kinks import find_kinks
 from ...core.footage.tracking import BlockTrack
 from ...core.reconstruction.picks import Indices
+from ...core.reconstruction.triangulation import contact_points
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array
 from . import live, picking, picks, videos

@@ -12,10 +12,16 @@ import numpy as np
 
 from ...core.camera.model import Camera, project, rays
 from ...core.errors import RockfallError
-from ...core.exchange.footage import contact_points
 from ...core.footage.advice import time_sigma_s
 from ...core.reconstruction.block import Block
-from ...core.reconstruction.triangulation import GRAZING_DEG, SpacePoints, epipolar_curve, pick_on_terrain, triangulate
+from ...core.reconstruction.triangulation import (
+    GRAZING_DEG,
+    SpacePoints,
+    contact_points,
+    epipolar_curve,
+    pick_on_terrain,
+    triangulate,
+)
 from ...core.terrain.raycast import cast_rays, closest_points
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array

@@ -5,6 +5,7 @@ import bpy
 
 from . import (
     alignment,
+    alignment_files,
     demo,
     film,
     impacts,
@@ -24,6 +25,7 @@ CLASSES = (
     *terrain.CLASSES,
     *videos.CLASSES,
     *alignment.CLASSES,
+    *alignment_files.CLASSES,
     *picks.CLASSES,
     *picking.CLASSES,
     *tracking.CLASSES,

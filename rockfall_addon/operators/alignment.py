@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Step 3: align a camera: mark pairs, place it by eye, follow the background, files."""
-
-from pathlib import Path
+"""Step 3: align a camera: mark pairs, place it by eye, follow the background."""
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, StringProperty
-from bpy_extras.io_utils import ExportHelper, ImportHelper
+from bpy.props import BoolProperty
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 from ...core.errors import RockfallError
-from ..bridge import alignment, alignment_files, following, footage_blend, image_view, terrain, videos
+from ..bridge import alignment, following, footage_blend, image_view, terrain, videos
 from . import look
+from .of_video import OfVideo, has_video
 from .reporting import reported
 
 TOOL = "rockfall.align_tool"
@@ -20,17 +18,9 @@ FINE = 0.1
 POLL_S = 0.2
 
 
-def _camera(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether there is a camera to align; if not, what to do."""
-    if videos.active_camera(context.scene) is not None:
-        return True
-    cls.poll_message_set("Add a video first")
-    return False
-
-
 def _pair(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether there is an active pair; if not, what to do."""
-    if not _camera(cls, context):
+    if not has_video(cls, context):
         return False
     if alignment.active_pair(videos.active_camera(context.scene)) is not None:
         return True
@@ -49,7 +39,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.region_data is not None and _camera(cls, context)
+        return context.region_data is not None and has_video(cls, context)
 
     @reported
     def _begin(self, context: bpy.types.Context) -> set[str]:
@@ -200,7 +190,7 @@ class ROCKFALL_OT_accept_pair(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _camera(cls, context):
+        if not has_video(cls, context):
             return False
         if _proposal(videos.active_camera(context.scene)) is not None:
             return True
@@ -222,16 +212,11 @@ def _proposal(camera: bpy.types.Object) -> alignment.Pair | None:
     return None
 
 
-class ROCKFALL_OT_align_views(bpy.types.Operator):
+class ROCKFALL_OT_align_views(OfVideo, bpy.types.Operator):
     """Footage to the left, terrain to the right, and the tool that marks pairs"""
 
     bl_idname = "rockfall.align_views"
     bl_label = "Footage Beside Terrain"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _camera(cls, context)
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -297,7 +282,7 @@ class ROCKFALL_OT_use_view(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.region_data is not None and _camera(cls, context)
+        return context.region_data is not None and has_video(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.keep_focal = not videos.active_camera(context.scene).rockfall_alignment.free_focal
@@ -349,7 +334,7 @@ class ROCKFALL_OT_propose_pairs(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _camera(cls, context):
+        if not has_video(cls, context):
             return False
         if videos.is_solved(videos.active_camera(context.scene)):
             return True
@@ -376,7 +361,7 @@ class ROCKFALL_OT_follow_background(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _camera(cls, context):
+        if not has_video(cls, context):
             return False
         if following.running:
             cls.poll_message_set("The background is being followed already")
@@ -448,119 +433,6 @@ class ROCKFALL_OT_stop_following(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_import_pairs(bpy.types.Operator, ImportHelper):
-    """Import pairs of pixels and surveyed points (pairs.csv) for the shown camera"""
-
-    bl_idname = "rockfall.import_pairs"
-    bl_label = "Import Pairs"
-    bl_options = {"REGISTER", "UNDO"}
-
-    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _camera(cls, context)
-
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, camera = context.scene, videos.active_camera(context.scene)
-        count = alignment_files.import_pairs(scene, camera, self.filepath)
-        solution = alignment.solution_of(camera)
-        fit = f" They fit to {solution.rmse_px:.2f} px." if np.isfinite(solution.rmse_px) else ""
-        self.report({"INFO"}, f"{count} pairs.{fit}")
-        return {"FINISHED"}
-
-
-class ROCKFALL_OT_export_pairs(bpy.types.Operator, ExportHelper):
-    """Write the complete pairs, with survey coordinates"""
-
-    bl_idname = "rockfall.export_pairs"
-    bl_label = "Export Pairs"
-    bl_options = {"REGISTER"}
-
-    filename_ext = ".csv"
-    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", default="pairs.csv")
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not _camera(cls, context):
-            return False
-        if any(pair.is_complete for pair in alignment.pairs_of(videos.active_camera(context.scene))):
-            return True
-        cls.poll_message_set("There are no complete pairs")
-        return False
-
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        camera = videos.active_camera(context.scene)
-        count = _written(alignment_files.export_pairs, context.scene, camera, self.filepath)
-        self.report({"INFO"}, f"{count} pairs written to {Path(self.filepath).name}")
-        return {"FINISHED"}
-
-
-class ROCKFALL_OT_import_camera(bpy.types.Operator, ImportHelper):
-    """Take a solved camera, or a calibrated lens, from camera.toml"""
-
-    bl_idname = "rockfall.import_camera"
-    bl_label = "Import Camera"
-    bl_options = {"REGISTER", "UNDO"}
-
-    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    lens_only: BoolProperty(
-        name="Lens only", description="Take the focal length, the centre and the distortion, and leave the place"
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _camera(cls, context)
-
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, camera = context.scene, videos.active_camera(context.scene)
-        alignment_files.import_camera(scene, camera, self.filepath, lens_only=self.lens_only)
-        return {"FINISHED"}
-
-
-class ROCKFALL_OT_export_camera(bpy.types.Operator, ExportHelper):
-    """Write the camera as camera.toml and what is left of its pairs as pairs_residuals.csv"""
-
-    bl_idname = "rockfall.export_camera"
-    bl_label = "Export Camera"
-    bl_options = {"REGISTER"}
-
-    filename_ext = ".toml"
-    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", default="camera.toml")
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not _camera(cls, context):
-            return False
-        if videos.is_solved(videos.active_camera(context.scene)):
-            return True
-        cls.poll_message_set("The camera is not solved yet")
-        return False
-
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        camera = videos.active_camera(context.scene)
-        names = _written(alignment_files.export_camera, context.scene, camera, self.filepath)
-        self.report({"INFO"}, f"Written: {', '.join(names)}")
-        return {"FINISHED"}
-
-
-def _written(write: object, scene: bpy.types.Scene, camera: bpy.types.Object, path: str) -> object:
-    try:
-        return write(scene, camera, path)
-    except OSError as error:
-        raise RockfallError(
-            f"{Path(path).name} cannot be written there: {error.strerror}. Choose another place."
-        ) from None
-
-
 class AlignTool(bpy.types.WorkSpaceTool):
     """The tool in the toolbar."""
 
@@ -603,9 +475,5 @@ CLASSES = (
     ROCKFALL_OT_propose_pairs,
     ROCKFALL_OT_follow_background,
     ROCKFALL_OT_stop_following,
-    ROCKFALL_OT_import_pairs,
-    ROCKFALL_OT_export_pairs,
-    ROCKFALL_OT_import_camera,
-    ROCKFALL_OT_export_camera,
 )
 TOOLS = (AlignTool,)

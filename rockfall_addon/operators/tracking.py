@@ -9,6 +9,7 @@ import bpy
 from ...core.errors import RockfallError
 from ...core.footage.tracking import BlockTrack, track_block
 from ..bridge import observations, picking, videos
+from .of_video import OfVideo
 from .reporting import reported
 
 POLL_S = 0.15
@@ -22,19 +23,11 @@ def _solved_name(context: bpy.types.Context) -> tuple[bpy.types.Object | None, s
     return videos.active_camera(context.scene), picking.trajectory(context.scene)
 
 
-class ROCKFALL_OT_track_block(bpy.types.Operator):
+class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
     """Follow the block through the video, from where it was clicked or picked; Esc stops"""
 
     bl_idname = "rockfall.track_block"
     bl_label = "Track Block"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if videos.active_camera(context.scene) is not None:
-            return True
-        cls.poll_message_set("Add a video first")
-        return False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         try:

@@ -10,6 +10,7 @@ from mathutils import Matrix
 
 from ...core.errors import RockfallError
 from ..bridge import footage, proxies, video_times, videos
+from .of_video import OfVideo, has_video
 from .reporting import reported
 
 EXTENSIONS = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v")
@@ -27,23 +28,6 @@ KEYS = (
 """Shortcuts of `rockfall.step_frame` while the view looks through the camera of a video."""
 
 _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
-
-
-def _has_video(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    if videos.active_camera(context.scene) is not None:
-        return True
-    cls.poll_message_set("Add a video first")
-    return False
-
-
-class _OfVideo:
-    """Mix-in: works on the active camera's video."""
-
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_video(cls, context)
 
 
 class ROCKFALL_OT_add_video(bpy.types.Operator, ImportHelper):
@@ -80,7 +64,7 @@ class ROCKFALL_OT_add_video(bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_look_through(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_look_through(OfVideo, bpy.types.Operator):
     """Look through the camera of a video, with its footage behind the terrain"""
 
     bl_idname = "rockfall.look_through"
@@ -112,7 +96,7 @@ class ROCKFALL_OT_remove_video(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_relink_video(_OfVideo, bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_relink_video(OfVideo, bpy.types.Operator, ImportHelper):
     """Tell where the file of the active video is now; nothing that was marked in it is lost"""
 
     bl_idname = "rockfall.relink_video"
@@ -148,7 +132,7 @@ class ROCKFALL_OT_step_frame(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_video(cls, context)
+        return has_video(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.in_camera_view and not _in_camera_view(context):
@@ -160,7 +144,7 @@ class ROCKFALL_OT_step_frame(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_time_origin_here(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_time_origin_here(OfVideo, bpy.types.Operator):
     """Begin to count time at the picture that is shown"""
 
     bl_idname = "rockfall.time_origin_here"
@@ -184,7 +168,7 @@ class ROCKFALL_OT_time_origin_here(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_mark_event(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_mark_event(OfVideo, bpy.types.Operator):
     """The picture that is shown is that of the event: a clap, an impact. Mark the same event in another video too"""
 
     bl_idname = "rockfall.mark_event"
@@ -203,7 +187,7 @@ class ROCKFALL_OT_mark_event(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_synchronise_videos(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_synchronise_videos(OfVideo, bpy.types.Operator):
     """Set the clocks of the videos by the events that were marked in two of them"""
 
     bl_idname = "rockfall.synchronise_videos"
@@ -216,7 +200,7 @@ class ROCKFALL_OT_synchronise_videos(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_reference_video(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_reference_video(OfVideo, bpy.types.Operator):
     """The clock of this video stays; the others are set by it"""
 
     bl_idname = "rockfall.reference_video"
@@ -228,7 +212,7 @@ class ROCKFALL_OT_reference_video(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_use_video_rate(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_use_video_rate(OfVideo, bpy.types.Operator):
     """Play the scene at the rate of the active video: one frame of the scene for each picture"""
 
     bl_idname = "rockfall.use_video_rate"
@@ -239,7 +223,7 @@ class ROCKFALL_OT_use_video_rate(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_use_video_size(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_use_video_size(OfVideo, bpy.types.Operator):
     """Render at the size of the active video, so that footage and terrain fit"""
 
     bl_idname = "rockfall.use_video_size"
@@ -252,7 +236,7 @@ class ROCKFALL_OT_use_video_size(_OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_build_proxy(_OfVideo, bpy.types.Operator):
+class ROCKFALL_OT_build_proxy(OfVideo, bpy.types.Operator):
     """Write small copies of the active video, with which large footage plays smoothly; they lie beside the file.
     Picking and tracking use the full pictures in either case"""
 

@@ -6,7 +6,7 @@ import importlib
 from ..core.dependencies import missing_packages
 from . import preferences
 
-MODULES = ("properties", "operators", "overlays", "panels", "menus", "handlers", "commands", "warm_up")
+MODULES = ("steps", "menus", "handlers", "commands", "warm_up")
 """What registers besides the preferences, in this order; each has ``register()`` and ``unregister()``."""
 
 _registered: list = []

@@ -34,7 +34,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _make(job: FilmJob, report: Report) -> None:
-    from .film.render import make
+    from .steps.film.render import make
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     with _quiet():

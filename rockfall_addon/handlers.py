@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .bridge import footage, impact_rows, live, migration, picks, problems, terrain, timing, videos
+from .scene import footage, impact_rows, migration, picks, problems, sync, terrain, timing, videos
 
 _owner = object()
 
@@ -21,7 +21,7 @@ def _follow_rate(scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None 
 def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _keep_rate(scene)
     footage.follow(scene)
-    live.notice(scene, depsgraph)
+    sync.notice(scene, depsgraph)
 
 
 @persistent
@@ -41,14 +41,14 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     terrain.forget_surfaces()
     _keep_rate(scene)
     footage.follow(scene)
-    live.sync(scene)
+    sync.sync(scene)
 
 
 @persistent
 @problems.guarded
 def _saving(_path: str, _unused: object = None) -> None:
     for scene in bpy.data.scenes:
-        live.sync(scene, dragging=live.is_dragging())
+        sync.sync(scene, dragging=sync.is_dragging())
 
 
 @problems.guarded
@@ -60,7 +60,7 @@ def _rate_changed() -> None:
 @problems.guarded
 def _units_changed() -> None:
     for scene in bpy.data.scenes:
-        live.touch(scene)
+        sync.touch(scene)
 
 
 @problems.guarded
@@ -75,12 +75,12 @@ def _catch_up() -> None:
     """Files of older versions, and picks that were changed while nobody watched."""
     for scene in bpy.data.scenes:
         migration.migrate(scene)
-        live.touch(scene)
+        sync.touch(scene)
 
 
 def _keep_rate(scene: bpy.types.Scene) -> None:
     if not migration.is_newer(scene) and timing.follow_frame_rate(scene):
-        live.touch(scene)
+        sync.touch(scene)
 
 
 def _listen() -> None:
@@ -114,7 +114,7 @@ def register() -> None:
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_owner)
-    for function in (live.work, _catch_up):
+    for function in (sync.work, _catch_up):
         if bpy.app.timers.is_registered(function):
             bpy.app.timers.unregister(function)
     for name, function in HANDLERS:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from rockfall.core.analysis.comparison import compare, predict
 from rockfall.core.analysis.courses import find_courses
-from rockfall.core.impact_models.base import ImpactModel, Incident
+from rockfall.core.impact_models.machinery.base import ImpactModel, Incident
 from rockfall.core.impact_models.registry import MODELS
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct

@@ -44,17 +44,18 @@ def case_picks(window):
 
     with window.override():
         assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
-    timer = window.part("rockfall_addon.operators.workspace")._arrange
+    timer = window.part("rockfall_addon.steps.start.workspace")._arrange
     yield from window.wait_for(lambda: not bpy.app.timers.is_registered(timer), 60, "arranged")
     yield 2.0
     scene = bpy.context.scene
-    bridge = {name: window.part(f"rockfall_addon.bridge.{name}") for name in ("image_view", "videos", "shown", "live")}
+    parts = {name: window.part(f"rockfall_addon.scene.{name}") for name in ("videos", "fingerprints", "sync")}
+    parts["image_view"] = window.part("rockfall_addon.view.image_view")
     area = max((one for one in window.window.screen.areas if one.type == "VIEW_3D"), key=lambda one: one.width)
     region = next(one for one in area.regions if one.type == "WINDOW")
-    known, drawn, computed, count, kept = [""], [], [], [0], bridge["live"].sync
+    known, drawn, computed, count, kept = [""], [], [], [0], parts["sync"].sync
 
     def now() -> str:
-        return bridge["shown"].remembered(scene).get(NAME, "")
+        return parts["fingerprints"].remembered(scene).get(NAME, "")
 
     def look() -> None:
         if bpy.context.region != region or drawn:
@@ -72,15 +73,15 @@ def case_picks(window):
         return done
 
     handle = bpy.types.SpaceView3D.draw_handler_add(look, (), "WINDOW", "POST_PIXEL")
-    bridge["live"].sync = timed
+    parts["sync"].sync = timed
     waits, works, redraws, drawings = [], [], [], []
     for frame, u, v in seen_impacts():
         for beside in (0.0, BESIDE_PX):
             scene.frame_set(frame)
             yield 0.6
-            camera = bridge["videos"].active_camera(scene)
-            rectangle = bridge["image_view"].image_rectangle(region, area.spaces.active.region_3d, scene, camera)
-            x, y = bridge["image_view"].to_region(rectangle, (1280, 720), (u + beside, v))
+            camera = parts["videos"].active_camera(scene)
+            rectangle = parts["image_view"].image_rectangle(region, area.spaces.active.region_3d, scene, camera)
+            x, y = parts["image_view"].to_region(rectangle, (1280, 720), (u + beside, v))
             x, y = round(region.x + x), round(region.y + y)
             yield from window.move(x, y)
             known[0], count[0] = now(), 0
@@ -99,7 +100,7 @@ def case_picks(window):
                 bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=1)
             redraws.append(1e3 * (time.perf_counter() - begun))
     bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
-    bridge["live"].sync = kept
+    parts["sync"].sync = kept
     picks = len([one for one in scene.objects if one.get("rockfall_role") == "pick"])
     row("picks", f"{picks}", f"{len(waits)} clicks on the demo's footage; the first is not counted: kernels are loaded")
     for what, taken in (
@@ -142,13 +143,13 @@ def case_memory(window):
         write_clip(clip)
         yield 0.5
         tell("  this script's clip written", ", OpenCV")
-        scene, bridge = bpy.context.scene, window.part("rockfall_addon.bridge.terrain")
+        scene, parts = bpy.context.scene, window.part("rockfall_addon.scene.terrain")
         started = time.perf_counter()
         add_slope(window, scene)
         taken = time.perf_counter() - started
         yield 5.0
         tell("terrain added and drawn", f", {taken:.1f} s to add it")
-        surface = bridge.surface_of_scene(scene)
+        surface = parts.surface_of_scene(scene)
         cast = window.part("core.terrain.raycast").cast_rays
         assert cast(surface, [[9.0, 9.0, 500.0]], [0, 0, -1]).face[0] >= 0
         yield 1.0
@@ -163,7 +164,7 @@ def case_memory(window):
             yield 0.3
         yield 1.0
         tell("stepped through the clip", ", Blender's cache of pictures")
-        videos = window.part("rockfall_addon.bridge.videos")
+        videos = window.part("rockfall_addon.scene.videos")
         camera = videos.active_camera(scene)
         for index in range(0, int(CLIP_S * RATE_HZ), 6):
             videos.picture(camera, index)
@@ -183,7 +184,7 @@ def add_slope(window, scene) -> None:
     faces = np.stack([np.stack([a, b, d], 1), np.stack([a, d, c], 1)], axis=1).reshape(-1, 3)
     shift = window.part("core.georeference").GlobalShift()
     surface = window.part("core.terrain.surface").Surface(np.stack([x, y, z], -1).reshape(-1, 3), faces, shift, "slope")
-    window.part("rockfall_addon.bridge.terrain").add_terrain(
+    window.part("rockfall_addon.scene.terrain").add_terrain(
         scene, surface, window.part("core.terrain.shading").shade(surface)
     )
 

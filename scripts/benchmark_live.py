@@ -83,27 +83,27 @@ def main() -> None:
     package = importlib.import_module("rockfall")
     bpy.context.preferences.addons.new().module = "rockfall"
     package.register()
-    bridge = {
-        name: importlib.import_module(f"rockfall.rockfall_addon.bridge.{name}")
-        for name in ("live", "picks", "reconstruction", "terrain")
+    parts = {
+        name: importlib.import_module(f"rockfall.rockfall_addon.scene.{name}")
+        for name in ("sync", "picks", "reconstruction", "terrain")
     }
     from rockfall.core.terrain.shading import shade
 
     scene = bpy.context.scene
     surface = make_terrain(options.triangles)
-    bridge["terrain"].add_terrain(scene, surface, shade(surface))
+    parts["terrain"].add_terrain(scene, surface, shade(surface))
     made = make_picks(options.trajectories, options.impacts)
     start = time.perf_counter()
-    bridge["reconstruction"].show(scene, bridge["reconstruction"].reconstruct_scene(scene, made))
+    parts["reconstruction"].show(scene, parts["reconstruction"].reconstruct_scene(scene, made))
     bpy.context.view_layer.update()
     print(
         f"{len(surface.faces)} triangles, {options.trajectories} trajectories of {options.impacts} impacts: "
         f"first time {time.perf_counter() - start:.1f} s, with the index of the terrain"
     )
 
-    live = bridge["live"]
+    live = parts["sync"]
     things = sorted(
-        bridge["picks"].things_of(scene, ["run 7" if options.trajectories > 6 else "run 1"]), key=lambda o: o.name
+        parts["picks"].things_of(scene, ["run 7" if options.trajectories > 6 else "run 1"]), key=lambda o: o.name
     )
     pick = things[len(things) // 2]
     place = np.array(pick.location)
@@ -144,7 +144,7 @@ def main() -> None:
     edit = statistics.median(timed(edited, options.edits)[0])
 
     def everything() -> None:
-        bridge["reconstruction"].refresh(scene)
+        parts["reconstruction"].refresh(scene)
 
     everything()
     taken = timed(everything, 8)

@@ -34,11 +34,11 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.placement import terrain_normals
-from rockfall.core.reconstruction.refinement import PixelObservations, Refinement, View, refine
-from rockfall.core.reconstruction.refinement_problem import Unknowns, evaluate
-from rockfall.core.reconstruction.refinement_setup import prepare, set_up
-from rockfall.core.reconstruction.refinement_sigmas import velocity_rows
-from rockfall.core.reconstruction.refinement_solver import normal_equations
+from rockfall.core.reconstruction.refinement.deviations import velocity_rows
+from rockfall.core.reconstruction.refinement.problem import Unknowns, evaluate
+from rockfall.core.reconstruction.refinement.refine import PixelObservations, Refinement, View, refine
+from rockfall.core.reconstruction.refinement.setup import prepare, set_up
+from rockfall.core.reconstruction.refinement.solver import normal_equations
 from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.raycast import cast_rays, closest_points
 from rockfall.core.terrain.surface import Surface
@@ -438,8 +438,8 @@ TABLE = 10
 
 def compare_speed(surface: Surface, truth: Fall, seed: int) -> None:
     """Time of refine, and of scipy's least squares with a numeric Jacobian on the same residuals."""
-    from rockfall.core.reconstruction.refinement_problem import moved
-    from rockfall.core.reconstruction.refinement_solver import solve
+    from rockfall.core.reconstruction.refinement.problem import moved
+    from rockfall.core.reconstruction.refinement.solver import solve
 
     case = Case("two views", 3840, 2160, 30.0, 150.0, 2)
     footage = film(case, surface, truth, np.random.default_rng(seed))

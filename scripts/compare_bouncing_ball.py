@@ -20,8 +20,8 @@ from rockfall.core.footage.video import open_video
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.refinement import Refinement, refine
-from rockfall.core.reconstruction.views import PixelObservations, View
+from rockfall.core.reconstruction.refinement.refine import Refinement, refine
+from rockfall.core.reconstruction.refinement.views import PixelObservations, View
 from rockfall.core.vectors import Array
 
 VIDEO = Path(__file__).parents[1] / "assets" / "examples" / "bouncing_ball" / "balle1-vp9.avi"

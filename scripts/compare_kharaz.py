@@ -9,7 +9,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from rockfall.core.impact_models.base import Incident
+from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import MODELS
 
 TABLE = Path(__file__).parent.parent / "tests" / "data" / "kharaz2001.csv"

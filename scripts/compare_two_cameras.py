@@ -17,10 +17,10 @@ from rockfall.core.exchange.tables import read_picks
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.picks import Picks, take
-from rockfall.core.reconstruction.refinement import Refinement, refine
+from rockfall.core.reconstruction.refinement.refine import Refinement, refine
+from rockfall.core.reconstruction.refinement.views import PixelObservations, View
 from rockfall.core.reconstruction.sampling import sample_trajectories
 from rockfall.core.reconstruction.triangulation import triangulate
-from rockfall.core.reconstruction.views import PixelObservations, View
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.vectors import Array
 

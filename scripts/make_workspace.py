@@ -19,7 +19,7 @@ from pathlib import Path
 import bpy
 
 OUT = Path(__file__).resolve().parent.parent / "assets" / "workspace.blend"
-NAME, KEY = "Rockfall", "rockfall_workspace"  # as rockfall_addon/bridge/workspace.py knows them
+NAME, KEY = "Rockfall", "rockfall_workspace"  # as rockfall_addon/view/workspace.py knows them
 CAMERA_SHARE, TIMELINE_SHARE = 0.66, 0.13
 SIDEBAR = 300  # width at interface scale 1 [px]
 SETTLE_S = 0.4

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ..errors import InputError
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..reconstruction.impact import Impacts
 from ..reconstruction.picks import Indices

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..impact_models.base import ImpactModel
+from ..impact_models.machinery.base import ImpactModel
 from ..reconstruction.impact import Impacts
 from ..reconstruction.picks import Indices, Mask
 from ..vectors import Array

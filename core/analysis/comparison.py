@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..impact_models.base import ImpactModel
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.base import ImpactModel
+from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import COMPARED, find_model
 from ..reconstruction.impact import Impacts, apparent
 from ..reconstruction.picks import Indices, Names

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
-from ..impact_models.base import Incident
+from ..impact_models.machinery.base import Incident
 from ..reconstruction.impact import Impacts, cross
 from ..reconstruction.picks import Indices, Mask
 from ..vectors import Array, dot, unit

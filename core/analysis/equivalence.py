@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..reconstruction.impact import Impacts
 from ..vectors import Array

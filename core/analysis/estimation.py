@@ -9,8 +9,8 @@ from math import nan, prod
 import numpy as np
 
 from ..errors import InputError
-from ..impact_models.base import ImpactModel
-from ..impact_models.parameters import ParameterSpec, Value
+from ..impact_models.machinery.base import ImpactModel
+from ..impact_models.machinery.parameters import ParameterSpec, Value
 from ..vectors import Array
 from .clouds import Contest
 from .fitting import Axis, Fit, Report, Stop, Sums, cancellable, fit, interval, resample

@@ -11,7 +11,7 @@ from html import escape
 from typing import Any
 
 from ..errors import RockfallError
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..reconstruction.impact import Impacts
 from .background import Job

@@ -15,7 +15,7 @@ from math import asinh, sinh
 import numpy as np
 
 from ..errors import RockfallError
-from ..impact_models.parameters import ParameterSpec
+from ..impact_models.machinery.parameters import ParameterSpec
 from ..vectors import Array
 
 Sums = Callable[[Array], Array]

@@ -7,8 +7,8 @@ from html import escape
 from math import floor, log10
 from typing import Any
 
-from ..impact_models.base import ImpactModel
-from ..impact_models.parameters import ParameterSpec, Value
+from ..impact_models.machinery.base import ImpactModel
+from ..impact_models.machinery.parameters import ParameterSpec, Value
 from .linked_graphs import MUTED, SHEET
 
 Changed = Callable[[str, Value], None]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..errors import InputError
-from ..impact_models.parameters import suggestion
+from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.impact import Impacts
 from ..reconstruction.picks import Indices
 from ..vectors import Array, norm

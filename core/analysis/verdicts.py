@@ -3,7 +3,7 @@
 
 from collections.abc import Sequence
 
-from ..impact_models.parameters import ParameterSpec
+from ..impact_models.machinery.parameters import ParameterSpec
 
 AT_LIMIT = 2e-3
 """Of the range: a value so near to its end is at the end."""

@@ -12,7 +12,7 @@ from .options import add_incident_options, whole
 from .progress import Progress
 
 if TYPE_CHECKING:
-    from ..impact_models.parameters import Value
+    from ..impact_models.machinery.parameters import Value
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,7 +12,7 @@ from .options import add_incident_options, whole
 
 if TYPE_CHECKING:
     from ..analysis.estimation import Estimate
-    from ..impact_models.base import ImpactModel
+    from ..impact_models.machinery.base import ImpactModel
 
 WIDTH = 100
 

@@ -6,8 +6,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..impact_models.base import ImpactModel
-    from ..impact_models.parameters import ParameterSpec
+    from ..impact_models.machinery.base import ImpactModel
+    from ..impact_models.machinery.parameters import ParameterSpec
 
 WIDTH = 96
 NAME_WIDTH, VALUE_WIDTH, RANGE_WIDTH = 22, 12, 24

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..impact_models.parameters import Value
+    from ..impact_models.machinery.parameters import Value
     from ..terrain.surface import Surface
     from .progress import Progress
 

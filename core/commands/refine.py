@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ..exchange.project import Project, RefinementSettings
     from ..reconstruction.impact import Impacts
     from ..reconstruction.picks import Picks
-    from ..reconstruction.refinement import Refinement
-    from ..reconstruction.views import View
+    from ..reconstruction.refinement.refine import Refinement
+    from ..reconstruction.refinement.views import View
     from ..terrain.surface import Surface
 
 MOST_ROWS = 20
@@ -69,8 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.opening import blocks_of, drag_of, open_terrain
     from ..exchange.output import output_folder
     from ..exchange.project import read_project
-    from ..reconstruction.refinement import refine
-    from ..reconstruction.refinement_solver import Loss
+    from ..reconstruction.refinement.refine import refine
+    from ..reconstruction.refinement.solver import Loss
 
     with output_folder(arguments.out) as folder, Progress() as progress:
         progress(f"Reading {arguments.project}")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..analysis.calibration import Fold
 from ..analysis.estimation import Estimate
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.parameters import Value
 from .csv_text import read_table
 
 ESTIMATES_COLUMNS = ("model", "parameter", "unit", "default", "fitted", "low", "high", "verdict")

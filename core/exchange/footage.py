@@ -13,8 +13,8 @@ from ..footage.clock import Clock
 from ..georeference import GlobalShift
 from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
 from ..reconstruction.ray_flight import flight_through_rays
+from ..reconstruction.refinement.views import PixelObservations, View
 from ..reconstruction.triangulation import contact_points
-from ..reconstruction.views import PixelObservations, View
 from ..terrain.surface import Surface
 from ..vectors import Array
 from .cameras import CameraFile, read_camera

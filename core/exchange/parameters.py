@@ -8,7 +8,7 @@ from pathlib import Path
 import tomli_w
 
 from ..errors import InputError
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 
 

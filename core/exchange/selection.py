@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..impact_models.parameters import suggestion
+from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.impact import FLAGS, Impacts
 from ..reconstruction.picks import Indices, Mask, Names
 from ..vectors import Array

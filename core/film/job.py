@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from ..impact_models.parameters import Value
+from ..impact_models.machinery.parameters import Value
 
 Kind = Literal["film", "still", "slope", "terrain"]
 

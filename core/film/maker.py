@@ -111,7 +111,7 @@ def run_job(command: Sequence[str], name: str, report: Report) -> None:
 
 def _make(job: FilmJob, report: Report) -> None:
     package = __name__.partition(".core.")[0]
-    run_job([sys.executable, "-m", f"{package}.rockfall_addon.film", job.to_json()], job.out.name, report)
+    run_job([sys.executable, "-m", f"{package}.rockfall_addon.steps.film", job.to_json()], job.out.name, report)
 
 
 def _silent(done: int, total: int) -> None:

@@ -16,10 +16,10 @@ energies.
 from collections.abc import Sequence
 from math import sqrt
 
-from .base import ImpactModel
-from .contact import leaving, rolling, split
-from .parameters import ParameterSpec
-from .triples import Vector, scaled
+from .machinery.base import ImpactModel
+from .machinery.contact import leaving, rolling, split
+from .machinery.parameters import ParameterSpec
+from .machinery.triples import Vector, scaled
 
 ENERGY = 1.0
 

@@ -17,10 +17,10 @@ R_t is ours.
 from collections.abc import Sequence
 from math import radians, tan
 
-from .base import ImpactModel
-from .contact import leaving, slip, split
-from .parameters import ParameterSpec
-from .triples import Vector, add, cross, length, scaled
+from .machinery.base import ImpactModel
+from .machinery.contact import leaving, slip, split
+from .machinery.parameters import ParameterSpec
+from .machinery.triples import Vector, add, cross, length, scaled
 
 
 def rebound(

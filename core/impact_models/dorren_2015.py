@@ -33,10 +33,11 @@ Shape "none" (0) is not a block and left out.
 from collections.abc import Sequence
 from math import cos, isnan, log, pi, radians, sin, sqrt
 
-from .base import ImpactModel
-from .chance import uniform
-from .contact import leaving, rolling, spin_in_plane, split, with_length
-from .parameters import SWITCH, ParameterSpec
+from .machinery.base import ImpactModel
+from .machinery.chance import uniform
+from .machinery.contact import leaving, rolling, spin_in_plane, split, with_length
+from .machinery.parameters import SWITCH, ParameterSpec
+from .machinery.triples import Vector, add, cross, dot, length, scaled, turned
 from .rockyfor3d_tables import (
     DEVIATION_LIMITS_DEG,
     DEVIATION_SHARES,
@@ -45,7 +46,6 @@ from .rockyfor3d_tables import (
     SHAPES,
     SOILS,
 )
-from .triples import Vector, add, cross, dot, length, scaled, turned
 
 NORMAL_SPEED_MPS = 9.0
 INERTIA = tuple(inertia for _, inertia in SHAPES)

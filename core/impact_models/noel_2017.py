@@ -24,11 +24,11 @@ open which tangential velocity, and whether velocity or energy: the restituted o
 from collections.abc import Sequence
 from math import sqrt
 
-from .base import ImpactModel
-from .chance import normal
-from .contact import CUBE_INERTIA, gripped, incident_angle_deg, leaving, split
-from .parameters import ParameterSpec
-from .triples import Vector, length, scaled
+from .machinery.base import ImpactModel
+from .machinery.chance import normal
+from .machinery.contact import CUBE_INERTIA, gripped, incident_angle_deg, leaving, split
+from .machinery.parameters import ParameterSpec
+from .machinery.triples import Vector, length, scaled
 
 LIMIT_ANGLE_DEG = 4.0
 RN_FACTOR, RN_FLOOR = 10.0, 0.08

@@ -22,11 +22,11 @@ al. 2018.
 from collections.abc import Sequence
 from math import atan, isnan, sqrt
 
-from .base import ImpactModel
-from .chance import uniform
-from .contact import SPHERE_INERTIA, leaving, rolling, slip, spin_in_plane, split, with_length
-from .parameters import ParameterSpec
-from .triples import Vector, cross, length, turned
+from .machinery.base import ImpactModel
+from .machinery.chance import uniform
+from .machinery.contact import SPHERE_INERTIA, leaving, rolling, slip, spin_in_plane, split, with_length
+from .machinery.parameters import ParameterSpec
+from .machinery.triples import Vector, cross, length, turned
 
 NORMAL_SPEED_MPS = 9.144
 FRICTION_SPEED_MPS = 6.096

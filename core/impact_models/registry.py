@@ -12,8 +12,8 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from ..errors import InputError
-from .base import ImpactModel
-from .parameters import suggestion
+from .machinery.base import ImpactModel
+from .machinery.parameters import suggestion
 
 
 def _found() -> dict[str, ImpactModel]:

@@ -16,12 +16,12 @@ standard deviations: Noël et al. 2018. Not verified: the truncation, and how th
 
 from collections.abc import Sequence
 
-from .base import ImpactModel
-from .chance import truncated_normal
-from .contact import leaving, rolling, split
-from .parameters import SWITCH, ParameterSpec
+from .machinery.base import ImpactModel
+from .machinery.chance import truncated_normal
+from .machinery.contact import leaving, rolling, split
+from .machinery.parameters import SWITCH, ParameterSpec
+from .machinery.triples import Vector, scaled
 from .pfeiffer_bowen_1989 import restituted_tangential
-from .triples import Vector, scaled
 
 WIDEST_SD = 3.0
 

@@ -16,10 +16,10 @@ not conserved: Noël et al. 2018.
 
 from collections.abc import Sequence
 
-from .base import ImpactModel
-from .contact import CUBE_INERTIA, SPHERE_INERTIA, gripped, incident_angle_deg, leaving, split
-from .parameters import ParameterSpec
-from .triples import Vector
+from .machinery.base import ImpactModel
+from .machinery.contact import CUBE_INERTIA, SPHERE_INERTIA, gripped, incident_angle_deg, leaving, split
+from .machinery.parameters import ParameterSpec
+from .machinery.triples import Vector
 
 SMALLEST_ANGLE_DEG = 0.1
 SPHERE = 1.0

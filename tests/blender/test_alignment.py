@@ -21,8 +21,8 @@ def scene(part):
 
 
 @pytest.fixture
-def bridge(part):
-    return part("rockfall_addon.bridge.alignment")
+def aligned(part):
+    return part("rockfall_addon.scene.alignment")
 
 
 _opened: dict = {}
@@ -36,14 +36,14 @@ def camera(part, scene, monkeypatch):
         one = video.open_video(FOOTAGE / "footage.mp4")
         _opened.update({field.name: getattr(one, field.name) for field in fields(one)})
     kept = video.Video(**_opened)
-    monkeypatch.setattr(part("rockfall_addon.bridge.videos"), "open_video", lambda path: kept)
-    part("rockfall_addon.bridge.state").write_shift(scene, part("core.georeference").GlobalShift(988400, 6375600, 0))
-    return part("rockfall_addon.bridge.videos").add_video(scene, FOOTAGE / "footage.mp4")
+    monkeypatch.setattr(part("rockfall_addon.scene.videos"), "open_video", lambda path: kept)
+    part("rockfall_addon.scene.store").write_shift(scene, part("core.georeference").GlobalShift(988400, 6375600, 0))
+    return part("rockfall_addon.scene.videos").add_video(scene, FOOTAGE / "footage.mp4")
 
 
 @pytest.fixture
 def table(part, scene):
-    return part("core.exchange.cameras").read_pairs(PAIRS, part("rockfall_addon.bridge.state").read_shift(scene))
+    return part("core.exchange.cameras").read_pairs(PAIRS, part("rockfall_addon.scene.store").read_shift(scene))
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def slope(part, scene):
         if axes[2][2] < 0:
             faces = faces[:, ::-1].copy()
         surface = part("core.terrain.surface").Surface(corners, faces, table.shift, "plane", ())
-        part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+        part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
         return surface
 
     return make
@@ -73,185 +73,185 @@ def solved_by_core(part, table, rows=slice(None), **options):
     )
 
 
-def mark_all(bridge, scene, camera, table, count) -> None:
+def mark_all(aligned, scene, camera, table, count) -> None:
     for i in range(count):
-        bridge.mark(scene, camera, "pixel", table.pixel[i])
-        bridge.mark(scene, camera, "point", table.point[i])
+        aligned.mark(scene, camera, "pixel", table.pixel[i])
+        aligned.mark(scene, camera, "point", table.point[i])
 
 
-def test_imported_pairs_give_the_cores_camera(part, scene, bridge, camera, table) -> None:
+def test_imported_pairs_give_the_cores_camera(part, scene, aligned, camera, table) -> None:
     assert bpy.ops.rockfall.import_pairs(filepath=str(PAIRS)) == {"FINISHED"}
     found = solved_by_core(part, table)
-    moving = part("rockfall_addon.bridge.videos").moving_camera(camera)
+    moving = part("rockfall_addon.scene.videos").moving_camera(camera)
     np.testing.assert_allclose(moving.camera.position, found.camera.position, atol=1e-6)
     np.testing.assert_allclose(moving.camera.rotation, found.camera.rotation, atol=1e-9)
     assert moving.camera.fx == pytest.approx(found.camera.fx, rel=1e-9)
     assert abs(moving.camera.fx - 2100) < 10, "the truth"
     place = np.array([float(cell) for cell in TRUTH.read_text().splitlines()[1].split(",")][2:5])
     assert np.linalg.norm(moving.camera.shift.to_survey(moving.camera.position) - place) < 0.3, "the truth"
-    solution = bridge.solution_of(camera)
+    solution = aligned.solution_of(camera)
     assert solution.rmse_px == pytest.approx(found.rmse_px, rel=1e-6)
     rows = camera.rockfall_alignment.rows
     lengths = np.hypot(*found.residual_px.T)
     np.testing.assert_allclose([row.residual_px for row in rows], lengths, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose([row.residual_m for row in rows], found.residual_m, rtol=1e-4, atol=1e-7)
     assert [row.name for row in rows] == table.name.tolist()
-    assert bridge.placement(camera) == "pairs"
+    assert aligned.placement(camera) == "pairs"
 
 
-def test_blenders_camera_sees_the_points_where_they_were_marked(part, scene, bridge, camera, table) -> None:
+def test_blenders_camera_sees_the_points_where_they_were_marked(part, scene, aligned, camera, table) -> None:
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
-    bridge.look_through(scene, camera)
+    aligned.look_through(scene, camera)
     bpy.context.view_layer.update()
     views = [world_to_camera_view(scene, camera, Vector(point)) for point in table.point.tolist()]
     seen = np.array([(view.x * 1280, (1 - view.y) * 720) for view in views])
     assert np.sqrt(((seen - table.pixel) ** 2).sum(axis=1).mean()) < 0.6
 
 
-def test_clicks_in_either_order(part, scene, bridge, camera, table) -> None:
-    one = bridge.mark(scene, camera, "pixel", table.pixel[0])
-    assert bridge.open_pair(camera).missing == "point"
-    assert "terrain" in bridge.hint(scene, camera)
-    assert bridge.mark(scene, camera, "pixel", table.pixel[1]) == one, (
+def test_clicks_in_either_order(part, scene, aligned, camera, table) -> None:
+    one = aligned.mark(scene, camera, "pixel", table.pixel[0])
+    assert aligned.open_pair(camera).missing == "point"
+    assert "terrain" in aligned.hint(scene, camera)
+    assert aligned.mark(scene, camera, "pixel", table.pixel[1]) == one, (
         "a second click in the picture corrects the first"
     )
-    bridge.mark(scene, camera, "point", table.point[1])
-    assert bridge.open_pair(camera) is None
-    other = bridge.mark(scene, camera, "point", table.point[0])
-    assert bridge.open_pair(camera).missing == "pixel"
-    bridge.mark(scene, camera, "pixel", table.pixel[0])
-    first, second = bridge.pairs_of(camera)
+    aligned.mark(scene, camera, "point", table.point[1])
+    assert aligned.open_pair(camera) is None
+    other = aligned.mark(scene, camera, "point", table.point[0])
+    assert aligned.open_pair(camera).missing == "pixel"
+    aligned.mark(scene, camera, "pixel", table.pixel[0])
+    first, second = aligned.pairs_of(camera)
     assert (first.id, second.id) == (one, other)
     assert second.pixel == tuple(table.pixel[0]), "doubles, exactly"
     assert second.point == tuple(table.point[0])
     assert first.colour != second.colour
-    assert bridge.placement(camera) == ""
+    assert aligned.placement(camera) == ""
 
 
-def test_solved_from_the_fifth_pair_on_and_predicted_from_then(part, scene, bridge, camera, table, slope) -> None:
+def test_solved_from_the_fifth_pair_on_and_predicted_from_then(part, scene, aligned, camera, table, slope) -> None:
     surface = slope(table)
-    mark_all(bridge, scene, camera, table, 4)
-    assert not part("rockfall_addon.bridge.videos").is_solved(camera)
-    assert "1 more" in bridge.hint(scene, camera)
+    mark_all(aligned, scene, camera, table, 4)
+    assert not part("rockfall_addon.scene.videos").is_solved(camera)
+    assert "1 more" in aligned.hint(scene, camera)
     order = [4, 5, 7]
     for i in order:
-        bridge.mark(scene, camera, "pixel", table.pixel[i])
-        if bridge.open_pair(camera).proposed:
-            bridge.move(scene, camera, bridge.open_pair(camera).id, "point", table.point[i])
+        aligned.mark(scene, camera, "pixel", table.pixel[i])
+        if aligned.open_pair(camera).proposed:
+            aligned.move(scene, camera, aligned.open_pair(camera).id, "point", table.point[i])
         else:
-            bridge.mark(scene, camera, "point", table.point[i])
-    assert part("rockfall_addon.bridge.videos").is_solved(camera)
-    assert len([pair for pair in bridge.pairs_of(camera) if pair.is_complete]) == 7
-    pair = bridge.mark(scene, camera, "pixel", table.pixel[8])
-    proposed = bridge.with_id(bridge.pairs_of(camera), pair)
+            aligned.mark(scene, camera, "point", table.point[i])
+    assert part("rockfall_addon.scene.videos").is_solved(camera)
+    assert len([pair for pair in aligned.pairs_of(camera) if pair.is_complete]) == 7
+    pair = aligned.mark(scene, camera, "pixel", table.pixel[8])
+    proposed = aligned.with_id(aligned.pairs_of(camera), pair)
     assert proposed.proposed == "point"
     assert not proposed.is_complete
-    moving = part("rockfall_addon.bridge.videos").moving_camera(camera)
+    moving = part("rockfall_addon.scene.videos").moving_camera(camera)
     np.testing.assert_allclose(
         part("core.camera.model").project(moving.camera, [proposed.point])[0], table.pixel[8], atol=1e-6
     )
     near = part("core.terrain.raycast").closest_points(surface, [proposed.point])
     assert near.distance[0] < 1e-3, "on the terrain"
-    before = bridge.solution_of(camera).rmse_px
-    bridge.delete(scene, camera, [pair])
-    pair = bridge.mark(scene, camera, "point", table.point[8])
-    proposed = bridge.with_id(bridge.pairs_of(camera), pair)
+    before = aligned.solution_of(camera).rmse_px
+    aligned.delete(scene, camera, [pair])
+    pair = aligned.mark(scene, camera, "point", table.point[8])
+    proposed = aligned.with_id(aligned.pairs_of(camera), pair)
     assert proposed.proposed == "pixel"
     assert np.hypot(*(np.array(proposed.pixel) - table.pixel[8])) < 5
-    assert bridge.solution_of(camera).rmse_px == pytest.approx(before, rel=1e-9), "a prediction does not count"
-    bridge.settle(scene, camera, pair)
-    assert bridge.with_id(bridge.pairs_of(camera), pair).is_complete
-    assert bridge.open_pair(camera) is None
+    assert aligned.solution_of(camera).rmse_px == pytest.approx(before, rel=1e-9), "a prediction does not count"
+    aligned.settle(scene, camera, pair)
+    assert aligned.with_id(aligned.pairs_of(camera), pair).is_complete
+    assert aligned.open_pair(camera) is None
 
 
-def test_known_focal_length_needs_four_pairs(part, scene, bridge, camera, table) -> None:
+def test_known_focal_length_needs_four_pairs(part, scene, aligned, camera, table) -> None:
     settings = camera.rockfall_alignment
     settings.focal_px = 2100.0
     settings.free_focal = False
     rows = [0, 4, 7, 11]
     for i in rows:
-        bridge.mark(scene, camera, "pixel", table.pixel[i])
-        bridge.mark(scene, camera, "point", table.point[i])
-    moving = part("rockfall_addon.bridge.videos").moving_camera(camera)
-    assert part("rockfall_addon.bridge.videos").is_solved(camera)
+        aligned.mark(scene, camera, "pixel", table.pixel[i])
+        aligned.mark(scene, camera, "point", table.point[i])
+    moving = part("rockfall_addon.scene.videos").moving_camera(camera)
+    assert part("rockfall_addon.scene.videos").is_solved(camera)
     assert moving.camera.fx == 2100.0
     assert settings.focal_mm == pytest.approx(43.2666 * 2100 / np.hypot(1280, 720), rel=1e-5)
     before = moving.camera.position
     settings.focal_px = 2150.0
-    after = part("rockfall_addon.bridge.videos").moving_camera(camera).camera
+    after = part("rockfall_addon.scene.videos").moving_camera(camera).camera
     assert after.fx == 2150.0
     assert np.linalg.norm(after.position - before) > 0.5, "the camera has gone back"
 
 
-def test_boxes_of_the_lens(part, scene, bridge, camera, table) -> None:
+def test_boxes_of_the_lens(part, scene, aligned, camera, table) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     settings = camera.rockfall_alignment
-    focal = bridge.focal_px(camera)
+    focal = aligned.focal_px(camera)
     settings.free_k1 = True
     found = solved_by_core(part, table, free=("f", "k1"))
-    assert bridge.lens_of(camera)[4] == pytest.approx(found.camera.k1, rel=1e-5)
-    assert bridge.solution_of(camera).sigma["k1"] == pytest.approx(found.sigma["k1"], rel=1e-5)
+    assert aligned.lens_of(camera)[4] == pytest.approx(found.camera.k1, rel=1e-5)
+    assert aligned.solution_of(camera).sigma["k1"] == pytest.approx(found.sigma["k1"], rel=1e-5)
     settings.free_k1 = False
-    assert bridge.lens_of(camera)[4] == 0.0, "a coefficient that is not asked for is not there"
-    assert bridge.focal_px(camera) == pytest.approx(focal, rel=1e-9)
+    assert aligned.lens_of(camera)[4] == 0.0, "a coefficient that is not asked for is not there"
+    assert aligned.focal_px(camera) == pytest.approx(focal, rel=1e-9)
     settings.free_focal = False
-    assert bridge.focal_px(camera) == pytest.approx(focal, rel=1e-9), "locked where it was found"
-    assert "fx" not in bridge.solution_of(camera).sigma
+    assert aligned.focal_px(camera) == pytest.approx(focal, rel=1e-9), "locked where it was found"
+    assert "fx" not in aligned.solution_of(camera).sigma
 
 
-def test_enabled_box_and_wrong_pair(part, scene, bridge, camera, table) -> None:
+def test_enabled_box_and_wrong_pair(part, scene, aligned, camera, table) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     rows = camera.rockfall_alignment.rows
     rows[3].enabled = False
     found = solved_by_core(part, table, [i for i in range(14) if i != 3])
-    assert bridge.focal_px(camera) == pytest.approx(found.camera.fx, rel=1e-9)
+    assert aligned.focal_px(camera) == pytest.approx(found.camera.fx, rel=1e-9)
     assert rows[3].residual_px > 0, "it is still checked"
     rows[3].enabled = True
-    wrong = bridge.pairs_of(camera)[5]
-    bridge.move(scene, camera, wrong.id, "pixel", (wrong.pixel[0] + 40, wrong.pixel[1]))
-    assert bridge.solution_of(camera).wrong == (wrong.id,)
+    wrong = aligned.pairs_of(camera)[5]
+    aligned.move(scene, camera, wrong.id, "pixel", (wrong.pixel[0] + 40, wrong.pixel[1]))
+    assert aligned.solution_of(camera).wrong == (wrong.id,)
     assert [row.is_wrong for row in rows].index(True) == 5
-    assert any("T06" in sentence for sentence in bridge.solution_of(camera).advice)
+    assert any("T06" in sentence for sentence in aligned.solution_of(camera).advice)
     rows[5].name = "ledge"
-    assert bridge.pairs_of(camera)[5].name == "ledge"
+    assert aligned.pairs_of(camera)[5].name == "ledge"
 
 
-def test_bad_pairs_in_words(part, scene, bridge, camera, table) -> None:
+def test_bad_pairs_in_words(part, scene, aligned, camera, table) -> None:
     errors = part("core.errors")
     with pytest.raises(errors.RockfallError, match="outside of the picture"):
-        bridge.mark(scene, camera, "pixel", (1300.0, 10.0))
-    assert bridge.pairs_of(camera) == []
+        aligned.mark(scene, camera, "pixel", (1300.0, 10.0))
+    assert aligned.pairs_of(camera) == []
     line = table.point[0] + np.linspace(0, 10, 6)[:, None] * [1, 2, 0.5]
     for i in range(6):
-        bridge.mark(scene, camera, "pixel", table.pixel[i])
-        bridge.mark(scene, camera, "point", line[i])
-    assert "line" in bridge.solution_of(camera).problem
-    assert not part("rockfall_addon.bridge.videos").is_solved(camera)
-    bridge.delete(scene, camera, [pair.id for pair in bridge.pairs_of(camera)])
+        aligned.mark(scene, camera, "pixel", table.pixel[i])
+        aligned.mark(scene, camera, "point", line[i])
+    assert "line" in aligned.solution_of(camera).problem
+    assert not part("rockfall_addon.scene.videos").is_solved(camera)
+    aligned.delete(scene, camera, [pair.id for pair in aligned.pairs_of(camera)])
     assert "rockfall_pairs" not in camera
     assert len(camera.rockfall_alignment.rows) == 0
 
 
-def test_file_keeps_the_doubles(part, scene, bridge, camera, table, tmp_path) -> None:
+def test_file_keeps_the_doubles(part, scene, aligned, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
-    pairs, lens = bridge.pairs_of(camera), bridge.lens_of(camera).tolist()
-    pose = part("rockfall_addon.bridge.videos").moving_camera(camera).camera.position.tolist()
+    pairs, lens = aligned.pairs_of(camera), aligned.lens_of(camera).tolist()
+    pose = part("rockfall_addon.scene.videos").moving_camera(camera).camera.position.tolist()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "aligned.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "aligned.blend"), load_ui=False)
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     again = videos.active_camera(bpy.context.scene)
-    assert repr(bridge.pairs_of(again)) == repr(pairs)
-    assert bridge.lens_of(again).tolist() == lens
+    assert repr(aligned.pairs_of(again)) == repr(pairs)
+    assert aligned.lens_of(again).tolist() == lens
     assert videos.moving_camera(again).camera.position.tolist() == pose
     assert len(again.rockfall_alignment.rows) == 14
-    assert bridge.solution_of(again).rmse_px < 0.5
+    assert aligned.solution_of(again).rmse_px < 0.5
 
 
-def test_pairs_and_camera_go_through_files(part, scene, bridge, camera, table, tmp_path) -> None:
+def test_pairs_and_camera_go_through_files(part, scene, aligned, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     assert bpy.ops.rockfall.export_pairs(filepath=str(tmp_path / "pairs.csv")) == {"FINISHED"}
     again = part("core.exchange.cameras").read_pairs(tmp_path / "pairs.csv", table.shift)
@@ -260,67 +260,67 @@ def test_pairs_and_camera_go_through_files(part, scene, bridge, camera, table, t
     assert again.frame.tolist() == [0] * 14
     assert bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
     file = part("core.exchange.cameras").read_camera(tmp_path / "camera.toml", table.shift)
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     solved = videos.moving_camera(camera).camera
     np.testing.assert_allclose(file.camera.camera.position, solved.position, atol=1e-8)
-    assert file.rmse_px == pytest.approx(bridge.solution_of(camera).rmse_px)
+    assert file.rmse_px == pytest.approx(aligned.solution_of(camera).rmse_px)
     assert len((tmp_path / "pairs_residuals.csv").read_text().splitlines()) == 15
     bpy.ops.rockfall.delete_pair(every=True)
     videos.unsolve(camera)
     assert bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
     np.testing.assert_allclose(videos.moving_camera(camera).camera.position, solved.position, atol=1e-8)
-    assert bridge.placement(camera) == "file"
+    assert aligned.placement(camera) == "file"
     text = (tmp_path / "camera.toml").read_text().replace("width = 1280", "width = 640")
     (tmp_path / "small.toml").write_text(text)
     with pytest.raises(RuntimeError, match="640 × 720 px"):
         bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "small.toml"))
 
 
-def test_placed_by_eye(part, scene, bridge, camera, table) -> None:
+def test_placed_by_eye(part, scene, aligned, camera, table) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     one = part("core.camera.model").look_at(1280, 720, (10, -40, 1540), (20, 60, 1530), focal_px=1000.0)
-    bridge.place_by_eye(scene, camera, one)
-    assert bridge.placement(camera) == "eye"
-    assert bridge.focal_px(camera) == 1000.0
-    assert np.isnan(bridge.solution_of(camera).rmse_px)
+    aligned.place_by_eye(scene, camera, one)
+    assert aligned.placement(camera) == "eye"
+    assert aligned.focal_px(camera) == 1000.0
+    assert np.isnan(aligned.solution_of(camera).rmse_px)
     assert camera.rockfall_alignment.rows[0].residual_px > 5, "the pairs say how far off it is"
 
 
-def test_camera_that_is_gone(part, scene, bridge, camera) -> None:
-    bridge.mark(scene, camera, "pixel", (10.0, 10.0))
+def test_camera_that_is_gone(part, scene, aligned, camera) -> None:
+    aligned.mark(scene, camera, "pixel", (10.0, 10.0))
     bpy.data.objects.remove(camera)
-    assert bridge.hint(scene, None)
+    assert aligned.hint(scene, None)
     with pytest.raises(RuntimeError, match="Add a video first"):
         bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
 
 
-def test_video_that_has_moved(part, scene, bridge, table, tmp_path) -> None:
-    part("rockfall_addon.bridge.state").write_shift(scene, table.shift)
+def test_video_that_has_moved(part, scene, aligned, table, tmp_path) -> None:
+    part("rockfall_addon.scene.store").write_shift(scene, table.shift)
     file = tmp_path / "clip.mp4"
     shutil.copy(FOOTAGE / "footage.mp4", file)
-    camera = part("rockfall_addon.bridge.videos").add_video(scene, file)
+    camera = part("rockfall_addon.scene.videos").add_video(scene, file)
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
-    assert bridge.solution_of(camera).rmse_px < 0.5
+    assert aligned.solution_of(camera).rmse_px < 0.5
     file.unlink()
-    part("rockfall_addon.bridge.videos").forget_files()
+    part("rockfall_addon.scene.videos").forget_files()
     camera.rockfall_alignment.motion = "ROTATION"
     with pytest.raises(RuntimeError, match=r"clip\.mp4"):
         bpy.ops.rockfall.follow_background()
 
 
-def test_hand_held_camera_is_followed_and_corrected(part, scene, bridge, camera, table, monkeypatch) -> None:
+def test_hand_held_camera_is_followed_and_corrected(part, scene, aligned, camera, table, monkeypatch) -> None:
     """Each frame's pose is close to the truth, and pairs of another frame bend the path through it.
 
     A third of the video is followed, to be quick.
     """
-    following = part("rockfall_addon.bridge.following")
+    following = part("rockfall_addon.steps.alignment.following")
     monkeypatch.setattr(following, "background_motion", partial(following.background_motion, last=95))
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     with pytest.raises(RuntimeError, match="stands still"):
         bpy.ops.rockfall.follow_background()
     camera.rockfall_alignment.motion = "ROTATION"
     assert bpy.ops.rockfall.follow_background() == {"FINISHED"}
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     known = following.followed(camera)
     assert (known["reference"], known["frames"]) == (0, 300)
     assert not following.is_stale(camera)
@@ -333,14 +333,14 @@ def test_hand_held_camera_is_followed_and_corrected(part, scene, bridge, camera,
     assert np.degrees(angle).max() < 0.1
     scene.frame_set(90)
     middle = part("core.exchange.cameras").read_pairs(FOOTAGE / "pairs_middle.csv", table.shift)
-    count = bridge.propose_here(scene, camera)
+    count = aligned.propose_here(scene, camera)
     assert count >= 4
-    offered = [pair for pair in bridge.pairs_of(camera) if pair.proposed]
+    offered = [pair for pair in aligned.pairs_of(camera) if pair.proposed]
     for pair in offered:
         there = middle.pixel[middle.name.tolist().index(pair.name)]
         assert np.hypot(*(np.array(pair.pixel) - there)) < 6
-        bridge.move(scene, camera, pair.id, "pixel", there)
-    assert bridge.solution_of(camera).keys == (90,)
+        aligned.move(scene, camera, pair.id, "pixel", there)
+    assert aligned.solution_of(camera).keys == (90,)
     corrected = videos.moving_camera(camera)
     assert not np.allclose(corrected.rotation[90], moving.rotation[90], atol=1e-9)
     np.testing.assert_allclose(corrected.rotation[0], moving.rotation[0], atol=1e-9)

@@ -54,9 +54,9 @@ def shape(thing: bpy.types.Object) -> np.ndarray:
 
 
 def test_camera_shows_every_point_of_the_trajectories(scene, preset, part) -> None:
-    part("rockfall_addon.film.dressing").set_up_film(scene, preset, "cycles")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
     bpy.context.view_layer.update()
-    motions = part("rockfall_addon.film.motions").motions_of(scene)
+    motions = part("rockfall_addon.steps.film.motions").motions_of(scene)
     points = np.vstack([motion.position for motion in motions])
     seen = np.array([world_to_camera_view(scene, scene.camera, Vector(point)) for point in points])
     assert seen[:, :2].min() > 0.05
@@ -64,16 +64,16 @@ def test_camera_shows_every_point_of_the_trajectories(scene, preset, part) -> No
     assert seen[:, 2].min() > scene.camera.data.clip_start
     assert seen[:, 2].max() < scene.camera.data.clip_end
     # our own projection is Blender's
-    view = part("rockfall_addon.film.camera").automatic_view(scene, motions, 64 / 36)
+    view = part("rockfall_addon.steps.film.camera").automatic_view(scene, motions, 64 / 36)
     np.testing.assert_allclose(view.project(points), seen, atol=2e-4)
 
 
 def test_a_given_camera_stands_in_survey_coordinates(scene, preset, part) -> None:
     from dataclasses import replace
 
-    part("rockfall_addon.bridge.state").write_shift(scene, part("core.georeference").GlobalShift(1000.0, 2000.0, 0.0))
+    part("rockfall_addon.scene.store").write_shift(scene, part("core.georeference").GlobalShift(1000.0, 2000.0, 0.0))
     placement = part("core.exchange.project").CameraPlacement((1060.0, 2000.0, 30.0), (1000.0, 2000.0, 30.0), 50.0)
-    part("rockfall_addon.film.dressing").set_up_film(scene, replace(preset, camera=placement), "cycles")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, replace(preset, camera=placement), "cycles")
     bpy.context.view_layer.update()
     np.testing.assert_allclose(scene.camera.matrix_world.translation, (60, 0, 30), atol=1e-4)
     assert np.degrees(scene.camera.data.angle) == pytest.approx(50.0, abs=1e-3)
@@ -81,14 +81,14 @@ def test_a_given_camera_stands_in_survey_coordinates(scene, preset, part) -> Non
 
 
 def test_captions_say_time_and_speed_of_each_frame(scene, preset, part) -> None:
-    part("rockfall_addon.film.dressing").set_up_film(scene, preset, "cycles")
-    captions = part("rockfall_addon.film.captions")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
+    captions = part("rockfall_addon.steps.film.captions")
     for frame in (0, 7, 31, 77):
         scene.frame_set(frame)
         time = frame * 0.5 / 25  # half speed
         assert scene.frame_current == frame
         speeds = [0.0]
-        for motion in part("rockfall_addon.film.motions").motions_of(scene):
+        for motion in part("rockfall_addon.steps.film.motions").motions_of(scene):
             if motion.time_s[0] <= time <= motion.time_s[-1]:
                 speeds.append(float(np.interp(time, motion.time_s, motion.speed_mps)))
         for name, text in (
@@ -117,7 +117,7 @@ def _inputs(thing: bpy.types.Object) -> dict:
 
 
 def test_blocks_are_there_while_they_move(scene, preset, part) -> None:
-    part("rockfall_addon.film.dressing").set_up_film(scene, preset, "cycles")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
     a, b = (scene.objects[f"{name} block"] for name in "AB")
     hidden = {}
     for frame in (0, 19, 21, scene.frame_end):  # B starts at 0.4 s, which is frame 20 at half speed
@@ -127,7 +127,7 @@ def test_blocks_are_there_while_they_move(scene, preset, part) -> None:
 
 
 def test_trails_and_impact_rings_grow(scene, preset, part) -> None:
-    part("rockfall_addon.film.dressing").set_up_film(scene, preset, "cycles")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
     counts = []
     for frame in (0, 40, 90, scene.frame_end):
         scene.frame_set(frame)
@@ -141,7 +141,7 @@ def test_trails_and_impact_rings_grow(scene, preset, part) -> None:
 
 def test_set_up_and_removal_leave_the_scene_as_it_was(scene, part) -> None:
     def state() -> dict:
-        remembered = part("rockfall_addon.film.remembered")
+        remembered = part("rockfall_addon.steps.film.remembered")
         owners = {name: remembered._owner(scene, name) for name in remembered.SETTINGS}
         values = {name: getattr(*owner) for name, owner in owners.items()}
         things = {
@@ -171,10 +171,10 @@ def test_set_up_and_removal_leave_the_scene_as_it_was(scene, part) -> None:
 
 
 def test_film_of_three_frames(scene, preset, part, tmp_path: Path) -> None:
-    part("rockfall_addon.film.dressing").set_up_film(scene, preset, "cycles")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
     scene.cycles.samples = 1
     path, reported = tmp_path / "film.mp4", []
-    part("rockfall_addon.film.render").render_film(scene, path, (10, 12), lambda *done: reported.append(done))
+    part("rockfall_addon.steps.film.render").render_film(scene, path, (10, 12), lambda *done: reported.append(done))
     assert reported == [(1, 3), (2, 3), (3, 3)]
     assert [file.name for file in tmp_path.iterdir() if file.suffix == ".mp4"] == ["film.mp4"]
     clip = bpy.data.movieclips.load(str(path))
@@ -184,8 +184,8 @@ def test_film_of_three_frames(scene, preset, part, tmp_path: Path) -> None:
 
 
 def test_frames_beyond_the_film(scene, preset, part, tmp_path: Path) -> None:
-    part("rockfall_addon.film.dressing").set_up_film(scene, preset, "cycles")
-    render = part("rockfall_addon.film.render")
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
+    render = part("rockfall_addon.steps.film.render")
     with pytest.raises(part("core.errors").InputError, match=r"no frame 100000\. Its last frame is"):
         render.render_film(scene, tmp_path / "film.mp4", (100_000, 100_001), lambda *_: None)
 

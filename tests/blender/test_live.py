@@ -51,7 +51,7 @@ def scene(part, table: Path) -> bpy.types.Scene:
 def slope(part, table: Path, terrain_file: Path) -> bpy.types.Scene:
     """The scene with its terrain."""
     surface = part("core.terrain.readers").read_terrain(terrain_file)
-    part("rockfall_addon.bridge.terrain").add_terrain(
+    part("rockfall_addon.scene.terrain").add_terrain(
         bpy.context.scene, surface, part("core.terrain.shading").shade(surface)
     )
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
@@ -102,7 +102,7 @@ def move_key(thing: bpy.types.Object, frames: float) -> None:
 
 def check_shown(scene: bpy.types.Scene, part) -> None:
     """What is shown is what a reconstruction of the picks from nothing gives."""
-    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(scene)
+    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
     rows = {(row.trajectory, row.number): row for row in scene.rockfall_impacts}
     assert len(rows) == len(result.impacts)
     for i in range(len(result.impacts)):
@@ -320,14 +320,14 @@ def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part) -> None:
 
 def test_unit_scale_backside_and_early_picks_are_told(slope: bpy.types.Scene, part) -> None:
     slope.unit_settings.scale_length = 0.01
-    part("rockfall_addon.bridge.live").touch(slope)
+    part("rockfall_addon.scene.sync").touch(slope)
     assert "unit scale is 0.01" in slope["rockfall_problem"]
     slope.unit_settings.scale_length = 1.0
-    part("rockfall_addon.bridge.live").touch(slope)
+    part("rockfall_addon.scene.sync").touch(slope)
     assert slope["rockfall_problem"] == ""
     pick = picks_of(slope, "A")[1]
     pick["rockfall_normal"] = [0.0, 0.6, -0.8]
-    part("rockfall_addon.bridge.live").touch(slope)
+    part("rockfall_addon.scene.sync").touch(slope)
     assert "Trajectory A, 10.731 s: the pick is on the back" in slope["rockfall_problem"]
     del pick["rockfall_normal"]
     slope["rockfall_time_origin_s"] = 10.5
@@ -338,7 +338,7 @@ def test_unit_scale_backside_and_early_picks_are_told(slope: bpy.types.Scene, pa
 
 
 def test_errors_of_ours_are_told_once(scene: bpy.types.Scene, part, monkeypatch, capsys) -> None:
-    live, problems = part("rockfall_addon.bridge.live"), part("rockfall_addon.bridge.problems")
+    live, problems = part("rockfall_addon.scene.sync"), part("rockfall_addon.scene.problems")
 
     def broken(*_: object, **__: object) -> None:
         raise ValueError("quite unexpected")
@@ -414,7 +414,7 @@ def test_colours(scene: bpy.types.Scene, part, by: str) -> None:
 
 def test_flights_join_centres(slope: bpy.types.Scene, part) -> None:
     slope.rockfall.flights_join = "centres"
-    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(slope)
+    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(slope)
     assert result.ends == "centres"
     pick = picks_of(slope, "A")[1]
     frame = pick["rockfall_key_frame"]
@@ -428,7 +428,7 @@ def test_flights_join_centres(slope: bpy.types.Scene, part) -> None:
 
 
 def test_the_table_selects_and_follows_the_selection(scene: bpy.types.Scene, part) -> None:
-    rows = part("rockfall_addon.bridge.impact_rows")
+    rows = part("rockfall_addon.scene.impact_rows")
     assert [(row.trajectory, row.number) for row in scene.rockfall_impacts] == [
         (name, i) for name in "AB" for i in (1, 2, 3)
     ]
@@ -442,7 +442,7 @@ def test_the_table_selects_and_follows_the_selection(scene: bpy.types.Scene, par
 
 
 def test_the_table_sorts_and_filters(scene: bpy.types.Scene, part) -> None:
-    table = part("rockfall_addon.panels.impact_table")
+    table = part("rockfall_addon.steps.impacts.table")
     rows = list(scene.rockfall_impacts)
 
     def listed() -> list:
@@ -467,7 +467,7 @@ def test_the_table_sorts_and_filters(scene: bpy.types.Scene, part) -> None:
 
 
 def test_a_new_pick(slope: bpy.types.Scene, part) -> None:
-    picks, live = part("rockfall_addon.bridge.picks"), part("rockfall_addon.bridge.live")
+    picks, live = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.sync")
     for time, x in ((50.0, 2.0), (50.8, 6.0), (51.5, 11.0)):
         picks.add_pick(slope, "new run", time, [x, -3.0, ground(x)])
     live.sync(slope)
@@ -497,7 +497,7 @@ def test_a_pick_that_lost_a_property(scene: bpy.types.Scene, part, key: str) -> 
     update()
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("other", None))
     update()
-    assert part("rockfall_addon.bridge.problems").sentences(scene) == []
+    assert part("rockfall_addon.scene.problems").sentences(scene) == []
     check_shown(scene, part)
     assert len([row for row in scene.rockfall_impacts if row.trajectory == "A"]) == (
         2 if key in ("rockfall_time_s", "rockfall_position_m") else 3

@@ -35,11 +35,11 @@ def impacts() -> list[dict[str, str]]:
 def site(part) -> bpy.types.Scene:
     """The demo's terrain and footage, the camera as it truly was."""
     scene = bpy.context.scene
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     surface = part("core.terrain.readers").read_terrain(
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
-    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
     camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
     poses = rows("camera.csv")
     model = part("core.camera.model")
@@ -60,7 +60,7 @@ def site(part) -> bpy.types.Scene:
 
 
 def camera_of(scene: bpy.types.Scene, part) -> bpy.types.Object:
-    (camera,) = part("rockfall_addon.bridge.videos").cameras(scene)
+    (camera,) = part("rockfall_addon.scene.videos").cameras(scene)
     return camera
 
 
@@ -70,7 +70,7 @@ def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str = "B10", **how) -> bpy.types.Object:
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     scene.frame_set(frame)
     camera = camera_of(scene, part)
     place = picking.in_picture(scene, camera, pixel, name, **how)
@@ -81,7 +81,7 @@ def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str 
 
 def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -> None:
     """A true contact point, projected by hand, is found again."""
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     camera, poses = camera_of(site, part), rows("camera.csv")
     for row in impacts[:5]:
         frame = round(float(row["time_s"]) * 30)
@@ -102,9 +102,9 @@ def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -
 
 def test_the_middle_of_the_block_is_a_radius_from_the_ground(site, part, impacts) -> None:
     """The block's centre at the impact, as pixel → the contact that the truth has."""
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     camera, motion = camera_of(site, part), part("core.camera.motion")
-    path = part("rockfall_addon.bridge.videos").moving_camera(camera)
+    path = part("rockfall_addon.scene.videos").moving_camera(camera)
     assert isinstance(path, motion.MovingCamera)
     for row in impacts[:5]:
         frame = round(float(row["time_s"]) * 30)
@@ -130,7 +130,7 @@ def test_clicks_become_picks_and_trajectories(site, part, impacts) -> None:
     flights = [thing for thing in site.objects if thing.get("rockfall_role") == "flights"]
     assert len(flights) == 1, "the trajectory follows by itself"
     assert len(site.rockfall_impacts) == 3
-    table = part("rockfall_addon.bridge.picks").picks_of(site)
+    table = part("rockfall_addon.scene.picks").picks_of(site)
     assert set(table.extra["video"].tolist()) == {"footage"}
     assert float(table.extra["u_px"][0]) == float(block[frames[0]]["u_px"])
 
@@ -147,7 +147,7 @@ def test_a_second_click_in_one_picture_moves_the_pick(site, part) -> None:
 
 
 def test_what_was_seen_is_forgotten_when_the_pick_is_moved(site, part) -> None:
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     thing = pick(site, part, 60, np.array([700.0, 300.0]))
     (seen,) = picking.sightings(thing).values()
     assert (seen.frame, seen.pixel.tolist(), seen.centre) == (60, [700.0, 300.0], True)
@@ -158,7 +158,7 @@ def test_what_was_seen_is_forgotten_when_the_pick_is_moved(site, part) -> None:
 
 
 def test_a_cancelled_click_leaves_the_pick_as_it_was(site, part) -> None:
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     thing = pick(site, part, 60, np.array([700.0, 300.0]))
     kept = picking.snapshot(thing)
     camera = camera_of(site, part)
@@ -176,8 +176,8 @@ def test_grazing_rays_are_warned_of(part) -> None:
         np.array([[-200.0, -200, 0], [200, -200, 0], [200, 200, 0], [-200, 200, 0]]),
         np.array([[0, 1, 2], [0, 2, 3]]), part("core.georeference").GlobalShift(), "plane", (),
     )  # fmt: skip
-    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    videos, picking = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.picking")
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    videos, picking = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.picking")
     camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
     lens = part("core.camera.model").look_at(1280, 720, (0, -60, 2), (0, 0, 0), focal_px=1000)
     videos.set_moving_camera(scene, camera, part("core.camera.motion").fixed(lens))
@@ -193,10 +193,10 @@ def test_grazing_rays_are_warned_of(part) -> None:
 
 
 def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
-    picking, errors = part("rockfall_addon.bridge.picking"), part("core.errors")
+    picking, errors = part("rockfall_addon.scene.picking"), part("core.errors")
     camera = camera_of(site, part)
     site.frame_set(90)
-    part("rockfall_addon.bridge.videos").unsolve(camera)
+    part("rockfall_addon.scene.videos").unsolve(camera)
     with pytest.raises(errors.RockfallError, match="not aligned"):
         picking.in_picture(site, camera, np.array([640.0, 360.0]), "B10")
     place = picking.on_ray(site, np.array([8.0, 60.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
@@ -208,7 +208,7 @@ def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
 
 
 def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     bpy.data.objects.remove(camera_of(site, part))
     del site["rockfall_time_origin_s"]
     for frame, y in ((30, 60.0), (60, 55.0)):
@@ -222,7 +222,7 @@ def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
 
 
 def test_two_views_make_one_point(site, part) -> None:
-    picking, videos = part("rockfall_addon.bridge.picking"), part("rockfall_addon.bridge.videos")
+    picking, videos = part("rockfall_addon.scene.picking"), part("rockfall_addon.scene.videos")
     model = part("core.camera.model")
     truth = np.array(local(rows("impacts.csv")[3], "x_m", "y_m", "z_m"))
     first = camera_of(site, part)
@@ -254,7 +254,7 @@ def test_two_views_make_one_point(site, part) -> None:
 
 def test_clicked_and_proposed_observations(site, part) -> None:
     """The true pixels, as a track: its kinks are the true impacts."""
-    observations, tracking = part("rockfall_addon.bridge.observations"), part("core.footage.tracking")
+    observations, tracking = part("rockfall_addon.scene.observations"), part("core.footage.tracking")
     camera = camera_of(site, part)
     block = [row for row in rows("block.csv") if row["visible"] == "1" and float(row["time_s"]) < 5.0]
     pixel = np.array([[float(row["u_px"]), float(row["v_px"])] for row in block])
@@ -287,14 +287,14 @@ def test_operators_tell_what_is_missing(part) -> None:
     scene = bpy.context.scene
     assert not bpy.ops.rockfall.remove_pick.poll()
     assert not bpy.ops.rockfall.drag_pick.poll()
-    picking = part("rockfall_addon.bridge.picking")
+    picking = part("rockfall_addon.scene.picking")
     with pytest.raises(part("core.errors").RockfallError, match="no terrain to pick on"):
         picking.on_ray(scene, np.zeros(3), np.array([0.0, 0, -1]), "B01")
 
 
 def test_the_block_is_tracked(site, part) -> None:
     """From one rough click, through thirty pictures: the operator as it runs without a window."""
-    observations = part("rockfall_addon.bridge.observations")
+    observations = part("rockfall_addon.scene.observations")
     camera = camera_of(site, part)
     site.frame_set(60)
     observations.click(camera, "B10", 60, 2.0, np.array([862.0, 143.0]), 1.0)

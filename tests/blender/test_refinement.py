@@ -33,11 +33,11 @@ def truth() -> list[dict[str, str]]:
 def site(part, truth) -> bpy.types.Scene:
     """Terrain, the true camera, a track of true pixels with 0.3 px of noise, picks 15 cm and 20 ms off."""
     scene = bpy.context.scene
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     surface = part("core.terrain.readers").read_terrain(
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
-    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
     camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
     scene["rockfall_time_origin_s"] = OFFSET_S
     poses = rows("camera.csv")
@@ -55,12 +55,12 @@ def site(part, truth) -> bpy.types.Scene:
     scene.rockfall.normal_radius_m = 0.6
 
     random = np.random.default_rng(5)
-    add = part("rockfall_addon.bridge.picks").add_pick
+    add = part("rockfall_addon.scene.picks").add_pick
     for row in truth:
         spot = local(row, "contact_x_m", "contact_y_m", "contact_z_m") + random.normal(0, 0.15, 3)
         closest = part("core.terrain.raycast").closest_points(surface, spot).point[0]
         add(scene, "B10", OFFSET_S + float(row["time_s"]) + random.normal(0, 0.02), closest)
-    part("rockfall_addon.bridge.live").sync(scene)
+    part("rockfall_addon.scene.sync").sync(scene)
     bpy.context.view_layer.update()
     return scene
 
@@ -75,8 +75,8 @@ def tracked(site, part, truth) -> bpy.types.Scene:
     frame, time = np.array([int(row["frame"]) for row in block]), np.array([float(row["time_s"]) for row in block])
     one = np.ones(len(block))
     track = part("core.footage.tracking").BlockTrack(frame, time, pixel, 0.3 * one, one, pixel, 9 * one, ("", ""))
-    (camera,) = part("rockfall_addon.bridge.videos").cameras(site)
-    part("rockfall_addon.bridge.observations").keep_track(camera, "B10", track)
+    (camera,) = part("rockfall_addon.scene.videos").cameras(site)
+    part("rockfall_addon.scene.observations").keep_track(camera, "B10", track)
     return site
 
 
@@ -93,7 +93,7 @@ def times_off(scene: bpy.types.Scene, truth) -> np.ndarray:
 
 
 def test_what_is_missing_is_said(site, part) -> None:
-    refinement = part("rockfall_addon.bridge.refinement")
+    refinement = part("rockfall_addon.scene.refinement")
     assert "Track the block" in refinement.ready(site)[0]
     assert not bpy.ops.rockfall.refine.poll()
     for thing in picks_of(site):
@@ -102,7 +102,7 @@ def test_what_is_missing_is_said(site, part) -> None:
 
 
 def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) -> None:
-    refinement = part("rockfall_addon.bridge.refinement")
+    refinement = part("rockfall_addon.scene.refinement")
     before = [list(thing["rockfall_position_m"]) for thing in picks_of(tracked)]
     off = times_off(tracked, truth)
     assert bpy.ops.rockfall.refine() == {"FINISHED"}
@@ -131,18 +131,18 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
     speed = np.linalg.norm(local(truth[2], "v1x_mps", "v1y_mps", "v1z_mps") + ORIGIN)
     assert np.linalg.norm(list(result["incident_mps"])) == pytest.approx(speed, rel=0.03)
     assert "sigma_r" in result, "impacts show their errors"
-    sentences = part("rockfall_addon.bridge.problems").sentences(tracked)
+    sentences = part("rockfall_addon.scene.problems").sentences(tracked)
     assert not [sentence for sentence in sentences if "went wrong" in sentence]
 
 
 def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
     """Refined once more, nothing moves: the scene's picks are those of the core's result."""
-    refinement = part("rockfall_addon.bridge.refinement")
+    refinement = part("rockfall_addon.scene.refinement")
     bpy.ops.rockfall.refine()
     first = refinement.proposal(tracked)["picks"]
     place, _, _ = refinement.proposed_path(tracked)
     bpy.ops.rockfall.apply_refinement()
-    path = part("rockfall_addon.bridge.footage_view").path_of(tracked, "B10")
+    path = part("rockfall_addon.view.footage_view").path_of(tracked, "B10")
     np.testing.assert_allclose(path.position, place, atol=1e-6)
     bpy.ops.rockfall.refine()
     for before, again in zip(first, refinement.proposal(tracked)["picks"], strict=True):
@@ -150,7 +150,7 @@ def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
 
 
 def test_discarding_and_changing(tracked, part) -> None:
-    refinement = part("rockfall_addon.bridge.refinement")
+    refinement = part("rockfall_addon.scene.refinement")
     kept = [dict(thing.items()).keys() for thing in picks_of(tracked)]
     bpy.ops.rockfall.refine()
     bpy.ops.rockfall.discard_refinement()
@@ -169,7 +169,7 @@ def test_discarding_and_changing(tracked, part) -> None:
 def test_gravity_can_be_checked(tracked, part) -> None:
     tracked.rockfall_picking.free = {"gravity"}
     bpy.ops.rockfall.refine()
-    (name, value, sigma) = part("rockfall_addon.bridge.refinement").proposal(tracked)["unknowns"][0]
+    (name, value, sigma) = part("rockfall_addon.scene.refinement").proposal(tracked)["unknowns"][0]
     assert name == "gravity_mps2"
     assert abs(value - 9.81) < max(4 * sigma, 0.05)
     bpy.ops.rockfall.apply_refinement()
@@ -178,7 +178,7 @@ def test_gravity_can_be_checked(tracked, part) -> None:
 
 def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
     """After refinement the outline lies on the true block, in pixels of a hand-held picture."""
-    view, videos = part("rockfall_addon.bridge.footage_view"), part("rockfall_addon.bridge.videos")
+    view, videos = part("rockfall_addon.view.footage_view"), part("rockfall_addon.scene.videos")
     bpy.ops.rockfall.refine()
     bpy.ops.rockfall.apply_refinement()
     (camera,) = videos.cameras(tracked)
@@ -200,7 +200,7 @@ def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
 
 def test_paths_bend_with_the_lens(part) -> None:
     """A straight line in space, through a lens with k1, is curved as OpenCV has it."""
-    view, model = part("rockfall_addon.bridge.footage_view"), part("core.camera.model")
+    view, model = part("rockfall_addon.view.footage_view"), part("core.camera.model")
     lens = model.Camera(1280, 720, 1000.0, 1000.0, 640.0, 360.0, k1=-0.2)
     line = np.column_stack([np.linspace(-5, 5, 11), np.full(11, 10.0), np.full(11, 3.0)])
     drawing = view.Drawing()

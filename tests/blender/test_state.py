@@ -54,7 +54,7 @@ def project(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def scene(part, project: Path) -> bpy.types.Scene:
-    part("rockfall_addon.bridge.project").load_project(bpy.context.scene, project)
+    part("rockfall_addon.scene.project").load_project(bpy.context.scene, project)
     bpy.context.view_layer.update()
     return bpy.context.scene
 
@@ -70,14 +70,14 @@ def things(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
 
 def everything(scene: bpy.types.Scene, part, *, ids: bool = True) -> dict[str, object]:
     """All numbers of the state, and of what is computed from it."""
-    picks = part("rockfall_addon.bridge.picks").picks_of(scene)
-    reconstruction = part("rockfall_addon.bridge.reconstruction")
+    picks = part("rockfall_addon.scene.picks").picks_of(scene)
+    reconstruction = part("rockfall_addon.scene.reconstruction")
     result = reconstruction.reconstruct_scene(scene)
     settings = reconstruction.project_settings(scene, picks.trajectory.tolist())
     names = ("trajectory", "time_s", "position", "kind", "status", "normal", "sigma_time_s", "sigma_position_m")
     found: dict[str, object] = {name: getattr(picks, name).tolist() for name in names}
     found |= {"extra": {n: v.tolist() for n, v in picks.extra.items()}, "shift": picks.shift}
-    found |= {"settings": settings, "models": part("rockfall_addon.bridge.twins").parameters_of(scene)}
+    found |= {"settings": settings, "models": part("rockfall_addon.scene.models").parameters_of(scene)}
     found |= {"rn": np.round(result.impacts.rn, 9).tolist(), "v1": np.round(result.impacts.v1, 9).tolist()}
     if ids:
         found["ids"] = sorted(o["rockfall_id"] for o in things(scene, "pick"))
@@ -121,9 +121,9 @@ def test_a_project_goes_out_and_comes_in_the_same(scene: bpy.types.Scene, part, 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(out / "project.toml")) == {"FINISHED"}
     assert everything(bpy.context.scene, part, ids=False) == before
-    bridge = part("rockfall_addon.bridge.project")
+    projects = part("rockfall_addon.scene.project")
     again = tmp_path / "again"
-    bridge.save_project(bpy.context.scene, again)
+    projects.save_project(bpy.context.scene, again)
     for name in ("project.toml", "picks.csv", "terrain.ply"):
         assert (again / name).read_bytes() == (out / name).read_bytes(), name
     read = part("core.exchange.project").read_project(again / "project.toml")
@@ -135,7 +135,7 @@ def test_a_project_goes_out_and_comes_in_the_same(scene: bpy.types.Scene, part, 
 
 def test_the_command_line_takes_an_exported_project(scene: bpy.types.Scene, part, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    path = part("rockfall_addon.bridge.project").save_project(scene, out)
+    path = part("rockfall_addon.scene.project").save_project(scene, out)
     _, result = part("core.exchange.opening").open_project(part("core.exchange.project").read_project(path))
     stored = [list(o["rockfall_result"]["incident_mps"]) for o in picks_of(scene, "A")[1:4]]
     np.testing.assert_allclose(result.impacts.v1[:3], stored, atol=1e-9)
@@ -169,11 +169,11 @@ def test_what_is_deleted_by_hand_comes_again(scene: bpy.types.Scene, part, role:
 def test_a_deleted_marker_mesh_or_group_comes_again(scene: bpy.types.Scene, part) -> None:
     bpy.data.node_groups.remove(bpy.data.node_groups["Rockfall trail"])
     edit(scene)
-    part("rockfall_addon.bridge.live").sync(scene, again=True)
+    part("rockfall_addon.scene.sync").sync(scene, again=True)
     trail = things(scene, "flights")[0]
     assert trail.modifiers["Trail"].node_group.name == "Rockfall trail"
     bpy.data.meshes["Rockfall impact"].name = "other"
-    part("rockfall_addon.bridge.live").sync(scene, again=True)
+    part("rockfall_addon.scene.sync").sync(scene, again=True)
     assert picks_of(scene, "A")[1].data.name == "Rockfall impact"
 
 
@@ -192,21 +192,21 @@ def test_a_deleted_collection(scene: bpy.types.Scene, part) -> None:
 
 def test_appended_into_a_scene_with_another_origin_and_rate(part, project: Path, tmp_path: Path) -> None:
     scene = bpy.context.scene
-    part("rockfall_addon.bridge.project").load_project(scene, project)
-    expected = part("rockfall_addon.bridge.picks").picks_of(scene)
+    part("rockfall_addon.scene.project").load_project(scene, project)
+    expected = part("rockfall_addon.scene.picks").picks_of(scene)
     survey = expected.shift.to_survey(expected.position)[:5]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     scene = bpy.context.scene
     scene.render.fps = 50
     shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 390.0)
-    part("rockfall_addon.bridge.state").write_shift(scene, shift)
+    part("rockfall_addon.scene.store").write_shift(scene, shift)
     with bpy.data.libraries.load(str(tmp_path / "a.blend")) as (source, target):
         target.objects = [name for name in source.objects if name.startswith("A ")]
     for thing in target.objects:
         scene.collection.objects.link(thing)
     bpy.context.view_layer.update()
-    picks = part("rockfall_addon.bridge.picks").picks_of(scene)
+    picks = part("rockfall_addon.scene.picks").picks_of(scene)
     np.testing.assert_array_equal(picks.time_s, expected.time_s[:5])
     np.testing.assert_allclose(picks.shift.to_survey(picks.position), survey, atol=1e-9)
     assert shown(scene)[:3] == (5, 1, 1)
@@ -234,7 +234,7 @@ def test_a_duplicated_scene_is_edited_alone(scene: bpy.types.Scene, part, kind: 
 
 
 def test_edits_while_rockfall_was_disabled_are_found(part, installation, project: Path) -> None:
-    part("rockfall_addon.bridge.project").load_project(bpy.context.scene, project)
+    part("rockfall_addon.scene.project").load_project(bpy.context.scene, project)
     scene = bpy.context.scene
     picks_of(scene, "A")[2].location.y += 0.4
     installation.disable()
@@ -244,7 +244,7 @@ def test_edits_while_rockfall_was_disabled_are_found(part, installation, project
     picks_of(scene, "A")[1].location.y += 0.2  # after the update, in which Blender may put keyed objects back
     installation.enable()
     if bpy.app.binary_path:  # registering may not touch the data there: a timer does it, which only a window has
-        part("rockfall_addon.bridge.live").sync(scene)
+        part("rockfall_addon.scene.sync").sync(scene)
     assert picks_of(scene, "A")[1]["rockfall_position_m"][1] == pytest.approx(0.323456789, abs=1e-6)
     assert shown(scene) == (10, 2, 2, 6)
 
@@ -295,7 +295,7 @@ def test_a_file_of_the_version_before_is_brought_up_to_date(scene: bpy.types.Sce
 
 
 def test_a_newer_file_is_left_alone(scene: bpy.types.Scene, part) -> None:
-    problems, picks = part("rockfall_addon.bridge.problems"), picks_of(scene, "A")
+    problems, picks = part("rockfall_addon.scene.problems"), picks_of(scene, "A")
     scene["rockfall_schema"] = 99
     trail = next(o for o in things(scene, "flights") if o["rockfall_trajectory"] == "A")
     before = [tuple(v.co) for v in trail.data.vertices], list(picks[1]["rockfall_position_m"])

@@ -20,7 +20,7 @@ def wave(path: Path) -> np.ndarray:
 def test_mesh_and_shift_give_the_survey_coordinates_back(part, tmp_path: Path) -> None:
     points = wave(tmp_path / "wave.asc")
     assert bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc")) == {"FINISHED"}
-    state, terrain = part("rockfall_addon.bridge.state"), part("rockfall_addon.bridge.terrain")
+    state, terrain = part("rockfall_addon.scene.store"), part("rockfall_addon.scene.terrain")
     ground = terrain.active_terrain(bpy.context.scene)
     coordinates = np.empty(3 * len(ground.data.vertices), dtype=np.float32)
     ground.data.vertices.foreach_get("co", coordinates)
@@ -34,7 +34,7 @@ def test_mesh_and_shift_give_the_survey_coordinates_back(part, tmp_path: Path) -
 def test_surface_of_a_mesh_is_the_mesh(part, tmp_path: Path) -> None:
     wave(tmp_path / "wave.asc")
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
-    terrain = part("rockfall_addon.bridge.terrain")
+    terrain = part("rockfall_addon.scene.terrain")
     ground = terrain.active_terrain(bpy.context.scene)
     imported = terrain.surface_of(ground)
     terrain._surfaces.clear()  # as when Blender starts
@@ -46,12 +46,12 @@ def test_surface_of_a_mesh_is_the_mesh(part, tmp_path: Path) -> None:
 
 def test_second_tile_uses_the_projects_shift(part, tmp_path: Path) -> None:
     wave(tmp_path / "wave.asc")
-    state = part("rockfall_addon.bridge.state")
+    state = part("rockfall_addon.scene.store")
     shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 400.0)
     state.write_shift(bpy.context.scene, shift)
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
     assert state.read_shift(bpy.context.scene) == shift
-    ground = part("rockfall_addon.bridge.terrain").active_terrain(bpy.context.scene)
+    ground = part("rockfall_addon.scene.terrain").active_terrain(bpy.context.scene)
     assert min(v.co.x for v in ground.data.vertices) == pytest.approx(-9.75, abs=1e-4)
 
 

@@ -32,7 +32,7 @@ def table(tmp_path: Path) -> Path:
 @pytest.fixture
 def scene(part, table: Path) -> bpy.types.Scene:
     scene = bpy.context.scene
-    part("rockfall_addon.bridge.state").write_shift(scene, part("core.georeference").GlobalShift(*SHIFT))
+    part("rockfall_addon.scene.store").write_shift(scene, part("core.georeference").GlobalShift(*SHIFT))
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     return scene
 
@@ -76,7 +76,7 @@ def test_picks_come_back_exactly_after_save_and_load(scene: bpy.types.Scene, par
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"), load_ui=False)
-    picks = part("rockfall_addon.bridge.picks").picks_of(bpy.context.scene)
+    picks = part("rockfall_addon.scene.picks").picks_of(bpy.context.scene)
     expected = part("core.exchange.tables").read_picks(table, part("core.georeference").GlobalShift(*SHIFT))
     for name in ("trajectory", "time_s", "position", "kind", "status", "normal"):
         np.testing.assert_array_equal(getattr(picks, name), getattr(expected, name), err_msg=name)
@@ -90,7 +90,7 @@ def test_a_moved_pick_moves_the_trajectory(scene: bpy.types.Scene, part) -> None
     pick.animation_data_clear()
     pick.location.x += 0.5
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
-    picks = part("rockfall_addon.bridge.picks").picks_of(scene)
+    picks = part("rockfall_addon.scene.picks").picks_of(scene)
     np.testing.assert_allclose(picks.position[1], PLACES[1] + [0.5, 0, 0], atol=1e-6)
     scene.frame_set(int(0.7312 * 24), subframe=(0.7312 * 24) % 1)
     np.testing.assert_allclose(scene.objects["A block"].matrix_world.translation, PLACES[1] + [0.5, 0, 0], atol=1e-3)
@@ -123,7 +123,7 @@ def test_imported_again_a_pick_is_what_the_table_says(scene: bpy.types.Scene, ta
 def test_a_deleted_pick_is_gone(scene: bpy.types.Scene, part) -> None:
     bpy.data.objects.remove(next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 03 " in o.name))
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
-    assert len(part("rockfall_addon.bridge.picks").picks_of(scene)) == 7
+    assert len(part("rockfall_addon.scene.picks").picks_of(scene)) == 7
     direct = (PLACES[3] - PLACES[1]) / (TIMES[3] - TIMES[1]) + [0, 0, GRAVITY * (TIMES[3] - TIMES[1]) / 2]
     pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
     np.testing.assert_allclose(pick["rockfall_result"]["restituted_mps"], direct, atol=1e-9)

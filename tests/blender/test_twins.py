@@ -26,7 +26,7 @@ def scene(part, tmp_path: Path) -> bpy.types.Scene:
     shift = part("core.georeference").GlobalShift()
     vertices = np.column_stack([x, y, -SLOPE * x])
     surface = part("core.terrain.surface").Surface(vertices, faces, shift, "plane", ())
-    part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
     rows = [
         f"{name},{time + later!r},{x!r},{aside!r},{-SLOPE * x!r},{kind},ok"
         for name, later, aside in (("A", 0.0, 0.0), ("B", 30.0, 3.0))
@@ -49,15 +49,15 @@ def of_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
 
 
 def expected(part, scene: bpy.types.Scene):
-    bridge = part("rockfall_addon.bridge.twins")
-    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(scene)
-    return bridge.find_twins(scene, result, MODELS)
+    models = part("rockfall_addon.scene.models")
+    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    return models.find_twins(scene, result, MODELS)
 
 
 def check_motion(part, scene: bpy.types.Scene) -> None:
     """Every flight of every twin is flown, by a block of its own that is hidden when it does not fly."""
     twins = expected(part, scene)
-    linger = part("rockfall_addon.bridge.twins").LINGER_S
+    linger = part("rockfall_addon.scene.models").LINGER_S
     rate = scene.render.fps / scene.render.fps_base
     begin = twins.time_s - np.where(twins.trajectory == "A", TIMES[0], TIMES[0] + 30.0 - scene.rockfall.stagger_s)
     end = begin + twins.duration_s
@@ -169,10 +169,10 @@ def test_parameters_of_a_file_are_used_and_kept(scene: bpy.types.Scene, part, tm
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"), load_ui=False)
     scene = bpy.context.scene
-    bridge = part("rockfall_addon.bridge.twins")
-    assert bridge.parameters_of(scene) == own
-    result = part("rockfall_addon.bridge.reconstruction").reconstruct_scene(scene)
-    twins = bridge.find_twins(scene, result, bridge.shown_models(scene))
+    models = part("rockfall_addon.scene.models")
+    assert models.parameters_of(scene) == own
+    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    twins = models.find_twins(scene, result, models.shown_models(scene))
     impacts = result.impacts
     normal = np.sum(impacts.v1 * impacts.normal, axis=1)[:, None] * impacts.normal
     rebound = -0.9 * normal + 0.4 * (impacts.v1 - normal)
@@ -197,7 +197,7 @@ def test_without_terrain_there_are_none(scene: bpy.types.Scene) -> None:
 
 def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None:
     preset = part("core.exchange.project").RenderPreset("tiny", width=64, height=36, fps=25.0, engine="cycles")
-    film = part("rockfall_addon.film.dressing")
+    film = part("rockfall_addon.steps.film.dressing")
     film.set_up_film(shown, preset, "cycles")
     captions = {thing.name for thing in of_role(shown, "film")}
     assert {"Film source observed", "Film source Noël et al. 2017", "Film source Wyllie 2014"} <= captions
@@ -209,8 +209,8 @@ def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None
 
 def test_the_models_colours_are_in_a_rendered_film(shown: bpy.types.Scene, part, tmp_path: Path) -> None:
     preset = part("core.exchange.project").RenderPreset("tiny", width=192, height=108, fps=25.0, engine="cycles")
-    part("rockfall_addon.film.dressing").set_up_film(shown, preset, "cycles")
-    render = part("rockfall_addon.film.render")
+    part("rockfall_addon.steps.film.dressing").set_up_film(shown, preset, "cycles")
+    render = part("rockfall_addon.steps.film.render")
     done: list[tuple[int, int]] = []
     render.render_film(shown, tmp_path / "film.mp4", (60, 61), lambda *count: done.append(count))
     assert done == [(1, 2), (2, 2)]

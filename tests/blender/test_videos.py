@@ -34,7 +34,7 @@ def number_in(image: np.ndarray) -> int:
 
 @pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "variable.mp4"])
 def test_added_video(part: Part, name: str) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera = videos.add_video(scene(), DATA / name)
     video = videos.video_of(camera)
     assert videos.size_of(camera) == (video.width, video.height) == tuple(videos.clip_of(camera).size)
@@ -46,18 +46,18 @@ def test_added_video(part: Part, name: str) -> None:
 
 
 def test_television_rate_is_exact(part: Part) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     videos.add_video(scene(), DATA / "rotated.mov")
     assert scene().render.fps / scene().render.fps_base == 30_000 / 1001
 
 
 @pytest.mark.parametrize(("rate", "fps", "base"), [(30, 30, 1), (29.97002997, 30_000, 1001), (59.94006, 30_000, 500.5)])
 def test_scene_rate(part: Part, rate: float, fps: int, base: float) -> None:
-    assert part("rockfall_addon.bridge.videos").scene_rate(rate) == (fps, base)
+    assert part("rockfall_addon.scene.videos").scene_rate(rate) == (fps, base)
 
 
 def test_odd_rate(part: Part) -> None:
-    fps, base = part("rockfall_addon.bridge.videos").scene_rate(29.83)
+    fps, base = part("rockfall_addon.scene.videos").scene_rate(29.83)
     assert fps == 30
     assert fps / base == pytest.approx(29.83)
 
@@ -65,7 +65,7 @@ def test_odd_rate(part: Part) -> None:
 @pytest.fixture
 def seen(part: Part, tmp_path: Path) -> Callable[[bpy.types.Object, int], int]:
     """The number in the picture that Blender has behind a camera at a frame: rendered by the compositor."""
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     tree = bpy.data.node_groups.new("seen", "CompositorNodeTree")
     tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
     result = tree.nodes.new("NodeGroupOutput")
@@ -110,7 +110,7 @@ def test_picture_behind_the_camera(
     part: Part, seen: Callable[[bpy.types.Object, float], int], name: str, capture_rate_hz: float | None
 ) -> None:
     """Whatever the rates, Blender shows the last picture that is not later than the scene's time."""
-    videos, clock = part("rockfall_addon.bridge.videos"), part("core.footage.clock")
+    videos, clock = part("rockfall_addon.scene.videos"), part("core.footage.clock")
     camera = videos.add_video(scene(), DATA / name)
     scene().camera = camera
     scene().render.fps, scene().render.fps_base = 25, 1.0
@@ -134,7 +134,7 @@ def test_picture_behind_the_camera(
     "name", ["constant.mp4", "variable.mp4", "variable.mkv", "slower.mp4", "vp9.webm", "bframes.avi"]
 )
 def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object, float], int], name: str) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera = videos.add_video(scene(), DATA / name)
     scene().camera = camera
     for index in range(0, 40, 1):
@@ -142,7 +142,7 @@ def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object,
 
 
 def add(part: Part, name: str) -> bpy.types.Object:
-    return part("rockfall_addon.bridge.videos").add_video(scene(), DATA / name)
+    return part("rockfall_addon.scene.videos").add_video(scene(), DATA / name)
 
 
 @pytest.fixture
@@ -154,7 +154,7 @@ def pair(part: Part) -> tuple[bpy.types.Object, bpy.types.Object]:
 @pytest.mark.parametrize("fit_drift", [False, True])
 def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     """Events at pictures whose times are known lead back to the clock that was made up for the second video."""
-    videos, times = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_times")
+    videos, times = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.video_times")
     reference, other = (add(part, "slower.mp4") for _ in range(2))
     assert times.reference_camera(scene()) == reference
     drift = 0.02 if fit_drift else 0.0
@@ -178,7 +178,7 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
 
 
 def test_next_video_begins_with_the_others(part: Part) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera = add(part, "constant.mp4")
     videos.set_clock(camera, part("core.footage.clock").Clock(465.5))
     other = add(part, "variable.mp4")
@@ -189,7 +189,7 @@ def test_pixels_that_are_not_square(part: Part) -> None:
     """Of the same angle of view across and up: fx · width of a pixel = fy · height of a pixel."""
     from dataclasses import replace
 
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     video = replace(part("core.footage.video").open_video(DATA / "constant.mp4"), pixel_aspect=1.25)
     camera = videos.add_camera(scene(), video)
     one = videos.moving_camera(camera).camera
@@ -200,16 +200,16 @@ def test_pixels_that_are_not_square(part: Part) -> None:
 
 
 def test_nothing_to_synchronise(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
-    times, errors = part("rockfall_addon.bridge.video_times"), part("core.errors")
+    times, errors = part("rockfall_addon.scene.video_times"), part("core.errors")
     with pytest.raises(errors.RockfallError, match="same event"):
         times.synchronise_cameras(scene(), fit_drift=False)
-    part("rockfall_addon.bridge.footage").remove(scene(), pair[1])
+    part("rockfall_addon.scene.footage").remove(scene(), pair[1])
     with pytest.raises(errors.RockfallError, match="one video only"):
         times.synchronise_cameras(scene(), fit_drift=False)
 
 
 def test_stepping_lands_on_true_frames(part: Part) -> None:
-    videos, times = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_times")
+    videos, times = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.video_times")
     camera = add(part, "variable.mp4")
     scene().render.fps = 24
     stamps = videos.times_of(camera)
@@ -234,7 +234,7 @@ def test_stepping_lands_on_true_frames(part: Part) -> None:
 
 
 def test_time_origin(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera, other = pair
     scene().camera = camera
     scene().frame_set(12)
@@ -255,7 +255,7 @@ def test_common_clock_stays_with_picks(part: Part, pair: tuple[bpy.types.Object,
 
 def test_render_size_follows_the_active_camera(part: Part) -> None:
     """Cameras of other sizes do not spoil each other."""
-    view = part("rockfall_addon.bridge.image_view")
+    view = part("rockfall_addon.view.image_view")
     wide, tall = add(part, "constant.mp4"), add(part, "rotated.mov")
     render = scene().render
     for camera, size in ((wide, (64, 48)), (tall, (48, 64)), (wide, (64, 48))):
@@ -281,7 +281,7 @@ def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
     one = model.with_intrinsics(one, [80.1, 79.7, 31.2, 24.9, 0.01, -0.002, 0.0, 1e-4, 2e-4])
     if frames == 1:
         return motion.fixed(one)
-    time = part("rockfall_addon.bridge.videos").times_of(camera)[:frames]
+    time = part("rockfall_addon.scene.videos").times_of(camera)[:frames]
     turn = model.rotation_from_vector(np.outer(np.sin(5 * time), [0.02, -0.03, 0.01])) @ one.rotation
     place = one.position + np.outer(time, [0.1, 0.0, 0.05])
     return motion.MovingCamera(one, time, place, turn, 0.01 * np.ones(frames), 1e-4 * np.ones(frames))
@@ -290,7 +290,7 @@ def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
 @pytest.mark.parametrize("frames", [1, 20])
 def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
     """Its doubles come back exactly, also from a file, and Blender's camera sees what ours does."""
-    videos, model = part("rockfall_addon.bridge.videos"), part("core.camera.model")
+    videos, model = part("rockfall_addon.scene.videos"), part("core.camera.model")
     camera = add(part, "variable.mp4")
     moving = solved(part, camera, frames)
     videos.set_moving_camera(scene(), camera, moving, rmse_px=0.4, pose_covariance=np.diag(np.arange(1.0, 7.0)))
@@ -331,11 +331,11 @@ def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
 def test_solved_camera_of_another_size(part: Part) -> None:
     camera = add(part, "rotated.mov")
     with pytest.raises(part("core.errors").RockfallError, match="64 × 48"):
-        part("rockfall_addon.bridge.videos").set_moving_camera(scene(), camera, solved(part, camera, 1))
+        part("rockfall_addon.scene.videos").set_moving_camera(scene(), camera, solved(part, camera, 1))
 
 
 def test_pixels_and_rays(part: Part) -> None:
-    videos, view = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.image_view")
+    videos, view = part("rockfall_addon.scene.videos"), part("rockfall_addon.view.image_view")
     camera = add(part, "variable.mp4")
     videos.set_clock(camera, part("core.footage.clock").Clock(5.0, 1e-3, 0.1, 0.25))
     videos.set_moving_camera(scene(), camera, solved(part, camera, 20))
@@ -350,7 +350,7 @@ def test_pixels_and_rays(part: Part) -> None:
 
 
 def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera = add(part, "constant.mp4")
     copy = camera.copy()  # linked data, as Alt D makes it
     camera.users_collection[0].objects.link(copy)
@@ -367,7 +367,7 @@ def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
 
 
 def test_camera_deleted(part: Part) -> None:
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera, other = add(part, "constant.mp4"), add(part, "variable.mp4")
     identifier = camera["rockfall_id"]
     bpy.data.objects.remove(camera)
@@ -382,7 +382,7 @@ def test_camera_deleted(part: Part) -> None:
 
 
 def test_file_moved(part: Part, tmp_path: Path) -> None:
-    videos, words = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_words")
+    videos, words = part("rockfall_addon.scene.videos"), part("rockfall_addon.steps.videos.wording")
     errors = part("core.errors")
     there = tmp_path / "there.mp4"
     there.write_bytes((DATA / "constant.mp4").read_bytes())
@@ -402,10 +402,10 @@ def test_file_moved(part: Part, tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="another one"):
         bpy.ops.rockfall.relink_video(filepath=str(DATA / "rotated.mov"))
     assert words.is_missing(camera)
-    assert "frames" in part("rockfall_addon.bridge.footage").relink(camera, DATA / "variable.mp4")[0]
+    assert "frames" in part("rockfall_addon.scene.footage").relink(camera, DATA / "variable.mp4")[0]
     assert bpy.ops.rockfall.relink_video(filepath=str(tmp_path / "elsewhere.mp4")) == {"FINISHED"}
     assert not words.is_missing(camera)
-    assert part("rockfall_addon.bridge.video_times").events_of(camera) == {1: 0.4}
+    assert part("rockfall_addon.scene.video_times").events_of(camera) == {1: 0.4}
     assert number_in(videos.picture(camera, 12)) == 12
     assert len(bpy.data.movieclips) == 1
 
@@ -420,13 +420,13 @@ def test_bad_videos(part: Part, name: str) -> None:
 def test_good_among_bad(part: Part) -> None:
     names = [{"name": name} for name in ("interlaced.mp4", "constant.mp4", "rotated.mov")]
     assert bpy.ops.rockfall.add_video(directory=str(DATA), files=names) == {"FINISHED"}
-    cameras = part("rockfall_addon.bridge.videos").cameras(scene())
+    cameras = part("rockfall_addon.scene.videos").cameras(scene())
     assert [camera.name for camera in cameras] == ["constant", "rotated"]
     assert scene().camera == cameras[0]
 
 
 def test_scene_rate_changed(part: Part) -> None:
-    videos, words = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.video_words")
+    videos, words = part("rockfall_addon.scene.videos"), part("rockfall_addon.steps.videos.wording")
     camera = add(part, "constant.mp4")
     assert words.rates(scene(), camera) == ""
     scene().render.fps = 24
@@ -439,7 +439,7 @@ def test_scene_rate_changed(part: Part) -> None:
 
 def test_slow_motion(part: Part) -> None:
     """240 pictures a second stored at 30: the fall takes an eighth of the file's duration."""
-    videos = part("rockfall_addon.bridge.videos")
+    videos = part("rockfall_addon.scene.videos")
     camera = add(part, "constant.mp4")
     camera.rockfall_video.capture_rate_hz = 240
     assert videos.clock_of(camera).to_common(0.8) == pytest.approx(0.1)
@@ -453,7 +453,7 @@ def test_slow_motion(part: Part) -> None:
 
 
 def test_words_about_videos(part: Part) -> None:
-    words = part("rockfall_addon.bridge.video_words")
+    words = part("rockfall_addon.steps.videos.wording")
     for name in ("rotated.mov", "single.mp4", "repeated.avi", "variable.mp4"):
         camera = add(part, name)
         rows = dict(words.facts(camera))
@@ -473,7 +473,7 @@ def test_disabled_and_enabled(part: Part, installation: object) -> None:
     add(part, "constant.mp4")
     installation.disable()
     installation.enable()
-    videos = installation.part("rockfall_addon.bridge.videos")
+    videos = installation.part("rockfall_addon.scene.videos")
     (camera,) = videos.cameras(scene())
     scene().frame_set(20)
     assert videos.true_frame(scene(), camera) == 20
@@ -484,26 +484,26 @@ DEMO = Path(__file__).resolve().parents[2] / "assets" / "demo"
 
 def test_footage_project(part: Part) -> None:
     """The demo's camera and track, as the command line made them, and the terrain under its pixels."""
-    videos, view = part("rockfall_addon.bridge.videos"), part("rockfall_addon.bridge.image_view")
-    assert part("rockfall_addon.bridge.project").load_project(scene(), DEMO / "footage" / "project.toml") is None
+    videos, view = part("rockfall_addon.scene.videos"), part("rockfall_addon.view.image_view")
+    assert part("rockfall_addon.scene.project").load_project(scene(), DEMO / "footage" / "project.toml") is None
     (camera,) = videos.cameras(scene())
     assert videos.is_solved(camera)
     assert videos.clock_of(camera).offset_s == 465.499
     assert videos.video_time(scene(), camera, 0) == pytest.approx(0.0), "frame 0 is the first picture"
     assert (scene().frame_start, scene().frame_end, scene().render.fps) == (0, 299, 30)
     pairs = part("core.exchange.cameras").read_pairs(
-        DEMO / "footage" / "pairs.csv", part("rockfall_addon.bridge.state").read_shift(scene())
+        DEMO / "footage" / "pairs.csv", part("rockfall_addon.scene.store").read_shift(scene())
     )
     seen = view.project(scene(), camera, pairs.point, videos.common_time(scene(), 0))
     assert np.sqrt(np.mean((seen - pairs.pixel) ** 2)) < 2.0
-    assert part("rockfall_addon.bridge.observations").names_in(camera) == ["B10"]
+    assert part("rockfall_addon.scene.observations").names_in(camera) == ["B10"]
 
 
 def project_with_video(part: Part, folder: Path, file: Path) -> Path:
     cameras = part("core.exchange.cameras")
     camera = add(part, "variable.mp4")
     moving = solved(part, camera, 20)
-    part("rockfall_addon.bridge.footage").remove(scene(), camera)
+    part("rockfall_addon.scene.footage").remove(scene(), camera)
     cameras.write_camera(folder / "camera.toml", moving, rmse_px=0.3, pose_covariance=np.eye(6))
     (folder / "track.csv").write_text("trajectory,frame,time_s,u_px,v_px\nB1,2,0.1,11.5,12.25\nB1,5,0.2,13,14\n")
     text = (DEMO / "project.toml").read_text()
@@ -527,19 +527,19 @@ row_time_s = 2e-5
 @pytest.mark.parametrize("moved", [False, True])
 def test_project_goes_out_as_it_came_in(part: Part, tmp_path: Path, moved: bool) -> None:
     """Also when the video is not where it was: nothing that is known of it is lost."""
-    bridge, videos = part("rockfall_addon.bridge.project"), part("rockfall_addon.bridge.videos")
+    projects, videos = part("rockfall_addon.scene.project"), part("rockfall_addon.scene.videos")
     project, cameras = part("core.exchange.project"), part("core.exchange.cameras")
     file = tmp_path / "gone.mp4" if moved else DATA / "variable.mp4"
     path = project_with_video(part, tmp_path, file)
-    bridge.load_project(scene(), path)
+    projects.load_project(scene(), path)
     (camera,) = videos.cameras(scene())
-    assert part("rockfall_addon.bridge.video_words").is_missing(camera) == moved
-    out = bridge.save_project(scene(), tmp_path / "out")
+    assert part("rockfall_addon.steps.videos.wording").is_missing(camera) == moved
+    out = projects.save_project(scene(), tmp_path / "out")
     (before,), (after,) = (project.read_project(each).videos for each in (path, out))
     for name in ("name", "offset_s", "drift", "origin_s", "capture_rate_hz", "row_time_s"):
         assert getattr(after, name) == getattr(before, name)
     assert after.file.resolve() == before.file.resolve()
-    shift = part("rockfall_addon.bridge.state").read_shift(scene())
+    shift = part("rockfall_addon.scene.store").read_shift(scene())
     first, second = (cameras.read_camera(each.camera, shift) for each in (before, after))
     np.testing.assert_allclose(second.camera.position, first.camera.position, atol=1e-9)
     np.testing.assert_array_equal(second.camera.rotation, first.camera.rotation)

@@ -15,7 +15,7 @@ LARGEST_WORKSPACE_BYTES = 200_000
 
 
 def operators(part) -> dict[str, type]:
-    classes = part("rockfall_addon.operators").CLASSES
+    classes = part("rockfall_addon.steps").classes()
     return {cls.bl_idname: cls for cls in classes if issubclass(cls, bpy.types.Operator)}
 
 
@@ -69,7 +69,7 @@ def test_entries_exist_with_their_properties(rockfall, part) -> None:
 
 
 def test_tools_of_the_menus_are_there(rockfall, part) -> None:
-    known = {tool.bl_idname for tool in part("rockfall_addon.operators").TOOLS}
+    known = {tool.bl_idname for tool in part("rockfall_addon.steps").tools()}
     asked = {
         entry[2]["name"]
         for _, _, step in part("rockfall_addon.menus").STEPS
@@ -89,9 +89,13 @@ def test_menus_come_and_go(clean_blender, installation) -> None:
     assert not installation.traces()["menus"]
 
 
+def _panels(part) -> list[type]:
+    return [cls for cls in part("rockfall_addon.steps").classes() if issubclass(cls, bpy.types.Panel)]
+
+
 def test_steps_are_numbered_in_their_order(rockfall, part) -> None:
-    panels = part("rockfall_addon.panels").CLASSES
-    labels = [cls.bl_label for cls in panels if issubclass(cls, bpy.types.Panel)]
+    panels = _panels(part)
+    labels = [cls.bl_label for cls in panels]
     numbered = [re.fullmatch(r"(\d)  (\S.*)", label) for label in labels if label[:1].isdigit()]
     assert [int(match[1]) for match in numbered] == list(range(1, 10))
     assert len(set(labels)) == len(labels)
@@ -102,7 +106,7 @@ def test_steps_are_numbered_in_their_order(rockfall, part) -> None:
 
 
 def test_each_step_has_a_state_before_and_after(rockfall, part) -> None:
-    base, panels = part("rockfall_addon.panels.base"), part("rockfall_addon.panels").CLASSES
+    base, panels = part("rockfall_addon.view.panel"), _panels(part)
     steps = {cls.bl_label[0]: cls for cls in panels if getattr(cls, "bl_label", "")[:1].isdigit()}
 
     def states() -> dict[str, str]:
@@ -122,15 +126,15 @@ def test_each_step_has_a_state_before_and_after(rockfall, part) -> None:
 
 
 def test_the_file_of_the_workspace(rockfall, part, tmp_path: Path) -> None:
-    bridge = part("rockfall_addon.bridge.workspace")
-    assert bridge.FILE.stat().st_size < LARGEST_WORKSPACE_BYTES
-    with bpy.data.libraries.load(str(bridge.FILE)) as (there, here):
-        assert there.workspaces == [bridge.NAME]
+    workspace = part("rockfall_addon.view.workspace")
+    assert workspace.FILE.stat().st_size < LARGEST_WORKSPACE_BYTES
+    with bpy.data.libraries.load(str(workspace.FILE)) as (there, here):
+        assert there.workspaces == [workspace.NAME]
         assert not there.objects
         assert not there.scenes
         here.workspaces = there.workspaces
     (ours,) = here.workspaces
-    assert bridge.KEY in ours
+    assert workspace.KEY in ours
     (screen,) = ours.screens
     views = sorted((area for area in screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
     assert len(views) == 2
@@ -142,7 +146,7 @@ def test_the_file_of_the_workspace(rockfall, part, tmp_path: Path) -> None:
 
 
 def test_the_next_step_leads_from_the_footage_to_the_end(rockfall, part) -> None:
-    start, scene = part("rockfall_addon.panels.start"), bpy.context.scene
+    start, scene = part("rockfall_addon.steps.start.panel"), bpy.context.scene
     for expected in (
         "rockfall.load_footage_demo",
         "rockfall.propose_impacts",
@@ -168,12 +172,12 @@ def test_opening_needs_a_window(rockfall) -> None:
 
 def test_footage_demo_is_ready_to_be_picked(rockfall, part) -> None:
     assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
-    scene, videos = bpy.context.scene, part("rockfall_addon.bridge.videos")
+    scene, videos = bpy.context.scene, part("rockfall_addon.scene.videos")
     (camera,) = videos.cameras(scene)
     assert videos.is_solved(camera)
     assert scene.camera == camera
     assert videos.video_time(scene, camera) == pytest.approx(51 / 30, abs=1e-6)
-    observations = part("rockfall_addon.bridge.observations")
+    observations = part("rockfall_addon.scene.observations")
     assert observations.names_in(camera) == ["B10"]
-    assert part("rockfall_addon.bridge.picking").trajectory(scene) == "B10"
+    assert part("rockfall_addon.scene.picking").trajectory(scene) == "B10"
     assert not bpy.ops.rockfall.load_footage_demo.poll()

@@ -10,7 +10,7 @@ from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.scores import ABSCISSA, energy_distance, scores
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.comparison_tables import read_predictions, read_scores, write_predictions, write_scores
-from rockfall.core.impact_models.base import Incident
+from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import COMPARED, MODELS
 from rockfall.core.reconstruction.impact import Impacts
 from rockfall.core.reconstruction.picks import make_picks

@@ -3,8 +3,8 @@
 
 import numpy as np
 import pytest
-from rockfall.core.impact_models.base import Incident
-from rockfall.core.impact_models.chance import normal, normal_quantile, truncated_normal, uniform
+from rockfall.core.impact_models.machinery.base import Incident
+from rockfall.core.impact_models.machinery.chance import normal, normal_quantile, truncated_normal, uniform
 from rockfall.core.impact_models.pfeiffer_bowen_1989 import rough_normal
 from rockfall.core.impact_models.registry import MODELS
 from rockfall.core.reconstruction.impact import apparent

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rockfall.core.impact_models.base import Incident
+from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import MODELS
 
 RADIUS, SPEED = 0.0025, 3.9

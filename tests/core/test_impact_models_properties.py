@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rockfall.core.impact_models.base import Incident
 from rockfall.core.impact_models.dorren_2015 import lowered
+from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import COMPARED, MODELS
 from rockfall.core.reconstruction.impact import apparent
 from rockfall.core.vectors import dot, norm, unit

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.impact_models.base import Incident
+from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import COMPARED, MODELS, find_model, parse_settings
 from rockfall.core.impact_models.rockyfor3d_tables import SHAPES
 
@@ -145,7 +145,7 @@ def test_a_new_model_is_one_file(tmp_path):
         f"package.__path__.append({str(tmp_path)!r})\n"
         "import numpy as np\n"
         "from rockfall.core.impact_models.registry import MODELS\n"
-        "from rockfall.core.impact_models.base import Incident\n"
+        "from rockfall.core.impact_models.machinery.base import Incident\n"
         "velocity, up, still = np.array([[3.0, 0, -2]]), np.array([[0, 0, 1.0]]), np.zeros((1, 3))\n"
         "state = Incident(velocity, up, still, np.ones(1), np.ones(1))\n"
         "print(MODELS['mirror_2026'].rebound(state).velocity.tolist())\n"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rockfall.core.impact_models.base import Incident
 from rockfall.core.impact_models.dorren_2015 import penetration_depth
+from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import MODELS
 from rockfall.core.reconstruction.impact import apparent
 

@@ -14,9 +14,9 @@ from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.node_motion import join_nodes, places_at
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.refinement import PixelObservations, View, refine
-from rockfall.core.reconstruction.refinement_problem import evaluate, moved
-from rockfall.core.reconstruction.refinement_setup import prepare, set_up
+from rockfall.core.reconstruction.refinement.problem import evaluate, moved
+from rockfall.core.reconstruction.refinement.refine import PixelObservations, View, refine
+from rockfall.core.reconstruction.refinement.setup import prepare, set_up
 from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.surface import Surface
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rockfall.core.camera.resection import resect
 from rockfall.core.exchange.cameras import read_pairs
-from rockfall.core.reconstruction.refinement import Refinement
+from rockfall.core.reconstruction.refinement.refine import Refinement
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 

@@ -19,10 +19,10 @@ def start(window):
     scene = bpy.context.scene
     opening, project = window.part("core.exchange.opening"), window.part("core.exchange.project")
     surface, result = opening.open_project(project.read_project(DEMO / "project.toml"))
-    window.part("rockfall_addon.bridge.state").write_shift(scene, result.picks.shift)
+    window.part("rockfall_addon.scene.store").write_shift(scene, result.picks.shift)
     shading = window.part("core.terrain.shading").shade(surface)
-    window.part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, shading)
-    camera = window.part("rockfall_addon.bridge.videos").add_video(scene, FOOTAGE / "footage.mp4")
+    window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
+    camera = window.part("rockfall_addon.scene.videos").add_video(scene, FOOTAGE / "footage.mp4")
     yield 1.0
     with window.override():
         assert bpy.ops.rockfall.align_views() == {"FINISHED"}
@@ -43,17 +43,17 @@ def region_of(area):
 
 
 def table(window):
-    shift = window.part("rockfall_addon.bridge.state").read_shift(bpy.context.scene)
+    shift = window.part("rockfall_addon.scene.store").read_shift(bpy.context.scene)
     return window.part("core.exchange.cameras").read_pairs(FOOTAGE / "pairs.csv", shift)
 
 
 def the_camera(window):
-    return window.part("rockfall_addon.bridge.videos").active_camera(bpy.context.scene)
+    return window.part("rockfall_addon.scene.videos").active_camera(bpy.context.scene)
 
 
 def in_picture(window, pixel):
     """Where a pixel of the footage is in the window."""
-    view, area = window.part("rockfall_addon.bridge.image_view"), views(window)[0]
+    view, area = window.part("rockfall_addon.view.image_view"), views(window)[0]
     region, camera = region_of(area), the_camera(window)
     rectangle = view.image_rectangle(region, area.spaces.active.region_3d, bpy.context.scene, camera)
     assert rectangle is not None, "the left view looks through the camera"
@@ -94,7 +94,7 @@ def sidebar(window, shown):
 
 def case_align_with_clicks(window):
     yield from start(window)
-    bridge, videos = (window.part(f"rockfall_addon.bridge.{name}") for name in ("alignment", "videos"))
+    aligned, videos = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "videos"))
     ground = table(window)
     look_at(window, ground.point)
     yield 1.0
@@ -108,14 +108,14 @@ def case_align_with_clicks(window):
         if count == 0:
             yield 0.5
             window.screenshot("2-half-pair")
-        pair = bridge.open_pair(the_camera(window))
+        pair = aligned.open_pair(the_camera(window))
         assert pair is not None, f"pair {count} is open"
         if count < 5:
             yield from window.click(*second)
-            assert bridge.open_pair(the_camera(window)) is None, f"pair {count} is complete"
+            assert aligned.open_pair(the_camera(window)) is None, f"pair {count} is complete"
     camera = the_camera(window)
-    assert videos.is_solved(camera), bridge.solution_of(camera).problem
-    pair = bridge.open_pair(camera)
+    assert videos.is_solved(camera), aligned.solution_of(camera).problem
+    pair = aligned.open_pair(camera)
     assert pair.proposed == "pixel", "five pairs solve the camera, so the sixth is predicted"
     yield 1.0
     window.screenshot("3-predicted")
@@ -132,10 +132,10 @@ def case_align_with_clicks(window):
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(goal[0]), y=round(goal[1]))
     yield 0.5
     camera = the_camera(window)
-    assert bridge.open_pair(camera) is None
-    assert sum(pair.is_complete for pair in bridge.pairs_of(camera)) == 6
-    focal, rmse = bridge.focal_px(camera), bridge.solution_of(camera).rmse_px
-    print(f"focal {focal:.0f} px, rmse {rmse:.2f} px, {bridge.solution_of(camera).advice}")
+    assert aligned.open_pair(camera) is None
+    assert sum(pair.is_complete for pair in aligned.pairs_of(camera)) == 6
+    focal, rmse = aligned.focal_px(camera), aligned.solution_of(camera).rmse_px
+    print(f"focal {focal:.0f} px, rmse {rmse:.2f} px, {aligned.solution_of(camera).advice}")
     yield from sidebar(window, True)
     camera = the_camera(window)
     camera.rockfall_alignment.blend = 0.5
@@ -152,26 +152,26 @@ def case_align_with_clicks(window):
     for left in (6, 5):
         yield from window.press("X", *in_picture(window, (640, 600)))
         yield 0.5
-        assert len(bridge.pairs_of(the_camera(window))) == left - 1
+        assert len(aligned.pairs_of(the_camera(window))) == left - 1
     for expected in (5, 6):
         with window.override():
             bpy.ops.ed.undo()
         yield 0.7
-        assert len(bridge.pairs_of(the_camera(window))) == expected
+        assert len(aligned.pairs_of(the_camera(window))) == expected
     assert len(the_camera(window).rockfall_alignment.rows) == 6
-    assert abs(bridge.focal_px(the_camera(window)) - focal) < 1e-6, "undo brings the solution back"
+    assert abs(aligned.focal_px(the_camera(window)) - focal) < 1e-6, "undo brings the solution back"
     for _ in range(2):
         with window.override():
             bpy.ops.ed.undo()
         yield 0.7
-    assert bridge.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
-    assert not window.part("rockfall_addon.bridge.problems").sentences(bpy.context.scene)
+    assert aligned.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
+    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
 
 
 def case_align_by_eye(window):
     """Footage that cannot be solved: the view is taken; then terrain that shines through is dragged into place."""
     yield from start(window)
-    bridge = window.part("rockfall_addon.bridge.alignment")
+    aligned = window.part("rockfall_addon.scene.alignment")
     ground = table(window)
     yield from sidebar(window, False)
     window.window.cursor_warp(800, 500)
@@ -189,14 +189,14 @@ def case_align_by_eye(window):
     look_at(window, ground.point)
     yield 1.5
     camera = the_camera(window)
-    assert bridge.placement(camera) == "eye"
+    assert aligned.placement(camera) == "eye"
     window.screenshot("1-by-eye")
     x, y = in_picture(window, (640, 360))
     yield from window.click(x, y, shift=True)
-    pair = bridge.open_pair(the_camera(window))
+    pair = aligned.open_pair(the_camera(window))
     assert pair.proposed == "pixel"
     assert np.allclose(pair.pixel, (640, 360), atol=2), "what shines through there"
-    surface = window.part("rockfall_addon.bridge.terrain").surface_of_scene(bpy.context.scene)
+    surface = window.part("rockfall_addon.scene.terrain").surface_of_scene(bpy.context.scene)
     assert window.part("core.terrain.raycast").closest_points(surface, [pair.point]).distance[0] < 1e-6
     window.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=round(x), y=round(y))
     window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
@@ -205,7 +205,7 @@ def case_align_by_eye(window):
     yield 0.3
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x) + 100, y=round(y))
     yield 0.5
-    pair = bridge.pairs_of(the_camera(window))[0]
+    pair = aligned.pairs_of(the_camera(window))[0]
     assert pair.is_complete
     width = in_picture(window, (1280, 0))[0] - in_picture(window, (0, 0))[0]
     assert abs(pair.pixel[0] - 640 - 10 * 1280 / width) < 3, "Shift moves a tenth"
@@ -215,14 +215,14 @@ def case_align_by_eye(window):
 
 def case_align_follow_hand_held(window):
     yield from start(window)
-    bridge, videos = (window.part(f"rockfall_addon.bridge.{name}") for name in ("alignment", "videos"))
+    aligned, videos = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "videos"))
     with window.override():
         assert bpy.ops.rockfall.import_pairs(filepath=str(FOOTAGE / "pairs.csv")) == {"FINISHED"}
     camera = the_camera(window)
     camera.rockfall_alignment.motion = "ROTATION"
     yield 1.0
     window.screenshot("1-imported")
-    following = window.part("rockfall_addon.bridge.following")
+    following = window.part("rockfall_addon.steps.alignment.following")
     with window.override():
         bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
     yield 1.5
@@ -249,4 +249,4 @@ def case_align_follow_hand_held(window):
     yield 1.0
     window.screenshot("4-correct-here")
     assert videos.is_solved(the_camera(window))
-    assert bridge.hint(scene, the_camera(window))
+    assert aligned.hint(scene, the_camera(window))

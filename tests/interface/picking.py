@@ -25,7 +25,7 @@ def local(row, *names):
 
 
 def camera_of(window):
-    return window.part("rockfall_addon.bridge.videos").cameras(bpy.context.scene)[0]
+    return window.part("rockfall_addon.scene.videos").cameras(bpy.context.scene)[0]
 
 
 def open_site(window):
@@ -34,11 +34,11 @@ def open_site(window):
     with window.override():
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete()
-    videos, model = window.part("rockfall_addon.bridge.videos"), window.part("core.camera.model")
+    videos, model = window.part("rockfall_addon.scene.videos"), window.part("core.camera.model")
     shift = window.part("core.georeference").GlobalShift(*ORIGIN)
     surface = window.part("core.terrain.readers").read_terrain(ROOT / "assets" / "demo" / "terrain.ply", shift=shift)
     shading = window.part("core.terrain.shading").shade(surface)
-    window.part("rockfall_addon.bridge.terrain").add_terrain(scene, surface, shading)
+    window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
     camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
     poses = rows("camera.csv")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
@@ -65,7 +65,7 @@ def open_site(window):
 
 def on_screen(window, pixel):
     """Where a pixel of the footage is in the window."""
-    view = window.part("rockfall_addon.bridge.image_view")
+    view = window.part("rockfall_addon.view.image_view")
     region, camera = window.region(), camera_of(window)
     rectangle = view.image_rectangle(region, window.area().spaces.active.region_3d, bpy.context.scene, camera)
     assert rectangle is not None
@@ -79,7 +79,7 @@ def picks():
 
 
 def no_trouble(window):
-    said = window.part("rockfall_addon.bridge.problems").sentences(bpy.context.scene)
+    said = window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
     assert not [text for text in said if "went wrong" in text], said
 
 
@@ -112,7 +112,7 @@ def case_pick_impacts_in_the_footage(window):
     thing = picks()[-1]
     before, identifier = list(thing["rockfall_position_m"]), thing["rockfall_id"]
     with window.override():
-        pointing = window.part("rockfall_addon.bridge.pointing")
+        pointing = window.part("rockfall_addon.view.pointing")
         spot = pointing.on_screen(bpy.context, [before])[0]
     x, y = window.region().x + spot[0], window.region().y + spot[1]
     yield from window.move(x, y)
@@ -121,7 +121,7 @@ def case_pick_impacts_in_the_footage(window):
     for step in range(1, 7):
         yield from window.move(x + 6 * step, y)
     window.screenshot("dragging")
-    assert window.part("rockfall_addon.bridge.live").is_dragging()
+    assert window.part("rockfall_addon.scene.sync").is_dragging()
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x + 36), y=round(y))
     yield 1.0
     after = list(picks()[-1]["rockfall_position_m"])
@@ -154,7 +154,7 @@ def case_pick_impacts_in_the_footage(window):
     x, y = on_screen(window, [300, 500])
     moment = picks()[-1]["rockfall_time_s"]
     with window.override():
-        window.part("rockfall_addon.bridge.pointing").select(bpy.context, picks()[-1])
+        window.part("rockfall_addon.view.pointing").select(bpy.context, picks()[-1])
     yield from window.press("RIGHT_BRACKET", x, y)
     assert abs(picks()[-1]["rockfall_time_s"] - moment - 0.1 / 30) < 1e-6, picks()[-1]["rockfall_time_s"] - moment
     yield from window.press("THREE", x, y)
@@ -179,9 +179,9 @@ def case_pick_refine(window):
     track = window.part("core.footage.tracking").BlockTrack(
         table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
     )
-    window.part("rockfall_addon.bridge.observations").keep_track(camera_of(window), "B10", track)
+    window.part("rockfall_addon.scene.observations").keep_track(camera_of(window), "B10", track)
     picks()[1]["rockfall_time_s"] += 0.03
-    window.part("rockfall_addon.bridge.live").sync(scene)
+    window.part("rockfall_addon.scene.sync").sync(scene)
     with window.override():
         bpy.ops.ed.undo_push(message="track")
     scene.frame_set(80)
@@ -197,7 +197,7 @@ def case_pick_refine(window):
     window.redraw()
     yield 1.5
     window.screenshot("proposed")
-    found = window.part("rockfall_addon.bridge.refinement").proposal(scene)
+    found = window.part("rockfall_addon.scene.refinement").proposal(scene)
     assert found["after_px"] < 1.5 < found["before_px"], found
     with window.override():
         assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
@@ -206,7 +206,7 @@ def case_pick_refine(window):
     yield 1.5
     window.screenshot("applied")
     no_trouble(window)
-    view = window.part("rockfall_addon.bridge.footage_view")
+    view = window.part("rockfall_addon.view.footage_view")
     start = time.perf_counter()
     for _ in range(20):
         view.draw(scene, camera_of(window), picks()[1])
@@ -216,7 +216,7 @@ def case_pick_refine(window):
     with window.override():
         space = window.area().spaces.active
         space.region_3d.view_perspective = "PERSP"
-        window.part("rockfall_addon.bridge.pointing").select(bpy.context, picks()[2])
+        window.part("rockfall_addon.view.pointing").select(bpy.context, picks()[2])
         bpy.ops.view3d.view_selected()
     space.region_3d.view_distance = 8.0
     yield 1.5
@@ -239,7 +239,7 @@ def case_pick_fine_and_cancelled(window):
     (thing,) = picks()
     before = list(thing["rockfall_position_m"])
     with window.override():
-        x, y = window.part("rockfall_addon.bridge.pointing").handle_of(bpy.context, thing)
+        x, y = window.part("rockfall_addon.view.pointing").handle_of(bpy.context, thing)
     x, y = window.region().x + x, window.region().y + y
     yield from window.move(x + 3, y)
     for value, to in (("PRESS", x + 3), ("NOTHING", x + 6), ("NOTHING", x + 3), ("RELEASE", x + 3)):
@@ -250,7 +250,7 @@ def case_pick_fine_and_cancelled(window):
     assert off < 0.03, f"taken and put back it has not jumped: {off} m"
     for modifiers in ({}, {"shift": True}):
         with window.override():
-            spot = window.part("rockfall_addon.bridge.pointing").on_screen(
+            spot = window.part("rockfall_addon.view.pointing").on_screen(
                 bpy.context, [list(picks()[0]["rockfall_position_m"])]
             )[0]
         x, y = window.region().x + spot[0], window.region().y + spot[1]
@@ -306,7 +306,7 @@ def case_pick_track_the_block(window):
         x, y = on_screen(window, [float(block[frame]["u_px"]), float(block[frame]["v_px"])])
         yield from window.click(x, y)
         yield 0.3
-    observations, camera = window.part("rockfall_addon.bridge.observations"), camera_of(window)
+    observations, camera = window.part("rockfall_addon.scene.observations"), camera_of(window)
     assert not picks(), "in flight the pixel is kept, not a place"
     assert observations.seen_in(camera, "B10").frame.tolist() == [70, 100]
     scene.rockfall_picking.whole_video, scene.rockfall_picking.track_frames = False, 55
@@ -345,7 +345,7 @@ def case_pick_in_two_views(window):
     scene = bpy.context.scene
     _, impacts = yield from pick_impacts(window, 1, 2)
     truth = local(impacts[0], "x_m", "y_m", "z_m")
-    videos, model = window.part("rockfall_addon.bridge.videos"), window.part("core.camera.model")
+    videos, model = window.part("rockfall_addon.scene.videos"), window.part("core.camera.model")
     second = videos.add_video(scene, FOOTAGE / "footage.mp4")
     videos.set_clock(second, window.part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, truth + np.array([60.0, -50.0, 30.0]), truth, focal_px=1500)
@@ -357,7 +357,7 @@ def case_pick_in_two_views(window):
         bpy.ops.view3d.view_center_camera()
         bpy.ops.ed.undo_push(message="second video")
     yield 1.0
-    view = window.part("rockfall_addon.bridge.image_view")
+    view = window.part("rockfall_addon.view.image_view")
     region = window.region()
     rectangle = view.image_rectangle(region, window.area().spaces.active.region_3d, scene, second)
     x, y = view.to_region(rectangle, (1280, 720), model.project(lens, truth[None])[0])
@@ -369,7 +369,7 @@ def case_pick_in_two_views(window):
     window.screenshot("diamond")
     (thing,) = picks()
     assert list(thing["rockfall_position_m"]) == held, "the pick stays until it is told to move"
-    picking = window.part("rockfall_addon.bridge.picking")
+    picking = window.part("rockfall_addon.scene.picking")
     found = picking.triangulated(scene, thing)
     assert 0.001 < found.miss_distance[0] < 2.0, found.miss_distance
     with window.override():

@@ -70,19 +70,19 @@ def import_demo(window):
         bpy.ops.ed.undo_push(message="imported")
     yield 2.0
     window.screenshot("2-imported")
-    assert not window.part("rockfall_addon.bridge.videos").is_solved(aligning.the_camera(window))
+    assert not window.part("rockfall_addon.scene.videos").is_solved(aligning.the_camera(window))
 
 
 def align(window):
     """Six pairs: five of two clicks; of the sixth, the predicted mark is dragged to where the place is seen."""
-    bridge, ground = window.part("rockfall_addon.bridge.alignment"), aligning.table(window)
+    aligned, ground = window.part("rockfall_addon.scene.alignment"), aligning.table(window)
     for count, i in enumerate(PAIRS):
         aligning.look_at(window, ground.point[[i]])
         aligning.views(window)[1].spaces.active.region_3d.view_distance = NEAR_M
         yield 0.7
         goal, place = aligning.in_picture(window, ground.pixel[i]), aligning.on_terrain(window, ground.point[i])
         yield from window.click(*place)
-        pair = bridge.open_pair(aligning.the_camera(window))
+        pair = aligned.open_pair(aligning.the_camera(window))
         assert pair is not None, f"pair {count} is open"
         if count + 1 < len(PAIRS):
             yield from window.click(*goal)
@@ -90,12 +90,12 @@ def align(window):
             assert pair.proposed == "pixel", "five pairs solve the camera, so the sixth is predicted"
             window.screenshot("3-predicted")
             yield from drag(window, aligning.in_picture(window, pair.pixel), goal)
-        assert bridge.open_pair(aligning.the_camera(window)) is None, f"pair {count} is complete"
+        assert aligned.open_pair(aligning.the_camera(window)) is None, f"pair {count} is complete"
     camera = aligning.the_camera(window)
-    assert window.part("rockfall_addon.bridge.videos").is_solved(camera), bridge.solution_of(camera).problem
-    assert sum(pair.is_complete for pair in bridge.pairs_of(camera)) == len(PAIRS)
-    focal = bridge.focal_px(camera)
-    print(f"focal length {focal:.0f} px, {bridge.solution_of(camera).rmse_px:.2f} px left")
+    assert window.part("rockfall_addon.scene.videos").is_solved(camera), aligned.solution_of(camera).problem
+    assert sum(pair.is_complete for pair in aligned.pairs_of(camera)) == len(PAIRS)
+    focal = aligned.focal_px(camera)
+    print(f"focal length {focal:.0f} px, {aligned.solution_of(camera).rmse_px:.2f} px left")
     assert abs(focal / FOCAL_PX - 1) < 0.03, focal
     aligning.look_at(window, ground.point)
     camera.rockfall_alignment.blend = 0.5
@@ -119,7 +119,7 @@ def follow(window):
     """The camera was held by hand: from the pairs of frame 0 through the video."""
     aligning.the_camera(window).rockfall_alignment.motion = "ROTATION"
     yield 0.5
-    begun, following = time.perf_counter(), window.part("rockfall_addon.bridge.following")
+    begun, following = time.perf_counter(), window.part("rockfall_addon.steps.alignment.following")
     with in_left_view(window):
         bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
     yield 1.0
@@ -139,7 +139,7 @@ def impacts():
 
 def misses(window):
     """Distances of the picks from where the block truly touched the ground [m]."""
-    shift = window.part("rockfall_addon.bridge.state").read_shift(bpy.context.scene).vector
+    shift = window.part("rockfall_addon.scene.store").read_shift(bpy.context.scene).vector
     axes = ("contact_x_m", "contact_y_m", "contact_z_m")
     truth = np.array([[float(row[name]) for name in axes] for row in impacts()]) - shift
     return np.linalg.norm([list(thing["rockfall_position_m"]) for thing in picking.picks()] - truth, axis=1)
@@ -171,7 +171,7 @@ def places():
 def drag_undo_redo(window):
     before, flights = places(), path()
     with in_left_view(window):
-        region, pointing = bpy.context.region, window.part("rockfall_addon.bridge.pointing")
+        region, pointing = bpy.context.region, window.part("rockfall_addon.view.pointing")
         x, y = pointing.on_screen(bpy.context, [before[-1]])[0]
     x, y = region.x + x, region.y + y
     yield from drag(window, (x, y), (x + DRAGGED_PX, y))
@@ -200,12 +200,12 @@ def refine(window):
     track = window.part("core.footage.tracking").BlockTrack(
         table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
     )
-    window.part("rockfall_addon.bridge.observations").keep_track(aligning.the_camera(window), NAME, track)
+    window.part("rockfall_addon.scene.observations").keep_track(aligning.the_camera(window), NAME, track)
     with in_left_view(window):
         bpy.ops.ed.undo_push(message="track")
         assert bpy.ops.rockfall.refine() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="refined")
-    found = window.part("rockfall_addon.bridge.refinement").proposal(scene)
+    found = window.part("rockfall_addon.scene.refinement").proposal(scene)
     yield from window.move(*window.centre("DOPESHEET_EDITOR"))  # the loupe is not to hide the path
     yield 1.0
     window.screenshot("7-proposed")
@@ -226,7 +226,7 @@ def refine(window):
 
 def speed_errors(window):
     """Relative errors of the speeds at which the two flights begin and end."""
-    flights = window.part("rockfall_addon.bridge.reconstruction").reconstruct_scene(bpy.context.scene).flights
+    flights = window.part("rockfall_addon.scene.reconstruction").reconstruct_scene(bpy.context.scene).flights
     states = window.part("core.reconstruction.flight").flight_states
     rows, count = impacts(), len(flights.start_time_s)
     assert count == len(rows) - 1

@@ -16,14 +16,14 @@ def region(area, kind):
 def open_it(window):
     with window.override():
         assert bpy.ops.rockfall.open_workspace() == {"FINISHED"}
-    workspace = window.part("rockfall_addon.bridge.workspace")
+    workspace = window.part("rockfall_addon.view.workspace")
     yield from window.wait_for(lambda: workspace.KEY in window.window.workspace, what="the workspace")
     yield 1.5
 
 
 def arranged(window):
     """Wait until the demo's footage is arranged; the first drawing takes long without a graphics card."""
-    timer = window.part("rockfall_addon.operators.workspace")._arrange
+    timer = window.part("rockfall_addon.steps.start.workspace")._arrange
     yield from window.wait_for(lambda: not bpy.app.timers.is_registered(timer), 60, "arranged")
     yield 2.0
 
@@ -67,8 +67,8 @@ def case_workspace_with_the_footage(window):
     scene, (seen, free) = bpy.context.scene, views(window)
     assert seen.spaces.active.region_3d.view_perspective == "CAMERA"
     assert free.spaces.active.region_3d.view_perspective == "PERSP"
-    view = window.part("rockfall_addon.bridge.image_view")
-    camera = window.part("rockfall_addon.bridge.videos").active_camera(scene)
+    view = window.part("rockfall_addon.view.image_view")
+    camera = window.part("rockfall_addon.scene.videos").active_camera(scene)
     here, sidebar = region(seen, "WINDOW"), region(seen, "UI")
     rectangle = view.image_rectangle(here, seen.spaces.active.region_3d, scene, camera)
     assert rectangle.left >= 0
@@ -83,7 +83,7 @@ def case_workspace_with_the_footage(window):
 def case_tutorial_of_the_manual(window):
     """From the demo's footage to a refined trajectory, by the clicks that docs/manual counts."""
     scene = bpy.context.scene
-    start = window.part("rockfall_addon.panels.start")
+    start = window.part("rockfall_addon.steps.start.panel")
 
     def press(operator):
         assert operator in [button[0] for button in start.next_step(scene)[1]], "not offered as the next step"
@@ -108,7 +108,7 @@ def case_tutorial_of_the_manual(window):
     window.screenshot("3-refined")
     press("rockfall.apply_refinement")
     yield 3.0
-    said = window.part("rockfall_addon.bridge.problems").sentences(scene)
+    said = window.part("rockfall_addon.scene.problems").sentences(scene)
     assert not [text for text in said if "went wrong" in text], said
     window.screenshot("4-applied")
     assert start.next_step(scene)[0].startswith("Play")
@@ -127,8 +127,8 @@ def case_first_clicks_of_the_manual(window):
     yield from arranged(window)
     seen, _ = views(window)
     here = region(seen, "WINDOW")
-    view = window.part("rockfall_addon.bridge.image_view")
-    camera = window.part("rockfall_addon.bridge.videos").active_camera(scene)
+    view = window.part("rockfall_addon.view.image_view")
+    camera = window.part("rockfall_addon.scene.videos").active_camera(scene)
     rectangle = view.image_rectangle(here, seen.spaces.active.region_3d, scene, camera)
     for pixel, presses in (((921.974, 114.007), 38), ((726.5, 346.1), 0)):  # the first two impacts
         x, y = view.to_region(rectangle, (1280, 720), pixel)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Standard deviations of refined impacts, from the covariance of the refinement's unknowns."""
+
+import numpy as np
+
+from ...vectors import Array, dot, norm
+from ..impact import Impacts, apparent, cross
+from ..node_motion import NodeMotion
+from ..picks import Indices
+from .problem import NODE, Problem
+
+SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
+
+
+def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:
+    """(q, 3, size) derivatives of the velocities at the ends of segments by the free unknowns; zero for segment −1."""
+    has = np.flatnonzero(segment >= 0)
+    which = segment[has]
+    if at_end:
+        by_place, by_law = motion.end_by_displacement[which], motion.end_between_by_law[which]
+        by_duration = motion.end_acceleration[which] - (by_place @ motion.end_velocity[which][:, :, None])[:, :, 0]
+    else:
+        by_place, by_law = motion.inverse[which], motion.start_by_law[which]
+        by_duration = -(by_place @ motion.end_velocity[which][:, :, None])[:, :, 0]
+    result = np.zeros((segment.size, 3, problem.columns.size + 1))
+    first, last = NODE * problem.first[which], NODE * problem.last[which]
+    for axis in range(3):
+        result[has, :, first + axis] = -by_place[:, :, axis]
+        result[has, :, last + axis] = by_place[:, :, axis]
+    result[has, :, first + 3] = -by_duration
+    result[has, :, last + 3] = by_duration
+    result[has, :, problem.columns.law[0]] = by_law[:, :, 0] * problem.reference_drag[which, None]
+    result[has, :, problem.columns.law[1]] = by_law[:, :, 1]
+    return result[:, :, :-1]
+
+
+def impact_sigmas(impacts: Impacts, covariance: Array, spread: Array) -> dict[str, Array]:
+    """Standard deviations of n impacts' velocities, coefficients, angles and energies.
+
+    Parameters
+    ----------
+    covariance : (n, 6, 6) of v1 and v2.
+    spread : (n,) root mean square angle by which the block-scale normal is off [rad]; NaN counts as none.
+
+    Returns
+    -------
+    the columns of `uncertainty.propagate`, and kinetic1_j, kinetic2_j; NaN where the column is undefined.
+
+    Notes
+    -----
+    The root mean square deviation from the value over pairs of points √3 standard deviations to either side along each
+    axis of the covariance, with a weight of 1/6 each (Julier & Uhlmann 2004): first-order propagation where a column is
+    linear, but true for R_N at grazing impacts too, where a small tilt of the normal changes it by half. The normal is
+    tilted by spread/√2 about each of two axes at right angles to it, independent of everything else.
+    """
+    usable = np.nan_to_num(covariance)
+    size, axes = np.linalg.eigh(usable)
+    reach = np.sqrt(3 * np.maximum(size, 0.0))
+    tilt = np.sqrt(1.5) * np.nan_to_num(spread)
+    here = _values(impacts, impacts.v1, impacts.v2, impacts.normal)
+    squares = np.zeros_like(here)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for axis in range(6):
+            away = reach[:, axis, None] * axes[:, :, axis]
+            for sign in (-1.0, 1.0):
+                v1, v2 = impacts.v1 + sign * away[:, :3], impacts.v2 + sign * away[:, 3:]
+                squares += np.nan_to_num(_values(impacts, v1, v2, impacts.normal) - here) ** 2 / 6
+        for direction in _across(impacts.normal):
+            for sign in (-1.0, 1.0):
+                normal = np.cos(tilt)[:, None] * impacts.normal + sign * np.sin(tilt)[:, None] * direction
+                squares += np.nan_to_num(_values(impacts, impacts.v1, impacts.v2, normal) - here) ** 2 / 6
+    deviation = np.sqrt(squares)
+    result = {name: deviation[:, i] for i, name in enumerate((*SCALARS, "kinetic1_j", "kinetic2_j"))}
+    diagonal = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
+    result["v1"], result["v2"] = diagonal[:, :3], diagonal[:, 3:]
+    known = np.isfinite(covariance[:, 0, 0])
+    result = {name: np.where(known if sd.ndim == 1 else known[:, None], sd, np.nan) for name, sd in result.items()}
+    return {name: np.where(np.isfinite(getattr(impacts, name)), sd, np.nan) for name, sd in result.items()}
+
+
+def _values(impacts: Impacts, v1: Array, v2: Array, normal: Array) -> Array:
+    """(n, 11) the scalar columns."""
+    found = apparent(v1, v2, normal)
+    energies = [0.5 * impacts.mass_kg * dot(v, v) for v in (v1, v2)]
+    return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
+
+
+def _across(normal: Array) -> tuple[Array, Array]:
+    """Two unit vectors (n, 3) at right angles to each normal and to each other."""
+    helper = np.where(np.abs(normal[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    first = cross(normal, np.broadcast_to(helper, normal.shape))
+    first = first / norm(first)[:, None]
+    return first, cross(normal, first)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Refinement: whole trajectories fitted to the block's pixels in every frame."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...constants import GRAVITY_MPS2
+from ...errors import InputError, RockfallError
+from ..block import Block, per_pick
+from ..drag import Drag
+from ..picks import Picks
+from ..placement import check_placement
+from .problem import evaluate
+from .result import Refinement, summarise
+from .setup import Setup, prepare, set_up
+from .solver import LOSSES, Loss, Solution, find_clocks, pixel_noise, solve
+from .views import PixelObservations, View, check_observations
+
+if TYPE_CHECKING:
+    from ...terrain.surface import Surface
+
+__all__ = ["FREE", "SIGMA_AIM", "PixelObservations", "Refinement", "View", "refine"]
+
+FREE = ("camera", "clock", "clock_drift", "drag", "gravity")
+SIGMA_AIM = 0.15
+"""Standard deviation of the tracked spot about the block's centre, in parts of its diameter: its sunlit side draws the
+eye of people and of trackers."""
+
+
+def refine(
+    picks: Picks,
+    views: Sequence[View],
+    observations: PixelObservations,
+    *,
+    surface: "Surface | None" = None,
+    block: Block | Mapping[str, Block] | None = None,
+    gravity_mps2: float = GRAVITY_MPS2,
+    drag: Drag | None = None,
+    normal_radius_m: float | None = None,
+    free: Sequence[str] = (),
+    sigma_terrain_m: float | None = None,
+    sigma_aim: float = SIGMA_AIM,
+    loss: Loss = "huber",
+    site: str = "",
+) -> Refinement:
+    """Fit the places and times of the picks to where the block's centre is seen in the frames.
+
+    Parameters
+    ----------
+    picks : contact points on the terrain, as a person marked them: the first guess, and what holds what the pixels do
+        not tell. A time without sigma_time_s counts as known to a frame, a place without sigma_position_m to 10 m.
+    views : the cameras, their clocks roughly right.
+    observations : pixels of the block's centre.
+    surface : terrain, which every block on the ground touches as a sphere; without it, places come from the rays alone.
+    block, gravity_mps2, drag, normal_radius_m, site : see `reconstruct`.
+    free : what else to fit, of `FREE`: the poses of the views that have a covariance, the clocks of all but the first
+        view, the drag coefficient, gravity. All trajectories share these.
+    sigma_terrain_m : standard deviation of the centre's distance from the terrain at a contact, about its radius. None
+        takes, for each pick, a tenth of the radius (blocks are no spheres) and a quarter of the point spacing times
+        the spread of the terrain's normals (what lies between the points), as one root of squares.
+    sigma_aim : standard deviation of what all pixels of a trajectory in a view are off the block's centre by, alike, in
+        parts of its diameter; 0 takes the pixels for the centre's.
+    loss : how pixels that do not fit count; "linear" trusts all of them.
+
+    Raises
+    ------
+    InputError : pixels of a trajectory without picks, or at no time of its picks; a block behind a camera; nothing to
+        fit; picks off the terrain.
+    RockfallError : a parameter out of range; no flight joins the picks.
+
+    Notes
+    -----
+    Unknowns are the centre's place and the time at every release, impact, contact and stop (the nodes of
+    `find_segments`); free flights run between them in closed form, or with drag; rolling is straight and even. All
+    are found at once, with the residuals: pixels at the time of their row (rolling shutter) against the projected
+    centre and what is aimed off it, one part of the block's apparent diameter for each trajectory and view, itself
+    against `sigma_aim`; the centre's distance from the terrain against the radius; the marked times, and the places
+    where they have a standard deviation; places marked in flight that have one; the poses against their covariance. A
+    flight thus counts with all its frames, and an impact is where and when two flights meet.
+    """
+    block = block if block is not None else Block()
+    free_set = _check_parameters(free, loss, gravity_mps2, sigma_terrain_m, normal_radius_m)
+    if not (np.isfinite(sigma_aim) and sigma_aim >= 0):
+        raise RockfallError(f"The standard deviation of the aim must be a number not below zero, not {sigma_aim}.")
+    if surface is not None:
+        picks = picks.in_shift(surface.shift)
+        check_placement(picks, surface, per_pick(picks, block, lambda one: one.diameter_m))
+    moved_views = tuple(view.in_shift(picks.shift) for view in views)
+    check_observations(observations, moved_views, set(picks.trajectory.tolist()))
+    if "camera" in free_set and all(view.pose_covariance is None for view in moved_views):
+        raise InputError(
+            "The cameras are to be fitted, but no view has a covariance of its pose",
+            advice="Solve the camera from pairs of pixels and points, or hold it",
+        )
+    if "drag" in free_set and drag is None:
+        drag = Drag()
+
+    ground = prepare(picks, surface, block, drag, normal_radius_m, sigma_terrain_m)
+    names = [name for name in dict.fromkeys(picks.trajectory.tolist()) if name in set(observations.trajectory.tolist())]
+    groups = [names] if free_set else [[name] for name in names]
+    setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set, sigma_aim) for group in groups]
+    solved = [_solve(setup, loss, free_set) for setup in setups]
+    return summarise(
+        ground, moved_views, observations, [pair[0] for pair in solved], [pair[1] for pair in solved],
+        block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, site=site,
+    )  # fmt: skip
+
+
+def _solve(setup: Setup, loss: Loss, free: frozenset[str]) -> tuple[Setup, Solution]:
+    """Solve, once more with larger standard deviations of the pixels if these scatter more than stated."""
+    _check_start(setup)
+    problem = setup.problem
+    solution = solve(problem, find_clocks(problem, setup.state) if "clock" in free else setup.state, loss)
+    noise = pixel_noise(problem, solution)
+    if noise > 1:
+        problem = replace(problem, sigma_px=noise * problem.sigma_px)
+        solution = solve(problem, solution.state, loss)
+    return replace(setup, problem=problem, noise=noise), solution
+
+
+def _check_parameters(
+    free: Sequence[str], loss: str, gravity_mps2: float, sigma_terrain_m: float | None, normal_radius_m: float | None
+) -> frozenset[str]:
+    unknown = sorted(set(free) - set(FREE))
+    if unknown:
+        raise RockfallError(f"{unknown[0]!r} cannot be fitted. Choose from {', '.join(FREE)}.")
+    if loss not in LOSSES:
+        raise RockfallError(f"Unknown loss {loss!r}. Use one of {', '.join(LOSSES)}.")
+    if not (np.isfinite(gravity_mps2) and gravity_mps2 > 0):
+        raise RockfallError(f"Gravity must be a positive number [m/s²], not {gravity_mps2}.")
+    for label, value in (("standard deviation of the terrain", sigma_terrain_m), ("normal's radius", normal_radius_m)):
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise RockfallError(f"The {label} must be a positive number [m], not {value}.")
+    return frozenset(free)
+
+
+def _check_start(setup: Setup) -> None:
+    """Raise when the marked motion cannot be seen at all."""
+    start = evaluate(setup.problem, setup.state)
+    if start.valid:
+        return
+    problem = setup.problem
+    if not np.isfinite(start.motion.inverse).all():
+        raise RockfallError("No flight with this drag joins the picks. Check the times, and the block's size.")
+    lost = np.flatnonzero(~np.isfinite(start.pixels.residual).all(axis=1))
+    if not lost.size:
+        raise RockfallError("The picks are too close in time to be fitted. Remove one of each pair.")
+    view = problem.views[problem.view[lost[0]]]
+    segment = start.segment[lost[0]]
+    raise InputError(
+        f"The block is behind the camera of view {view.name}, or outside of what its lens can see, at "
+        f"{problem.video_s[lost[0]]:.3f} s of the video",
+        trajectory=str(setup.picks.trajectory[setup.nodes[problem.first[segment]]]),
+        advice="Check the camera's solution, and that picks and camera are in the same coordinates",
+    )

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Levenberg–Marquardt with reweighting (Triggs et al. 2000, Bundle adjustment, §4)."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.stats import chi2
+
+from ...camera.model import project
+from ...vectors import Array, norm
+from ..node_motion import places_at
+from ..picks import Indices, Mask
+from .problem import (
+    Evaluation,
+    Problem,
+    Rows,
+    Unknowns,
+    chains_at,
+    common_times,
+    evaluate,
+    moved,
+    segments_at,
+    solve_segments,
+)
+
+Loss = Literal["huber", "cauchy", "linear"]
+LOSSES: tuple[Loss, ...] = ("huber", "cauchy", "linear")
+HUBER, CAUCHY = 2.5, 3.5
+"""Length of a whitened pixel residual from which it counts less: 98 % efficient on normal noise in two dimensions."""
+REJECTED = 4.5
+"""Longer ones are outliers: a normal one is with a probability of 4e-5."""
+MOST_ITERATIONS, MOST_ROUNDS = 100, 5
+HEAVIEST = 1e10
+"""A damping with which no step gets anywhere."""
+SETTLED = 1e-7
+"""A last step of this part of a standard deviation ends the search,"""
+NO_GAIN = 1e-10
+"""and so does a step that takes less than this part off the cost."""
+UNEXPLAINED = 0.999
+"""A sum of squares that chance exceeds only in one of a thousand cases is not explained by the stated noise."""
+MEDIAN_LENGTH = float(np.sqrt(2 * np.log(2)))
+"""Median length of a normal vector of two dimensions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the search ended.
+
+    Attributes
+    ----------
+    state : the unknowns.
+    evaluation : the problem there.
+    weight : (m,) of the squared residuals of the pixels; zero for outliers and unused ones.
+    outlier : (m,).
+    information : (size, size) the normal equations' matrix.
+    iterations : number of them.
+    settled : the search ended by itself.
+    """
+
+    state: Unknowns
+    evaluation: Evaluation
+    weight: Array
+    outlier: Mask
+    information: Array
+    iterations: int
+    settled: bool
+
+
+def solve(problem: Problem, state: Unknowns, loss: Loss) -> Solution:
+    """Search from a first state; once more without outliers, and as long as pixels join or leave the ends of chains."""
+    found = _search(problem, state, chains_at(problem, state), loss, reject=False)
+    iterations = found.iterations
+    for _ in range(MOST_ROUNDS):
+        reject = loss != "linear" and bool(found.outlier.any())
+        chain = chains_at(problem, found.state)
+        unchanged = bool(((chain >= 0) == (found.evaluation.segment >= 0)).all())
+        if unchanged and reject == bool((found.weight[found.evaluation.segment >= 0] == 0).any()):
+            break
+        found = _search(problem, found.state, chain, loss, reject=reject)
+        iterations += found.iterations
+    return replace(found, iterations=iterations)
+
+
+def _search(problem: Problem, state: Unknowns, chain: Indices, loss: Loss, *, reject: bool) -> Solution:
+    damping, settled, iteration = 1e-4, False, 0
+    here = evaluate(problem, state, chain)
+    weight, outlier = _weights(here, loss, reject)
+    information, gradient = normal_equations(problem, here, weight)
+    while iteration < MOST_ITERATIONS and not settled:
+        iteration += 1
+        improved = False
+        while not improved and damping < HEAVIEST:
+            step = _step(information, gradient, damping)
+            settled = float(step @ information @ step) < SETTLED**2
+            trial_state = moved(problem, state, step)
+            trial = evaluate(problem, trial_state, chain)
+            before = _cost(here, weight)
+            after = _cost(trial, weight) if trial.valid else np.inf
+            improved = after <= before
+            if settled:
+                break
+            damping *= 0.1 if improved else 10
+        settled = settled or not improved or before - after < NO_GAIN * before
+        if improved:
+            state, here, damping = trial_state, trial, max(damping, 1e-12)
+            weight, outlier = _weights(here, loss, reject)
+            information, gradient = normal_equations(problem, here, weight)
+    return Solution(state, here, weight, outlier, information, iteration, settled)
+
+
+def pixel_noise(problem: Problem, solution: Solution) -> float:
+    """By how much the pixels scatter more than stated; 1 where chance may explain it."""
+    squares = float(solution.weight @ (solution.evaluation.pixels.residual**2).sum(axis=1))
+    spare = 2 * int((solution.weight > 0).sum()) - problem.columns.size
+    return float(np.sqrt(squares / spare)) if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare) else 1.0
+
+
+def _lengths(evaluation: Evaluation) -> Array:
+    return norm(evaluation.pixels.residual)
+
+
+def _weights(evaluation: Evaluation, loss: Loss, reject: bool) -> tuple[Array, Mask]:
+    """Weights of the pixels (m,), and which are outliers."""
+    length, used = _lengths(evaluation), evaluation.segment >= 0
+    scale = max(1.0, float(np.median(length[used])) / MEDIAN_LENGTH) if used.any() else 1.0
+    ratio = length / scale
+    outlier = used & (ratio > REJECTED)
+    if loss == "linear":
+        weight = np.ones(length.size)
+    elif loss == "cauchy":
+        weight = 1 / (1 + (ratio / CAUCHY) ** 2)
+    else:
+        weight = HUBER / np.maximum(ratio, HUBER)
+    if reject:
+        weight = np.where(outlier, 0.0, weight)
+    return np.where(used, weight, 0.0), outlier
+
+
+def _cost(evaluation: Evaluation, weight: Array) -> float:
+    """Half the weighted squares; with the weights of the present state a smaller one is progress for any loss here."""
+    cost = float(weight @ (evaluation.pixels.residual**2).sum(axis=1))
+    return 0.5 * (cost + sum(float((rows.residual**2).sum()) for rows in evaluation.others))
+
+
+def _step(information: Array, gradient: Array, damping: float) -> Array:
+    diagonal = np.diag(information)
+    damped = information + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))
+    try:
+        return np.asarray(-cho_solve(cho_factor(damped, check_finite=False), gradient, check_finite=False))
+    except LinAlgError:
+        return np.asarray(-np.linalg.lstsq(damped, gradient, rcond=None)[0])
+
+
+def normal_equations(problem: Problem, evaluation: Evaluation, weight: Array) -> tuple[Array, Array]:
+    """Information matrix (size, size) and gradient (size,) of half the weighted squares."""
+    size = problem.columns.size
+    information, gradient = np.zeros((size + 1) ** 2), np.zeros(size + 1)
+    used = np.flatnonzero(weight > 0)
+    pixels = evaluation.pixels
+    chosen = Rows(pixels.residual[used], pixels.jacobian[used], pixels.columns[used])
+    _add(chosen, weight[used], size, information, gradient)
+    for rows in evaluation.others:
+        _add(rows, np.ones(len(rows.residual)), size, information, gradient)
+    return information.reshape(size + 1, size + 1)[:size, :size], gradient[:size]
+
+
+def _add(rows: Rows, weight: Array, size: int, information: Array, gradient: Array) -> None:
+    """Add the rows to a flat (size + 1)² matrix and a vector, whose last places take what is not free."""
+    if not len(rows.residual):
+        return
+    free = (rows.columns >= 0).any(axis=0)
+    columns, jacobian = rows.columns[:, free], rows.jacobian[:, :, free]
+    place: Indices = np.where(columns < 0, size, columns)
+    weighted = jacobian * weight[:, None, None]
+    turned = np.swapaxes(weighted, 1, 2)
+    squares = turned @ jacobian
+    cells = place[:, :, None] * (size + 1) + place[:, None, :]
+    information += np.bincount(cells.ravel(), squares.ravel(), information.size)
+    products = (turned @ rows.residual[:, :, None])[:, :, 0]
+    gradient += np.bincount(place.ravel(), products.ravel(), gradient.size)
+
+
+CLOCK_REACH_S, CLOCK_STEP_S, CLOCK_PIXELS = 1.0, 1 / 60, 60
+"""How far off a free clock may be, and the steps in which it is sought first, with how many pixels of a view."""
+
+
+def find_clocks(problem: Problem, state: Unknowns) -> Unknowns:
+    """A first guess of the free clocks: the offsets at which the median pixel lies closest to the marked motion."""
+    motion = solve_segments(problem, state)
+    offsets = np.arange(-CLOCK_REACH_S, CLOCK_REACH_S + CLOCK_STEP_S / 2, CLOCK_STEP_S)
+    times, shift = common_times(problem, state), state.offset_s.copy()
+    for number in np.flatnonzero(problem.columns.clock[:, 0] >= 0):
+        mine = np.flatnonzero(problem.view == number)
+        mine = mine[:: max(1, mine.size // CLOCK_PIXELS)]
+        each = np.tile(mine, offsets.size)
+        time = times[each] + np.repeat(offsets, mine.size)
+        segment = segments_at(problem, state, time, problem.obs_group[each])
+        used = np.flatnonzero(segment >= 0)
+        places = places_at(motion, segment[used], time[used]).position
+        camera, here = problem.views[number].camera.camera, each[used]
+        pixel = project(camera, places, position=problem.position[here], rotation=problem.rotation[here])
+        miss = np.full(each.size, np.nan)
+        miss[used] = norm(pixel - problem.pixel[here])
+        table = miss.reshape(offsets.size, mine.size)
+        enough = np.flatnonzero(np.isfinite(table).sum(axis=1) >= 0.5 * mine.size)
+        if enough.size:
+            shift[number] += offsets[enough[np.argmin(np.nanmedian(table[enough], axis=1))]]
+    return replace(state, offset_s=shift)

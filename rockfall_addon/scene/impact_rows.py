@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The impact table: rows that the panel lists, mirrored from the results that the picks' objects keep."""
+
+import math
+
+import bpy
+
+from . import picks, store
+
+RESULT_KEY = "rockfall_result"
+COLUMNS = ("speed1_mps", "speed2_mps", "rn", "rt", "r", "theta1_deg", "theta_dev_deg")
+
+
+def fill(scene: bpy.types.Scene, trajectory: str | None = None) -> None:
+    """Write the rows of one trajectory, or of all, from the results that are stored."""
+    rows = scene.rockfall_impacts
+    names = None if trajectory is None else [trajectory]
+    wanted = [thing for thing in picks.things_of(scene, names) if RESULT_KEY in thing]
+    wanted.sort(key=lambda thing: (thing[picks.TRAJECTORY_KEY], thing[picks.TIME_KEY]))
+    there = [i for i, row in enumerate(rows) if trajectory is None or row.trajectory == trajectory]
+    for _ in range(len(wanted) - len(there)):
+        rows.add()
+        there.append(len(rows) - 1)
+    for i in reversed(there[len(wanted) :]):
+        rows.remove(i)
+    for i, thing in zip(there, wanted, strict=False):
+        _write(rows[i], thing)
+
+
+def highlight(scene: bpy.types.Scene, identifier: str) -> None:
+    """Make the row of a pick the active one, if it has one."""
+    rows, settings = scene.rockfall_impacts, scene.rockfall
+    if 0 <= settings.impact_index < len(rows) and rows[settings.impact_index].pick == identifier:
+        return
+    for i, row in enumerate(rows):
+        if row.pick == identifier:
+            settings.impact_index = i
+            return
+
+
+def chosen(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The pick of the active row."""
+    rows, index = scene.rockfall_impacts, scene.rockfall.impact_index
+    return picks.with_id(scene, rows[index].pick) if 0 <= index < len(rows) else None
+
+
+def go_to(context: bpy.types.Context, scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    """Select a pick, and nothing else, and go to its moment."""
+    layer = context.view_layer
+    if layer is not None and thing.name in layer.objects:
+        for other in layer.objects.selected:
+            if other != thing:
+                other.select_set(False)
+        thing.select_set(True)
+        layer.objects.active = thing
+    frame = thing.get(picks.KEY_FRAME_KEY)
+    if frame is not None:
+        scene.frame_set(math.floor(frame), subframe=frame % 1)
+
+
+def selected(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The active pick."""
+    thing = context.object
+    return thing if thing is not None and thing.get(store.ROLE_KEY) == store.PICK_ROLE else None
+
+
+def _write(row: bpy.types.PropertyGroup, thing: bpy.types.Object) -> None:
+    result = thing[RESULT_KEY]
+    row.pick, row.trajectory = thing[picks.ID_KEY], thing[picks.TRAJECTORY_KEY]
+    row.number, row.flags = result["number"], result["flags"]
+    row.time_s = thing[picks.TIME_KEY]
+    row.speed1_mps, row.speed2_mps = math.hypot(*result["incident_mps"]), math.hypot(*result["restituted_mps"])
+    for name in COLUMNS[2:]:
+        setattr(row, name, result[name][0])

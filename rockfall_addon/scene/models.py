@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Twins in the scene: beside each real block, the block that leaves its impacts as a model says.
+
+Of each model: its flight curves, and for each trajectory a block that appears at an impact, flies, and vanishes soon
+after it has landed. Where a twin still flies when the next one starts, a second block takes over.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+
+import bpy
+import numpy as np
+
+from ...core.analysis.comparison import compare
+from ...core.analysis.twins import Twins, fly_twins
+from ...core.colours import model_colour
+from ...core.errors import RockfallError
+from ...core.impact_models.machinery.parameters import Value
+from ...core.impact_models.registry import find_model
+from ...core.reconstruction.trajectory import Reconstruction
+from . import keyframes, store, terrain, timing, trails, trajectories
+
+MODELS_KEY = "rockfall_twin_models"
+PARAMETERS_KEY = "rockfall_model_parameters"
+MODEL_KEY = "rockfall_model"
+LINGER_S = 0.2
+"""How long a twin lies where it has landed."""
+
+
+def shown_models(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """The models whose twins are in the scene."""
+    return tuple(filter(None, str(scene.get(MODELS_KEY, "")).split(" ")))
+
+
+def parameters_of(scene: bpy.types.Scene) -> dict[str, dict[str, Value]]:
+    """Model → parameter → value, where the scene has another than the default."""
+    return json.loads(scene.get(PARAMETERS_KEY, "{}"))
+
+
+def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]]) -> None:
+    """Store parameters with the scene: as text, which keeps every digit."""
+    scene[PARAMETERS_KEY] = json.dumps({name: dict(values) for name, values in parameters.items()})
+
+
+def show_twins(
+    scene: bpy.types.Scene,
+    result: Reconstruction,
+    models: Sequence[str],
+    parameters: Mapping[str, Mapping[str, Value]] | None = None,
+) -> Twins:
+    """Show the twins of these models, and of no others; with these parameters, which are kept, or those of the scene.
+
+    Raises
+    ------
+    RockfallError : there is no terrain for them to land on, or no impact that a model can be asked about.
+    """
+    if parameters is not None:
+        keep_parameters(scene, parameters)
+    twins = find_twins(scene, result, models)
+    _remove_objects(scene)
+    scene[MODELS_KEY] = " ".join(twins.models)
+    offsets = timing.shown_offsets(scene, result.picks)
+    begin_s = twins.time_s - np.array([offsets[name] for name in twins.trajectory.tolist()])
+    blocks = {thing["rockfall_trajectory"]: thing for thing in store.with_role(scene, store.BLOCK_ROLE)}
+    for model in twins.models:
+        which = np.flatnonzero((twins.model == model) & (twins.duration_s > 0))
+        if not which.size:
+            continue
+        _show_flights(scene, model, twins, which, begin_s)
+        for name, block in blocks.items():
+            own = which[twins.trajectory[which] == name]
+            for number, lane in enumerate(_lanes(begin_s[own], twins.duration_s[own])):
+                _show_block(scene, block, model, number, twins, own[lane], begin_s)
+    trails.paint_observed(scene)
+    trails.set_trails(scene)
+    return twins
+
+
+def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> Twins:
+    """The twins of the models' means on the scene's terrain; errors as in `show_twins`."""
+    surface = terrain.surface_of_scene(scene)
+    if surface is None:
+        raise RockfallError("The blocks of the models land on the terrain: import one first.")
+    own = {name: values for name, values in parameters_of(scene).items() if name in models}
+    predictions = compare(result.impacts, models, own)
+    return fly_twins(result.impacts, predictions, surface, gravity_mps2=result.gravity_mps2, drag=result.drag)
+
+
+def follow(scene: bpy.types.Scene, result: Reconstruction) -> None:
+    """Bring the twins that are shown in line with a changed reconstruction."""
+    models = shown_models(scene)
+    if not models:
+        return
+    try:
+        show_twins(scene, result, models)
+    except RockfallError:
+        remove_twins(scene)
+        raise
+
+
+def remove_twins(scene: bpy.types.Scene) -> None:
+    """Show the real blocks only, coloured by speed again."""
+    _remove_objects(scene)
+    if MODELS_KEY in scene:
+        del scene[MODELS_KEY]
+    trails.paint_observed(scene)
+
+
+def _remove_objects(scene: bpy.types.Scene) -> None:
+    store.remove_objects(store.with_role(scene, store.TWIN_ROLE) + store.with_role(scene, store.TWIN_FLIGHTS_ROLE))
+    store.remove_collection(scene, "Twins")
+
+
+def _show_flights(scene: bpy.types.Scene, model: str, twins: Twins, which: np.ndarray, begin_s: np.ndarray) -> None:
+    pieces = []
+    for index in which:
+        clock = trails.moments(0.0, float(twins.duration_s[index]))
+        position, velocity = twins.launches.states(np.full(len(clock), index), clock)
+        pieces.append((begin_s[index] + clock, position, np.linalg.norm(velocity, axis=1)))
+    thing = trails.trail(f"{model} flights", store.TWIN_FLIGHTS_ROLE, pieces)
+    thing[MODEL_KEY] = model
+    trails.paint(thing.data, np.array(model_colour(model)))
+    _link(scene, thing, model)
+
+
+def _show_block(
+    scene: bpy.types.Scene,
+    real: bpy.types.Object,
+    model: str,
+    number: int,
+    twins: Twins,
+    which: np.ndarray,
+    begin_s: np.ndarray,
+) -> None:
+    """A block for the flights `which`, which follow each other without overlap."""
+    name = real["rockfall_trajectory"]
+    thing = bpy.data.objects.new(
+        f"{name} {model}{f' {number + 1}' if number else ''}",
+        trajectories.block_mesh(f"Rockfall twin {model}", model_colour(model)),
+    )
+    thing[store.ROLE_KEY], thing[MODEL_KEY], thing["rockfall_trajectory"] = store.TWIN_ROLE, model, name
+    thing.scale, thing.delta_location = real.scale, real.delta_location
+    _link(scene, thing, model)
+    rate = timing.frame_rate(scene)
+    keyframes.write_location_keys(thing, _keys(twins, which, begin_s), rate)
+    ends = begin_s[which] + twins.duration_s[which] + LINGER_S
+    ends[:-1] = np.minimum(ends[:-1], begin_s[which[1:]])
+    keyframes.write_visibility_keys(thing, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
+
+
+def _keys(twins: Twins, which: np.ndarray, begin_s: np.ndarray) -> keyframes.Keys:
+    """Of each flight its ends, which make the parabola; with drag, more of them."""
+    times, places, speeds, held = [], [], [], []
+    for index in which:
+        duration = float(twins.duration_s[index])
+        dragged = twins.launches.drag_per_m[index] > 0
+        knots = np.linspace(0.0, duration, (int(np.ceil(duration / keyframes.DRAG_KEY_STEP_S)) if dragged else 1) + 1)
+        position, velocity = twins.launches.states(np.full(len(knots), index), knots)
+        times.append(begin_s[index] + knots)
+        places.append(position)
+        speeds.append(velocity)
+        held.append(np.arange(len(knots)) == len(knots) - 1)
+    velocity = np.vstack(speeds)
+    return keyframes.Keys(np.concatenate(times), np.vstack(places), velocity, velocity, np.concatenate(held))
+
+
+def _lanes(begin_s: np.ndarray, duration_s: np.ndarray) -> list[list[int]]:
+    """The flights of each block, so that no block flies twice at a time and there are as few blocks as can be."""
+    lanes: list[list[int]] = []
+    free_at: list[float] = []
+    for i in np.argsort(begin_s).tolist():
+        lane = next((j for j, free in enumerate(free_at) if free <= begin_s[i]), len(lanes))
+        if lane == len(lanes):
+            lanes.append([])
+            free_at.append(0.0)
+        lanes[lane].append(i)
+        free_at[lane] = float(begin_s[i] + duration_s[i])
+    return lanes
+
+
+def _link(scene: bpy.types.Scene, thing: bpy.types.Object, model: str) -> None:
+    store.collection(scene, "Twins", find_model(model).title).objects.link(thing)

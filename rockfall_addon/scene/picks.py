@@ -1,0 +1,358 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Picks: one object each, placed on the terrain and keyed at its time.
+
+The doubles are kept as ID properties, beside the frame at which the key was written. A person edits a pick by moving
+its object (its place differs from the kept one) or its key (the frame differs); `read` sees the edit at once, `absorb`
+makes it the pick's state.
+"""
+
+import uuid
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+from mathutils import Quaternion, Vector
+
+from ...core.reconstruction.picks import Picks, make_picks
+from ...core.terrain.raycast import closest_points
+from ...core.terrain.surface import Surface
+from ...core.vectors import Array
+from . import keyframes, materials, store, timing
+
+ID_KEY, TRAJECTORY_KEY, TIME_KEY = "rockfall_id", "rockfall_trajectory", "rockfall_time_s"
+POSITION_KEY, KIND_KEY, STATUS_KEY = "rockfall_position_m", "rockfall_kind", "rockfall_status"
+NORMAL_KEY, EXTRA_KEY, ROW_KEY = "rockfall_normal", "rockfall_extra", "rockfall_row"
+SIGMA_TIME_KEY, SIGMA_POSITION_KEY = "rockfall_sigma_time_s", "rockfall_sigma_position_m"
+SPIN_KEY = "rockfall_angular_velocity_radps"
+KEY_FRAME_KEY = "rockfall_key_frame"
+PICK_SHIFT_KEY = "rockfall_pick_shift_m"
+SOURCE_KEY = "rockfall_picks_source"
+
+CONFIDENCE_SIGMA_M = {1: 0.50, 2: 0.20, 3: 0.05}
+"""Standard deviation that a person's confidence in a place stands for, where the pick has none of its own [m]."""
+SAME_FRAME = 1e-3
+"""Keys nearer than this have not been moved [frames]."""
+
+MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler than any model's colour
+    "impact": (0.95, 0.95, 0.95),
+    "release": (0.00, 0.62, 0.45),
+    "pass": (0.62, 0.70, 0.78),
+    "contact": (0.00, 0.45, 0.70),
+    "stop": (0.84, 0.37, 0.00),
+}
+MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the rough surface
+
+
+def things_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
+    """The objects of the picks, all or those of some trajectories, in no order."""
+    names = None if trajectories is None else set(trajectories)
+    return [
+        thing
+        for thing in scene.objects
+        if thing.get(store.ROLE_KEY) == store.PICK_ROLE
+        and TRAJECTORY_KEY in thing
+        and TIME_KEY in thing
+        and POSITION_KEY in thing
+        and (names is None or thing[TRAJECTORY_KEY] in names)
+    ]
+
+
+def with_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
+    """The pick with an id."""
+    return next((thing for thing in things_of(scene) if thing.get(ID_KEY) == identifier), None)
+
+
+def show_picks(
+    scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offsets: dict[str, float], radius_m: float
+) -> list[bpy.types.Object]:
+    """Bring the picks' objects in line; a pick that is there already (by trajectory and time) keeps its object and id.
+
+    normals : (n, 3) directions of the discs, NaN rows lie flat.
+    offsets : from `timing.offsets_of`.
+
+    Returns
+    -------
+    The object of each pick.
+    """
+    kept_rate = timing.keyed_rate(scene)
+    there = {(o[TRAJECTORY_KEY], time_of(o, kept_rate)): o for o in things_of(scene)}
+    rate, shown = timing.frame_rate(scene), []
+    for i in range(len(picks.time_s)):
+        trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
+        thing = there.pop((trajectory, time), None)
+        if thing is None:
+            number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
+            thing = _new(scene, trajectory, kind, number)
+        thing[TRAJECTORY_KEY], thing[TIME_KEY] = trajectory, time
+        thing[POSITION_KEY] = picks.position[i].tolist()
+        thing[KIND_KEY], thing[STATUS_KEY] = kind, str(picks.status[i])
+        thing[ROW_KEY] = int(picks.row[i])
+        for key, value in (
+            (NORMAL_KEY, picks.normal[i]),
+            (SPIN_KEY, picks.angular_velocity[i]),
+            (SIGMA_TIME_KEY, picks.sigma_time_s[i : i + 1]),
+            (SIGMA_POSITION_KEY, picks.sigma_position_m[i : i + 1]),
+        ):
+            if np.isfinite(value).all() and not (key == SIGMA_POSITION_KEY and _of_confidence(picks, i)):
+                thing[key] = value.tolist()
+            elif key in thing:
+                del thing[key]
+        extra = {name: str(values[i]) for name, values in picks.extra.items()}
+        if EXTRA_KEY not in thing or thing[EXTRA_KEY].to_dict() != extra:
+            thing[EXTRA_KEY] = extra
+        thing[PICK_SHIFT_KEY] = picks.shift.vector.tolist()
+        pose(thing, normals[i], (time - offsets[trajectory]) * rate, radius_m)
+        shown.append(thing)
+    store.remove_objects(list(there.values()))
+    scene[SOURCE_KEY] = picks.source
+    return shown
+
+
+def add_pick(
+    scene: bpy.types.Scene,
+    trajectory: str,
+    time_s: float,
+    position_m: Sequence[float] | Array,
+    *,
+    kind: str = "impact",
+    status: str = "ok",
+    extra: Mapping[str, str] | None = None,
+) -> bpy.types.Object:
+    """A new pick at a local place; `live.sync` then makes the trajectory follow."""
+    number = len(things_of(scene, [trajectory])) + 1
+    thing = _new(scene, trajectory, kind, number)
+    thing[TRAJECTORY_KEY], thing[TIME_KEY], thing[ROW_KEY] = trajectory, float(time_s), 0
+    thing[POSITION_KEY] = _writable(scene, position_m)
+    thing[KIND_KEY], thing[STATUS_KEY] = kind, status
+    thing[EXTRA_KEY] = dict(extra or {})
+    thing[PICK_SHIFT_KEY] = store.read_shift(scene).vector.tolist()
+    offset = timing.offset_of(scene, trajectory, float(time_s))
+    frame = (float(time_s) - offset) * timing.frame_rate(scene)
+    pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m)
+    return thing
+
+
+def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float) -> None:
+    """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay."""
+    marker = _marker(thing[KIND_KEY])
+    if thing.data is not marker:
+        thing.data = marker
+    up = Vector(normal) if np.isfinite(normal).all() else Vector((0.0, 0.0, 1.0))
+    turn = up.to_track_quat("Z", "Y")
+    if thing.rotation_mode != "QUATERNION":
+        thing.rotation_mode = "QUATERNION"
+    if (Quaternion(thing.rotation_quaternion) - turn).magnitude > 1e-6:
+        thing.rotation_quaternion = turn
+    if (thing.scale - Vector((radius_m,) * 3)).length > 1e-6 * radius_m:
+        thing.scale = (radius_m,) * 3
+    place = list(thing[POSITION_KEY])
+    if not _same_place(thing.location, place):
+        thing.location = place
+    if not _keyed_at(thing, frame):
+        keyframes.key_location_once(thing, frame)
+    thing[KEY_FRAME_KEY] = float(np.float32(frame))
+
+
+def picks_of(scene: bpy.types.Scene) -> Picks:
+    """The picks as they stand in the scene: trajectories in the order of their starts.
+
+    Raises
+    ------
+    InputError : two picks of a trajectory at one time, and whatever else `make_picks` refuses.
+    """
+    return read(scene, ordered(scene, things_of(scene)))
+
+
+def ordered(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Trajectories in the order of their starts, the picks of each in the order of time."""
+    rate = timing.keyed_rate(scene)
+    rows = [(thing[TRAJECTORY_KEY], time_of(thing, rate), thing) for thing in things]
+    started: dict[str, float] = {}
+    for name, time, _ in rows:
+        started[name] = min(time, started.get(name, time))
+    rows.sort(key=lambda row: (started[row[0]], row[0], row[1]))
+    return [thing for _, _, thing in rows]
+
+
+def read(
+    scene: bpy.types.Scene,
+    things: Sequence[bpy.types.Object],
+    surface: Surface | None = None,
+    reach_m: float = 0.0,
+) -> Picks:
+    """The picks of these objects, which are in order, with what a person is just doing to them.
+
+    surface, reach_m : see `resting_place`; without a surface a moved pick is where its object is.
+    """
+    rate = timing.keyed_rate(scene)
+    extras = [thing[EXTRA_KEY].to_dict() if EXTRA_KEY in thing else {} for thing in things]
+    names = list(dict.fromkeys(name for extra in extras for name in extra))
+    return make_picks(
+        [thing[TRAJECTORY_KEY] for thing in things],
+        [time_of(thing, rate) for thing in things],
+        [resting_place(thing, surface, reach_m) for thing in things],
+        kind=[thing[KIND_KEY] for thing in things],
+        status=[thing[STATUS_KEY] for thing in things],
+        normal=[
+            [np.nan] * 3
+            if NORMAL_KEY not in thing or (surface is not None and moved(thing))
+            else list(thing[NORMAL_KEY])
+            for thing in things
+        ],
+        sigma_time_s=_doubles(things, SIGMA_TIME_KEY, 1),
+        sigma_position_m=_doubles(things, SIGMA_POSITION_KEY, 1),
+        angular_velocity=_doubles(things, SPIN_KEY, 3),
+        row=[thing.get(ROW_KEY, 0) for thing in things],
+        extra={name: np.array([str(extra.get(name, "")) for extra in extras], dtype=np.str_) for name in names},
+        source=str(scene.get(SOURCE_KEY, "")),
+        shift=store.read_shift(scene),
+        sort=True,
+    )
+
+
+def moved(thing: bpy.types.Object) -> bool:
+    """Whether the object is elsewhere than the pick."""
+    return not _same_place(thing.location, thing[POSITION_KEY])
+
+
+def frames_moved(thing: bpy.types.Object) -> float:
+    """How far the key was moved in time since it was written [frames]; keys that were added do not count."""
+    kept = thing.get(KEY_FRAME_KEY)
+    if kept is None:
+        return 0.0
+    for curve in keyframes.location_curves(thing):
+        frames = [point.co[0] for point in curve.keyframe_points]
+        if frames:
+            nearest = min((frame - kept for frame in frames), key=abs)
+            if abs(nearest) > max(SAME_FRAME, 4e-7 * abs(kept)):
+                return nearest
+    return 0.0
+
+
+def time_of(thing: bpy.types.Object, rate: float) -> float:
+    """The pick's time on the common clock [s], with the edit of its key. `rate` is the one that the keys have."""
+    shift = frames_moved(thing)
+    return float(thing[TIME_KEY]) + (shift / rate if shift else 0.0)
+
+
+def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> Array:
+    """(3,) where the pick is, with the edit of its object.
+
+    A pick that was on the terrain, that is nearer to it than `reach_m`, stays on it: it is moved along the terrain, to
+    the point closest to its object. A pass is a point in the air and goes where it is put.
+    """
+    stored = np.array(thing[POSITION_KEY])
+    if not moved(thing):
+        return stored
+    place = np.array(thing.location, dtype=np.float64)
+    if surface is None or thing[KIND_KEY] == "pass":
+        return place
+    near = closest_points(surface, np.stack([stored, place]))
+    return near.point[1] if near.distance[0] <= reach_m else place
+
+
+def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> bool:
+    """Make what a person did to the object the state of the pick; True when there was something.
+
+    On another place the terrain has another normal: one that came with the pick is dropped where there is a terrain.
+    """
+    changed = False
+    frames = frames_moved(thing)
+    if frames:
+        thing[TIME_KEY] = float(thing[TIME_KEY]) + frames / timing.keyed_rate(scene)
+        thing[KEY_FRAME_KEY] = float(thing[KEY_FRAME_KEY]) + frames
+        changed = True
+    if moved(thing):
+        thing[POSITION_KEY] = _writable(scene, resting_place(thing, surface, reach_m))
+        if surface is not None and NORMAL_KEY in thing:
+            del thing[NORMAL_KEY]
+        changed = True
+    return changed
+
+
+def trusted(picks: Picks) -> Picks:
+    """The picks with the standard deviation that their confidence stands for, where they have none of their own."""
+    if "confidence" not in picks.extra:
+        return picks
+    sigma = picks.sigma_position_m.copy()
+    for i, text in enumerate(picks.extra["confidence"].tolist()):
+        if np.isnan(sigma[i]) and text.isdecimal():
+            sigma[i] = CONFIDENCE_SIGMA_M.get(int(text), np.nan)
+    return replace(picks, sigma_position_m=sigma)
+
+
+def _writable(scene: bpy.types.Scene, place: Sequence[float] | Array) -> list[float]:
+    """A place whose survey coordinates are doubles, so that a table gives it back to the last bit."""
+    shift = store.read_shift(scene)
+    return shift.to_local(shift.to_survey(np.asarray(place, dtype=np.float64))).tolist()
+
+
+def _of_confidence(picks: Picks, i: int) -> bool:
+    """Whether a pick's standard deviation is no more than what its confidence says."""
+    text = str(picks.extra["confidence"][i]) if "confidence" in picks.extra else ""
+    return text.isdecimal() and CONFIDENCE_SIGMA_M.get(int(text)) == picks.sigma_position_m[i]
+
+
+def set_extra(thing: bpy.types.Object, name: str, text: str) -> None:
+    """Keep a further column of the pick, such as its note; an empty one is dropped."""
+    extra = thing[EXTRA_KEY].to_dict() if EXTRA_KEY in thing else {}
+    extra.pop(name, None)
+    thing[EXTRA_KEY] = extra | ({name: text} if text else {})
+
+
+def extra_of(thing: bpy.types.Object, name: str) -> str:
+    """A further column of the pick as text."""
+    return str(thing[EXTRA_KEY].get(name, "")) if EXTRA_KEY in thing else ""
+
+
+def _new(scene: bpy.types.Scene, trajectory: str, kind: str, number: int) -> bpy.types.Object:
+    thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
+    thing[store.ROLE_KEY], thing[ID_KEY] = store.PICK_ROLE, uuid.uuid4().hex
+    store.collection(scene, "Trajectories", trajectory).objects.link(thing)
+    return thing
+
+
+def _same_place(location: Vector, stored: Sequence[float]) -> bool:
+    """Whether a single-precision place is that of these doubles."""
+    return Vector(stored) == location if len(location) == 3 else False
+
+
+def _keyed_at(thing: bpy.types.Object, frame: float) -> bool:
+    """Whether the object has the one key that it should have."""
+    curves = list(keyframes.location_curves(thing))
+    wanted = float(np.float32(frame))
+    return len(curves) == 3 and all(
+        len(curve.keyframe_points) == 1
+        and curve.keyframe_points[0].co[0] == wanted
+        and curve.keyframe_points[0].co[1] == thing.location[curve.array_index]
+        for curve in curves
+    )
+
+
+def _doubles(things: Sequence[bpy.types.Object], key: str, width: int) -> np.ndarray:
+    rows = [list(o[key]) if key in o else [np.nan] * width for o in things]
+    return np.array(rows, dtype=np.float64).reshape(-1, width)
+
+
+def _marker(kind: str) -> bpy.types.Mesh:
+    """A ring with a spot in it, of radius 1, shared by all picks of a kind."""
+    name = f"Rockfall {kind}"
+    existing = bpy.data.meshes.get(name)
+    if existing is not None:
+        return existing
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(24)])
+    rings = [radius * circle for radius in (1.0, 0.72, 0.30)]
+    vertices = np.vstack(rings) + np.array([0.0, 0.0, MARKER_LIFT])
+    following = (np.arange(24) + 1) % 24
+    ring = np.column_stack([np.arange(24), following, 24 + following, 24 + np.arange(24)])
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(vertices.tolist(), [], [*ring.tolist(), (48 + np.arange(24)).tolist()])
+    colour = mesh.attributes.new("colour", "FLOAT_COLOR", "POINT")
+    colour.data.foreach_set(
+        "color", np.tile(materials.linear_colour(MARKER_COLOURS[kind]), len(vertices)).astype(np.float32)
+    )
+    mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
+    mesh.materials.append(materials.emission_material("Rockfall marker", "colour"))
+    return mesh

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is wrong, in words that the panels show: problems of trajectories, of the scene, and of ourselves."""
+
+import json
+from collections.abc import Callable
+from functools import wraps
+
+import bpy
+import numpy as np
+
+from ...core.reconstruction.trajectory import Reconstruction
+from . import fingerprints, migration, picks, store, timing
+
+PROBLEM_KEY = "rockfall_problem"
+TRAJECTORIES_KEY = "rockfall_trajectory_problems"
+MOST = 6
+BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon
+CAMERA_ROLE = "camera"
+
+_troubles: list[str] = []  # our own errors, each told once
+
+
+def keep_trajectories(scene: bpy.types.Scene, sentences: dict[str, list[str]]) -> None:
+    """Store what there is to say about the trajectories."""
+    text = json.dumps({name: said for name, said in sentences.items() if said})
+    if scene.get(TRAJECTORIES_KEY, "{}") != text:
+        scene[TRAJECTORIES_KEY] = text
+
+
+def of_trajectories(scene: bpy.types.Scene) -> dict[str, list[str]]:
+    """Trajectory → sentences."""
+    return json.loads(scene.get(TRAJECTORIES_KEY, "{}"))
+
+
+def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[str]]:
+    """Trajectory → what deserves a look in its reconstruction."""
+    names = list(dict.fromkeys(result.picks.trajectory.tolist()))
+    said: dict[str, list[str]] = {name: [] for name in names}
+    for note in result.notes:
+        about = [name for name in names if f"rajectory {name} " in note]
+        said[max(about, key=len) if about else names[0]].append(note)
+    impacts = result.impacts
+    for i in np.flatnonzero(impacts.normal[:, 2] < BACKSIDE):
+        said[str(impacts.trajectory[i])].append(
+            f"Trajectory {impacts.trajectory[i]}, {impacts.time_s[i]:.3f} s: the pick is on the back of the terrain, "
+            "whose normal points down there. Move it to the upper side, or turn the terrain's faces round."
+        )
+    start = first_instant(scene)
+    if start is not None:
+        early = np.flatnonzero(result.picks.time_s < start - 1e-6)
+        for i in early[:1]:
+            name, more = str(result.picks.trajectory[i]), f" and {early.size - 1} more" if early.size > 1 else ""
+            said[name].append(
+                f"Trajectory {name}, {result.picks.time_s[i]:.3f} s{more}: the pick is before the start, at "
+                f"{start:.3f} s. Move its key, or correct the time origin."
+            )
+    return said
+
+
+def first_instant(scene: bpy.types.Scene) -> float | None:
+    """Common time of the first picture, or the time origin when the scene plays as filmed; None when neither is set."""
+    starts = []
+    for thing in scene.objects:
+        if thing.get(store.ROLE_KEY) == CAMERA_ROLE and "rockfall_video_times_s" in thing and "rockfall_clock" in thing:
+            times = thing["rockfall_video_times_s"]
+            offset, drift, origin, rate = thing["rockfall_clock"]
+            if len(times):
+                starts.append(offset + (1 + drift) * rate * (times[0] - origin))
+    if starts:
+        return min(starts)
+    return timing.origin_s(scene) if scene.rockfall.playback == "REAL" else None
+
+
+def tell(scene: bpy.types.Scene) -> None:
+    """Bring the panel's text in line: the scene's problems, then those of its trajectories."""
+    said = _of_scene(scene)
+    for sentences in of_trajectories(scene).values():
+        said += sentences
+    if len(said) > MOST:
+        said = [*said[: MOST - 1], f"… and {len(said) - MOST + 1} more."]
+    text = "\n".join(said)
+    if scene.get(PROBLEM_KEY, "") != text:
+        scene[PROBLEM_KEY] = text
+
+
+def sentences(scene: bpy.types.Scene) -> list[str]:
+    """What the panels show."""
+    newer = [migration.warning(scene)] if migration.is_newer(scene) else []
+    return [*newer, *_troubles, *filter(None, str(scene.get(PROBLEM_KEY, "")).split("\n"))]
+
+
+def guarded[**P, T](function: Callable[P, T]) -> Callable[P, T | None]:
+    """For what Blender calls: an error is caught, printed in one line and shown on the panel, each text once."""
+
+    @wraps(function)
+    def call(*arguments: P.args, **named: P.kwargs) -> T | None:
+        try:
+            return function(*arguments, **named)
+        except Exception as error:  # noqa: BLE001 - whatever it is, Blender would print it at every event
+            failed(function.__name__, error)
+            return None
+
+    return call
+
+
+def failed(where: str, error: Exception) -> None:
+    """Remember an error of ours and print it, unless it is known already."""
+    text = f"Something went wrong in Rockfall ({where}): {type(error).__name__}: {error}"
+    if text not in _troubles:
+        _troubles.append(text)
+        print(f"Rockfall: {where}: {type(error).__name__}: {error}")
+
+
+def forget() -> None:
+    """Another file, another start: errors of ours may be told again."""
+    _troubles.clear()
+
+
+def _of_scene(scene: bpy.types.Scene) -> list[str]:
+    said = []
+    scale = scene.unit_settings.scale_length
+    if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6 and picks.things_of(scene):
+        said.append(
+            f"The scene's unit scale is {scale:g}. Rockfall counts one unit as one metre, so the lengths that Blender "
+            "shows are not those of the slope: set Scene Properties > Units > Unit Scale to 1."
+        )
+    if scene.get(fingerprints.GROUND_KEY) and not fingerprints.ground(scene):
+        said.append(
+            "The terrain is gone. What was computed stays; edited trajectories have no terrain normals and heights. "
+            "Undo, or import the terrain again."
+        )
+    return said

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Between project.toml and the scene: what *Load demo* and a film without a window have in common, and the way back."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import RockfallError
+from ...core.exchange.opening import open_project, open_terrain
+from ...core.exchange.output import output_folder
+from ...core.exchange.parameters import checked_parameters
+from ...core.exchange.project import (
+    CameraPlacement,
+    Project,
+    RenderPreset,
+    Site,
+    TerrainSource,
+    read_project,
+    write_project,
+)
+from ...core.exchange.tables import write_picks
+from ...core.reconstruction.trajectory import Reconstruction
+from ...core.terrain.shading import shade
+from ...core.terrain.writers import write_ply
+from . import migration, models, picks, project_videos, reconstruction, store, terrain
+
+DESCRIPTION_KEY, RENDER_KEY = "rockfall_site_description", "rockfall_render_presets"
+
+
+def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True) -> Reconstruction | None:
+    """Show a project in a scene: its terrain, its videos, its picks, and what is reconstructed from them.
+
+    Returns None for a project of videos without picks: they are still to be made.
+
+    Parameters
+    ----------
+    with_videos : a film needs none; with them the scene plays at the rate and the times of the first.
+
+    Raises
+    ------
+    RockfallError : the project or one of its files is bad. The scene is as it was.
+    """
+    project = read_project(path)
+    parameters = checked_parameters(project.extra["models"], path) if "models" in project.extra else {}
+    if project.picks is None and project.videos and with_videos:
+        surface, result = open_terrain(project), None
+    else:
+        surface, result = open_project(project)
+    shading = None if surface is None else shade(surface)
+    known = surface.shift if surface is not None else None if result is None else result.picks.shift
+    found = project_videos.read_videos(project, known) if with_videos else []
+    cameras = [read.camera.camera.camera.shift for read in found if read.camera is not None]
+
+    names = [block.name for block in project.blocks] if result is None else result.picks.trajectory.tolist()
+    shift = result.picks.shift if result is not None else known or next(iter(cameras), None)
+    if shift is not None:
+        store.write_shift(scene, shift)
+    reconstruction.keep_settings(scene, project, sorted(set(names)))
+    scene[DESCRIPTION_KEY] = project.site.description
+    scene[RENDER_KEY] = json.dumps([asdict(preset) for preset in project.render])
+    models.keep_parameters(scene, parameters)
+    if surface is not None and shading is not None:
+        terrain.add_terrain(scene, surface, shading)
+    project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
+    if result is not None:
+        reconstruction.show(scene, result)
+    return result
+
+
+def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
+    """Write project.toml, picks.csv and, when there is one, the terrain; `load_project` then gives the same again.
+
+    Several tiles are written as one terrain. Returns the path of project.toml.
+
+    Raises
+    ------
+    RockfallError : there are no picks, two are at one time, or the folder cannot be written.
+    """
+    migration.refuse_newer(scene)
+    if not picks.things_of(scene):
+        raise RockfallError("There are no picks to export: import some first, or load the demo.")
+    table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), store.read_shift(scene)
+    settings = reconstruction.project_settings(scene, table.trajectory.tolist())
+    with output_folder(folder) as place:
+        write_picks(table, place / "picks.csv")
+        if surface is not None:
+            write_ply(surface, place / "terrain.ply")
+        source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
+        parameters = models.parameters_of(scene)
+        project = Project(
+            site=Site(str(scene.get(reconstruction.SITE_KEY, "")), str(scene.get(DESCRIPTION_KEY, ""))),
+            terrain=None if surface is None else source,
+            picks=place / "picks.csv",
+            block=settings.block,
+            blocks=settings.blocks,
+            reconstruction=settings.reconstruction,
+            videos=project_videos.write_videos(scene, place),
+            render=tuple(_preset(values) for values in json.loads(scene.get(RENDER_KEY, "[]"))),
+            extra={"models": parameters} if parameters else {},
+        )
+        write_project(project, place / "project.toml")
+    return folder / "project.toml"
+
+
+def _preset(values: dict) -> RenderPreset:
+    placed = values.pop("camera")
+    if placed is None:
+        return RenderPreset(**values)
+    placed |= {name: tuple(placed[name]) for name in ("position", "target")}
+    return RenderPreset(**values, camera=CameraPlacement(**placed))

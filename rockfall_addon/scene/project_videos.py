@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The videos of a project file: their cameras, clocks and tracks, into the scene and out again."""
+
+import re
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.exchange.cameras import CameraFile, read_camera, write_camera
+from ...core.exchange.footage import SIGMA_PX
+from ...core.exchange.footage_tables import Track, read_track, write_track
+from ...core.exchange.project import Project, VideoEntry
+from ...core.footage.clock import Clock, clock_for
+from ...core.footage.video import Video, open_video
+from ...core.georeference import GlobalShift
+from . import footage, observations, store, timing, video_times, videos
+
+EVENTS_FILE_KEY = "rockfall_events_file"
+
+
+@dataclass(frozen=True, eq=False)
+class ReadVideo:
+    """A video of a project, read."""
+
+    entry: VideoEntry
+    video: Video
+    camera: CameraFile | None
+    track: Track | None
+    clock: Clock
+
+
+def read_videos(project: Project, shift: GlobalShift | None) -> list[ReadVideo]:
+    """Read all that belongs to a project's videos; those whose frames nothing tells are left out.
+
+    Parameters
+    ----------
+    shift : of the terrain or the picks; None takes that of the first camera.
+
+    Raises
+    ------
+    RockfallError : one of the files is bad.
+    """
+    found = []
+    for entry in project.videos:
+        camera = None if entry.camera is None else read_camera(entry.camera, shift)
+        shift = camera.camera.camera.shift if camera is not None and shift is None else shift
+        track = None if entry.track is None else read_track(entry.track)
+        video = _video(entry, camera, track)
+        if video is None:
+            continue
+        clock = clock_for(
+            video, entry.capture_rate_hz, offset_s=entry.offset_s, drift=entry.drift, origin_s=entry.origin_s
+        )
+        found.append(ReadVideo(entry, video, camera, track, clock))
+    return found
+
+
+def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") -> list[bpy.types.Object]:
+    """Make the cameras; a video that is there already, by its file, takes the project's numbers.
+
+    The first one gives the scene its rate, and frame 0 is its first picture.
+
+    Parameters
+    ----------
+    name : of the trajectory, for tracks that name none.
+    """
+    things = []
+    for read in found:
+        first = not videos.cameras(scene)
+        there = (c for c in videos.cameras(scene) if Path(str(c[videos.FILE_KEY])) == read.video.path.resolve())
+        camera = next(there, None) or videos.add_camera(scene, read.video)
+        camera.name = read.entry.name
+        videos.set_clock(camera, read.clock)
+        camera[videos.CAPTURE_KEY] = read.entry.capture_rate_hz or 0.0
+        camera[videos.ROW_TIME_KEY] = read.entry.row_time_s
+        if read.entry.events is not None:
+            camera[EVENTS_FILE_KEY] = str(read.entry.events.resolve())
+        if first:
+            scene[timing.ORIGIN_KEY] = float(read.clock.to_common(float(read.video.time_s[0])))
+            videos.begin_with(scene, camera)
+        if read.camera is not None and read.camera.camera.camera.size == videos.size_of(camera):
+            videos.set_moving_camera(
+                scene,
+                camera,
+                read.camera.camera,
+                rmse_px=read.camera.rmse_px,
+                pose_covariance=read.camera.pose_covariance,
+            )
+        if read.track is not None:
+            _keep_track(camera, read.track, name)
+        things.append(camera)
+    if things:
+        video_times.fit_range(scene)
+        footage.follow(scene)
+    return things
+
+
+def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]:
+    """Write the cameras and tracks into a folder, and tell how the project names them."""
+    entries = []
+    for camera in videos.cameras(scene):
+        stem = re.sub(r"[^\w.-]+", "_", camera.name)
+        files: dict[str, Path | None] = {"camera": None, "track": None, "events": None}
+        if videos.is_solved(camera):
+            files["camera"] = folder / f"{stem}_camera.toml"
+            rmse = camera.get(videos.RMSE_KEY)
+            write_camera(
+                files["camera"],
+                videos.moving_camera(camera),
+                rmse_px=None if rmse is None else float(rmse),
+                crs=store.read_shift(scene).crs,
+                pose_covariance=videos.pose_covariance(camera),
+            )
+        track = _track_of(camera)
+        if track is not None:
+            files["track"] = folder / f"{stem}_track.csv"
+            write_track(track, files["track"])
+        events = Path(str(camera.get(EVENTS_FILE_KEY, "")))
+        if events.is_file():
+            files["events"] = folder / f"{stem}_events.csv"
+            shutil.copyfile(events, files["events"])
+        clock = videos.clock_of(camera)
+        entries.append(
+            VideoEntry(
+                name=camera.name,
+                file=videos.file_of(camera),
+                offset_s=clock.offset_s,
+                drift=clock.drift,
+                origin_s=clock.origin_s,
+                capture_rate_hz=videos.capture_rate_of(camera),
+                row_time_s=videos.row_time_of(camera),
+                **files,
+            )
+        )
+    return tuple(entries)
+
+
+def _video(entry: VideoEntry, camera: CameraFile | None, track: Track | None) -> Video | None:
+    """The file, or, where it has moved, what the camera and the track tell of it; None when that is nothing."""
+    if entry.file is not None and entry.file.is_file():
+        return open_video(entry.file)
+    times = camera.camera.time_s if camera is not None and not camera.camera.is_fixed else None
+    if times is None and track is not None and len(track):
+        times = np.unique(track.time_s)
+    if entry.file is None or camera is None or times is None:
+        return None
+    width, height = camera.camera.camera.size
+    rate = 1 / float(np.median(np.diff(times))) if times.size > 1 else np.nan
+    return Video(entry.file, width, height, 0, "", "", rate, 0, times, np.empty(0))
+
+
+def _keep_track(camera: bpy.types.Object, track: Track, name: str) -> None:
+    times = videos.times_of(camera)
+    names = np.where(track.trajectory == "", name or camera.name, track.trajectory)
+    nearest = np.abs(times[:, None] - track.time_s).argmin(axis=0)
+    frame = np.where(track.frame >= 0, track.frame, nearest)
+    sigma = np.where(np.isnan(track.sigma_px), SIGMA_PX, track.sigma_px)
+    for each in dict.fromkeys(names.tolist()):
+        rows = names == each
+        by_hand = np.zeros(int(rows.sum()))
+        seen = observations.Seen(frame[rows], track.time_s[rows], track.pixel[rows], sigma[rows], by_hand)
+        observations.keep_track(camera, each, seen)
+
+
+def _track_of(camera: bpy.types.Object) -> Track | None:
+    parts = [(name, observations.seen_in(camera, name)) for name in observations.names_in(camera)]
+    if not parts:
+        return None
+    count = sum(len(seen) for _, seen in parts)
+    return Track(
+        trajectory=np.concatenate([np.full(len(seen), name, dtype=object) for name, seen in parts]).astype(str),
+        frame=np.concatenate([seen.frame for _, seen in parts]),
+        time_s=np.concatenate([seen.time_s for _, seen in parts]),
+        pixel=np.concatenate([seen.pixel for _, seen in parts]),
+        sigma_px=np.concatenate([seen.sigma_px for _, seen in parts]),
+        score=np.full(count, np.nan),
+        row=np.arange(count),
+    )

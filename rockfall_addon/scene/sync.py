@@ -1,0 +1,325 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The trajectories follow their picks: whatever changes a pick, its trajectory, and no other, is computed again.
+
+Nothing is told by whoever changes a pick. `sync` compares fingerprints of the picks with those of what is shown; the
+handlers only say where to look, and a timer does the work, since data must not be changed while Blender evaluates them.
+While a person drags, picks are read where they are dragged to; what was done is absorbed when the mouse is released.
+"""
+
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.errors import RockfallError
+from . import (
+    fingerprints,
+    impact_rows,
+    migration,
+    models,
+    picks,
+    problems,
+    reconstruction,
+    store,
+    timing,
+    trails,
+    trajectories,
+)
+
+DRAGGING = ("TRANSFORM_OT_", "ROCKFALL_OT_drag")
+REACH_RADII = 1.0
+"""A pick nearer to the terrain than this many radii of its block lies on it, and stays on it when it is moved."""
+LEAST_REACH_M = 0.1
+POLL_S = 0.015
+
+_waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajectories to look at, None for all
+
+
+@dataclass
+class Done:
+    """What a `sync` has done: trajectories that were computed again, or could not be."""
+
+    rebuilt: list[str]
+    failed: list[str]
+
+
+def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
+    """Something may have changed in these trajectories (None: anywhere): look soon, in background at once."""
+    key, asked = scene.session_uid, None if names is None else set(names)
+    before = _waiting.get(key, set())
+    _waiting[key] = None if asked is None or before is None else before | asked
+    if bpy.app.background:
+        work()
+    elif not bpy.app.timers.is_registered(work):
+        bpy.app.timers.register(work, first_interval=0.0)
+
+
+def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """From Blender's list of updates, find what to look at."""
+    names: set[str] | None = set()
+    for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
+        thing = update.id
+        if isinstance(thing, bpy.types.Object):
+            role = thing.get(store.ROLE_KEY)
+            if role == store.PICK_ROLE and picks.TRAJECTORY_KEY in thing:
+                names.add(thing[picks.TRAJECTORY_KEY])
+            elif role == store.TERRAIN_ROLE:
+                names = None
+        elif isinstance(thing, bpy.types.Collection) or (
+            isinstance(thing, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
+        ):
+            names = None
+        if names is None:
+            break
+    if names or (names is None and migration.version(scene) is not None):
+        touch(scene, names)
+
+
+@problems.guarded
+def work() -> float | None:
+    """Do what is waiting; as a timer, come again while a person still drags."""
+    waiting = dict(_waiting)
+    _waiting.clear()
+    dragging = is_dragging()
+    for scene in bpy.data.scenes:
+        if scene.session_uid in waiting:
+            names = waiting[scene.session_uid]
+            sync(scene, names, dragging=dragging)
+            if dragging:
+                _waiting[scene.session_uid] = names
+    return POLL_S if dragging else None
+
+
+def is_dragging() -> bool:
+    """Whether a person is just moving something."""
+    if bpy.app.background or bpy.context.window_manager is None:
+        return False
+    return any(
+        operator.bl_idname.startswith(DRAGGING)
+        for window in bpy.context.window_manager.windows
+        for operator in window.modal_operators
+    )
+
+
+def sync(
+    scene: bpy.types.Scene,
+    names: Iterable[str] | None = None,
+    *,
+    dragging: bool = False,
+    again: bool = False,
+) -> Done:
+    """Bring what is shown of some trajectories (None: of all) in line with their picks.
+
+    dragging : the picks are only read, not written: a person holds them.
+    again : compute them even where nothing has changed.
+    """
+    done = Done([], [])
+    if migration.is_newer(scene):
+        return done
+    wanted = None if names is None else set(names)
+    things = picks.things_of(scene, wanted)
+    if not things and fingerprints.SHOWN_KEY not in scene:
+        return done
+    if dragging:
+        things, resample = _originals(things), False
+    else:
+        _heal(scene, things)
+        again, resample = again or _ground_changed(scene), _rate_changed(scene)
+        if (again or resample) and wanted is not None:
+            wanted, things = None, picks.things_of(scene)
+    groups = fingerprints.by_trajectory(things)
+    prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
+    gone = [name for name in prints if name not in groups and (wanted is None or name in wanted)]
+    for name in gone:
+        _forget(scene, name)
+        prints.pop(name), said.pop(name, None)
+    parts = trajectories.parts_of(scene, None if wanted is None else list(groups))
+    altered = again or bool(gone)
+    for name, members in groups.items():
+        changed = _has_changed(name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging)
+        if changed or again or resample:
+            altered = altered or changed
+            prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, done)
+    fingerprints.remember(scene, prints)
+    problems.keep_trajectories(scene, said)
+    if altered and not dragging:
+        _finish(scene)
+    problems.tell(scene)
+    return done
+
+
+def retime(thing: bpy.types.Object, text: str) -> None:
+    """Give a pick the time that a person has typed; what is no number is not taken."""
+    try:
+        time = float(text.strip().removesuffix("s").replace(",", "."))
+    except ValueError:
+        return
+    if np.isfinite(time):
+        thing[picks.TIME_KEY] = time
+        for scene in thing.users_scene:
+            touch(scene, [thing[picks.TRAJECTORY_KEY]])
+
+
+def nudge(scene: bpy.types.Scene, thing: bpy.types.Object, frames: float) -> None:
+    """Move a pick in time by (parts of) a frame of the scene."""
+    thing[picks.TIME_KEY] = float(thing[picks.TIME_KEY]) + frames / timing.frame_rate(scene)
+    sync(scene, [thing[picks.TRAJECTORY_KEY]])
+
+
+def _has_changed(
+    name: str, members: list[bpy.types.Object], before: str, parts: trajectories.Parts, rate: float, dragging: bool
+) -> bool:
+    """Whether the picks differ from what is shown, hold an edit to be absorbed, or what is shown is damaged."""
+    if not dragging and any(picks.moved(one) or picks.frames_moved(one) for one in members):
+        return True
+    if before.endswith(fingerprints.COMPLETE) and not _complete(name, parts):
+        return True
+    return before.rstrip(fingerprints.COMPLETE) != fingerprints.fingerprint(members, rate)
+
+
+def _try_rebuild(
+    scene: bpy.types.Scene,
+    name: str,
+    members: list[bpy.types.Object],
+    parts: trajectories.Parts,
+    dragging: bool,
+    done: Done,
+) -> tuple[str, list[str]]:
+    """Compute one trajectory and show it, or keep the last good flights; its fingerprint, and what there is to say."""
+    mark = ""
+    try:
+        said = _rebuild(scene, name, members, parts, dragging)
+        done.rebuilt.append(name)
+        mark = fingerprints.COMPLETE if _complete(name, trajectories.parts_of(scene, [name])) else ""
+    except RockfallError as error:
+        said = [str(error)]
+        _grey(scene, name, parts)
+        done.failed.append(name)
+    return fingerprints.fingerprint(members, timing.keyed_rate(scene)) + mark, said
+
+
+def _rebuild(
+    scene: bpy.types.Scene,
+    name: str,
+    members: list[bpy.types.Object],
+    parts: trajectories.Parts,
+    dragging: bool,
+) -> list[str]:
+    """Compute one trajectory and show it; returns what there is to say about it."""
+    surface = reconstruction.ground(scene)
+    block = reconstruction.blocks_of(scene, {name})[name]
+    reach = max(LEAST_REACH_M, REACH_RADII * block.radius_m)
+    if not dragging:
+        for thing in members:
+            picks.absorb(scene, thing, surface, reach)
+    members = picks.ordered(scene, members)
+    result = reconstruction.reconstruct_scene(scene, picks.read(scene, members, surface, reach))
+    offset = timing.offset_of(scene, name, float(result.picks.time_s[0]))
+    trajectories.store_results(members, result)
+    if not dragging:
+        _pose(scene, members, result, offset)
+    trajectories.show_trajectory(scene, name, result, offset, surface, parts, in_place=dragging)
+    impact_rows.fill(scene, name)
+    return problems.of_result(scene, result)[name]
+
+
+def _pose(scene: bpy.types.Scene, members: list[bpy.types.Object], result: object, offset: float) -> None:
+    rate, radius = timing.frame_rate(scene), scene.rockfall.marker_radius_m
+    if store.KEYED_RATE_KEY not in scene:
+        scene[store.KEYED_RATE_KEY] = rate
+    for thing, normal in zip(members, trajectories.normals_of(result), strict=True):
+        picks.pose(thing, normal, (float(thing[picks.TIME_KEY]) - offset) * timing.keyed_rate(scene), radius)
+
+
+def _complete(name: str, parts: trajectories.Parts) -> bool:
+    """Whether a trajectory has its flights and its block; a person may delete them."""
+    return (store.FLIGHTS_ROLE, name) in parts and (store.BLOCK_ROLE, name) in parts
+
+
+def _grey(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:
+    """The last good flights stay, in grey."""
+    trail = parts.get((store.FLIGHTS_ROLE, name))
+    if trail is not None:
+        trail[trails.STALE_KEY] = True
+        trails.paint_observed(scene, [trail])
+
+
+def _forget(scene: bpy.types.Scene, name: str) -> None:
+    """All picks of a trajectory are gone, so is what was made of them."""
+    store.remove_objects(list(trajectories.parts_of(scene, [name]).values()))
+    offsets = timing.kept_offsets(scene)
+    if offsets.pop(name, None) is not None:
+        timing.keep_offsets(scene, offsets)
+    impact_rows.fill(scene, name)
+
+
+def _finish(scene: bpy.types.Scene) -> None:
+    """What concerns all trajectories, once nothing moves: the ends of the colour scales, the twins of the models."""
+    scene[migration.SCHEMA_KEY] = migration.SCHEMA
+    last = max((float(thing.get(picks.KEY_FRAME_KEY, 0.0)) for thing in picks.things_of(scene)), default=0.0)
+    if last > scene.frame_end:
+        scene.frame_end = int(np.ceil(last + timing.frame_rate(scene)))
+    if trails.set_tops(scene):
+        trails.paint_observed(scene)
+    if models.shown_models(scene):
+        try:
+            models.follow(scene, reconstruction.reconstruct_scene(scene))
+        except RockfallError as error:
+            problems.keep_trajectories(scene, problems.of_trajectories(scene) | {"": [str(error)]})
+
+
+def _ground_changed(scene: bpy.types.Scene) -> bool:
+    """Whether there is another terrain than the trajectories were computed with; one that is gone changes nothing."""
+    now = fingerprints.ground(scene)
+    if not now or now == scene.get(fingerprints.GROUND_KEY, ""):
+        return False
+    scene[fingerprints.GROUND_KEY] = now
+    return True
+
+
+def _rate_changed(scene: bpy.types.Scene) -> bool:
+    """Whether the flights have their ticks at another frame rate than the scene's."""
+    rate = timing.frame_rate(scene)
+    if scene.get(fingerprints.TICK_RATE_KEY) == rate:
+        return False
+    scene[fingerprints.TICK_RATE_KEY] = rate
+    return True
+
+
+def _heal(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:
+    """Copies of picks become picks of their own; picks from another scene come to this one's origin."""
+    shift = store.read_shift(scene).vector
+    seen: dict[str, bpy.types.Object] = {}
+    for thing in sorted(things, key=lambda one: one.session_uid):
+        identifier = thing.get(picks.ID_KEY)
+        if identifier is None or identifier in seen:
+            thing[picks.ID_KEY] = uuid.uuid4().hex
+            if identifier is not None:
+                _begin_copy(scene, thing, seen[identifier])
+        seen[thing[picks.ID_KEY]] = thing
+        own = thing.get(picks.PICK_SHIFT_KEY)
+        if own is None:
+            thing[picks.PICK_SHIFT_KEY] = shift.tolist()
+        elif list(own) != shift.tolist():
+            place = np.array(thing[picks.POSITION_KEY]) + np.array(own) - shift
+            thing[picks.POSITION_KEY], thing[picks.PICK_SHIFT_KEY] = place.tolist(), shift.tolist()
+            thing.location = place
+
+
+def _originals(things: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Without the copies that a person is just placing: they are picks once they are let go."""
+    first: dict[str | None, bpy.types.Object] = {}
+    for thing in sorted(things, key=lambda one: one.session_uid):
+        first.setdefault(thing.get(picks.ID_KEY), thing)
+    return list(first.values())
+
+
+def _begin_copy(scene: bpy.types.Scene, copy: bpy.types.Object, original: bpy.types.Object) -> None:
+    """A copy is a pick at the moment that the scene shows, when that is another one than the original's."""
+    copy[picks.ROW_KEY] = 0
+    frame = scene.frame_current + scene.frame_subframe
+    kept = original.get(picks.KEY_FRAME_KEY)
+    if kept is not None and abs(frame - kept) > 0.5 and copy[picks.TIME_KEY] == original[picks.TIME_KEY]:
+        copy[picks.TIME_KEY] = float(copy[picks.TIME_KEY]) + (frame - kept) / timing.keyed_rate(scene)

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Terrain: core surfaces ↔ Blender mesh objects, one for each tile."""
+
+import uuid
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ...core.errors import RockfallError
+from ...core.georeference import LARGE_COORDINATE_M
+from ...core.terrain.joining import join, moved
+from ...core.terrain.shading import Shading
+from ...core.terrain.surface import Surface
+from . import materials, store, terrain_look, terrain_view
+
+ID_KEY = "rockfall_id"
+FILE_KEY = "rockfall_file"
+THIN_KEY = "rockfall_thin_share"
+REACH_KEY = "rockfall_reach_m"
+LEAST_THIN = 0.005
+
+
+@dataclass
+class _Known:
+    """A surface that was made for a mesh, the mesh's contents then, and whether they may have changed since."""
+
+    surface: Surface
+    contents: tuple[int, int]
+    doubtful: bool = False
+
+
+_surfaces: dict[tuple, _Known] = {}  # the index of a million triangles takes a while: built once per mesh
+_joined: list[tuple[tuple[Surface, ...], Surface]] = []
+
+
+def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> bpy.types.Object:
+    """Make the mesh object of a terrain, shaded by its attributes, in the project's local coordinates.
+
+    The first terrain gives the project its shift; later ones are moved to it.
+    """
+    if store.has_shift(scene):
+        surface = moved(surface, store.read_shift(scene))
+    else:
+        store.write_shift(scene, surface.shift)
+    values = dict(zip(terrain_look.SHADING, (shading.hillshade, shading.eye_dome, shading.thin), strict=True))
+    mesh = new_mesh(surface.name, surface.vertices, surface.faces, values)
+    thing = bpy.data.objects.new(surface.name, mesh)
+    thing[store.ROLE_KEY], thing[ID_KEY] = store.TERRAIN_ROLE, uuid.uuid4().hex
+    thing["rockfall_summary"], thing[FILE_KEY] = list(surface.summary), surface.name
+    thing[THIN_KEY] = float(np.mean(shading.thin))
+    thing[REACH_KEY] = float(np.abs(surface.bounds).max())
+    store.collection(scene, "Terrain").objects.link(thing)
+    _surfaces[_key(thing)] = _Known(surface, _contents(mesh))
+    terrain_view.follow(scene)
+    terrain_look.apply(scene)
+    return thing
+
+
+def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping[str, np.ndarray]) -> bpy.types.Mesh:
+    """A smooth mesh with the terrain's material, the shading values (n,) as attributes, and a relief to be painted."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.attributes["position"].data.foreach_set("vector", vertices.astype(np.float32).ravel())
+    mesh.loops.add(3 * len(faces))
+    mesh.attributes[".corner_vert"].data.foreach_set("value", faces.astype(np.int32).ravel())
+    mesh.polygons.add(len(faces))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(faces), 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    for name_, value in values.items():
+        attribute = mesh.attributes.new(name_, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", np.ascontiguousarray(value, dtype=np.float32))
+    mesh.attributes.new(materials.RELIEF_COLOUR, "FLOAT_COLOR", "POINT")
+    mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.RELIEF_COLOUR
+    mesh.materials.append(materials.terrain_material())
+    return mesh
+
+
+def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) in single precision and triangles (m, 3) of a mesh, in its own coordinates."""
+    vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", vertices)  # many times as quick as mesh.vertices
+    if len(mesh.loops) == 3 * len(mesh.polygons):
+        faces = np.empty(len(mesh.loops), dtype=np.int32)
+        mesh.attributes[".corner_vert"].data.foreach_get("value", faces)
+    else:
+        mesh.calc_loop_triangles()
+        faces = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", faces)
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def tiles(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The terrain objects that have faces, by name."""
+    return [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if has_faces(thing)]
+
+
+def has_faces(thing: bpy.types.Object) -> bool:
+    """Whether an object can be terrain."""
+    return thing.type == "MESH" and len(thing.data.polygons) > 0
+
+
+def surface_of_scene(scene: bpy.types.Scene) -> Surface | None:
+    """All tiles of a scene as one surface in local coordinates; None when there is no terrain.
+
+    Made once, until a tile comes, goes, moves or changes; so is its spatial index.
+
+    Raises
+    ------
+    RockfallError : there is terrain, but none of it has faces.
+    """
+    parts = tiles(scene)
+    if not parts:
+        empty = next(iter(store.with_role(scene, store.TERRAIN_ROLE)), None)
+        return None if empty is None else surface_of(empty)
+    surfaces = tuple(surface_of(part) for part in parts)
+    if len(surfaces) == 1:
+        _joined.clear()
+        return surfaces[0]
+    if not _joined or len(_joined[0][0]) != len(surfaces) or any(map(_differ, _joined[0][0], surfaces)):
+        _joined[:] = [(surfaces, join(surfaces))]
+    return _joined[0][1]
+
+
+def surface_of(thing: bpy.types.Object) -> Surface:
+    """The surface of one terrain object, with its spatial index, in local coordinates.
+
+    That of a terrain that was just imported is the file's, in double precision. From a loaded file it is made from the
+    mesh, which is single precision: coordinates within 1 km of the origin are exact to 0.03 mm.
+
+    Raises
+    ------
+    RockfallError : the object has no faces.
+    """
+    if not has_faces(thing):
+        raise RockfallError(f"{thing.name} has no faces, so it cannot be the terrain. Choose a mesh with faces.")
+    key = _key(thing)
+    known = _surfaces.get(key)
+    if known is not None and known.doubtful:
+        known.doubtful = False
+        if known.contents != _contents(thing.data):
+            known = None
+    if known is None:
+        _forget_gone()
+        known = _surfaces[key] = _Known(_read(thing), _contents(thing.data))
+    return known.surface
+
+
+def active_terrain(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The first terrain object by name."""
+    return next(iter(store.with_role(scene, store.TERRAIN_ROLE)), None)
+
+
+def downhill(scene: bpy.types.Scene) -> Vector:
+    """Horizontal direction in which the terrain falls, from its mean normal; to the south when it is level."""
+    surface = surface_of_scene(scene) if tiles(scene) else None
+    if surface is None:
+        return Vector((0.0, -1.0, 0.0))
+    mean = Vector(np.nansum(surface.face_normals * surface.face_areas[:, None], axis=0).tolist())
+    fall = Vector((mean.x, mean.y, 0.0))
+    return fall.normalized() if fall.length > 1e-3 * mean.length else Vector((0.0, -1.0, 0.0))
+
+
+def forget_surfaces() -> None:
+    """Mistrust the cached surfaces: after undo or loading, the same keys may mean other meshes.
+
+    A surface whose mesh turns out to be as it was is kept with its index.
+    """
+    for known in _surfaces.values():
+        known.doubtful = True
+
+
+def warnings(scene: bpy.types.Scene) -> list[str]:
+    """What needs a person's attention, in sentences."""
+    said = []
+    for tile in store.with_role(scene, store.TERRAIN_ROLE):
+        if not has_faces(tile):
+            said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
+        reach = float(tile.get(REACH_KEY, 0.0))
+        if reach > LARGE_COORDINATE_M:
+            step = float(np.spacing(np.float32(reach))) * 1000
+            said.append(
+                f"{tile.name} reaches {reach / 1000:.0f} km from the project's origin. Blender is single precision and "
+                f"shows and saves it in steps of {step:.{0 if step >= 10 else 1}f} mm there. Is it of this project?"
+            )
+    return said
+
+
+def remarks(scene: bpy.types.Scene) -> list[str]:
+    """What is good to know about the scene's terrain, in sentences."""
+    said = []
+    grounds = tiles(scene)
+    faces = sum(len(tile.data.polygons) for tile in grounds)
+    drawn = sum(terrain_view.drawn_triangles(tile) for tile in grounds)
+    if drawn < faces:
+        said.append(
+            f"The 3-D view draws {grouped(drawn)} of {grouped(faces)} triangles. "
+            "Rays, normals and renders use them all."
+        )
+    thin = [(len(tile.data.vertices), float(tile.get(THIN_KEY, 0.0))) for tile in grounds]
+    share = sum(count * part for count, part in thin) / max(1, sum(count for count, _ in thin))
+    if share >= LEAST_THIN:
+        said.append(f"{100 * share:.0f} % of the points have thin data (bluish): the surface is guessed there.")
+    moved_by_hand = [tile.name for tile in grounds if tile.matrix_world != Matrix.Identity(4)]
+    if moved_by_hand:
+        said.append(f"Moved, turned or scaled in Blender: {', '.join(moved_by_hand)}. Rockfall takes it where it is.")
+    scale = scene.unit_settings.scale_length
+    if scale != 1.0:
+        said.append(f"Blender shows lengths × {scale:g} (the scene's unit scale); Rockfall computes in metres.")
+    return said
+
+
+def grouped(count: int) -> str:
+    """A count with its thousands set apart."""
+    return f"{count:,}".replace(",", "\u202f")
+
+
+def _read(thing: bpy.types.Object) -> Surface:
+    vertices, faces = mesh_arrays(thing.data)
+    world = np.array(thing.matrix_world)
+    local = vertices.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
+    if np.linalg.det(world[:3, :3]) < 0:  # mirrored: the faces would look into the ground
+        faces = np.ascontiguousarray(faces[:, ::-1])
+    return Surface(local, faces, store.read_shift(_scene_of(thing)), thing.name, ())
+
+
+def _forget_gone() -> None:
+    """Drop the surfaces whose meshes are no more."""
+    alive = {mesh.session_uid for mesh in bpy.data.meshes}
+    for key in [key for key in _surfaces if key[0] not in alive]:
+        del _surfaces[key]
+
+
+def _key(thing: bpy.types.Object) -> tuple:
+    mesh = thing.data
+    place = tuple(round(value, 9) for row in thing.matrix_world for value in row)
+    shift = store.read_shift(_scene_of(thing))
+    return mesh.session_uid, len(mesh.vertices), len(mesh.polygons), place, shift
+
+
+def _scene_of(thing: bpy.types.Object) -> bpy.types.Scene:
+    return next(iter(thing.users_scene), bpy.context.scene)
+
+
+def _contents(mesh: bpy.types.Mesh) -> tuple[int, int]:
+    """Checksums of the coordinates and the corners, some milliseconds for each million triangles."""
+    vertices, faces = mesh_arrays(mesh)
+    return zlib.crc32(vertices), zlib.crc32(faces)
+
+
+def _differ(one: Surface, other: Surface) -> bool:
+    return one is not other

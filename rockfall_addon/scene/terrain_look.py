@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The terrain's look: the sliders of a scene → the colours of its meshes and the values of its material.
+
+The 3-D view's solid mode shows a colour attribute, the material computes the same from the shading attributes.
+"""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+import bpy
+import numpy as np
+
+from . import materials, store
+
+SHADING = ("hillshade", "eye_dome", "thin")
+"""Attributes of a terrain's vertices, 0 … 1."""
+PLAIN_THIN = 5 / 7
+"""Where the material hatches half of the thin data, colours are mixed everywhere, somewhat less."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Strengths 0 … 1 of hillshade, eye-dome and the mark of thin data; brightness and contrast about 1."""
+
+    hillshade: float
+    eye_dome: float
+    thin: float
+    brightness: float
+    contrast: float
+
+
+def look_of(scene: bpy.types.Scene) -> Look:
+    """What the scene's sliders say."""
+    settings = scene.rockfall_terrain
+    return Look(**{name: store.double(getattr(settings, name)) for name in Look.__dataclass_fields__})
+
+
+def apply(scene: bpy.types.Scene) -> None:
+    """Show all terrain of a scene as its sliders say."""
+    look = look_of(scene)
+    paint(meshes(scene), look)
+    material = bpy.data.materials.get(materials.TERRAIN_MATERIAL)
+    if material is not None:
+        materials.set_terrain_values(material, asdict(look))
+
+
+def meshes(scene: bpy.types.Scene) -> list[bpy.types.Mesh]:
+    """The meshes of the scene's tiles, and those that stand in for them in the 3-D view."""
+    from . import terrain_view
+
+    tiles = [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if thing.type == "MESH"]
+    stand_ins = [stand_in for tile in tiles if (stand_in := terrain_view.stand_in(tile)) is not None]
+    return list({thing.data.name: thing.data for thing in (*tiles, *stand_ins)}.values())
+
+
+def paint(which: Iterable[bpy.types.Mesh], look: Look) -> None:
+    """Compute the relief colours of meshes anew; a mesh without the shading attributes stays as it is."""
+    for mesh in which:
+        relief = mesh.attributes.get(materials.RELIEF_COLOUR)
+        if relief is None or any(name not in mesh.attributes for name in SHADING):
+            continue
+        values = np.empty((len(SHADING), len(mesh.vertices)), dtype=np.float32)
+        for row, name in zip(values, SHADING, strict=True):
+            mesh.attributes[name].data.foreach_get("value", row)
+        relief.data.foreach_set("color", relief_colours(*values, look).ravel())
+        mesh.update_tag()
+
+
+def relief_colours(hillshade: np.ndarray, eye_dome: np.ndarray, thin: np.ndarray, look: Look) -> np.ndarray:
+    """(n, 4) linear colours: rock × light of hillshade and eye-dome, thin data bluish; single precision."""
+    light = _lit(hillshade, look.hillshade) * _lit(eye_dome, look.eye_dome)
+    if look.contrast != 1.0:
+        light = materials.RELIEF_MIDDLE * (light / materials.RELIEF_MIDDLE) ** np.float32(look.contrast)
+    light *= np.float32(materials.RELIEF_BRIGHTNESS * look.brightness)
+    mixed = np.asarray(thin, dtype=np.float32) * np.float32(PLAIN_THIN * look.thin)
+    colours = np.empty((len(light), 4), dtype=np.float32)
+    for axis in range(3):
+        rock, other = materials.ROCK_COLOUR[axis], materials.THIN_COLOUR[axis]
+        np.multiply(mixed, np.float32(other - rock), out=colours[:, axis])
+        colours[:, axis] += np.float32(rock)
+        colours[:, axis] *= light
+    np.minimum(colours, 1.0, out=colours)
+    colours[:, 3] = 1.0
+    return colours
+
+
+def _lit(value: np.ndarray, strength: float) -> np.ndarray:
+    return np.asarray(value, dtype=np.float32) * np.float32(strength) + np.float32(1.0 - strength)

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Flight curves: polylines with times and colours, which geometry nodes make tubes of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.colours import OBSERVED_COLOUR, rounded_top, scale_colours, srgb_to_linear
+from ...core.vectors import Array
+from . import materials, store
+
+SAMPLE_STEP_S = 0.02
+SAME_MOMENT_S = 1e-4
+BELOW_COLOUR = (1.0, 0.0, 0.0)
+STALE_COLOUR = (0.45, 0.45, 0.45)
+BELOW_ATTRIBUTE, DOUBT_ATTRIBUTE = "below_terrain", "doubt"
+MASS_KEY, STALE_KEY = "rockfall_mass_kg", "rockfall_stale"
+DOUBTFUL_SIGMA = 0.2
+"""Relative standard deviation of the speed that counts as full doubt."""
+
+Piece = tuple[Array, Array, Array]
+"""Of one flight: (m,) display times [s], (m, 3) positions [m], (m,) speeds [m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """What else is known of the points of a trail, by attribute: (points,) values; none by default."""
+
+    below: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    doubt: Array = field(default_factory=lambda: np.zeros(0))
+    tick: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+
+def moments(start_s: float, end_s: float) -> Array:
+    """Times at which a flight is sampled, its ends among them."""
+    return np.linspace(start_s, end_s, max(2, int(np.ceil((end_s - start_s) / SAMPLE_STEP_S)) + 1))
+
+
+def moments_with_ticks(start_s: float, end_s: float, offset_s: float, rate: float) -> tuple[Array, Array]:
+    """`moments` and those of the scene's frames, which are ticks: (m,) [s] on the clock, (m,) bool."""
+    even = moments(start_s, end_s)
+    first, last = np.ceil((start_s - offset_s) * rate), np.floor((end_s - offset_s) * rate)
+    frames = offset_s + np.arange(first, last + 1) / rate
+    frames = frames[(frames > start_s + SAME_MOMENT_S) & (frames < end_s - SAME_MOMENT_S)]
+    if not frames.size:
+        return even, np.zeros(len(even), dtype=bool)
+    after = np.searchsorted(frames, even)
+    gap = np.minimum(
+        np.abs(even - frames[np.minimum(after, len(frames) - 1)]), np.abs(even - frames[np.maximum(after - 1, 0)])
+    )
+    kept = even[gap > SAME_MOMENT_S]
+    times = np.concatenate([kept, frames])
+    order = np.argsort(times, kind="stable")
+    return times[order], (np.arange(len(times)) >= len(kept))[order]
+
+
+def trail(
+    name: str,
+    role: str,
+    pieces: Sequence[Piece],
+    marks: Marks | None = None,
+    thing: bpy.types.Object | None = None,
+) -> bpy.types.Object:
+    """An object of the flights, new or brought in line; `paint` gives it its colours, `set_trails` its thickness."""
+    counts = np.array([len(time) for time, _, _ in pieces])
+    time, place, speed = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    last = np.cumsum(counts) - 1
+    first = np.setdiff1d(np.arange(len(time)), last)
+    edges = np.column_stack([first, first + 1]).astype(np.int32).ravel()
+    if thing is None:
+        thing = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+        thing[store.ROLE_KEY] = role
+    mesh = thing.data
+    if len(mesh.vertices) != len(time) or len(mesh.edges) != len(first) or len(mesh.polygons):
+        mesh.clear_geometry()
+        mesh.vertices.add(len(time))
+        mesh.edges.add(len(first))
+    mesh.vertices.foreach_set("co", place.astype(np.float32).ravel())
+    mesh.edges.foreach_set("vertices", edges)
+    marks = marks or Marks()
+    for attribute, values in (
+        (materials.TIME_ATTRIBUTE, time),
+        (materials.SPEED_ATTRIBUTE, speed),
+        (BELOW_ATTRIBUTE, marks.below),
+        (DOUBT_ATTRIBUTE, marks.doubt),
+        (materials.TICK_ATTRIBUTE, marks.tick),
+    ):
+        if len(values):
+            _write(mesh, attribute, values)
+    if materials.SPEED_COLOUR not in mesh.attributes:
+        mesh.attributes.new(materials.SPEED_COLOUR, "FLOAT_COLOR", "POINT")
+        mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.SPEED_COLOUR
+    mesh.update()
+    modifier = thing.modifiers.get("Trail") or thing.modifiers.new("Trail", "NODES")
+    if modifier.node_group is None:
+        modifier.node_group = materials.trail_group()
+    return thing
+
+
+def paint(mesh: bpy.types.Mesh, colours: Array) -> None:
+    """Colour a trail: (3,) or (n, 3) sRGB."""
+    values = np.ones((len(mesh.vertices), 4), dtype=np.float32)
+    values[:, :3] = srgb_to_linear(np.asarray(colours))
+    mesh.attributes[materials.SPEED_COLOUR].data.foreach_set("color", values.ravel())
+    mesh.update()
+
+
+def paint_observed(scene: bpy.types.Scene, things: Sequence[bpy.types.Object] | None = None) -> None:
+    """Colour the real flights as the scene's settings say; all in the real blocks' colour while models are shown.
+
+    What passes below the terrain is red in any case, flights that are not up to date are grey.
+    """
+    models_shown = bool(store.with_role(scene, store.TWIN_FLIGHTS_ROLE))
+    for thing in store.with_role(scene, store.FLIGHTS_ROLE) if things is None else things:
+        mesh = thing.data
+        if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
+            continue
+        if thing.get(STALE_KEY):
+            paint(mesh, np.array(STALE_COLOUR))
+        elif models_shown:
+            paint(mesh, np.array(OBSERVED_COLOUR))
+        else:
+            colours = _colours(scene.rockfall, thing)
+            if BELOW_ATTRIBUTE in mesh.attributes:
+                colours[_read(mesh, BELOW_ATTRIBUTE).astype(bool)] = BELOW_COLOUR
+            paint(mesh, colours)
+
+
+def set_tops(scene: bpy.types.Scene) -> bool:
+    """Set the ends of the colour scales to what is shown; True when they changed."""
+    settings, speeds, energies = scene.rockfall, [0.0], [0.0]
+    for thing in store.with_role(scene, store.FLIGHTS_ROLE):
+        top = float(thing.get("rockfall_top_speed_mps", 0.0))
+        speeds.append(top)
+        energies.append(0.5 * float(thing.get(MASS_KEY, 0.0)) * top**2 / 1000)
+    tops = rounded_top(max(speeds)), rounded_top(max(energies))
+    before = settings.speed_top_mps, settings.energy_top_kj
+    settings.speed_top_mps, settings.energy_top_kj = tops
+    return before != (settings.speed_top_mps, settings.energy_top_kj)
+
+
+def set_trails(scene: bpy.types.Scene) -> None:
+    """Apply the trails' radius, their ticks, and whether they end at the current time."""
+    settings = scene.rockfall
+    for thing in store.with_role(scene, store.FLIGHTS_ROLE) + store.with_role(scene, store.TWIN_FLIGHTS_ROLE):
+        set_trail(settings, thing)
+
+
+def set_trail(settings: bpy.types.PropertyGroup, thing: bpy.types.Object) -> None:
+    """`set_trails` for one of them."""
+    modifier = thing.modifiers.get("Trail")
+    if modifier is not None and modifier.node_group is not None:
+        materials.set_input(modifier, "Radius", settings.trail_radius_m)
+        materials.set_input(modifier, "Up to now", settings.trail_until_now)
+        if "Ticks" in modifier.node_group.interface.items_tree:
+            materials.set_input(modifier, "Ticks", settings.show_ticks)
+        thing.update_tag()
+
+
+def _colours(settings: bpy.types.PropertyGroup, thing: bpy.types.Object) -> Array:
+    """(n, 3) sRGB of the points of a trail, by speed, energy or doubt."""
+    mesh = thing.data
+    if settings.colour_by == "DOUBT" and DOUBT_ATTRIBUTE in mesh.attributes:
+        return scale_colours(_read(mesh, DOUBT_ATTRIBUTE), 0.0, 1.0)
+    speed = _read(mesh, materials.SPEED_ATTRIBUTE)
+    if settings.colour_by == "ENERGY" and MASS_KEY in thing:
+        return scale_colours(0.5 * float(thing[MASS_KEY]) * speed**2 / 1000, 0.0, settings.energy_top_kj)
+    return scale_colours(speed, 0.0, settings.speed_top_mps)
+
+
+def _write(mesh: bpy.types.Mesh, name: str, values: Array) -> None:
+    boolean = values.dtype == np.bool_
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "BOOLEAN" if boolean else "FLOAT", "POINT")
+    attribute.data.foreach_set("value", values if boolean else values.astype(np.float32))
+
+
+def _read(mesh: bpy.types.Mesh, name: str) -> Array:
+    attribute = mesh.attributes[name]
+    values = np.empty(len(mesh.vertices), dtype=bool if attribute.data_type == "BOOLEAN" else np.float32)
+    attribute.data.foreach_get("value", values)
+    return values

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trajectories: a reconstruction ↔ what the scene shows of it.
+
+Of each trajectory: its picks, one polyline of its flights with colours, its block, keyed on the parabolas, and the
+numbers of its impacts. What is there already is brought in line, not made anew.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import bpy
+import numpy as np
+
+from ...core.colours import OBSERVED_COLOUR
+from ...core.reconstruction.block import Block
+from ...core.reconstruction.flight import flight_states
+from ...core.reconstruction.trajectory import Reconstruction
+from ...core.terrain.raycast import heights_above
+from ...core.terrain.surface import Surface
+from ...core.vectors import Array, norm
+from . import impact_rows, keyframes, materials, picks, store, timing, trails
+from .impact_rows import RESULT_KEY
+
+BELOW_RADII = 0.2
+"""A point of a flight that is deeper under the terrain than this part of the block's radius is shown as below it."""
+BOUNCES_HIGHER = 1.0
+"""An R above this deserves doubt: no impact makes a block quicker."""
+
+Parts = Mapping[tuple[str, str], bpy.types.Object]
+
+
+def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface: Surface | None = None) -> None:
+    """Bring the scene's picks, flights, blocks and impact table in line with a reconstruction.
+
+    surface : the terrain, to tell what passes below it.
+    """
+    settings = scene.rockfall
+    first = not store.with_role(scene, store.FLIGHTS_ROLE)
+    if first:
+        _choose_sizes(settings, result)
+    offsets = timing.offsets_of(scene, result.picks)
+    things = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
+    scene[store.KEYED_RATE_KEY] = timing.frame_rate(scene)
+    timing.keep_offsets(scene, offsets)
+    store_results(things, result)
+    parts = parts_of(scene)
+    names = [name for name in offsets if (result.flights.trajectory == name).any()]
+    store.remove_objects([thing for (_, name), thing in parts.items() if name not in names])
+    last = 1.0
+    for name in names:
+        show_trajectory(scene, name, result, offsets[name], surface, parts)
+        end = result.flights.end_time_s[result.flights.trajectory == name].max()
+        last = max(last, float(end) - offsets[name])
+    trails.set_tops(scene)
+    trails.paint_observed(scene)
+    impact_rows.fill(scene)
+    scene.frame_start = 0
+    end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
+    filmed = bool(store.with_role(scene, store.CAMERA_ROLE))  # a video may go on after the last pick
+    scene.frame_end = max(end, scene.frame_end) if filmed else end
+    if first and not filmed:
+        scene.frame_set(0)
+
+
+def parts_of(scene: bpy.types.Scene, trajectories: Sequence[str] | None = None) -> Parts:
+    """(role, trajectory) → the object that shows its flights, or its block. A copy that somebody made is not ours.
+
+    trajectories : None for all.
+    """
+    found: dict[tuple[str, str], bpy.types.Object] = {}
+    for thing in scene.objects:
+        role = thing.get(store.ROLE_KEY)
+        if role not in (store.FLIGHTS_ROLE, store.BLOCK_ROLE):
+            continue
+        name = thing.get(picks.TRAJECTORY_KEY)
+        if name is None or (trajectories is not None and name not in trajectories):
+            continue
+        other = found.setdefault((role, name), thing)
+        if other != thing:
+            older, newer = sorted((other, thing), key=lambda each: each.session_uid)
+            found[role, name] = older
+            del newer[store.ROLE_KEY]
+    return found
+
+
+def show_trajectory(
+    scene: bpy.types.Scene,
+    name: str,
+    result: Reconstruction,
+    offset: float,
+    surface: Surface | None,
+    parts: Parts,
+    *,
+    in_place: bool = False,
+) -> None:
+    """Bring the flights and the block of one trajectory in line; without a flight there are none.
+
+    in_place : see `motion.write_location_keys`.
+    """
+    which = np.flatnonzero(result.flights.trajectory == name)
+    trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
+    if not which.size:
+        store.remove_objects([thing for thing in (trail, block) if thing is not None])
+        return
+    trail = _show_flights(scene, name, result, which, offset, surface, trail)
+    _show_block(scene, name, result, which, offset, block, in_place)
+    trails.paint_observed(scene, [trail])
+
+
+def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> None:
+    """Sizes at which markers, trails and blocks are seen when the whole slope is; to be changed at will."""
+    extent = float(np.ptp(result.picks.position, axis=0).max(initial=0.0))
+    blocks = [result.block] if isinstance(result.block, Block) else list(result.block.values())
+    radius = float(np.mean([block.radius_m for block in blocks]))
+    settings.marker_radius_m = max(radius, 0.006 * extent)
+    settings.trail_radius_m = max(0.2 * radius, 0.0025 * extent)
+    settings.block_scale = max(1.0, round(0.008 * extent / radius * 2) / 2)
+
+
+def _block_of(result: Reconstruction, name: str) -> Block:
+    return result.block if isinstance(result.block, Block) else result.block[name]
+
+
+def _show_flights(
+    scene: bpy.types.Scene,
+    name: str,
+    result: Reconstruction,
+    which: np.ndarray,
+    offset: float,
+    surface: Surface | None,
+    thing: bpy.types.Object | None,
+) -> bpy.types.Object:
+    flights, rate = result.flights, timing.frame_rate(scene)
+    sampled = [
+        trails.moments_with_ticks(float(flights.start_time_s[i]), float(flights.end_time_s[i]), offset, rate)
+        for i in which
+    ]
+    counts = np.array([len(clock) for clock, _ in sampled])
+    clock = np.concatenate([clock for clock, _ in sampled])
+    position, velocity = flight_states(flights, np.repeat(which, counts), clock)
+    edges = np.cumsum(counts)[:-1]
+    speed = norm(velocity)
+    pieces = list(zip(np.split(clock - offset, edges), np.split(position, edges), np.split(speed, edges), strict=True))
+    marks = trails.Marks(
+        below=_below(result, name, position, surface),
+        doubt=np.repeat(_doubt(result, which), counts),
+        tick=np.concatenate([tick for _, tick in sampled]),
+    )
+    new = thing is None
+    bare = new or "Trail" not in thing.modifiers or thing.modifiers["Trail"].node_group is None
+    thing = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, pieces, marks, thing)
+    thing[picks.TRAJECTORY_KEY] = name
+    thing[trails.MASS_KEY] = _block_of(result, name).mass_kg
+    ends = np.vstack([flights.start_velocity[which], flights.end_velocity[which]])
+    thing["rockfall_top_speed_mps"] = float(norm(ends).max(initial=0.0))
+    thing.pop(trails.STALE_KEY, None)
+    if new:
+        store.collection(scene, "Trajectories", name).objects.link(thing)
+    if bare:
+        trails.set_trail(scene.rockfall, thing)
+    return thing
+
+
+def _below(result: Reconstruction, name: str, position: Array, surface: Surface | None) -> Array:
+    """(n,) whether points of a trajectory's flights are below the terrain."""
+    if surface is None:
+        return np.zeros(len(position), dtype=bool)
+    radius = _block_of(result, name).radius_m
+    underside = radius if result.ends == "centres" else 0.0
+    with np.errstate(invalid="ignore"):
+        return heights_above(surface, position) - underside < -BELOW_RADII * radius
+
+
+def _doubt(result: Reconstruction, which: np.ndarray) -> Array:
+    """(k,) doubt about flights, 0…1: the relative standard deviation of their speed, and 1 for what is flagged."""
+    flights, impacts = result.flights, result.impacts
+    row_of = np.full(len(result.picks), -1)
+    row_of[np.flatnonzero(result.picks.kind == "impact")] = np.arange(len(impacts))
+    doubt = np.zeros(which.size)
+    for ends, velocity, name in ((flights.first_pick, impacts.v2, "v2"), (flights.last_pick, impacts.v1, "v1")):
+        row = row_of[ends[which]]
+        known = row >= 0
+        if name in impacts.sigma:
+            relative = speed_sigma(velocity, impacts.sigma[name]) / norm(velocity)
+            doubt[known] = np.fmax(doubt[known], relative[row[known]] / trails.DOUBTFUL_SIGMA)
+        flagged = impacts.flags["doubtful"].copy()
+        if name == "v2":
+            flagged |= impacts.flags["into_ground"] | (impacts.r > BOUNCES_HIGHER)
+        else:
+            flagged |= impacts.flags["departing"]
+        doubt[known] = np.where(flagged[row[known]], 1.0, doubt[known])
+    radius = np.array([_block_of(result, str(flights.trajectory[i])).radius_m for i in which])
+    return np.clip(np.where(result.clearance.below_terrain_m[which] > radius, 1.0, doubt), 0.0, 1.0)
+
+
+def speed_sigma(velocity: Array, sigma: Array) -> Array:
+    """(n,) standard deviation of the speed, the errors of the components (n, 3) taken as independent [m/s]."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return norm(velocity * sigma) / norm(velocity)
+
+
+def _show_block(
+    scene: bpy.types.Scene,
+    name: str,
+    result: Reconstruction,
+    which: np.ndarray,
+    offset: float,
+    thing: bpy.types.Object | None,
+    in_place: bool,
+) -> None:
+    block = _block_of(result, name)
+    scale = scene.rockfall.block_scale
+    if thing is None:
+        thing = bpy.data.objects.new(f"{name} block", block_mesh())
+        thing[store.ROLE_KEY], thing[picks.TRAJECTORY_KEY] = store.BLOCK_ROLE, name
+        store.collection(scene, "Trajectories", name).objects.link(thing)
+    thing.scale = np.array([block.d1, block.d2, block.d3]) * scale / 2
+    thing.delta_location.z = (scale - 1) * block.radius_m  # an enlarged block must not sink into the slope
+    keys = keyframes.motion_keys(result.flights, which)
+    keys.time_s[:] -= offset
+    keyframes.write_location_keys(thing, keys, timing.frame_rate(scene), in_place=in_place)
+
+
+def normals_of(result: Reconstruction) -> np.ndarray:
+    """(n, 3) normals of the picks, those of the impacts as they were fitted to the terrain."""
+    normals = result.picks.normal.copy()
+    normals[result.picks.kind == "impact"] = result.impacts.normal
+    return normals
+
+
+def store_results(things: Sequence[bpy.types.Object], result: Reconstruction) -> None:
+    """Write each impact's numbers into its object, where panels and exports find them.
+
+    things : the object of each of the reconstruction's picks.
+    """
+    impacts, flags = result.impacts, result.impacts.flag_text()
+    columns = {
+        "incident_mps": impacts.v1,
+        "restituted_mps": impacts.v2,
+        "rn": impacts.rn,
+        "rt": impacts.rt,
+        "r": impacts.r,
+        "theta1_deg": np.degrees(impacts.theta1),
+        "theta_dev_deg": np.degrees(impacts.theta_dev),
+        "normal_spread_deg": np.degrees(impacts.normal_spread),
+        "kinetic1_j": impacts.kinetic1_j,
+        "kinetic2_j": impacts.kinetic2_j,
+        "bounce_height_m": impacts.bounce_height_m,
+        "chord_height_m": impacts.chord_height_m,
+    }
+    if impacts.sigma:
+        sigma = impacts.sigma
+        columns |= {f"sigma_{name}": sigma[name] for name in ("rn", "rt", "r")}
+        columns |= {f"sigma_{name}_deg": np.degrees(sigma[name]) for name in ("theta1", "theta_dev")}
+        columns["sigma_speed1"] = speed_sigma(impacts.v1, sigma["v1"])
+        columns["sigma_speed2"] = speed_sigma(impacts.v2, sigma["v2"])
+        columns["sigma_kinetic1_j"] = impacts.mass_kg * norm(impacts.v1) * columns["sigma_speed1"]
+        columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
+    rows = {name: values.reshape(len(impacts), -1).tolist() for name, values in columns.items()}
+    i = 0
+    for thing, kind in zip(things, result.picks.kind.tolist(), strict=True):
+        if kind != "impact":
+            thing.pop(RESULT_KEY, None)
+            continue
+        thing[RESULT_KEY] = {name: values[i] for name, values in rows.items()} | {
+            "number": int(impacts.impact[i]),
+            "flags": flags[i],
+        }
+        i += 1
+
+
+def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] = OBSERVED_COLOUR) -> bpy.types.Mesh:
+    """An angular block of radius 1 (convex hull of seeded directions), shared by all blocks of one colour."""
+    existing = bpy.data.meshes.get(name)
+    if existing is not None:
+        return existing
+    import bmesh
+
+    random = np.random.default_rng(7)
+    directions = random.normal(size=(28, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    corners = directions * random.uniform(0.88, 1.0, (28, 1))
+    shape = bmesh.new()
+    for corner in corners:
+        shape.verts.new(corner)
+    bmesh.ops.convex_hull(shape, input=shape.verts)
+    mesh = bpy.data.meshes.new(name)
+    shape.to_mesh(mesh)
+    shape.free()
+    colours = np.tile(materials.linear_colour(colour), len(mesh.vertices)).astype(np.float32)
+    mesh.attributes.new("colour", "FLOAT_COLOR", "POINT").data.foreach_set("color", colours)
+    mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
+    mesh.materials.append(materials.shaded_material("Rockfall block", "colour"))
+    return mesh

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The steps of the workflow, a folder each: its properties, operators, panel and overlay. No step imports another."""
+
+from importlib import import_module
+from types import ModuleType
+
+import bpy
+
+from .. import view
+from ..scene import settings
+
+STEPS = (
+    "start",
+    "terrain",
+    "videos",
+    "alignment",
+    "picking",
+    "impacts",
+    "refinement",
+    "models",
+    "playback",
+    "film",
+    "share",
+)
+"""In the order of the sidebar."""
+
+_registered: list[ModuleType] = []
+
+
+def parts() -> list[ModuleType]:
+    """All modules that register something: first the properties, which the rest reads; then step by step."""
+    found = [settings, *view.PARTS]
+    for name in STEPS:
+        found += import_module(f".{name}", __name__).PARTS
+    return sorted(found, key=lambda part: not part.__name__.endswith((".settings", ".properties")))
+
+
+def classes() -> list[type]:
+    """Panels, operators and lists of all parts."""
+    return [cls for part in parts() for cls in getattr(part, "CLASSES", ())]
+
+
+def tools() -> list[type]:
+    """The tools of all parts."""
+    return [tool for part in parts() for tool in getattr(part, "TOOLS", ())]
+
+
+def register() -> None:
+    """Register what each part lists in ``CLASSES`` and ``TOOLS``, then call its own ``register()``."""
+    first = tools()[0]
+    for part in parts():
+        _registered.append(part)
+        for cls in getattr(part, "CLASSES", ()):
+            bpy.utils.register_class(cls)
+        for tool in getattr(part, "TOOLS", ()):
+            bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=tool is first)
+        if hasattr(part, "register"):
+            part.register()
+
+
+def unregister() -> None:
+    """The same backwards."""
+    while _registered:
+        part = _registered.pop()
+        if hasattr(part, "unregister"):
+            part.unregister()
+        for tool in reversed(getattr(part, "TOOLS", ())):
+            bpy.utils.unregister_tool(tool)
+        for cls in reversed(getattr(part, "CLASSES", ())):
+            bpy.utils.unregister_class(cls)

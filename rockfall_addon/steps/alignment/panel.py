@@ -1,0 +1,260 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 3: the camera's place, from pairs of the footage and the terrain."""
+
+import math
+
+import bpy
+
+from ...scene import alignment, store, videos
+from ...view.panel import RockfallPanel, State, advise, facts, paragraph
+from . import following
+
+COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, alignment.COLOURS + 1))
+
+
+class ROCKFALL_UL_pairs(bpy.types.UIList):
+    """Rows: use, colour, name, residuals."""
+
+    bl_idname = "ROCKFALL_UL_pairs"
+    use_filter_show = False
+
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: object,
+        item: bpy.types.PropertyGroup,
+        icon: int,
+        active_data: object,
+        active_property: str,
+        index: int = 0,
+        flt_flag: int = 0,
+    ) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "enabled", text="")
+        row.label(text="", icon="ERROR" if item.is_wrong else COLOURS[item.colour % len(COLOURS)])
+        cells = row.split(factor=0.4, align=True)
+        cells.prop(item, "name", text="", emboss=False)
+        right = cells.row(align=True)
+        right.active = item.enabled
+        if item.missing:
+            right.label(text="terrain?" if item.missing == alignment.POINT else "picture?")
+        else:
+            for value in (item.residual_px, item.residual_m):
+                right.label(text=short(value))
+
+
+def short(value: float) -> str:
+    """A residual with no more digits than it deserves."""
+    return "–" if math.isnan(value) else f"{value:.{2 if value < 10 else 0}f}"
+
+
+class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
+    bl_label = "3  Alignment"
+    bl_idname = "ROCKFALL_PT_alignment"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        camera = videos.active_camera(context.scene)
+        if camera is None or not alignment.is_placed(camera):
+            return "TO_DO"
+        solution = alignment.solution_of(camera)
+        return "ATTENTION" if solution.problem or solution.wrong or following.is_stale(camera) else "READY"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        camera = videos.active_camera(scene)
+        if camera is None:
+            advise(context, layout, False, "Add a video first (step 2).")
+            return
+        settings, solution = camera.rockfall_alignment, alignment.solution_of(camera)
+        self._state(context, camera, solution)
+        if following.running:
+            self._progress(context)
+        column = layout.column(align=True)
+        column.scale_y = 1.3
+        column.operator("rockfall.align_views", icon="SPLIT_VERTICAL")
+        layout.operator("rockfall.use_view", icon="VIEW_CAMERA")
+        row = layout.row(align=True)
+        row.prop(settings, "blend", slider=True)
+        row.prop(settings, "use_wipe", text="", icon="MOD_MIRROR")
+        if settings.use_wipe:
+            layout.prop(settings, "wipe", slider=True)
+        self._pairs(layout, settings)
+
+    def _state(self, context: bpy.types.Context, camera: bpy.types.Object, solution: alignment.Solution) -> None:
+        """How this step stands, and what to do next."""
+        layout, scene = self.layout, context.scene
+        placed, next_step = alignment.placement(camera), alignment.hint(scene, camera)
+        if placed == alignment.BY_EYE:
+            paragraph(context, layout, f"{camera.name} is placed by eye: its errors are not known.", "INFO")
+        elif placed == alignment.FROM_FILE:
+            advise(context, layout, True, f"{camera.name} comes from a file.")
+        elif placed and not solution.problem:
+            count = sum(pair.is_complete and pair.enabled for pair in alignment.pairs_of(camera))
+            good = count - len(solution.wrong)
+            fit = f"{good} pairs fit to {solution.rmse_px:.2f} px." if math.isfinite(solution.rmse_px) else ""
+            advise(context, layout, True, f"{camera.name} is solved. {fit}")
+        if solution.problem and not next_step:
+            paragraph(context, layout, solution.problem, "ERROR")
+        for sentence in solution.advice:
+            paragraph(context, layout, sentence, "ERROR" if sentence.startswith("Pair ") else "INFO")
+        if next_step:
+            advise(context, layout, False, next_step)
+
+    def _progress(self, context: bpy.types.Context) -> None:
+        box = self.layout.box()
+        for job in following.running:
+            box.progress(factor=job.part, text=f"{100 * job.part:.0f} %")
+            paragraph(context, box, f"{job.said}. Esc stops it.", "TIME")
+        box.operator("rockfall.stop_following", icon="CANCEL")
+
+    def _pairs(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+        if len(settings.rows):
+            head = layout.split(factor=0.46, align=True)
+            head.label(text="Pairs")
+            for unit in ("px", "m"):
+                head.label(text=unit)
+            row = layout.row()
+            row.template_list("ROCKFALL_UL_pairs", "", settings, "rows", settings, "active", rows=4, maxrows=8)
+            column = row.column(align=True)
+            column.operator("rockfall.delete_pair", text="", icon="REMOVE")
+            column.operator("rockfall.go_to_pair", text="", icon="VIEWZOOM")
+            column.separator()
+            column.prop(settings, "show_pairs", text="", icon="HIDE_OFF")
+            column.prop(settings, "magnify", text="", icon="FULLSCREEN_ENTER")
+        row = layout.row(align=True)
+        row.operator("rockfall.import_pairs", text="Import", icon="IMPORT")
+        if len(settings.rows):
+            row.operator("rockfall.export_pairs", text="Export", icon="EXPORT")
+            row.operator("rockfall.delete_pair", text="", icon="TRASH").every = True
+
+
+class ROCKFALL_PT_alignment_lens(RockfallPanel, bpy.types.Panel):
+    bl_label = "Lens"
+    bl_idname = "ROCKFALL_PT_alignment_lens"
+    bl_parent_id = "ROCKFALL_PT_alignment"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return videos.active_camera(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, camera = self.layout, videos.active_camera(context.scene)
+        settings, solution = camera.rockfall_alignment, alignment.solution_of(camera)
+        sigma, lens = solution.sigma or {}, alignment.lens_of(camera)
+        row = layout.row(align=True)
+        row.prop(settings, "free_focal", text="", icon="UNLOCKED" if settings.free_focal else "LOCKED")
+        fields = row.row(align=True)
+        fields.enabled = not settings.free_focal
+        fields.prop(settings, "focal_px", text="f [px]")
+        fields.prop(settings, "focal_mm", text="[mm]")
+        if settings.free_focal and "fx" in sigma:
+            layout.label(text=f"Found: {lens[0]:.1f} ± {sigma['fx']:.1f} px", icon="BLANK1")
+        self._box(layout, settings, "free_centre", "Centre", _values(lens[2:4], sigma, ("cx", "cy"), ".1f", " px"))
+        for name, index in (("k1", 4), ("k2", 5)):
+            self._box(layout, settings, f"free_{name}", name, _values(lens[index : index + 1], sigma, (name,), ".4f"))
+        header, body = layout.panel("rockfall_more_of_the_lens", default_closed=True)
+        header.label(text="More of the lens")
+        if body is not None:
+            for name, index in (("k3", 6), ("p1", 7), ("p2", 8)):
+                text = _values(lens[index : index + 1], sigma, (name,), ".5f")
+                self._box(body, settings, f"free_{name}", name, text)
+
+    @staticmethod
+    def _box(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup, box: str, name: str, value: str) -> None:
+        row = layout.split(factor=0.4, align=True)
+        free = getattr(settings, box)
+        row.prop(settings, box, text=name, icon="UNLOCKED" if free else "LOCKED", toggle=True)
+        row.label(text=value)
+
+
+def _values(numbers: object, sigma: dict[str, float], names: tuple[str, ...], digits: str, unit: str = "") -> str:
+    text = ", ".join(f"{number:{digits}}" for number in numbers)
+    spread = [f"{sigma[name]:{digits}}" for name in names if name in sigma]
+    return f"{text}{' ± ' + ', '.join(spread) if spread else ''}{unit}"
+
+
+class ROCKFALL_PT_alignment_motion(RockfallPanel, bpy.types.Panel):
+    bl_label = "Hand-held Camera"
+    bl_idname = "ROCKFALL_PT_alignment_motion"
+    bl_parent_id = "ROCKFALL_PT_alignment"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return videos.active_camera(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, camera = self.layout, videos.active_camera(context.scene)
+        settings = camera.rockfall_alignment
+        layout.row(align=True).prop(settings, "motion", expand=True)
+        if settings.motion == "FIXED":
+            paragraph(context, layout, "One pose for all frames. If the picture moves, choose Hand-held.", "INFO")
+            return
+        known = following.followed(camera)
+        if known is None:
+            advise(context, layout, False, "Solve the camera in one frame, then follow the background from there.")
+        else:
+            self._said(context, camera, known)
+        row = layout.row()
+        row.scale_y = 1.2
+        row.operator(
+            "rockfall.follow_background",
+            text="Follow the Background" if known is None else "Follow Again",
+            icon="TRACKING_FORWARDS",
+        )
+        if known is not None:
+            layout.operator("rockfall.propose_pairs", icon="PINNED")
+
+    def _said(self, context: bpy.types.Context, camera: bpy.types.Object, known: dict) -> None:
+        layout, keys = self.layout, alignment.solution_of(camera).keys
+        corrected = f", corrected at {', '.join(map(str, keys))}" if keys else ""
+        text = f"Solved at frame {known['reference']}, followed through {known['frames']} frames{corrected}."
+        advise(context, layout, True, text)
+        rows = [("Turns by up to", f"{known['turn_deg']:.2f}°")]
+        if known["features"]:
+            rows.append(("Features a frame", f"{known['features']:.0f}"))
+        if known["residual_px"] is not None:
+            rows.append(("They fit to", f"{known['residual_px']:.2f} px"))
+        if known["sigma_px"] is not None:
+            rows.append(("Poses known to", f"{known['sigma_px']:.2f} px"))
+        facts(layout, rows)
+        for sentence in known["advice"]:
+            paragraph(context, layout, sentence, "INFO")
+        if following.is_stale(camera):
+            paragraph(context, layout, "The focal length has changed since. Follow again.", "ERROR")
+
+
+class ROCKFALL_PT_alignment_files(RockfallPanel, bpy.types.Panel):
+    bl_label = "Camera File"
+    bl_idname = "ROCKFALL_PT_alignment_files"
+    bl_parent_id = "ROCKFALL_PT_alignment"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return videos.active_camera(context.scene) is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, camera = self.layout, videos.active_camera(context.scene)
+        if videos.is_solved(camera):
+            place = store.read_shift(context.scene).to_survey(videos.moving_camera(camera).camera.position)
+            sigma = alignment.solution_of(camera).sigma or {}
+            rows = []
+            for axis, value in zip("xyz", place.tolist(), strict=True):
+                spread = f" ± {sigma[axis]:.2f}" if axis in sigma else ""
+                rows.append((f"Position {axis.upper()}", f"{value:.2f}{spread} m"))
+            facts(layout, rows)
+        row = layout.row(align=True)
+        row.operator("rockfall.import_camera", text="Import", icon="IMPORT")
+        row.operator("rockfall.export_camera", text="Export", icon="EXPORT")
+
+
+CLASSES = (
+    ROCKFALL_UL_pairs,
+    ROCKFALL_PT_alignment,
+    ROCKFALL_PT_alignment_lens,
+    ROCKFALL_PT_alignment_motion,
+    ROCKFALL_PT_alignment_files,
+)

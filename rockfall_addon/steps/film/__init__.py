@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 8: films, set up in Blender and rendered with or without a window."""
+
+from . import operators, panel
+
+PARTS = (operators, panel)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender as a module, in a process of its own: one job, given as JSON.
+
+Blender prints a lot, so its standard output goes to the error stream. What the parent process reads from our standard
+output are lines "frame DONE TOTAL", and "error TEXT" for what the user can put right.
+"""
+
+import os
+import sys
+from typing import NoReturn
+
+import bpy
+
+from .... import rockfall_addon
+from ....core.errors import RockfallError
+from ....core.film.job import FilmJob
+from .render import make
+
+
+def main(text: str) -> NoReturn:
+    parent = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
+    os.dup2(2, 1)
+
+    def say(line: str) -> None:
+        try:
+            parent.write(line + "\n")
+        except BrokenPipeError:  # nobody waits for this film any more
+            os._exit(1)
+
+    status = 0
+    try:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        rockfall_addon.register()
+        make(FilmJob.from_json(text), lambda done, total: say(f"frame {done} {total}"))
+    except RockfallError as error:
+        say(f"error {error}".replace("\n", " "))
+        status = 1
+    parent.close()
+    sys.stderr.flush()
+    os._exit(status)  # after work on the graphics card, Blender may crash when it leaves by itself
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

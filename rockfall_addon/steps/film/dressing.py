@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Setting a scene up for a film, and taking the set-up away again."""
+
+import bpy
+import numpy as np
+
+from ....core.colours import OBSERVED_COLOUR, model_colour
+from ....core.exchange.project import RenderPreset
+from ....core.film.engines import IDENTIFIERS
+from ....core.film.framing import View, rounded_scale
+from ....core.film.presets import FilmTiming
+from ....core.film.wording import compared_lines, fastest_speed, notes
+from ....core.impact_models.registry import find_model
+from ...scene import models, store, timing
+from ...scene.reconstruction import SITE_KEY
+from . import camera, layout, marks, presence, remembered
+from .engine import use_engine
+from .motions import Motion, motions_of
+
+FILM_ROLE = "film"
+BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 2.2, 2.4
+"""At least this many pixels of a picture 640 wide: a block, the width of a trail, the radius of an impact's ring."""
+SMALL_WIDTH = 640
+
+
+def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
+    """Camera, captions and growing trails for a film of what is in the scene, which is then played frame by frame.
+
+    Raises
+    ------
+    RockfallError : there is nothing to film.
+    """
+    _begin(scene, preset, engine)
+    film = FilmTiming(preset.fps, preset.time_scale)
+    scene.render.fps, scene.render.fps_base = film.base
+    scene.render.frame_map_old, scene.render.frame_map_new = film.remap
+    timing.follow_frame_rate(scene)
+    settings = scene.rockfall
+    playback = "REAL" if preset.stagger_s is None else "TOGETHER"
+    if settings.playback != playback:
+        settings.playback = playback
+    if preset.stagger_s is not None and abs(settings.stagger_s - preset.stagger_s) > 1e-6:
+        settings.stagger_s = preset.stagger_s
+
+    motions = motions_of(scene)
+    view = _view(scene, motions, preset, whole=False)
+    _size_things(scene, motions, view)
+    settings.trail_until_now = True
+    motions = motions_of(scene)
+    last = film.last_frame(max((float(motion.time_s[-1]) for motion in motions), default=0.0))
+    scene.frame_start, scene.frame_end = 0, last
+    moments = np.arange(last + 1) * film.frame_s
+    shown = models.shown_models(scene)
+    remarks = notes(settings.block_scale, preset.time_scale, rings=bool(motions))
+    subtitle, more = compared_lines(len(shown)) if shown else (_count(motions), "")
+    words = layout.Words(
+        title=_title(scene),
+        subtitle=subtitle,
+        note="\n".join(filter(None, (more, remarks))),
+        speed_top_mps=settings.speed_top_mps if motions and not shown else None,
+        sources=_sources(shown),
+        time_s=moments,
+        fastest_mps=fastest_speed([(motion.time_s, motion.speed_mps) for motion in motions], moments),
+        rate=1.0 / film.frame_s,
+    )
+    _furnish(scene, view, motions, words, preset)
+    presence.show_while_moving(scene, motions)
+    use_engine(scene, engine)
+    scene.frame_set(0)
+
+
+def set_up_picture(
+    scene: bpy.types.Scene, preset: RenderPreset, engine: str, title: str = "", subtitle: str = ""
+) -> None:
+    """Camera and captions for a still picture of the whole slope, with all trajectories and impacts there are.
+
+    Raises
+    ------
+    RockfallError : there is nothing to show.
+    """
+    _begin(scene, preset, engine)
+    motions = motions_of(scene)
+    view = _view(scene, motions, preset, whole=True)
+    _size_things(scene, motions, view)
+    scene.rockfall.trail_until_now = False
+    motions = motions_of(scene)
+    for thing in store.with_role(scene, store.BLOCK_ROLE):
+        thing.hide_render = True
+    words = layout.Words(
+        title=title or _title(scene),
+        subtitle=subtitle or _count(motions),
+        note=notes(rings=bool(motions)),
+        speed_top_mps=scene.rockfall.speed_top_mps if motions and not models.shown_models(scene) else None,
+        sources=_sources(models.shown_models(scene)),
+    )
+    _furnish(scene, view, motions, words, preset)
+    use_engine(scene, engine, still=True)
+    scene.frame_set(scene.frame_end)
+
+
+def remove_film(scene: bpy.types.Scene) -> None:
+    """Take the set-up away: the scene is as it was."""
+    _remove_furniture(scene)
+    presence.show_always(scene)
+    for thing in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
+        thing.hide_render = False
+    if remembered.is_set_up(scene):
+        remembered.put_back(scene)
+
+
+def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
+    remembered.remember(scene)
+    _remove_furniture(scene)
+    render = scene.render
+    render.engine = IDENTIFIERS[engine]
+    render.resolution_x, render.resolution_y, render.resolution_percentage = preset.width, preset.height, 100
+
+
+def _view(scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, whole: bool) -> View:
+    aspect = preset.width / preset.height
+    if preset.camera is not None:
+        return camera.given_view(scene, preset.camera, aspect)
+    return camera.automatic_view(scene, motions, aspect, whole)
+
+
+def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> None:
+    """Blocks and trails large enough to be seen from the camera."""
+    blocks = store.with_role(scene, store.BLOCK_ROLE)
+    if not motions or not blocks:
+        return
+    settings = scene.rockfall
+    pixel = _pixel_m(scene, view, motions)
+    diameter = float(np.median([2 * np.mean(thing.scale) for thing in blocks])) / settings.block_scale
+    before = remembered.value(scene, "rockfall.block_scale")
+    scale = max(before, rounded_scale(BLOCK_PX * pixel / diameter))
+    if abs(settings.block_scale - scale) > 1e-6:
+        settings.block_scale = scale
+    settings.trail_radius_m = max(remembered.value(scene, "rockfall.trail_radius_m"), TRAIL_PX * pixel / 2)
+
+
+def _furnish(
+    scene: bpy.types.Scene, view: View, motions: list[Motion], words: layout.Words, preset: RenderPreset
+) -> None:
+    """Camera, backdrop and captions, all moving with the camera; rings in place of the marks of the picks."""
+    for thing in store.with_role(scene, store.PICK_ROLE):
+        thing.hide_render = True
+    if motions:
+        radius = max(scene.rockfall.marker_radius_m, MARK_PX * _pixel_m(scene, view, motions))
+        rings = marks.impact_marks(scene, radius)
+        if rings is not None:
+            _add(scene, rings)
+    aspect = preset.width / preset.height
+    eye = camera.add_camera(scene, view, camera.scene_points(scene, motions))
+    _add(scene, eye)
+    scene.camera = eye
+    front = _sheet(scene, "Film captions", eye, 2.5 * eye.data.clip_start, aspect)
+    for thing in layout.lay_out(words, aspect, preset.height):
+        _add(scene, thing)
+        thing.parent = front
+    behind = _sheet(scene, "Film background", eye, 0.98 * eye.data.clip_end, aspect)
+    curtain = layout.backdrop(1.02 * aspect)
+    curtain.scale.y = 1.02
+    _add(scene, curtain)
+    curtain.parent = behind
+    curtain.hide_viewport = True
+    if scene.render.engine == "CYCLES":
+        _keep_search_tree(scene, eye)
+
+
+def _keep_search_tree(scene: bpy.types.Scene, eye: bpy.types.Object) -> None:
+    """A tiny second user of the terrain's mesh behind the camera.
+
+    Cycles puts all meshes that are used once into one search tree, which it builds anew when a block moves. A mesh that
+    is used twice keeps a tree of its own.
+    """
+    for ground in store.with_role(scene, store.TERRAIN_ROLE):
+        twin = bpy.data.objects.new("Film twin of the terrain", ground.data)
+        twin.scale, twin.location = (1e-4, 1e-4, 1e-4), (0.0, 0.0, 1.0)
+        _add(scene, twin)
+        twin.parent = eye
+        twin.hide_viewport = True
+
+
+def _sheet(
+    scene: bpy.types.Scene, name: str, eye: bpy.types.Object, distance: float, aspect: float
+) -> bpy.types.Object:
+    """An empty before the camera in which the picture is one unit high, whatever the focal length becomes."""
+    sheet = bpy.data.objects.new(name, None)
+    sheet.empty_display_size = 0.01
+    _add(scene, sheet)
+    sheet.parent = eye
+    sheet.location = (0.0, 0.0, -distance)
+    for axis in range(3):
+        driver = sheet.driver_add("scale", axis).driver
+        lens = driver.variables.new()
+        lens.name, lens.targets[0].id_type = "lens", "CAMERA"
+        lens.targets[0].id, lens.targets[0].data_path = eye.data, "lens"
+        driver.expression = f"{distance * eye.data.sensor_width / aspect!r} / lens"
+    return sheet
+
+
+def _add(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    thing[store.ROLE_KEY] = FILM_ROLE
+    thing.hide_select = thing.type != "CAMERA"
+    store.collection(scene, "Film").objects.link(thing)
+
+
+def _remove_furniture(scene: bpy.types.Scene) -> None:
+    things = store.with_role(scene, FILM_ROLE)
+    cameras = [thing.data for thing in things if thing.type == "CAMERA"]
+    store.remove_objects(things)
+    for each in cameras:
+        if not each.users:
+            bpy.data.cameras.remove(each)
+
+
+def _pixel_m(scene: bpy.types.Scene, view: View, motions: list[Motion]) -> float:
+    """Size of a pixel of a small picture where the blocks are [m]; in a large one, things may be a little finer."""
+    depth = float(np.median(view.project(np.vstack([motion.position for motion in motions]))[:, 2]))
+    return float(view.pixel_m(depth, (SMALL_WIDTH * max(SMALL_WIDTH, scene.render.resolution_x)) ** 0.5))
+
+
+def _sources(names: tuple[str, ...]) -> tuple[layout.Source, ...]:
+    """Whose blocks there are, when there are others than the real ones."""
+    if not names:
+        return ()
+    return ("observed", OBSERVED_COLOUR), *((find_model(name).title, model_colour(name)) for name in names)
+
+
+def _title(scene: bpy.types.Scene) -> str:
+    return str(scene.get(SITE_KEY, "")) or "Rockfall"
+
+
+def _count(motions: list[Motion]) -> str:
+    if not motions:
+        return ""
+    return f"Reconstructed paths of {len(motions)} block{'' if len(motions) == 1 else 's'}"

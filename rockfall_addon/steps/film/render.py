@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rendering a scene that is set up, and whole jobs from a project file to a film."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+
+from ....core.errors import InputError, RockfallError
+from ....core.exchange.project import RenderPreset, read_project
+from ....core.film.job import FilmJob
+from ....core.film.presets import HD, FilmTiming, find_preset
+from ....core.reconstruction.trajectory import Reconstruction
+from ...scene import models
+from ...scene.project import load_project
+from . import dressing
+from .engine import use_engine
+
+Report = Callable[[int, int], None]
+"""Called with the frames done and all frames."""
+
+
+def make(job: FilmJob, report: Report) -> None:
+    """Do a job in an empty file, which is filled.
+
+    Raises
+    ------
+    RockfallError : the project is bad, has nothing to show, or the file cannot be written.
+    """
+    scene = bpy.context.scene
+    if job.kind == "terrain":
+        _show_terrain(scene, job)
+    else:
+        project = read_project(job.source)
+        preset = find_preset(project, job.preset)
+        result = _load(scene, job.source, preset)
+        if job.models:
+            models.show_twins(scene, result, job.models, job.parameters)
+        if job.kind == "slope":
+            dressing.set_up_picture(scene, preset, job.engine)
+        else:
+            dressing.set_up_film(scene, preset, job.engine)
+    if job.kind == "film":
+        render_film(scene, job.out, job.frames, report)
+    else:
+        if job.kind == "still":
+            use_engine(scene, job.engine, still=True)
+            scene.frame_set(min(job.frames[0] if job.frames else scene.frame_end, scene.frame_end))
+        render_picture(scene, job.out)
+        report(1, 1)
+
+
+def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | None, report: Report) -> None:
+    """Render frames of a scene to an MP4 with H.264.
+
+    Raises
+    ------
+    RockfallError : the range lies outside the film, or Blender wrote nothing.
+    """
+    first, last = frames or (scene.frame_start, scene.frame_end)
+    if first > scene.frame_end:
+        raise InputError(f"The film has no frame {first}", advice=f"Its last frame is {scene.frame_end}")
+    scene.frame_start, scene.frame_end = first, min(last, scene.frame_end)
+    use_movie(scene, path)
+    total, done = scene.frame_end - first + 1, 0
+
+    def written(*_: object) -> None:
+        nonlocal done
+        done += 1
+        report(done, total)
+
+    bpy.app.handlers.render_write.append(written)
+    try:
+        bpy.ops.render.render(animation=True, scene=scene.name)
+    except RuntimeError as error:
+        raise RockfallError(f"Blender could not render the film: {error}") from error
+    finally:
+        bpy.app.handlers.render_write.remove(written)
+    if done != total:
+        raise RockfallError(f"Blender rendered {done} of {total} frames of the film.")
+    _check(path)
+
+
+def use_movie(scene: bpy.types.Scene, path: Path) -> None:
+    """Output of the scene: an MP4 with H.264."""
+    render = scene.render
+    render.filepath, render.use_file_extension = str(path), True
+    render.image_settings.media_type = "VIDEO"
+    render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.audio_codec = "MPEG4", "H264", "NONE"
+    render.ffmpeg.constant_rate_factor, render.ffmpeg.ffmpeg_preset = "HIGH", "GOOD"
+    render.ffmpeg.gopsize = 25
+
+
+def render_picture(scene: bpy.types.Scene, path: Path) -> None:
+    """Render the scene's frame to a PNG.
+
+    Raises
+    ------
+    RockfallError : Blender wrote nothing.
+    """
+    render = scene.render
+    render.filepath, render.use_file_extension = str(path), True
+    render.image_settings.media_type = "IMAGE"
+    render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGB"
+    try:
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+    except RuntimeError as error:
+        raise RockfallError(f"Blender could not render the picture: {error}") from error
+    _check(path)
+
+
+def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Reconstruction:
+    film, settings = FilmTiming(preset.fps, preset.time_scale), scene.rockfall
+    scene.render.fps, scene.render.fps_base = film.base
+    settings.playback = "REAL" if preset.stagger_s is None else "TOGETHER"
+    settings.stagger_s = preset.stagger_s or 0.0
+    return load_project(scene, project, with_videos=False)
+
+
+def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
+    from ....core.terrain.readers import read_terrain
+    from ....core.terrain.shading import shade
+    from ...scene.terrain import add_terrain
+
+    surface = read_terrain(job.source, up=job.up, unit_m=job.unit_m)
+    shading = shade(surface)
+    add_terrain(scene, surface, shading)
+    size = " × ".join(f"{length:.0f}" for length in surface.bounds[1] - surface.bounds[0])
+    facts = f"{len(surface.faces):,}".replace(",", "\u202f") + f" triangles, {size} m"
+    if shading.thin.any():
+        facts += f", thin data on {100 * shading.thin.mean():.0f} %"
+    dressing.set_up_picture(scene, HD, job.engine, title=job.title or job.source.name, subtitle=facts)
+
+
+def _check(path: Path) -> None:
+    if not path.is_file() or not path.stat().st_size:
+        raise RockfallError(f"Blender wrote no file {path.name}. Is the disk full?")

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The impact table: sort it, see it in a wide window; the selected pick: move it in time."""
+
+import bpy
+from bpy.props import FloatProperty, StringProperty
+
+from ...scene import impact_rows, store, sync
+from ...view.reporting import reported
+
+WIDE = 760  # pixels at interface scale 1
+
+
+class ROCKFALL_OT_sort_impacts(bpy.types.Operator):
+    """Sort the impact table by this column; again for the other direction"""
+
+    bl_idname = "rockfall.sort_impacts"
+    bl_label = "Sort"
+    bl_options = {"INTERNAL"}
+
+    column: StringProperty()
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.rockfall
+        settings.table_descending = settings.table_sort == self.column and not settings.table_descending
+        settings.table_sort = self.column
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_impact_table(bpy.types.Operator):
+    """Show the impact table with all its columns"""
+
+    bl_idname = "rockfall.impact_table"
+    bl_label = "Impact Table"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if len(context.scene.rockfall_impacts):
+            return True
+        cls.poll_message_set("There are no impacts yet: import picks first, or load the demo")
+        return False
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_popup(self, width=self._width(context))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        bpy.types.ROCKFALL_PT_impact_table.draw_table(self.layout, context, self._width(context))
+
+    @staticmethod
+    def _width(context: bpy.types.Context) -> int:
+        room = context.window.width / context.preferences.system.ui_scale - 40
+        return int(min(WIDE, room))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_nudge_pick_time(bpy.types.Operator):
+    """Move the selected pick in time by a part of a frame"""
+
+    bl_idname = "rockfall.nudge_pick_time"
+    bl_label = "Nudge Time"
+    bl_options = {"REGISTER", "UNDO"}
+
+    frames: FloatProperty(name="Frames", description="Of the scene; negative is earlier", default=0.1, precision=2)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        pick = context.object
+        if pick is not None and pick.get(store.ROLE_KEY) == store.PICK_ROLE:
+            return True
+        cls.poll_message_set("Select a pick first")
+        return False
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        pick = impact_rows.selected(context)
+        sync.nudge(context.scene, pick, store.double(self.frames))
+        return {"FINISHED"}
+
+
+CLASSES = (ROCKFALL_OT_sort_impacts, ROCKFALL_OT_impact_table, ROCKFALL_OT_nudge_pick_time)

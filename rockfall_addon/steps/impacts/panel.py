@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The selected pick: what it is, to be edited, and the numbers of its impact with their errors."""
+
+import math
+
+import bpy
+
+from ....core.reconstruction.summary import MEANINGS
+from ...scene import store
+from ...scene.impact_rows import RESULT_KEY
+from ...view.panel import RockfallPanel, facts, paragraph
+
+FLAG_WORDS = {
+    "first": "First of its chain: no incident velocity",
+    "last": "Last of its chain: no restituted velocity",
+    "departing": "Leaves the ground before it touches it: no coefficients",
+    "into_ground": "Goes on into the ground",
+    "below_terrain": "Beside a flight that passes under the terrain",
+    "gap": "The chain is cut here (shattered or discarded)",
+    "contact": "Rolls or slides before or after it",
+    "doubtful": "Marked as doubtful",
+    "shattered": "The block shatters here",
+    "discarded": "Discarded: not used",
+}
+NUMBERS = (  # what is shown, key of the result, key of its standard deviation, unit, digits
+    ("Incident speed", "incident_mps", "sigma_speed1", " m/s", 2),
+    ("Restituted speed", "restituted_mps", "sigma_speed2", " m/s", 2),
+    ("R", "r", "sigma_r", "", 2),
+    ("R_N", "rn", "sigma_rn", "", 2),
+    ("R_T", "rt", "sigma_rt", "", 2),
+    ("Impact angle θ₁", "theta1_deg", "sigma_theta1_deg", "°", 1),
+    ("Deviation θ_dev", "theta_dev_deg", "sigma_theta_dev_deg", "°", 1),
+    ("Energy before", "kinetic1_j", "sigma_kinetic1_j", " J", 0),
+    ("Energy after", "kinetic2_j", "sigma_kinetic2_j", " J", 0),
+    ("Height of bounce", "bounce_height_m", "", " m", 2),
+    ("Height over chord", "chord_height_m", "", " m", 2),
+    ("Spread of normal", "normal_spread_deg", "", "°", 1),
+)
+
+
+class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
+    bl_label = "Selected Impact"
+    bl_idname = "ROCKFALL_PT_impact"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(store.with_role(context.scene, store.PICK_ROLE))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, pick = self.layout, context.object
+        if pick is None or pick.get(store.ROLE_KEY) != store.PICK_ROLE or "rockfall_trajectory" not in pick:
+            layout.label(text="Click a disc on the slope.", icon="RESTRICT_SELECT_OFF")
+            return
+        result = pick.get(RESULT_KEY)
+        number = f", impact {result['number']}" if result is not None else ""
+        row = layout.row(align=True)
+        row.label(text=f"{pick['rockfall_trajectory']}{number}")
+        row.operator("rockfall.show_impact", text="", icon="TIME")
+        _draw_editable(layout, pick.rockfall_pick)
+        if result is None:
+            return
+        facts(layout, [_fact(result, *how) for how in NUMBERS if how[1] in result])
+        for flag in filter(None, result["flags"].split(";")):
+            paragraph(context, layout, FLAG_WORDS.get(flag) or MEANINGS.get(flag, flag), "INFO")
+        if "sigma_r" not in result:
+            paragraph(context, layout, "Give a confidence, and the numbers get their errors.")
+
+
+def _draw_editable(layout: bpy.types.UILayout, editable: bpy.types.PropertyGroup) -> None:
+    column = layout.column(align=True)
+    column.use_property_split, column.use_property_decorate = True, False
+    for name in ("kind", "status", "confidence", "note"):
+        column.prop(editable, name)
+    row = column.row(align=True)
+    row.prop(editable, "time_s")
+    for frames, icon in ((-0.1, "TRIA_LEFT"), (0.1, "TRIA_RIGHT")):
+        row.operator("rockfall.nudge_pick_time", text="", icon=icon).frames = frames
+
+
+def _fact(result: dict[str, object], label: str, key: str, sigma_key: str, unit: str, digits: int) -> tuple[str, str]:
+    value, sigma = math.hypot(*result[key]) if len(result[key]) == 3 else result[key][0], math.nan
+    if sigma_key in result:
+        sigma = result[sigma_key][0]
+    if math.isnan(value):
+        return label, "not defined"
+    return label, f"{value:.{digits}f}{'' if math.isnan(sigma) else f' ± {sigma:.{digits}f}'}{unit}"
+
+
+CLASSES = (ROCKFALL_PT_impact,)

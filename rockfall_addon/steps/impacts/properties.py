@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What panels show and edit of the picks: one selected pick, and the rows of the impact table.
+
+The pick's properties are windows on its doubles (`scene.picks`); the rows are mirrored by `scene.impact_rows`.
+"""
+
+import bpy
+from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ....core.reconstruction.picks import KINDS, STATUSES
+
+CONFIDENCES = ("", "1", "2", "3")
+
+
+def _edited(thing: bpy.types.Object) -> None:
+    from ...scene import sync
+
+    for scene in thing.users_scene:
+        sync.touch(scene)
+
+
+def _get_kind(self: bpy.types.PropertyGroup) -> int:
+    kind = self.id_data.get("rockfall_kind", "impact")
+    return KINDS.index(kind) if kind in KINDS else 0
+
+
+def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
+    self.id_data["rockfall_kind"] = KINDS[value]
+    _edited(self.id_data)
+
+
+def _get_status(self: bpy.types.PropertyGroup) -> int:
+    status = self.id_data.get("rockfall_status", "ok")
+    return STATUSES.index(status) if status in STATUSES else 0
+
+
+def _set_status(self: bpy.types.PropertyGroup, value: int) -> None:
+    self.id_data["rockfall_status"] = STATUSES[value]
+    _edited(self.id_data)
+
+
+def _get_confidence(self: bpy.types.PropertyGroup) -> int:
+    from ...scene import picks
+
+    text = picks.extra_of(self.id_data, "confidence")
+    return CONFIDENCES.index(text) if text in CONFIDENCES else 0
+
+
+def _set_confidence(self: bpy.types.PropertyGroup, value: int) -> None:
+    from ...scene import picks
+
+    picks.set_extra(self.id_data, "confidence", CONFIDENCES[value])
+    _edited(self.id_data)
+
+
+def _get_note(self: bpy.types.PropertyGroup) -> str:
+    from ...scene import picks
+
+    return picks.extra_of(self.id_data, "note")
+
+
+def _set_note(self: bpy.types.PropertyGroup, value: str) -> None:
+    from ...scene import picks
+
+    picks.set_extra(self.id_data, "note", value)
+
+
+def _get_time(self: bpy.types.PropertyGroup) -> str:
+    return repr(float(self.id_data.get("rockfall_time_s", 0.0)))
+
+
+def _set_time(self: bpy.types.PropertyGroup, value: str) -> None:
+    from ...scene import sync
+
+    sync.retime(self.id_data, value)
+
+
+class PickProperties(bpy.types.PropertyGroup):
+    """The selected pick, to be edited; the time is text because numbers here are single precision."""
+
+    kind: EnumProperty(
+        name="Kind",
+        items=[
+            ("impact", "Impact", "The block hits the ground"),
+            ("release", "Release", "The block starts"),
+            ("pass", "Pass", "A point of the flight, in the air"),
+            ("contact", "Contact", "The block rolls or slides"),
+            ("stop", "Stop", "The block comes to rest"),
+        ],
+        get=_get_kind, set=_set_kind,
+    )  # fmt: skip
+    status: EnumProperty(
+        name="Status",
+        items=[
+            ("ok", "Ok", "As it should be"),
+            ("doubtful", "Doubtful", "Used, and flagged"),
+            ("shattered", "Shattered", "The block breaks here: nothing is computed across"),
+            ("discarded", "Discarded", "Not used: nothing is computed across"),
+        ],
+        get=_get_status, set=_set_status,
+    )  # fmt: skip
+    confidence: EnumProperty(
+        name="Confidence",
+        description="How sure the place is. It stands for a standard deviation where the pick has none of its own",
+        items=[
+            ("NONE", "Not given", "No standard deviation"),
+            ("1", "1  Unsure", "0.50 m"),
+            ("2", "2  Fair", "0.20 m"),
+            ("3", "3  Sure", "0.05 m"),
+        ],
+        get=_get_confidence, set=_set_confidence,
+    )  # fmt: skip
+    note: StringProperty(name="Note", get=_get_note, set=_set_note)
+    time_s: StringProperty(
+        name="Time [s]", description="On the common clock, with all its digits", get=_get_time, set=_set_time
+    )
+
+
+class ImpactRow(bpy.types.PropertyGroup):
+    """One row of the impact table."""
+
+    pick: StringProperty()
+    trajectory: StringProperty()
+    number: IntProperty()
+    time_s: FloatProperty()
+    speed1_mps: FloatProperty()
+    speed2_mps: FloatProperty()
+    rn: FloatProperty()
+    rt: FloatProperty()
+    r: FloatProperty()
+    theta1_deg: FloatProperty()
+    theta_dev_deg: FloatProperty()
+    flags: StringProperty()
+
+
+CLASSES = (ImpactRow, PickProperties)
+
+
+def register() -> None:
+    bpy.types.Scene.rockfall_impacts = bpy.props.CollectionProperty(type=ImpactRow)
+    bpy.types.Object.rockfall_pick = bpy.props.PointerProperty(type=PickProperties)
+
+
+def unregister() -> None:
+    del bpy.types.Object.rockfall_pick
+    del bpy.types.Scene.rockfall_impacts

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Impact models beside reality: the blocks that leave each impact as a model says."""
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ....core.analysis.twins import score_twins
+from ....core.exchange.parameters import read_parameters
+from ....core.impact_models.registry import COMPARED, MODELS
+from ...scene import models, reconstruction, store
+from ...view.reporting import reported
+
+CHOICES = [
+    (name, MODELS[name].title, f"{MODELS[name].title} ({name}): {MODELS[name].reference}", 1 << i)
+    for i, name in enumerate((*COMPARED, *(name for name in MODELS if name not in COMPARED)))
+]
+
+
+class ROCKFALL_OT_show_twins(bpy.types.Operator):
+    """Show beside the real blocks those that leave the same impacts as a model says, flown to where they land"""
+
+    bl_idname = "rockfall.show_twins"
+    bl_label = "Show Models"
+    bl_options = {"REGISTER", "UNDO"}
+
+    models: EnumProperty(
+        name="Models", description="Whose blocks to show", items=CHOICES, options={"ENUM_FLAG"}, default={"noel_2017"}
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not store.with_role(context.scene, store.PICK_ROLE):
+            cls.poll_message_set("Import picks first, or load the demo")
+            return False
+        if not store.with_role(context.scene, store.TERRAIN_ROLE):
+            cls.poll_message_set("The blocks of the models land on the terrain: import one first")
+            return False
+        return True
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        if not self.models:
+            models.remove_twins(scene)
+            return {"FINISHED"}
+        chosen = [name for name, *_ in CHOICES if name in self.models]
+        marks = score_twins(models.show_twins(scene, reconstruction.reconstruct_scene(scene), chosen))
+        said = [
+            f"{MODELS[mark.model].title}: {mark.median_offset_m:.1f} m"
+            for mark in marks
+            if np.isfinite(mark.median_offset_m)
+        ]
+        if said:
+            self.report({"INFO"}, f"Median distance of the landings from the real ones: {', '.join(said)}.")
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_load_parameters(bpy.types.Operator, ImportHelper):
+    """Give the models the parameters of a file that rockfall explore or rockfall calibrate has saved"""
+
+    bl_idname = "rockfall.load_parameters"
+    bl_label = "Load Parameters"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        models.keep_parameters(scene, read_parameters(self.filepath))
+        if models.shown_models(scene):
+            models.follow(scene, reconstruction.reconstruct_scene(scene))
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_remove_twins(bpy.types.Operator):
+    """Show the real blocks only"""
+
+    bl_idname = "rockfall.remove_twins"
+    bl_label = "Remove Models"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(models.shown_models(context.scene))
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        models.remove_twins(context.scene)
+        return {"FINISHED"}
+
+
+CLASSES = (ROCKFALL_OT_show_twins, ROCKFALL_OT_load_parameters, ROCKFALL_OT_remove_twins)

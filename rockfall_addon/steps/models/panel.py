@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which impact models are shown beside the real blocks."""
+
+import bpy
+
+from ....core.impact_models.registry import COMPARED, MODELS
+from ...scene import models, store
+from ...view.panel import RockfallPanel, State, paragraph
+
+QUESTION = "Where would the blocks fly if a model were right? Same impacts, same incident velocity."
+
+
+class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
+    bl_label = "6  Models"
+    bl_idname = "ROCKFALL_PT_models"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = context.scene
+        return bool(store.with_role(scene, store.FLIGHTS_ROLE) and store.with_role(scene, store.TERRAIN_ROLE))
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        return "READY" if models.shown_models(context.scene) else "TO_DO"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, shown = self.layout, models.shown_models(context.scene)
+        paragraph(context, layout, QUESTION, "QUESTION")
+        column = layout.column(align=True)
+        for name in (*COMPARED, *(other for other in MODELS if other not in COMPARED)):
+            on = name in shown
+            button = column.operator(
+                "rockfall.show_twins",
+                text=MODELS[name].title,
+                icon="CHECKBOX_HLT" if on else "CHECKBOX_DEHLT",
+                depress=on,
+            )
+            button.models = set(shown) ^ {name}
+        own = models.parameters_of(context.scene)
+        if own:
+            paragraph(context, layout, f"Own parameters: {', '.join(MODELS[name].title for name in own)}", "INFO")
+        layout.operator("rockfall.load_parameters", icon="IMPORT")
+        if shown:
+            layout.operator("rockfall.remove_twins", icon="X")
+
+
+CLASSES = (ROCKFALL_PT_models,)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Picking in the footage: the tool, the track of the block, and what is drawn over the footage."""
+
+import bpy
+
+from ...scene import observations, picking, store, videos
+from ...view import pointing
+from ...view.panel import RockfallPanel, advise, paragraph
+
+
+class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
+    bl_label = "Pick in the Footage"
+    bl_idname = "ROCKFALL_PT_picking"
+    bl_parent_id = "ROCKFALL_PT_picks"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        settings, camera = scene.rockfall_picking, videos.active_camera(scene)
+        layout.operator("wm.tool_set_by_id", text="Pick Impacts", icon="CURSOR").name = "rockfall.pick_tool"
+        advise(context, layout, *_advice(scene, camera))
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(settings, "trajectory", icon="OUTLINER_OB_CURVE")
+        for name in ("kind", "aim", "sigma_px"):
+            column.prop(settings, name)
+        pick = pointing.active_pick(context)
+        if pick is not None:
+            warning = picking.grazing_warning(pick)
+            if warning:
+                paragraph(context, layout, warning, "ERROR")
+            if len(videos.cameras(scene)) > 1:
+                layout.operator("rockfall.use_triangulated", icon="EMPTY_AXIS")
+        row = layout.row(align=True)
+        row.prop(settings, "show_loupe", toggle=True)
+        row.prop(settings, "show_paths", text="Paths", toggle=True)
+        row.prop(settings, "show_track", text="Track", toggle=True)
+        if settings.show_loupe:
+            layout.prop(settings, "loupe_zoom")
+
+
+class ROCKFALL_PT_tracking(RockfallPanel, bpy.types.Panel):
+    bl_label = "Track the Block"
+    bl_idname = "ROCKFALL_PT_tracking"
+    bl_parent_id = "ROCKFALL_PT_picks"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(videos.cameras(context.scene))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        settings, camera = scene.rockfall_picking, videos.active_camera(scene)
+        name = picking.trajectory(scene)
+        seen = observations.seen_in(camera, name)
+        if len(seen):
+            text = f"{name} was seen in {len(seen)} pictures of {camera.name}, {int(seen.by_hand.sum())} by hand."
+        else:
+            text = f"Click the block of {name} in flight (kind “Block here”), then track it."
+        advise(context, layout, bool(len(seen)), text)
+        column = layout.column(align=True)
+        column.prop(settings, "whole_video")
+        if not settings.whole_video:
+            column.prop(settings, "track_frames")
+        layout.operator("rockfall.track_block", icon="TRACKING")
+        row = layout.row(align=True)
+        row.operator("rockfall.propose_impacts", icon="OUTLINER_OB_LIGHTPROBE")
+        row.operator("rockfall.clear_track", text="", icon="X")
+
+
+def _advice(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> tuple[bool, str]:
+    if not store.with_role(scene, store.TERRAIN_ROLE):
+        return False, "Import the terrain first: picks lie on it."
+    if camera is None:
+        return True, "Without a video, picks go on the terrain in the 3-D view, at the time of the timeline."
+    if not videos.is_solved(camera):
+        return True, (
+            f"{camera.name} is not aligned: clicks are taken as in a free view, at the time of the picture. "
+            "Align it to pick in its pixels."
+        )
+    return True, "Step to the picture of an impact (← →), look through the camera, and click the block."
+
+
+CLASSES = (ROCKFALL_PT_picking, ROCKFALL_PT_tracking)

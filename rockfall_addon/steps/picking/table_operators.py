@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 2: timed picks and the trajectories between them."""
+
+import bpy
+from bpy.props import StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ....core.exchange.tables import read_picks
+from ...scene import reconstruction, store
+from ...view import look
+from ...view.reporting import reported
+
+
+class ROCKFALL_OT_import_picks(bpy.types.Operator, ImportHelper):
+    """Import a table of timed impacts (picks.csv) and reconstruct the trajectories between them"""
+
+    bl_idname = "rockfall.import_picks"
+    bl_label = "Import Picks"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return self.execute(context) if self.filepath else super().invoke(context, event)
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene = context.scene
+        picks = read_picks(self.filepath, store.read_shift(scene) if store.has_shift(scene) else None)
+        result = reconstruction.reconstruct_scene(scene, picks)
+        if not store.has_shift(scene):
+            store.write_shift(scene, picks.shift)
+        reconstruction.show(scene, result)
+        look.show_relief(context, frame_all=True)
+        count = len(set(picks.trajectory.tolist()))
+        self.report({"INFO"}, f"{len(picks.time_s)} picks: {count} trajectories, {len(result.impacts.rn)} impacts.")
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_reconstruct(bpy.types.Operator):
+    """Compute the trajectories and impacts again from the picks where they now are"""
+
+    bl_idname = "rockfall.reconstruct"
+    bl_label = "Reconstruct"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if store.with_role(context.scene, store.PICK_ROLE):
+            return True
+        cls.poll_message_set("Import picks first, or load the demo")
+        return False
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        reconstruction.refresh(context.scene)
+        return {"FINISHED"}
+
+
+class ROCKFALL_FH_picks(bpy.types.FileHandler):
+    """Drop a table of picks into the 3-D view"""
+
+    bl_idname = "ROCKFALL_FH_picks"
+    bl_label = "Rockfall picks"
+    bl_import_operator = "rockfall.import_picks"
+    bl_file_extensions = ".csv"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+CLASSES = (ROCKFALL_OT_import_picks, ROCKFALL_OT_reconstruct, ROCKFALL_FH_picks)

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 5: refinement: fit, look at before and after, apply or discard."""
+
+import bpy
+
+from ...scene import picking, picks, refinement
+from ...view import pointing
+from ...view.reporting import reported
+
+
+class ROCKFALL_OT_refine(bpy.types.Operator):
+    """Fit places and times of the picks to where the block was seen; the result is shown beside what there is"""
+
+    bl_idname = "rockfall.refine"
+    bl_label = "Refine"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        lacking = refinement.ready(context.scene)
+        if lacking:
+            cls.poll_message_set(lacking[0])
+        return not lacking
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, settings = context.scene, context.scene.rockfall_picking
+        names = None
+        if settings.scope == "ACTIVE":
+            thing = pointing.active_pick(context)
+            names = [picking.trajectory(scene) if thing is None else thing[picks.TRAJECTORY_KEY]]
+        found = refinement.propose(scene, names, sorted(settings.free))
+        self.report({"INFO"}, f"{found['before_px']:.2f} px before, {found['after_px']:.2f} px after.")
+        return {"FINISHED"}
+
+
+class _OfProposal:
+    """Mix-in: decides on a proposal."""
+
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if refinement.PROPOSAL_KEY in context.scene:
+            return True
+        cls.poll_message_set("Refine first")
+        return False
+
+
+class ROCKFALL_OT_apply_refinement(_OfProposal, bpy.types.Operator):
+    """Give the picks the refined places, times and standard deviations"""
+
+    bl_idname = "rockfall.apply_refinement"
+    bl_label = "Apply Refinement"
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        count = refinement.apply(context.scene)
+        self.report({"INFO"}, f"{count} picks are refined.")
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_discard_refinement(_OfProposal, bpy.types.Operator):
+    """Forget the refined places and times; the picks stay as they are"""
+
+    bl_idname = "rockfall.discard_refinement"
+    bl_label = "Discard Refinement"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        refinement.discard(context.scene)
+        return {"FINISHED"}
+
+
+CLASSES = (ROCKFALL_OT_refine, ROCKFALL_OT_apply_refinement, ROCKFALL_OT_discard_refinement)

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 9: what leaves Blender: tables and the project."""
+
+from . import operators, panel
+
+PARTS = (operators, panel)

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exports."""
+
+import bpy
+
+from ...scene import store
+from ...view.panel import RockfallPanel, State, advise
+
+
+class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
+    bl_label = "9  Share"
+    bl_idname = "ROCKFALL_PT_share"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(store.with_role(context.scene, store.PICK_ROLE))
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        return "READY"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        advise(context, self.layout, True, "Tables in survey coordinates, with units.")
+        self.layout.operator("rockfall.export_tables", icon="EXPORT")
+        self.layout.operator("rockfall.export_project", icon="FILE_FOLDER")
+
+
+CLASSES = (ROCKFALL_PT_share,)

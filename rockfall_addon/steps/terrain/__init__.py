@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 1: the terrain."""
+
+from . import operators, panel, properties
+
+PARTS = (properties, operators, panel)

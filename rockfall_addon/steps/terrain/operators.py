@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 1: the terrain."""
+
+import textwrap
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy_extras.io_utils import ImportHelper
+
+from ....core.errors import RockfallError
+from ....core.georeference import GlobalShift
+from ....core.terrain.advice import sentences
+from ....core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
+from ....core.terrain.shading import shade
+from ...scene import materials, reconstruction, store, terrain, terrain_look
+from ...view import look
+from ...view.reporting import reported
+
+TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
+
+
+class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
+    """Import a scanned slope: a mesh, a grid or a point cloud, in survey coordinates"""
+
+    bl_idname = "rockfall.import_terrain"
+    bl_label = "Import Terrain"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: StringProperty(default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"})
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    shift_x: StringProperty(name="Shift X", description="Subtracted from the file's coordinates [m]")
+    shift_y: StringProperty(name="Y", description="Subtracted from the file's coordinates [m]")
+    shift_z: StringProperty(name="Z", description="Subtracted from the file's coordinates [m]")
+    up: EnumProperty(
+        name="Up", description="The axis that points up in the file",
+        items=[("auto", "Automatic", "Z, but Y for glTF"), ("z", "Z", ""), ("y", "Y", "")],
+    )  # fmt: skip
+    unit_m: FloatProperty(
+        name="File unit [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
+        default=1.0, min=1e-6, precision=4,
+    )  # fmt: skip
+    ground: EnumProperty(
+        name="Points", description="Which points of a cloud are meshed",
+        items=[
+            ("AUTO", "Ground if classified", "The ground class when the file has one, else all points"),
+            ("GROUND", "Ground only", "Only points of the class ground"),
+            ("ALL", "All", "All points, vegetation and noise too"),
+        ],
+    )  # fmt: skip
+    max_edge_m: FloatProperty(
+        name="Longest edge", description="Longer edges of a meshed cloud are left out. 0: from the points' spacing",
+        default=0.0, min=0.0, unit="LENGTH",
+    )  # fmt: skip
+    asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+    browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if not self.filepath:
+            self.browsing = True
+            return super().invoke(context, event)
+        return self._ask(context)
+
+    @reported
+    def _ask(self, context: bpy.types.Context) -> set[str]:
+        found = inspect_terrain(self.filepath)
+        shift = store.read_shift(context.scene) if store.has_shift(context.scene) else found.shift
+        self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
+        self.asked = True
+        self.facts = [
+            f"{found.name}: {found.kind}, {found.point_count:,} points, {found.face_count:,} faces",
+            *found.summary,
+        ]
+        self.facts += [said for said in sentences(found.minimum, found.maximum, shift) if said not in self.facts]
+        return context.window_manager.invoke_props_dialog(
+            self, width=420, title="Import Terrain", confirm_text="Import"
+        )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        if not self.asked:
+            return
+        layout = self.layout
+        box = layout.column(align=True)
+        for line in (part for sentence in self.facts for part in textwrap.wrap(sentence, 70)):
+            box.label(text=line)
+        layout.separator()
+        layout.use_property_split = True
+        column = layout.column(align=True)
+        known = store.has_shift(context.scene)
+        column.enabled = not known
+        for name in ("shift_x", "shift_y", "shift_z"):
+            column.prop(self, name)
+        column.label(
+            text="The project's shift, shared by all its files." if known else "Proposed: kept for the project."
+        )
+        for name in ("up", "unit_m", "ground", "max_edge_m"):
+            layout.prop(self, name)
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if self.browsing:
+            self.browsing = False
+            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath)
+        surface = read_terrain(
+            self.filepath,
+            shift=self._shift(context.scene),
+            up=self.up,
+            unit_m=float(f"{self.unit_m:.7g}"),
+            max_edge_m=self.max_edge_m or None,
+            ground_only={"AUTO": None, "GROUND": True, "ALL": False}[self.ground],
+        )
+        terrain.add_terrain(context.scene, surface, shade(surface))
+        reconstruction.refresh_or_tell(context.scene)
+        look.show_relief(context, frame_all=True)
+        self.report({"INFO"}, " ".join(surface.summary))
+        return {"FINISHED"}
+
+    def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:
+        """The project's shift, else the one that was given, else None: one is proposed.
+
+        Raises
+        ------
+        RockfallError : the shift is no shift, or not that of the project.
+        """
+        texts = (self.shift_x, self.shift_y, self.shift_z)
+        try:
+            given = GlobalShift(*(float(text or "0") for text in texts)) if any(texts) else None
+        except ValueError:
+            raise RockfallError(
+                f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0."
+            ) from None
+        if not store.has_shift(scene):
+            return given
+        shift = store.read_shift(scene)
+        if given is not None and (given.x, given.y, given.z) != (shift.x, shift.y, shift.z):
+            raise RockfallError(
+                f"This project has the shift ({shift.x:.10g}, {shift.y:.10g}, {shift.z:.10g}) m, so a terrain with the "
+                f"shift ({given.x:.10g}, {given.y:.10g}, {given.z:.10g}) m would not fit to it. Leave the shift empty: "
+                "all files share the project's."
+            )
+        return shift
+
+
+class ROCKFALL_OT_reset_relief(bpy.types.Operator):
+    """Give the sliders of the terrain's relief their usual values"""
+
+    bl_idname = "rockfall.reset_relief"
+    bl_label = "Reset Relief"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_terrain(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for name in materials.TERRAIN_VALUES:
+            context.scene.rockfall_terrain.property_unset(name)
+        terrain_look.apply(context.scene)
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_toggle_full_terrain(bpy.types.Operator):
+    """Draw every triangle of a large terrain in the 3-D view, or a coarse copy that is quick to draw"""
+
+    bl_idname = "rockfall.toggle_full_terrain"
+    bl_label = "Switch Between Coarse and Full Terrain"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_terrain(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.rockfall_terrain
+        settings.full_resolution = not settings.full_resolution
+        return {"FINISHED"}
+
+
+def _has_terrain(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if store.with_role(context.scene, store.TERRAIN_ROLE):
+        return True
+    cls.poll_message_set("Import a terrain first")
+    return False
+
+
+class ROCKFALL_FH_terrain(bpy.types.FileHandler):
+    """Drop a scanned slope into the 3-D view"""
+
+    bl_idname = "ROCKFALL_FH_terrain"
+    bl_label = "Rockfall terrain"
+    bl_import_operator = "rockfall.import_terrain"
+    bl_file_extensions = ";".join(e for e in EXTENSIONS if e not in TEXT_TABLES)
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+CLASSES = (
+    ROCKFALL_OT_import_terrain,
+    ROCKFALL_OT_reset_relief,
+    ROCKFALL_OT_toggle_full_terrain,
+    ROCKFALL_FH_terrain,
+)

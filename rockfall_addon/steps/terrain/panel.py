@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Step 1: the terrain."""
+
+import bpy
+
+from ...scene import fingerprints, store, terrain, terrain_view
+from ...view.panel import RockfallPanel, State, advise, facts, paragraph
+
+
+class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
+    bl_label = "1  Terrain"
+    bl_idname = "ROCKFALL_PT_terrain"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        scene = context.scene
+        if not store.with_role(scene, store.TERRAIN_ROLE):
+            return "ATTENTION" if scene.get(fingerprints.GROUND_KEY) else "TO_DO"
+        return "ATTENTION" if terrain.warnings(scene) else "READY"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        grounds = store.with_role(scene, store.TERRAIN_ROLE)
+        if not grounds:
+            if scene.get(fingerprints.GROUND_KEY):
+                paragraph(context, layout, "The terrain is gone. Undo, or import it again.", "ERROR")
+            else:
+                advise(context, layout, False, "Import your scan, or begin with the demo.")
+            column = layout.column(align=True)
+            column.scale_y = 1.4
+            column.operator("rockfall.load_footage_demo", icon="FILE_MOVIE")
+            column.operator("rockfall.load_demo", icon="PLAY")
+            column.operator("rockfall.import_terrain", icon="IMPORT")
+            return
+        warnings = terrain.warnings(scene)
+        for sentence in warnings:
+            paragraph(context, layout, sentence, "ERROR")
+        if not warnings:
+            advise(context, layout, True, "Ready.")
+        self._list_tiles(grounds)
+        for sentence in terrain.remarks(scene):
+            paragraph(context, layout, sentence, "INFO")
+        row = layout.row(align=True)
+        row.operator("rockfall.show_relief", text="Show relief", icon="SHADING_SOLID")
+        row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
+        shift = store.read_shift(scene)
+        rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
+        facts(layout, [*rows, ("System", shift.crs or "unknown")])
+
+    def _list_tiles(self, grounds: list[bpy.types.Object]) -> None:
+        column = self.layout.box().column(align=True)
+        for ground in grounds:
+            column.label(text=ground.name, icon="MESH_GRID", translate=False)
+            count = terrain.grouped(len(ground.data.polygons) if ground.type == "MESH" else 0)
+            file = str(ground.get(terrain.FILE_KEY, ground.name))
+            column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")
+
+
+class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
+    bl_label = "Relief"
+    bl_idname = "ROCKFALL_PT_relief"
+    bl_parent_id = "ROCKFALL_PT_terrain"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(store.with_role(context.scene, store.TERRAIN_ROLE))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings = context.scene.rockfall_terrain
+        layout = self.layout.column()
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column(align=True)
+        for name in ("hillshade", "eye_dome", "thin"):
+            column.prop(settings, name, slider=True)
+        column = layout.column(align=True)
+        for name in ("brightness", "contrast"):
+            column.prop(settings, name)
+        layout.operator("rockfall.reset_relief", icon="LOOP_BACK")
+        if terrain_view.is_coarse(context.scene):
+            self.layout.prop(settings, "full_resolution", toggle=True, icon="MESH_GRID")
+            column = self.layout.column()
+            column.use_property_split, column.use_property_decorate = True, False
+            column.prop(settings, "view_limit")
+
+
+CLASSES = (ROCKFALL_PT_terrain, ROCKFALL_PT_relief)

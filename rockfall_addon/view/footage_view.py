@@ -1,0 +1,349 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn over the footage: paths of the blocks' centres, outlines, picks, sightings, in pixels of the video.
+
+All is projected by the core, with the lens's distortion and the pose of the picture that is shown. What does not depend
+on the picture is kept until the picks change.
+"""
+
+import zlib
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.camera.model import Camera, project, rays
+from ...core.colours import scale_colours
+from ...core.errors import RockfallError
+from ...core.reconstruction.drag import Drag
+from ...core.reconstruction.flight import flight_states
+from ...core.reconstruction.trajectory import Reconstruction, reconstruct
+from ...core.terrain.raycast import cast_rays, heights_above
+from ...core.vectors import Array, norm, unit
+from ..scene import (
+    fingerprints,
+    observations,
+    picking,
+    picks,
+    reconstruction,
+    refinement,
+    sync,
+    trails,
+    trajectories,
+    videos,
+)
+
+BELOW = (1.0, 0.0, 0.0)
+PROPOSED = (0.2, 0.9, 1.0)
+OUTLINE = (1.0, 1.0, 0.35)
+EPIPOLAR = (1.0, 0.55, 0.95)
+SEEN, SEEN_SIZE = (0.35, 1.0, 0.45), 2.5
+CIRCLE = np.linspace(0.0, 2 * np.pi, 49)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """The path of one block's centre: n points in the order of time, those of a flight together.
+
+    Attributes
+    ----------
+    time_s, position : (n,) common time, (n, 3) local [m].
+    colour : (n, 3) sRGB: by speed, red below the terrain.
+    joined : (n,) whether a point is joined with the next one.
+    tick : (n,) points at the frames of the video.
+    radius_m : of the block.
+    """
+
+    time_s: Array
+    position: Array
+    colour: Array
+    joined: np.ndarray
+    tick: np.ndarray
+    radius_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Segments (k, 2, 2) in pixels of the video, with colours (k, 2, 4); width in pixels at interface scale 1."""
+
+    segments: Array
+    colour: Array
+    width: float
+
+
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """Something of a fixed size on the screen, at a pixel: "dot", "ring" or "diamond"; its text beside it."""
+
+    pixel: Array
+    shape: str
+    colour: tuple[float, float, float, float]
+    size: float
+    text: str = ""
+
+
+@dataclass(eq=False)
+class Drawing:
+    """All that is drawn over a picture."""
+
+    lines: list[Line] = field(default_factory=list)
+    dots: list[tuple[Array, Array, float]] = field(default_factory=list)
+    """(k, 2) pixels, (k, 4) colours, size."""
+    marks: list[Mark] = field(default_factory=list)
+
+
+_paths: dict[tuple[int, str], tuple[object, Path | None]] = {}
+_seen: dict[tuple[int, str, str], tuple[object, tuple[Array, Array]]] = {}
+
+
+def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Object | None) -> Drawing:
+    """What is drawn over the picture of an aligned camera.
+
+    active : the selected pick.
+    """
+    settings, found = scene.rockfall_picking, Drawing()
+    _, video_s = picking.picture_time(scene, camera)
+    lens, moment = picking.posed(camera, video_s), picking.common_time(camera, video_s)
+    times = videos.clock_of(camera).to_common(videos.times_of(camera))
+    step = picking.frame_step_s(camera)
+    things = fingerprints.by_trajectory(picks.things_of(scene))
+    filmed = {name: path for name in things if (path := path_of(scene, name, times)) is not None}
+    filmed = {n: p for n, p in filmed.items() if p.time_s[-1] > times[0] - step and p.time_s[0] < times[-1] + step}
+    if settings.show_paths:
+        for path in filmed.values():
+            _add_path(found, lens, path)
+            _add_outline(found, lens, path, moment, step)
+        proposed = refinement.proposed_path(scene)
+        if proposed is not None:
+            _add_polyline(found, lens, *proposed)
+    if settings.show_track:
+        for name in observations.names_in(camera):
+            _add_seen(found, scene, camera, lens, name, filmed.get(name), video_s)
+    for members in things.values():
+        for thing in members:
+            near = abs(thing[picks.TIME_KEY] - moment) <= picking.SAME_PICTURE * step
+            if near or thing == active or times[0] - step <= thing[picks.TIME_KEY] <= times[-1] + step:
+                _add_pick(found, lens, thing, near, thing == active)
+    if active is not None:
+        _add_active(found, scene, camera, lens, active)
+    return found
+
+
+def path_of(scene: bpy.types.Scene, name: str, frames_s: Array | None = None) -> Path | None:
+    """The path of a block's centre; None without flights. It is computed when its picks have changed.
+
+    frames_s : (f,) common times of frames, at which there are ticks.
+    """
+    how = reconstruction.project_settings(scene, [])
+    key = (
+        fingerprints.remembered(scene).get(name), scene.get(fingerprints.GROUND_KEY, ""), how.reconstruction, how.block,
+        scene.rockfall.speed_top_mps, scene.get(reconstruction.BLOCKS_KEY, ""),
+        None if frames_s is None else zlib.crc32(np.ascontiguousarray(frames_s)),
+    )  # fmt: skip
+    place = (scene.session_uid, name)
+    if place not in _paths or _paths[place][0] != key:
+        _paths[place] = key, _path(scene, name, frames_s)
+    return _paths[place][1]
+
+
+def forget() -> None:
+    """Another file was opened."""
+    _paths.clear()
+    _seen.clear()
+
+
+def sample(
+    result: Reconstruction, frames_s: Array | None, speed_top_mps: float, surface: object | None = None
+) -> Path | None:
+    """The path of the only trajectory of a reconstruction."""
+    flights = result.flights
+    radius = next(iter(result.block.values())).radius_m if isinstance(result.block, dict) else result.block.radius_m
+    pieces, which, ticks, joined = [], [], [], []
+    for i in range(len(flights.start_time_s)):
+        start, end = float(flights.start_time_s[i]), float(flights.end_time_s[i])
+        clock, tick = _with_frames(trails.moments(start, end), frames_s)
+        pieces.append(clock)
+        ticks.append(tick)
+        which.append(np.full(len(clock), i))
+        joined.append(np.arange(len(clock)) < len(clock) - 1)
+    if not pieces:
+        return None
+    time, owner = np.concatenate(pieces), np.concatenate(which)
+    position, velocity = flight_states(flights, owner, time)
+    colour = scale_colours(norm(velocity), 0.0, speed_top_mps)
+    if surface is not None:
+        under = radius if result.ends == "centres" else 0.0
+        with np.errstate(invalid="ignore"):
+            deep = heights_above(surface, position) - under < -trajectories.BELOW_RADII * radius
+        colour[deep] = BELOW
+    return Path(time, position, colour, np.concatenate(joined), np.concatenate(ticks), radius)
+
+
+def _path(scene: bpy.types.Scene, name: str, frames_s: Array | None) -> Path | None:
+    things = picks.ordered(scene, picks.things_of(scene, [name]))
+    surface, block = reconstruction.ground(scene), picking.block_of(scene, name)
+    how = reconstruction.project_settings(scene, []).reconstruction
+    reach = max(sync.LEAST_REACH_M, sync.REACH_RADII * block.radius_m)
+    drag = Drag(how.air_density_kgpm3, how.drag_coefficient) if how.drag else None
+    for ends in dict.fromkeys(("centres" if surface is not None else how.flights, how.flights)):
+        try:
+            result = reconstruct(
+                picks.trusted(picks.read(scene, things, surface, reach)), surface=surface, block={name: block},
+                gravity_mps2=how.gravity_mps2, drag=drag, normal_radius_m=how.normal_radius_m, flights=ends,
+            )  # fmt: skip
+        except RockfallError:
+            continue  # the panel tells it
+        return sample(result, frames_s, scene.rockfall.speed_top_mps, surface)
+    return None
+
+
+def _with_frames(even: Array, frames_s: Array | None) -> tuple[Array, np.ndarray]:
+    if frames_s is None:
+        return even, np.zeros(len(even), dtype=bool)
+    frames = frames_s[(frames_s > even[0]) & (frames_s < even[-1])]
+    clock = np.concatenate([even, frames])
+    order = np.argsort(clock, kind="stable")
+    return clock[order], (np.arange(len(clock)) >= len(even))[order]
+
+
+def _add_path(found: Drawing, lens: Camera, path: Path) -> None:
+    _add_polyline(found, lens, path.position, path.colour, path.joined)
+    pixels = project(lens, path.position[path.tick])
+    good = np.isfinite(pixels[:, 0])
+    colours = np.column_stack([0.4 + 0.6 * path.colour[path.tick], np.ones(path.tick.sum())])
+    found.dots.append((pixels[good], colours[good], 4.0))
+
+
+def _add_polyline(found: Drawing, lens: Camera, position: Array, colour: Array, joined: np.ndarray) -> None:
+    pixels = project(lens, position)
+    first = np.flatnonzero(joined[:-1] & np.isfinite(pixels[:-1, 0]) & np.isfinite(pixels[1:, 0]))
+    colours = np.column_stack([colour, np.ones(len(colour))])
+    pairs = np.stack([first, first + 1], axis=1)
+    found.lines.append(Line(pixels[pairs], colours[pairs], 2.0))
+
+
+def _add_outline(found: Drawing, lens: Camera, path: Path, moment: float, step: float) -> None:
+    """The block as a ball, where it is in the picture."""
+    if not path.time_s[0] - step / 2 <= moment <= path.time_s[-1] + step / 2:
+        return
+    centre = np.array([np.interp(moment, path.time_s, path.position[:, i]) for i in range(3)])
+    found.lines.append(_closed(ball(lens, centre, path.radius_m), OUTLINE, 1.5))
+
+
+def ball(lens: Camera, centre: Array, radius_m: float) -> Array:
+    """(49, 2) outline of a ball in pixels, NaN where it is not seen."""
+    away = centre - lens.position
+    distance = float(norm(away))
+    if distance <= radius_m:
+        return np.full((CIRCLE.size, 2), np.nan)
+    sight = away / distance
+    right = unit(np.asarray(np.cross(sight, lens.rotation[1])))
+    up = np.cross(right, sight)
+    reach = radius_m * np.sqrt(1 - (radius_m / distance) ** 2)  # the horizon circle of the ball
+    middle = centre - radius_m**2 / distance * sight
+    return project(lens, middle + reach * (np.cos(CIRCLE)[:, None] * right + np.sin(CIRCLE)[:, None] * up))
+
+
+def _closed(pixels: Array, colour: tuple[float, float, float], width: float, alpha: float = 1.0) -> Line:
+    good = np.isfinite(pixels[:-1, 0]) & np.isfinite(pixels[1:, 0])
+    segments = np.stack([pixels[:-1], pixels[1:]], axis=1)[good]
+    return Line(segments, np.broadcast_to(np.array([*colour, alpha]), (*segments.shape[:2], 4)), width)
+
+
+def _add_seen(
+    found: Drawing,
+    scene: bpy.types.Scene,
+    camera: bpy.types.Object,
+    lens: Camera,
+    name: str,
+    path: Path | None,
+    video_s: float,
+) -> None:
+    """Sightings of all pictures, brought into this one, joined with where the path is at their times."""
+    seen = observations.seen_in(camera, name)
+    place, where = _sightings(scene, camera, name, seen, path)
+    pixels, expected = project(lens, place), project(lens, where)
+    good = np.isfinite(pixels[:, 0])
+    colours = np.tile([*SEEN, 0.55], (len(pixels), 1))
+    now = np.abs(seen.time_s - video_s) < 1e-6
+    colours[now] = (1.0, 1.0, 1.0, 1.0)
+    found.dots.append((pixels[good], colours[good], SEEN_SIZE))
+    both = good & np.isfinite(expected[:, 0])
+    segments = np.stack([pixels[both], expected[both]], axis=1)
+    found.lines.append(Line(segments, np.broadcast_to([*SEEN, 0.8], (*segments.shape[:2], 4)), 1.0))
+    for i in np.flatnonzero(now & good):
+        found.marks.append(Mark(pixels[i], "ring", (*SEEN, 1.0), 4.0))
+
+
+def _sightings(
+    scene: bpy.types.Scene, camera: bpy.types.Object, name: str, seen: observations.Seen, path: Path | None
+) -> tuple[Array, Array]:
+    """Points in space of sightings (m, 3), as deep as the path is then, and of the path (m, 3), NaN where it is not."""
+    rows = np.array(camera[observations.ROWS_KEY], dtype=np.float64)
+    poses = np.array(camera[videos.POSES_KEY], dtype=np.float64)
+    key = (zlib.crc32(rows), zlib.crc32(poses), list(camera[videos.CLOCK_KEY]), id(path))
+    place = (scene.session_uid, camera[videos.ID_KEY], name)
+    if place in _seen and _seen[place][0] == key:
+        return _seen[place][1]
+    moving = videos.moving_camera(camera)
+    position, rotation = moving.poses_at(seen.time_s)
+    origin, direction = rays(moving.camera, seen.pixel, position=position, rotation=rotation)
+    clock, late = videos.clock_of(camera), videos.row_time_of(camera)
+    common = clock.to_common(seen.time_s) + late * (seen.pixel[:, 1] - videos.size_of(camera)[1] / 2)
+    where = np.full((len(seen), 3), np.nan)
+    if path is not None:
+        inside = (common >= path.time_s[0]) & (common <= path.time_s[-1])
+        for i in range(3):
+            where[inside, i] = np.interp(common[inside], path.time_s, path.position[:, i])
+    depth = np.einsum("ni,ni->n", where - origin, direction)
+    lacking = np.isnan(depth) & np.isfinite(direction[:, 0])
+    surface = reconstruction.ground(scene)
+    if lacking.any():
+        depth[lacking] = observations.FAR_M
+        if surface is not None:
+            met = cast_rays(surface, origin[lacking], direction[lacking]).distance
+            depth[lacking] = np.where(np.isfinite(met), met, observations.FAR_M)
+    _seen[place] = key, (origin + depth[:, None] * direction, where)
+    return _seen[place][1]
+
+
+def _add_pick(found: Drawing, lens: Camera, thing: bpy.types.Object, near: bool, active: bool) -> None:
+    place = thing.location if picks.moved(thing) else thing[picks.POSITION_KEY]
+    pixel = project(lens, [list(place)])[0]
+    if np.isnan(pixel[0]):
+        return
+    colour = picks.MARKER_COLOURS.get(thing[picks.KIND_KEY], (1.0, 1.0, 1.0))
+    found.marks.append(Mark(pixel, "ring", (*colour, 1.0 if near else 0.6), 8.0 if near else 5.0))
+    if active:
+        found.marks.append(Mark(pixel, "ring", (1.0, 0.65, 0.1, 1.0), 12.0))
+
+
+def _add_active(
+    found: Drawing, scene: bpy.types.Scene, camera: bpy.types.Object, lens: Camera, thing: bpy.types.Object
+) -> None:
+    """Disc, ellipse and second view of the selected pick."""
+    place = np.array(thing.location if picks.moved(thing) else thing[picks.POSITION_KEY], dtype=np.float64)
+    radius = picking.block_of(scene, thing[picks.TRAJECTORY_KEY]).radius_m
+    disc = around(place, np.array(thing.matrix_world.col[2].xyz), radius)
+    found.lines.append(_closed(project(lens, disc), (1.0, 0.65, 0.1), 1.0, 0.9))
+    sightings = picking.sightings(thing)
+    for seen in sightings.values():
+        axes = seen.ellipse
+        points = place + np.cos(CIRCLE)[:, None] * axes[0] + np.sin(CIRCLE)[:, None] * axes[1]
+        found.lines.append(_closed(project(lens, points), (1.0, 0.3, 0.2), 1.5))
+    curve = picking.epipolar(scene, thing, camera)
+    if curve is not None and len(curve) > 1:
+        found.lines.append(_closed(curve, EPIPOLAR, 1.5))
+    met = picking.triangulated(scene, thing) if len(sightings) > 1 else None
+    if met is not None and np.isfinite(met.point).all():
+        pixel = project(lens, met.point)[0]
+        if np.isfinite(pixel[0]):
+            text = f"the rays miss each other by {100 * met.miss_distance[0]:.1f} cm"
+            found.marks.append(Mark(pixel, "diamond", (*EPIPOLAR, 1.0), 7.0, text))
+
+
+def around(place: Array, normal: Array, radius_m: float) -> Array:
+    """(49, 3) a circle about a place, across a normal."""
+    helper = np.array([1.0, 0, 0]) if abs(normal[0]) < 0.8 else np.array([0, 1.0, 0])
+    first = unit(np.asarray(np.cross(normal, helper)))
+    second = np.cross(unit(normal), first)
+    return place + radius_m * (np.cos(CIRCLE)[:, None] * first + np.sin(CIRCLE)[:, None] * second)

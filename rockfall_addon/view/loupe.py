@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The loupe: the raw pixels of the video under the mouse, while one of our tools is used in the camera's view."""
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+
+from ...core.errors import RockfallError
+from ..scene import picking, problems, videos
+from . import drawing, image_view, loupe_picture, pointing
+
+SHOWN_BY = {"rockfall.pick_tool", "rockfall.align_tool"}
+AWAY = 26  # pixels at interface scale 1, between the mouse and the loupe
+
+_handles: list[object] = []
+
+
+def register() -> None:
+    if not bpy.app.background:
+        _handles.append(bpy.types.WindowManager.draw_cursor_add(_draw, (), "VIEW_3D", "WINDOW"))
+
+
+def unregister() -> None:
+    while _handles:
+        bpy.types.WindowManager.draw_cursor_remove(_handles.pop())
+
+
+@problems.guarded
+def _draw(mouse: tuple[int, int]) -> None:
+    context = bpy.context
+    region, scene = context.region, context.scene
+    settings = scene.rockfall_picking
+    if region is None or context.region_data is None or not settings.show_loupe or context.mode != "OBJECT":
+        return
+    tool = context.workspace.tools.from_space_view3d_mode("OBJECT")
+    camera = pointing.camera_of(context)
+    if tool is None or tool.idname not in SHOWN_BY or camera is None:
+        return
+    spot = np.array([mouse[0] - region.x, mouse[1] - region.y], dtype=np.float64)
+    rectangle = image_view.image_rectangle(region, context.region_data, scene, camera)
+    if rectangle is None or not ((spot >= 0) & (spot <= (region.width, region.height))).all():
+        return
+    pixel = image_view.to_pixel(rectangle, videos.size_of(camera), spot)
+    if not ((pixel >= 0) & (pixel <= videos.size_of(camera))).all():
+        return
+    scale = context.preferences.system.ui_scale
+    zoom = settings.loupe_zoom * scale
+    frame, _ = picking.picture_time(scene, camera)
+    try:
+        crop = loupe_picture.crop(videos.picture(camera, frame), pixel)
+    except RockfallError:
+        return  # the panel Videos tells that the file is gone
+    side = loupe_picture.SIDE * zoom
+    left = mouse[0] + AWAY * scale
+    if spot[0] + AWAY * scale + side > region.width:
+        left = mouse[0] - AWAY * scale - side
+    low = mouse[1] + AWAY * scale
+    if spot[1] + AWAY * scale + side > region.height:
+        low = mouse[1] - AWAY * scale - side
+    _picture(crop, left, low, side)
+    outline = loupe_picture.outline(scene, camera, pixel) if tool.idname == "rockfall.pick_tool" else None
+    _cross(pixel, left, low, side, zoom, scale, outline)
+
+
+def _picture(crop: np.ndarray, left: float, low: float, side: float) -> None:
+    values = np.ones((*crop.shape[:2], 4), dtype=np.float32)
+    values[:, :, :3] = crop[::-1] / 255.0
+    data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
+    texture = gpu.types.GPUTexture((crop.shape[1], crop.shape[0]), format="RGBA8", data=data)
+    texture.filter_mode(False)
+    shader = gpu.shader.from_builtin("IMAGE")
+    right, high = left + side, low + side
+    corners = [(left, low, 0), (right, low, 0), (left, high, 0), (right, high, 0)]
+    batch = batch_for_shader(shader, "TRI_STRIP", {"pos": corners, "texCoord": [(0, 0), (1, 0), (0, 1), (1, 1)]})
+    shader.uniform_sampler("image", texture)
+    batch.draw(shader)
+
+
+def _cross(
+    pixel: np.ndarray, left: float, low: float, side: float, zoom: float, scale: float, outline: np.ndarray | None
+) -> None:
+    """Frame, crosshair at the very pixel, and the block's outline there."""
+    first = np.floor(pixel) - loupe_picture.SIDE // 2
+    corner = np.array([left, low + side])
+
+    def to_screen(pixels: np.ndarray) -> np.ndarray:
+        return corner + (pixels - first) * (zoom, -zoom)
+
+    middle = to_screen(pixel)
+    arm, gap = 0.5 * side, 2.0 * zoom
+    lines = [
+        (middle + (way * gap) * axis, np.clip(middle + way * arm * axis, (left, low), (left + side, low + side)))
+        for axis in np.eye(2)
+        for way in (-1.0, 1.0)
+    ]
+    edge = [np.array(one) for one in ((left, low), (left + side, low), (left + side, low + side), (left, low + side))]
+    gpu.state.blend_set("ALPHA")
+    _plain(np.array(lines), (1.0, 1.0, 1.0, 0.7), scale)
+    _plain(np.array([(edge[i], edge[(i + 1) % 4]) for i in range(4)]), (0.0, 0.0, 0.0, 0.9), 2 * scale)
+    if outline is not None and len(outline):
+        points = np.clip(to_screen(outline), (left, low), (left + side, low + side))
+        _plain(np.stack([points[:-1], points[1:]], axis=1), (1.0, 1.0, 0.35, 0.9), 1.5 * scale)
+    gpu.state.blend_set("NONE")
+
+
+def _plain(segments: np.ndarray, colour: tuple[float, float, float, float], width: float) -> None:
+    drawing.segments(segments, np.broadcast_to(colour, (*segments.shape[:2], 4)), width)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mouse in a 3-D view: what it points at on the terrain, and which pick is under it."""
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
+from mathutils import Vector
+
+from ...core.camera.model import project
+from ...core.errors import RockfallError
+from ...core.vectors import Array
+from ..scene import picking, picks, store, videos
+from ..scene.picking import Place
+from . import image_view
+
+REACH_PX = 10.0
+"""A pick is under the mouse within this [px at interface scale 1]."""
+
+
+def camera_of(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The video's camera through which the 3-D view of the context looks; None in a free view."""
+    space, region = context.space_data, context.region_data
+    if space is None or space.type != "VIEW_3D" or region is None or region.view_perspective != "CAMERA":
+        return None
+    camera = space.camera if space.use_local_camera else context.scene.camera
+    return camera if videos.is_video(camera) else None
+
+
+def solved_camera_of(context: bpy.types.Context) -> bpy.types.Object | None:
+    """`camera_of`, unless its pose is not known: then pixels are taken as in a free view."""
+    camera = camera_of(context)
+    return camera if camera is not None and videos.is_solved(camera) else None
+
+
+def pixel_at(context: bpy.types.Context, xy: Sequence[float]) -> Array | None:
+    """(2,) pixel of the footage under a place of the region; None outside of the picture or in a free view."""
+    camera = camera_of(context)
+    if camera is None:
+        return None
+    rectangle = image_view.image_rectangle(context.region, context.region_data, context.scene, camera)
+    if rectangle is None:
+        return None
+    size = videos.size_of(camera)
+    pixel = image_view.to_pixel(rectangle, size, xy)
+    return pixel if (pixel >= 0).all() and (pixel <= size).all() else None
+
+
+def place_at(context: bpy.types.Context, xy: Sequence[float], name: str) -> Place:
+    """Where a place of the region lies on the terrain, for the block of a trajectory.
+
+    Raises
+    ------
+    RockfallError : the ray misses the terrain, or there is none.
+    """
+    camera, pixel = solved_camera_of(context), pixel_at(context, xy)
+    if camera is not None:
+        if pixel is None:
+            raise RockfallError(_no_pixel(context, camera))
+        return picking.in_picture(context.scene, camera, pixel, name)
+    origin = region_2d_to_origin_3d(context.region, context.region_data, Vector(xy))
+    direction = region_2d_to_vector_3d(context.region, context.region_data, Vector(xy))
+    return picking.on_ray(context.scene, np.array(origin), np.array(direction), name)
+
+
+def on_screen(context: bpy.types.Context, points: Array) -> Array:
+    """Places of points (n, 3) in the region, (n, 2); NaN where they are not seen."""
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    camera = solved_camera_of(context)
+    if camera is not None:
+        scene = context.scene
+        rectangle = image_view.image_rectangle(context.region, context.region_data, scene, camera)
+        if rectangle is not None:
+            _, video_s = picking.picture_time(scene, camera)
+            pixels = project(picking.posed(camera, video_s), points)
+            return image_view.to_region(rectangle, videos.size_of(camera), pixels)
+    matrix = np.array(context.region_data.perspective_matrix)
+    clip = np.c_[points, np.ones(len(points))] @ matrix.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        spots = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
+    spots[~(clip[:, 3] > 0)] = np.nan
+    return spots * [context.region.width, context.region.height]
+
+
+def pick_at(context: bpy.types.Context, xy: Sequence[float], *, any_time: bool = False) -> bpy.types.Object | None:
+    """The pick under a place of the region. In the footage those of its picture only, unless any_time."""
+    scene, camera = context.scene, solved_camera_of(context)
+    things = picks.things_of(scene)
+    if camera is not None and not any_time:
+        things = picking.in_this_picture(scene, camera)
+    things = [thing for thing in things if thing.visible_get()]
+    if not things:
+        return None
+    spots = on_screen(context, np.array([list(thing[picks.POSITION_KEY]) for thing in things]))
+    away = np.hypot(*(spots - np.asarray(xy, dtype=np.float64)).T)
+    away[np.isnan(away)] = np.inf
+    nearest = int(np.argmin(away))
+    return things[nearest] if away[nearest] <= REACH_PX * context.preferences.system.ui_scale else None
+
+
+def handle_of(context: bpy.types.Context, thing: bpy.types.Object) -> tuple[float, float]:
+    """Where a pick is held by the mouse, in the region: by what is clicked in the footage, else by its place."""
+    place, camera = np.array(thing[picks.POSITION_KEY], dtype=np.float64), solved_camera_of(context)
+    if camera is not None and context.scene.rockfall_picking.aim == "CENTRE":
+        seen = picking.sightings(thing).get(camera[videos.ID_KEY])
+        rectangle = image_view.image_rectangle(context.region, context.region_data, context.scene, camera)
+        if (
+            seen is not None
+            and seen.centre
+            and rectangle is not None
+            and thing in picking.in_this_picture(context.scene, camera)
+        ):
+            x, y = image_view.to_region(rectangle, videos.size_of(camera), seen.pixel)
+            return float(x), float(y)
+        normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
+        radius = picking.block_of(context.scene, thing[picks.TRAJECTORY_KEY]).radius_m
+        place = place + radius * normal / max(float(np.linalg.norm(normal)), 1e-9)
+    x, y = on_screen(context, place)[0]
+    return float(x), float(y)
+
+
+def select(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    """Make a pick the active and only selected object."""
+    for other in context.selected_objects:
+        if other != thing:
+            other.select_set(False)
+    thing.select_set(True)
+    context.view_layer.objects.active = thing
+
+
+def active_pick(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The selected pick."""
+    layer = context.view_layer
+    thing = layer.objects.active if layer is not None else None
+    if thing is None or thing.get(store.ROLE_KEY) != store.PICK_ROLE or picks.TRAJECTORY_KEY not in thing:
+        return None
+    return thing
+
+
+def _no_pixel(context: bpy.types.Context, camera: bpy.types.Object) -> str:
+    if image_view.shape_agrees(context.scene, camera):
+        return "This is outside of the picture. Click in it."
+    width, height = videos.size_of(camera)
+    return (
+        f"The scene's render size has another shape than {camera.name}, so its pixels cannot be told. Look through the "
+        f"camera again in the panel Videos, which sets it to {width} × {height}."
+    )

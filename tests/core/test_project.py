@@ -21,8 +21,8 @@ from rockfall.core.exchange.project import (
     read_project,
     write_project,
 )
-from rockfall.core.reconstruction import refinement, refinement_solver
 from rockfall.core.reconstruction.motion import FlightEnds
+from rockfall.core.reconstruction.refinement import refine, solver
 
 FULL = """
 schema = 1
@@ -243,9 +243,9 @@ def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
 
 
 def test_a_project_knows_what_a_refinement_knows() -> None:
-    assert formats.FREE == refinement.FREE
-    assert formats.SIGMA_AIM == refinement.SIGMA_AIM
-    assert set(formats.LOSSES) == set(refinement_solver.LOSSES)
+    assert formats.FREE == refine.FREE
+    assert formats.SIGMA_AIM == refine.SIGMA_AIM
+    assert set(formats.LOSSES) == set(solver.LOSSES)
     assert set(formats.FLIGHTS) == set(get_args(FlightEnds))
 
 

@@ -11,8 +11,7 @@ from ..errors import InputError
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .clouds import OBJECTIVE, Contest, Target, make_contest, measured_target
 from .courses import Spin, find_courses
 from .estimation import Estimate, Estimation, Question, ask, check_effort, estimate, paired_gain

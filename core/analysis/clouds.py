@@ -20,8 +20,7 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices, Mask
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask
 from .comparison import random_numbers
 from .courses import Courses
 

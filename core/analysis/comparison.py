@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import COMPARED, find_model
 from ..reconstruction.impact import Impacts, apparent
-from ..reconstruction.picks import Indices, Names
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask, Names
 from .courses import Courses, Spin, find_courses
 
 Parameters = Mapping[str, Mapping[str, object]]
@@ -57,7 +55,7 @@ class Predictions:
     rt: Array
     r: Array
     theta_dev: Array
-    into_ground: NDArray[np.bool_]
+    into_ground: Mask
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     spin: str = ""
     seed: int = 0

@@ -10,9 +10,8 @@ import numpy as np
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..impact_models.machinery.base import Incident
-from ..reconstruction.impact import Impacts, cross
-from ..reconstruction.picks import Indices, Mask
-from ..vectors import Array, dot, unit
+from ..reconstruction.impact import Impacts
+from ..vectors import Array, Indices, Mask, cross, dot, unit
 
 Spin = Literal["rolling", "zero", "table"]
 SPINS: tuple[Spin, ...] = get_args(Spin)

@@ -13,8 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices, Mask
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask
 from .comparison import Predictions
 from .curves import Curve, Trend, fit_curve
 from .variables import find_variable, measured_values, model_values

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .comparison import Predictions
 
 ABSCISSA = {

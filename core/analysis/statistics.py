@@ -7,8 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Mask
-from ..vectors import Array, norm
+from ..vectors import Array, Mask, norm
 
 PUBLISHED_RT_SLOPE = 0.66
 PUBLISHED_RT_R2 = 0.31

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reconstruction.impact import Impacts, apparent
-from ..vectors import Array, angle_between, norm
+from ..vectors import Array, Indices, Names, angle_between, norm
 
 COLUMNS = (
     *("trajectory", "impact", "time_s", "nx", "ny", "nz"),
@@ -30,8 +29,8 @@ class Truth:
     v1, v2 : (n, 3) velocity of the block's centre just before and after [m/s]; NaN where there is none.
     """
 
-    trajectory: NDArray[np.str_]
-    impact: NDArray[np.intp]
+    trajectory: Names
+    impact: Indices
     time_s: Array
     normal: Array
     v1: Array

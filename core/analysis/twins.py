@@ -17,9 +17,8 @@ from ..georeference import GlobalShift
 from ..reconstruction.drag import Drag
 from ..reconstruction.impact import Impacts
 from ..reconstruction.landing import LIMIT_S, STEP_S, Launches, find_landings, greatest_heights
-from ..reconstruction.picks import Indices, Mask, Names
 from ..terrain.surface import Surface
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, Mask, Names, norm
 from .comparison import Predictions
 
 DEFAULT_CLEARING_M = 0.1

@@ -10,8 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, norm
 from .comparison import Predictions
 
 

@@ -15,7 +15,7 @@ from scipy.linalg import null_space
 
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..vectors import Array, norm, unit
+from ..vectors import Array, cross, norm, unit
 
 INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 """The inner parameters of a camera, in the order of every array of them; the focal lengths and the centre in px."""
@@ -148,13 +148,13 @@ def look_at(
     forward = unit(np.asarray(target, dtype=np.float64) - place)
     if not np.isfinite(forward).all():
         raise InputError("The camera cannot look at the place where it stands")
-    right: Array = np.asarray(np.cross(forward, upright), dtype=np.float64)
+    right = cross(forward, upright)
     if norm(right) < 1e-9 * norm(upright):
-        right = np.asarray(np.cross(forward, [0.0, 1.0, 0.0]), dtype=np.float64)
+        right = cross(forward, np.array([0.0, 1.0, 0.0]))
     if norm(right) < 1e-9:
         right = null_space(forward[None])[:, 0]
     right = unit(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
+    rotation = np.stack([right, cross(forward, right), forward])
     return Camera(width, height, focal, focal, width / 2, height / 2, position=place, rotation=rotation)
 
 
@@ -260,7 +260,7 @@ def project_with_derivatives(
         pixel=bent * focal + [camera.cx, camera.cy],
         depth=depth,
         d_point=by_point,
-        d_rotation=np.cross(seen[:, None, :], by_seen).astype(np.float64, copy=False),
+        d_rotation=cross(seen[:, None, :], by_seen),
         d_position=-by_point,
         d_intrinsics=by_inner,
     )

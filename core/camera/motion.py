@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project, rays, rotation_from_vector, undistort, vector_from_rotation
-from .turning import LEAST_FEATURES, Indices, Turns, solve_turns
+from .turning import LEAST_FEATURES, Turns, solve_turns
 from .walking import LEAST_POINTS, solve_poses
 
 type PointsOf = Callable[[Array, Array], Array]
@@ -260,7 +260,7 @@ def _walk(
         solved |= asked
 
 
-def _nearest(solved: NDArray[np.bool_]) -> Indices:
+def _nearest(solved: Mask) -> Indices:
     """(f,) for each frame the nearest one that is solved."""
     known = np.flatnonzero(solved)
     gap = np.abs(np.arange(solved.size)[:, None] - known[None])
@@ -289,7 +289,7 @@ def _mean_sigma(covariance: Array, first: int) -> Array:
     return np.sqrt(np.trace(covariance[:, first : first + 3, first : first + 3], axis1=1, axis2=2) / 3)
 
 
-def _filled(times: Array, known: NDArray[np.bool_], position: Array, rotation: Array) -> tuple[Array, Array]:
+def _filled(times: Array, known: Mask, position: Array, rotation: Array) -> tuple[Array, Array]:
     """Poses between those of the neighbours for frames without any."""
     if known.all():
         return position, rotation
@@ -339,7 +339,7 @@ def _bridged(spread: Array, keys: list[int]) -> Array:
     return np.sqrt(result)
 
 
-def _advice(known: NDArray[np.bool_], features: Indices, residual: Array, sigma_px: float) -> tuple[str, ...]:
+def _advice(known: Mask, features: Indices, residual: Array, sigma_px: float) -> tuple[str, ...]:
     sentences = []
     if not known.all():
         sentences.append(

@@ -10,17 +10,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import fdtri
 
 from ..errors import InputError, RockfallError
 from ..georeference import GlobalShift
-from ..vectors import Array, norm
+from ..vectors import Array, Mask, distance_to_ray, norm
 from .model import INTRINSICS, Camera, project_with_derivatives, rays, rotation_from_vector, with_intrinsics
 from .resection_advice import Geometry, advise
 from .starting import Starts, find_starts
-
-type Mask = NDArray[np.bool_]
 
 POSE = ("rx", "ry", "rz", "x", "y", "z")
 """The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
@@ -608,5 +606,4 @@ def _spread(solution: _Solution, problem: _Problem, used: Mask) -> tuple[float, 
 
 def _distances(camera: Camera, problem: _Problem) -> Array:
     """(n,) between the points and the rays of their pixels [m]."""
-    origins, directions = rays(camera, problem.pixels)
-    return norm(np.asarray(np.cross(problem.points - origins, directions), dtype=np.float64))
+    return distance_to_ray(problem.points, *rays(camera, problem.pixels))

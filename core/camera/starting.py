@@ -12,7 +12,7 @@ from math import comb
 
 import numpy as np
 
-from ..vectors import Array, norm, unit
+from ..vectors import Array, cross, norm, unit
 from .model import Camera, project_with_derivatives, rotation_from_vector, undistort
 
 TRIPLES = 32
@@ -149,8 +149,8 @@ def poses_from_three(bearings: Array, points: Array) -> tuple[Array, Array, Arra
 def _triad(points: Array) -> Array:
     """Right-handed frames of triangles, axes in columns, (m, 3, 3) → (m, 3, 3)."""
     first = unit(points[:, 1] - points[:, 0])
-    third = unit(np.asarray(np.cross(first, points[:, 2] - points[:, 0]), dtype=np.float64))
-    return np.stack([first, np.cross(third, first), third], axis=2)
+    third = unit(cross(first, points[:, 2] - points[:, 0]))
+    return np.stack([first, cross(third, first), third], axis=2)
 
 
 def _quartic_roots(coefficients: Array) -> np.ndarray:
@@ -202,7 +202,7 @@ def _triples(pixels: Array, points: Array) -> np.ndarray:
         return triples
     a, b = (pixels[triples[:, i]] - pixels[triples[:, 0]] for i in (1, 2))
     flat = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    solid = norm(np.asarray(np.cross(*(points[triples[:, i]] - points[triples[:, 0]] for i in (1, 2)))))
+    solid = norm(cross(*(points[triples[:, i]] - points[triples[:, 0]] for i in (1, 2))))
     wide = flat / flat.max() * np.sqrt(solid / solid.max())
     # Half of the triples are the widest; the others come from all over, in case that a wide pair is wrong.
     order = np.argsort(-wide, kind="stable")

@@ -8,13 +8,10 @@ all features at once, by least squares with weights that fall to nothing (Geman 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from ..vectors import Array, norm, unit
+from ..vectors import Array, Indices, Mask, across, cross, norm, perpendicular, unit
 from .model import rotation_from_vector
-
-Indices = NDArray[np.intp]
 
 LEAST_FEATURES = 3
 WAHBA_ROUNDS = 15
@@ -152,7 +149,7 @@ def _together(
     rotations: Array,
     directions: Array,
     reference: int,
-    solved: NDArray[np.bool_],
+    solved: Mask,
 ) -> tuple[Array, Array, Array]:
     """All rotations and directions by Gauss–Newton; the directions are eliminated from the normal equations.
 
@@ -167,7 +164,7 @@ def _together(
     base, gap, length = np.empty((0, 2, 3)), np.empty((0, 2)), np.empty(0)
     scatter, ridge = 1.0, 0.0
     for number in range(ROUNDS):
-        base = _tangents(directions)
+        base = np.stack(perpendicular(directions), axis=1)
         seen = np.einsum("mji,mj->mi", rotations[frame], bearing)
         gap = np.einsum("mki,mi->mk", base[feature], seen)
         length = norm(gap) / sigma
@@ -180,7 +177,7 @@ def _together(
         turn = np.zeros((frames, 3))
         turn.reshape(-1)[unknown] = cho_solve(factor, right[unknown], check_finite=False)
         rotations = rotations @ rotation_from_vector(-turn)
-        moved = np.cross(turn[frame], directions[feature])
+        moved = cross(turn[frame], directions[feature])
         gained = sums_by(feature, weight[:, None] * np.einsum("mki,mi->mk", base[feature], moved), features)
         shift = np.divide(offset + gained, total[:, None], out=np.zeros_like(offset), where=total[:, None] > 0)
         directions = unit(directions + np.einsum("ikj,ik->ij", base, shift))
@@ -211,7 +208,7 @@ def _reduced(
     tied = np.zeros((frames, features))
     tied[frame, feature] = weight
     share = np.divide(tied, total, out=np.zeros_like(tied), where=total > 0)
-    square = np.nan_to_num(np.eye(3) - directions[:, :, None] * directions[:, None, :])
+    square = np.nan_to_num(across(directions))
     normal = np.empty((frames, 3, frames, 3))
     for i in range(3):
         for j in range(i, 3):
@@ -225,10 +222,3 @@ def _reduced(
     pulled = left[:, :1] * base[feature, 1] - left[:, 1:] * base[feature, 0]
     right = -sums_by(frame, weight[:, None] * pulled, frames).reshape(-1)
     return normal.reshape(3 * frames, 3 * frames), right, offset, total
-
-
-def _tangents(directions: Array) -> Array:
-    """(i, 2, 3) two unit vectors at right angles to each direction and each other, right-handed with it."""
-    helper = np.where(np.abs(directions[:, 2:]) < 0.7, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    first = unit(np.asarray(np.cross(helper, directions), dtype=np.float64))
-    return np.stack([first, np.cross(directions, first)], axis=1)

@@ -4,11 +4,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project_with_derivatives, rotation_from_vector
-from .turning import Indices, believed_scatter, sums_by
+from .turning import believed_scatter, sums_by
 
 LEAST_POINTS = 4
 ROUNDS = 9
@@ -40,7 +39,7 @@ def solve_poses(
     sigma_px: float,
     position: Array,
     rotation: Array,
-    asked: NDArray[np.bool_],
+    asked: Mask,
 ) -> Poses:
     """Levenberg–Marquardt on all frames at once, each for itself, with weights that fall to nothing.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, Mask, distance_to_ray, norm
 from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_told, whole
 from .progress import Progress
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from ..exchange.cameras import Pairs
     from ..footage.video import Video
     from ..georeference import GlobalShift
-    from ..reconstruction.picks import Indices, Mask
     from ..terrain.surface import Surface
 
 FREE = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
@@ -283,9 +282,9 @@ def _residuals(path: "MovingCamera", pairs: "Pairs", video: "Video | None", fram
 
     time_s = np.zeros(len(pairs)) if video is None else video.time_s[np.where(pairs.frame < 0, frame, pairs.frame)]
     position, rotation = path.poses_at(time_s)
-    origins, directions = rays(path.camera, pairs.pixel, position=position, rotation=rotation)
     seen = project(path.camera, pairs.point, position=position, rotation=rotation)
-    return pairs.pixel - seen, norm(np.cross(pairs.point - origins, directions))
+    beam = rays(path.camera, pairs.pixel, position=position, rotation=rotation)
+    return pairs.pixel - seen, distance_to_ray(pairs.point, *beam)
 
 
 def _frame(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> int:

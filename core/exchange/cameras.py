@@ -13,8 +13,7 @@ from ..camera.model import Camera
 from ..camera.motion import MovingCamera
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..reconstruction.picks import Indices, Mask, Names
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask, Names
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
 from .toml_text import TomlTable, read_toml

@@ -7,7 +7,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array
+from ..vectors import Array, Indices
 
 
 class Cells(Sequence[str]):
@@ -46,7 +46,7 @@ class Cells(Sequence[str]):
             texts.append(text)
         return texts
 
-    def numbers(self, *, empty: bool) -> tuple[Array, NDArray[np.intp]]:
+    def numbers(self, *, empty: bool) -> tuple[Array, Indices]:
         """(n,) numbers, and the rows to be looked at: what may be no number, and with `empty` the empty cells."""
         from .number_kernels import NUMBER, UNSURE, read_numbers
 

@@ -10,10 +10,9 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..vectors import Array
+from ..vectors import Array, Names
 from .cells import Cells, split_cells
 
 LARGE_BYTES = 2_000_000
@@ -88,7 +87,7 @@ class TextTable:
         """(n, 3) from three columns."""
         return np.stack([self.numbers(name, required=required) for name in names], axis=1)
 
-    def rest(self, known: Sequence[str]) -> dict[str, NDArray[np.str_]]:
+    def rest(self, known: Sequence[str]) -> dict[str, Names]:
         """The columns that are not among `known`."""
         left = [name for name in self.columns if name not in known]
         return {name: np.array(self.text(name), dtype=np.str_) for name in left}

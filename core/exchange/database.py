@@ -11,8 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices, Mask
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask
 from .duplicates import Duplicates, find_duplicates
 from .selection import joined, rows_of
 from .tables import read_impacts

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Indices, Mask
+from ..vectors import Indices, Mask
 from .selection import codes
 
 SAME_TIME_S, SAME_PLACE_M = 1e-3, 0.01

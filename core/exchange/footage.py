@@ -11,12 +11,12 @@ from ..camera.model import rays
 from ..errors import InputError, RockfallError
 from ..footage.clock import Clock
 from ..georeference import GlobalShift
-from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
+from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.ray_flight import flight_through_rays
 from ..reconstruction.refinement.views import PixelObservations, View
 from ..reconstruction.triangulation import contact_points
 from ..terrain.surface import Surface
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask, Names
 from .cameras import CameraFile, read_camera
 from .footage_tables import Events, Track, read_events, read_track
 from .opening import block_of

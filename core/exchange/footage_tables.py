@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..reconstruction.picks import Indices, Mask, Names
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask, Names
 from .csv_text import TextTable, read_table
 from .tables import Columns, vector_columns, write_columns
 

@@ -13,8 +13,7 @@ from ..errors import InputError
 from ..georeference import GlobalShift
 from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.impact import FLAGS, Impacts
-from ..reconstruction.picks import Indices, Mask, Names
-from ..vectors import Array
+from ..vectors import Array, Indices, Mask, Names
 from .tables import impact_column, impact_columns
 
 COMPARISONS: Mapping[str, Callable[[Any, Any], Any]] = {

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..georeference import GlobalShift
 from ..reconstruction.impact import FLAGS, Impacts, apparent
-from ..reconstruction.picks import Indices, Mask, Names, Picks, make_picks
+from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
-from ..vectors import Array, dot
+from ..vectors import Array, Indices, Mask, Names, dot
 from .csv_text import read_table
 
 POSITION = ("x_m", "y_m", "z_m")

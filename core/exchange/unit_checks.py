@@ -12,8 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reconstruction.impact import Impacts, apparent
-from ..reconstruction.picks import Mask
-from ..vectors import Array, norm
+from ..vectors import Array, Mask, norm
 from .tables import IMPACTS_COLUMNS
 
 OTHER_UNITS = {

@@ -7,7 +7,7 @@ from math import atan, hypot, pi, radians, tan
 
 import numpy as np
 
-from ..vectors import Array, unit
+from ..vectors import Array, cross, unit
 
 Seen = Callable[[Array], Array]
 """From a position (3,) to the share, 0…1, of each trajectory point that can be seen from there: (n,)."""
@@ -170,9 +170,8 @@ def _candidates(
 
 
 def _facing(position: Array, forward: Array, fov: float, aspect: float) -> View:
-    right = np.cross(forward, UP)
+    right = cross(forward, UP)
     if np.linalg.norm(right) < 1e-9:  # straight down: north is up
         right = np.array([1.0, 0.0, 0.0])
     right = unit(right)
-    up: Array = np.cross(right, forward).astype(np.float64)
-    return View(position, right, up, forward, fov, aspect)
+    return View(position, right, cross(right, forward), forward, fov, aspect)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .opencv import opencv
 from .sources import Source, frames
 
@@ -28,7 +28,6 @@ RENEW_SHARE = 0.6
 STILL_PX = 0.15
 """A tripod: the typical corner never moves further than this."""
 
-Indices = np.ndarray
 Progress = Callable[[str], None]
 
 

@@ -7,8 +7,8 @@ from typing import Any, overload
 import numpy as np
 
 from ..errors import InputError
-from ..vectors import Array
-from .video import Indices, Video
+from ..vectors import Array, Indices
+from .video import Video
 
 LEAST_SIGMA_S = 0.005
 """No event is taken to be timed better than this when none says how well: half a frame at 100 frames per second."""

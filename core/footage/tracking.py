@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import InputError
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .background import BackgroundMotion, background_motion, destabilise, stabilise
 from .kinks import find_kinks
 from .plates import Plates
@@ -39,7 +39,6 @@ NEIGHBOURS = 8
 SHAPE = 0.005
 """Standard deviation of the centre of a block that is no sphere, in diameters."""
 
-Indices = np.ndarray
 Progress = Callable[[str], None]
 
 

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .containers import codec_name, container_of, holds_sound, lacks_index
 from .opencv import opencv
 
 type Image = NDArray[np.uint8]
-type Indices = NDArray[np.intp]
 type Report = Callable[[str], None]
 
 SAME_TIME_S = 1e-6

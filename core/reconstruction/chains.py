@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .picks import Indices, Mask, Picks
+from ..vectors import Indices, Mask
+from .picks import Picks
 
 
 @dataclass(frozen=True, eq=False)

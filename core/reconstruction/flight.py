@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, Mask, Names, norm
 from .chains import Segments
 from .drag import fit_with_drag, fly
 from .observations import fit_parabolas, observe
-from .picks import Indices, Mask, Names, Picks
+from .picks import Picks
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array, dot, norm
+from ..vectors import Array, Indices, Mask, dot, norm
 from .block import per_pick
 from .impact import DeviationForm, Impacts, apparent
 from .motion import Motion
-from .picks import Indices, Mask, Picks
+from .picks import Picks
 from .uncertainty import propagate
 
 

@@ -8,10 +8,9 @@ import numpy as np
 from ..errors import RockfallError
 from ..terrain.raycast import cast_rays, heights_above
 from ..terrain.surface import Surface
-from ..vectors import Array, dot, norm
+from ..vectors import Array, Indices, Mask, dot, norm
 from .drag import fly
 from .flight import parabola
-from .picks import Indices, Mask
 
 FIRST_STEP_S, STEP_S = 0.001, 0.02
 """Chords of the curved path, short at its start, where it may be a hop. The longest leaves the path by g·t²/8 = 0.5 mm;

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .block import Block, per_pick
 from .chains import Segments, find_segments
 from .clearance import Clearance, clearances
 from .drag import Drag
 from .flight import Flights, solve_flights
-from .picks import Indices, Picks
+from .picks import Picks
 from .placement import GroundNormals, pick_normals
 
 if TYPE_CHECKING:

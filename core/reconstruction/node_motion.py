@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vectors import Array
-from .picks import Indices, Mask
+from ..vectors import Array, Indices, Mask
 
 
 @dataclass(frozen=True, eq=False)

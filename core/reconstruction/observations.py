@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vectors import Array
-from .picks import Indices, Picks
+from ..vectors import Array, Indices
+from .picks import Picks
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,20 +7,15 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..vectors import Array, norm
+from ..vectors import Array, Indices, Mask, Names, norm
 
 KINDS = ("impact", "release", "pass", "contact", "stop")
 STATUSES = ("ok", "doubtful", "shattered", "discarded")
 SAME_TIME_S = 1e-6
 """Picks of one trajectory that are closer in time than this are at one time: no velocity can be told from them."""
-
-Names = NDArray[np.str_]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

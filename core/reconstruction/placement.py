@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..vectors import Array
-from .picks import Mask, Picks
+from ..vectors import Array, Mask
+from .picks import Picks
 
 if TYPE_CHECKING:
     from ..terrain.surface import Surface

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vectors import Array, dot, norm
+from ..vectors import Array, across, angle_between, norm
 
 ROUNDS = 3
 """Of weighting by the distance, which the first round does not know."""
@@ -45,9 +45,9 @@ def flight_through_rays(
     elapsed = time_s - point_time_s
     fallen = np.zeros((time_s.size, 3))
     fallen[:, 2] = -0.5 * gravity_mps2 * elapsed**2
-    across = np.eye(3) - directions[:, :, None] * directions[:, None, :]
-    rest = (across @ (origins - point - fallen)[:, :, None])[:, :, 0]
-    rows = across * elapsed[:, None, None]
+    beside = across(directions)
+    rest = (beside @ (origins - point - fallen)[:, :, None])[:, :, 0]
+    rows = beside * elapsed[:, None, None]
     distance = np.maximum(norm(point - origins), 1e-6)
     velocity, position = np.zeros(3), np.broadcast_to(point, origins.shape)
     for _ in range(ROUNDS):
@@ -55,6 +55,4 @@ def flight_through_rays(
         velocity = np.linalg.lstsq(weighted.reshape(-1, 3), (rest / distance[:, None]).ravel(), rcond=None)[0]
         position = point + velocity * elapsed[:, None] + fallen
         distance = np.maximum(norm(position - origins), 1e-6)
-    towards = position - origins
-    sideways = norm((across @ towards[:, :, None])[:, :, 0])
-    return RayFlight(velocity, position, np.arctan2(sideways, dot(towards, directions)))
+    return RayFlight(velocity, position, angle_between(position - origins, directions))

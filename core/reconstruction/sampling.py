@@ -8,10 +8,9 @@ import numpy as np
 
 from ..errors import RockfallError
 from ..georeference import GlobalShift
-from ..vectors import Array, dot
+from ..vectors import Array, Indices, Names, dot
 from .block import per_pick
 from .flight import flight_states
-from .picks import Indices, Names
 
 if TYPE_CHECKING:
     from ..terrain.surface import Surface

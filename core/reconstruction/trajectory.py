@@ -9,6 +9,7 @@ import numpy as np
 
 from ..constants import GRAVITY_MPS2
 from ..errors import RockfallError
+from ..vectors import Indices
 from .block import Block, per_pick
 from .clearance import Clearance
 from .drag import Drag
@@ -16,7 +17,7 @@ from .flight import Flights
 from .impact import DeviationForm, Impacts
 from .impact_rows import find_impacts
 from .motion import FlightEnds, solve_motion
-from .picks import Indices, Picks
+from .picks import Picks
 from .placement import check_placement
 
 if TYPE_CHECKING:

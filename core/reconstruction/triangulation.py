@@ -10,8 +10,7 @@ from ..camera.model import Camera, project, project_with_derivatives, rays
 from ..errors import InputError
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
-from ..vectors import Array, dot, norm, unit
-from .picks import Mask
+from ..vectors import Array, Mask, across, cross, distance_to_ray, dot, norm, perpendicular, unit
 from .placement import terrain_normals
 
 GRAZING_DEG = 5.0
@@ -82,9 +81,8 @@ def pick_on_terrain(
         by_point = project_with_derivatives(camera, point[met], position=place, rotation=turn).d_point
         along = unit(direction[met] - dot(direction[met], normal[met])[:, None] * normal[met])
         bare = ~np.isfinite(along[:, 0])  # looking straight down on the face: any axis does
-        helper = np.where(np.abs(normal[met, :1]) < 0.8, [[1.0, 0, 0]], [[0, 1.0, 0]])
-        along = np.where(bare[:, None], unit(np.cross(normal[met], helper)), along)
-        plane = np.stack([along, np.cross(normal[met], along)], axis=2)
+        along = np.where(bare[:, None], perpendicular(normal[met])[0], along)
+        plane = np.stack([along, cross(normal[met], along)], axis=2)
         inverse = np.linalg.inv(by_point @ plane) * sigma[met, None, None]
         spread = plane @ inverse
         covariance[met] = spread @ np.swapaxes(spread, 1, 2)
@@ -183,9 +181,9 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
     seen: Mask = np.asarray(np.isfinite(direction).all(axis=2))
     enough = np.flatnonzero(seen.sum(axis=0) >= 2)
     point = np.full((n, 3), np.nan)
-    across = np.where(seen[:, :, None, None], np.eye(3) - direction[..., :, None] * direction[..., None, :], 0.0)
-    pull = np.einsum("vnij,vnj->vni", across, np.where(seen[:, :, None], origin, 0.0)).sum(axis=0)
-    point[enough] = np.linalg.solve(across.sum(axis=0)[enough], pull[enough, :, None])[:, :, 0]
+    beside = np.where(seen[:, :, None, None], across(direction), 0.0)
+    pull = np.einsum("vnij,vnj->vni", beside, np.where(seen[:, :, None], origin, 0.0)).sum(axis=0)
+    point[enough] = np.linalg.solve(beside.sum(axis=0)[enough], pull[enough, :, None])[:, :, 0]
 
     information = np.zeros((n, 3, 3))
     residual = np.full((v, n, 2), np.nan)
@@ -205,10 +203,8 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
             break
     covariance = np.full((n, 3, 3), np.nan)
     covariance[good] = np.linalg.inv(information[good])
-    away = point - origin
-    beside = norm(away - dot(away, direction)[..., None] * direction)
     count = np.maximum(seen.sum(axis=0), 1)
-    miss = np.sqrt(np.where(seen, beside**2, 0.0).sum(axis=0) / count)
+    miss = np.sqrt(np.where(seen, distance_to_ray(point, origin, direction) ** 2, 0.0).sum(axis=0) / count)
     return SpacePoints(point, covariance, np.where(np.isfinite(point[:, 0]), miss, np.nan), residual)
 
 

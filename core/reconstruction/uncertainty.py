@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..vectors import Array, dot, norm
+from ..vectors import Array, Indices, cross, dot, norm
 from .flight import Flights, flight_states
-from .impact import Apparent, cross
+from .impact import Apparent
 from .observations import observe, velocity_weights
-from .picks import Indices, Picks
+from .picks import Picks
 
 Gradient = tuple[Array, Array]
 

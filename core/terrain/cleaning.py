@@ -4,8 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array, dot
-from .surface import cross_product
+from ..vectors import Array, Mask, cross, dot
 
 CHUNK = 1 << 15
 FLAT = 1e-12
@@ -37,7 +36,7 @@ def merge_duplicates(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, 
     return vertices[kept], number[faces], int((~kept).sum())
 
 
-def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[NDArray[np.bool_], Array, NDArray[np.bool_]]:
+def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[Mask, Array, Mask]:
     """Chunk by chunk, to stay small: (m,) degenerate; (3,) twice the total vector area; (2,) any face up, any down."""
     degenerate = np.zeros(len(faces), np.bool_)
     total = np.zeros(3)
@@ -45,11 +44,11 @@ def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[NDArray[np
     for start in range(0, len(faces), CHUNK):
         a, b, c = (vertices[faces[start : start + CHUNK, k]] for k in range(3))
         u, v, w = b - a, c - a, c - b
-        cross = cross_product(u, v)
+        twice = cross(u, v)
         longest2 = np.maximum(np.maximum(dot(u, u), dot(v, v)), dot(w, w))
-        degenerate[start : start + CHUNK] = dot(cross, cross) <= (FLAT * longest2) ** 2
-        total += cross.sum(axis=0)
-        up_down |= ((cross[:, 2] > 0).any(), (cross[:, 2] < 0).any())
+        degenerate[start : start + CHUNK] = dot(twice, twice) <= (FLAT * longest2) ** 2
+        total += twice.sum(axis=0)
+        up_down |= ((twice[:, 2] > 0).any(), (twice[:, 2] < 0).any())
     return degenerate, total, up_down
 
 

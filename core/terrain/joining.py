@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..vectors import Array
+from ..vectors import Array, Mask
 from .surface import Surface
 
 SAME_M = 1e-3
@@ -74,7 +74,7 @@ def _same_points(tiles: Sequence[Surface], starts: NDArray[np.int64]) -> NDArray
     return every[pairs[tile_of[pairs[:, 0]] != tile_of[pairs[:, 1]]]]
 
 
-def _on_border(surface: Surface) -> NDArray[np.bool_]:
+def _on_border(surface: Surface) -> Mask:
     border = np.zeros(len(surface.vertices), np.bool_)
     face, edge = np.nonzero(surface.neighbours == -1)
     border[surface.faces[face, edge]] = border[surface.faces[face, (edge + 1) % 3]] = True

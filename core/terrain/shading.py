@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..vectors import Array, dot, norm, unit
+from ..vectors import Array, Mask, dot, norm, unit
 from .surface import Surface
 
 EYE_DOME_STEPS = (1, 4, 16)
@@ -33,7 +32,7 @@ class Shading:
     hillshade: Array
     eye_dome: Array
     density: Array
-    thin: NDArray[np.bool_]
+    thin: Mask
     roughness: Array
 
 
@@ -93,7 +92,7 @@ def _relief(vertices: Array, normals: Array, mean: Any) -> tuple[Array, Array]:
     return total, np.nan_to_num(residual, nan=0.0)
 
 
-def _neighbourhood(surface: Surface) -> tuple[Any, NDArray[np.bool_], Array]:
+def _neighbourhood(surface: Surface) -> tuple[Any, Mask, Array]:
     """Mean over a vertex and its neighbours (n, n), whether it is on a border (n,), its longest edge [m] (n,)."""
     from scipy.sparse import csr_array, diags_array
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..vectors import Array
+from ..vectors import Array, Mask
 
 MAX_EDGE_SPACINGS = 10.0
 """Longest edge of a meshed cloud by default, in multiples of its mean point spacing: longer ones bridge holes."""
@@ -67,7 +67,7 @@ def mesh_grid(points: Array, shape: tuple[int, int]) -> Meshed:
     return Meshed(points[valid], upward(points, kept[np.concatenate(faces)], valid), tuple(notes))
 
 
-def upward(points: Array, faces: NDArray[np.int32], valid: NDArray[np.bool_]) -> NDArray[np.int32]:
+def upward(points: Array, faces: NDArray[np.int32], valid: Mask) -> NDArray[np.int32]:
     """Faces of a grid turned if its rows and columns run the other way round (south row first)."""
     if len(faces):
         x, y = points[valid][faces[0], 0], points[valid][faces[0], 1]

@@ -21,7 +21,7 @@ from ...core.camera.motion import MovingCamera, fixed
 from ...core.camera.resection import Resection, resect
 from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_rays
-from ...core.vectors import Array, norm
+from ...core.vectors import Array, distance_to_ray
 from . import migration, store, terrain, videos
 
 PAIRS_KEY = "rockfall_pairs"
@@ -538,8 +538,7 @@ def _checked_against(camera: bpy.types.Object, pairs: Sequence[Pair], solution: 
     marked, points = np.array([pair.pixel for pair in complete]), np.array([pair.point for pair in complete])
     position, rotation = path.poses_at(_times(camera, [pair.frame for pair in complete]))
     seen = project(path.camera, points, position=position, rotation=rotation)
-    origins, directions = rays(path.camera, marked, position=position, rotation=rotation)
-    away = norm(np.cross(points - origins, directions))
+    away = distance_to_ray(points, *rays(path.camera, marked, position=position, rotation=rotation))
     names = [pair.id for pair in complete]
     return replace(
         solution,

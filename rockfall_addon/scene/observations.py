@@ -11,10 +11,9 @@ from ...core.camera.model import project, rays
 from ...core.errors import RockfallError
 from ...core.footage.kinks import find_kinks
 from ...core.footage.tracking import BlockTrack
-from ...core.reconstruction.picks import Indices
 from ...core.reconstruction.triangulation import contact_points
 from ...core.terrain.raycast import cast_rays
-from ...core.vectors import Array
+from ...core.vectors import Array, Indices
 from . import picking, picks, sync, videos
 
 NAMES_KEY, ROWS_KEY = "rockfall_track_names", "rockfall_track"

@@ -18,7 +18,7 @@ from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.terrain.raycast import cast_rays, heights_above
-from ...core.vectors import Array, norm, unit
+from ...core.vectors import Array, cross, norm, perpendicular, unit
 from ..scene import (
     fingerprints,
     observations,
@@ -236,8 +236,8 @@ def ball(lens: Camera, centre: Array, radius_m: float) -> Array:
     if distance <= radius_m:
         return np.full((CIRCLE.size, 2), np.nan)
     sight = away / distance
-    right = unit(np.asarray(np.cross(sight, lens.rotation[1])))
-    up = np.cross(right, sight)
+    right = unit(cross(sight, lens.rotation[1]))
+    up = cross(right, sight)
     reach = radius_m * np.sqrt(1 - (radius_m / distance) ** 2)  # the horizon circle of the ball
     middle = centre - radius_m**2 / distance * sight
     return project(lens, middle + reach * (np.cos(CIRCLE)[:, None] * right + np.sin(CIRCLE)[:, None] * up))
@@ -343,7 +343,5 @@ def _add_active(
 
 def around(place: Array, normal: Array, radius_m: float) -> Array:
     """(49, 3) a circle about a place, across a normal."""
-    helper = np.array([1.0, 0, 0]) if abs(normal[0]) < 0.8 else np.array([0, 1.0, 0])
-    first = unit(np.asarray(np.cross(normal, helper)))
-    second = np.cross(unit(normal), first)
+    first, second = perpendicular(normal)
     return place + radius_m * (np.cos(CIRCLE)[:, None] * first + np.sin(CIRCLE)[:, None] * second)

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import InputError
-from ...vectors import Array, dot
+from ...vectors import Array, Indices, dot
 from .compilation import compiled_driver, compiled_rebound
 from .parameters import ParameterSpec, Value, suggestion
 from .triples import Vector
@@ -182,9 +181,7 @@ class ImpactModel:
         _, v2, omega2 = self.chain(incident, follows, self.numbers(parameters), draws[None])
         return Outgoing(v2[0], omega2[0])
 
-    def chain(
-        self, incident: Incident, follows: NDArray[np.intp], numbers: Array, draws: Array
-    ) -> tuple[Array, Array, Array]:
+    def chain(self, incident: Incident, follows: Indices, numbers: Array, draws: Array) -> tuple[Array, Array, Array]:
         """Replicates of n impacts, in which an impact may take over the spin that the model gave to an earlier one.
 
         Parameters

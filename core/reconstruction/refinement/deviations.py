@@ -3,10 +3,9 @@
 
 import numpy as np
 
-from ...vectors import Array, dot, norm
-from ..impact import Impacts, apparent, cross
+from ...vectors import Array, Indices, dot, perpendicular
+from ..impact import Impacts, apparent
 from ..node_motion import NodeMotion
-from ..picks import Indices
 from .problem import NODE, Problem
 
 SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
@@ -65,7 +64,7 @@ def impact_sigmas(impacts: Impacts, covariance: Array, spread: Array) -> dict[st
             for sign in (-1.0, 1.0):
                 v1, v2 = impacts.v1 + sign * away[:, :3], impacts.v2 + sign * away[:, 3:]
                 squares += np.nan_to_num(_values(impacts, v1, v2, impacts.normal) - here) ** 2 / 6
-        for direction in _across(impacts.normal):
+        for direction in perpendicular(impacts.normal):
             for sign in (-1.0, 1.0):
                 normal = np.cos(tilt)[:, None] * impacts.normal + sign * np.sin(tilt)[:, None] * direction
                 squares += np.nan_to_num(_values(impacts, impacts.v1, impacts.v2, normal) - here) ** 2 / 6
@@ -83,11 +82,3 @@ def _values(impacts: Impacts, v1: Array, v2: Array, normal: Array) -> Array:
     found = apparent(v1, v2, normal)
     energies = [0.5 * impacts.mass_kg * dot(v, v) for v in (v1, v2)]
     return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
-
-
-def _across(normal: Array) -> tuple[Array, Array]:
-    """Two unit vectors (n, 3) at right angles to each normal and to each other."""
-    helper = np.where(np.abs(normal[:, :1]) < 0.8, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
-    first = cross(normal, np.broadcast_to(helper, normal.shape))
-    first = first / norm(first)[:, None]
-    return first, cross(normal, first)

@@ -8,9 +8,8 @@ import numpy as np
 from ...camera.model import project_with_derivatives, rotation_from_vector
 from ...terrain.raycast import closest_points
 from ...terrain.surface import Surface
-from ...vectors import Array, dot
+from ...vectors import Array, Indices, Mask, dot
 from ..node_motion import NodeMotion, Places, join_nodes, places_at
-from ..picks import Indices, Mask
 from .views import View
 
 NODE = 4

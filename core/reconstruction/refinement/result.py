@@ -8,12 +8,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...camera.model import rotation_from_vector
-from ...vectors import Array, dot, norm, unit
+from ...vectors import Array, Mask, dot, norm, unit
 from ..block import Block
 from ..drag import Drag
 from ..motion import FlightEnds
 from ..node_motion import places_at
-from ..picks import SAME_TIME_S, Mask, Picks
+from ..picks import SAME_TIME_S, Picks
 from ..placement import GroundNormals, pick_normals
 from ..trajectory import Reconstruction, reconstruct
 from .deviations import impact_sigmas, velocity_rows

@@ -9,12 +9,12 @@ import numpy as np
 from ...errors import InputError
 from ...terrain.raycast import closest_points
 from ...terrain.surface import Surface
-from ...vectors import Array, norm
+from ...vectors import Array, Indices, Mask, norm
 from ..block import Block, per_pick
 from ..chains import Segments, find_segments
 from ..drag import Drag
 from ..motion import GROUNDED
-from ..picks import Indices, Mask, Picks
+from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
 from .problem import Problem, Unknowns, free_columns
 from .views import PixelObservations, View

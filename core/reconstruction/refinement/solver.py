@@ -9,9 +9,8 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.stats import chi2
 
 from ...camera.model import project
-from ...vectors import Array, norm
+from ...vectors import Array, Indices, Mask, norm
 from ..node_motion import places_at
-from ..picks import Indices, Mask
 from .problem import (
     Evaluation,
     Problem,

@@ -9,8 +9,7 @@ from ...camera.motion import MovingCamera
 from ...errors import InputError
 from ...footage.clock import Clock
 from ...georeference import GlobalShift
-from ...vectors import Array
-from ..picks import Indices, Mask, Names
+from ...vectors import Array, Indices, Mask, Names
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from ....core.camera.model import project, rays
 from ....core.errors import InputError
 from ....core.exchange.cameras import Pairs, read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
-from ....core.vectors import norm
+from ....core.vectors import distance_to_ray
 from ...scene import alignment, migration, store, videos
 
 
@@ -116,8 +116,7 @@ def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
         return [path.name]
     position, rotation = moving.poses_at(videos.times_of(camera)[table.frame])
     seen = project(moving.camera, table.point, position=position, rotation=rotation)
-    origins, directions = rays(moving.camera, table.pixel, position=position, rotation=rotation)
-    away = norm(np.cross(table.point - origins, directions))
+    away = distance_to_ray(table.point, *rays(moving.camera, table.pixel, position=position, rotation=rotation))
     complete = [pair for pair in alignment.pairs_of(camera) if pair.is_complete]
     used = np.array([pair.enabled and pair.id not in solution.wrong for pair in complete])
     beside = path.with_name("pairs_residuals.csv")

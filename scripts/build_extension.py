@@ -40,7 +40,7 @@ SYSTEMS = {
     "macos-arm64": ("macosx_13_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
 }
 BLENDER_PYTHON = "3.13"
-LARGEST_ZIP_BYTES = 200_000_000
+LARGEST_ZIP_BYTES = 175_000_000
 NOT_BUNDLED = {"numpy"}
 """Blender brings its own, and two copies in one process crash."""
 ALSO_BUNDLED = ("llvmlite",)

@@ -63,10 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..footage.background import background_motion, no_motion
     from ..footage.kinks import find_kinks
-    from ..footage.opencv import opencv
     from ..footage.pictures import draw_track
     from ..footage.tracking import track_block
     from ..footage.video import open_video
+    from ..opencv import opencv
 
     clicks, name = _clicks(arguments)
     with Progress() as progress:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..opencv import opencv
 from ..vectors import Array, Indices
-from .opencv import opencv
 from .sources import Source, frames
 
 GRID = (16, 10)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..opencv import opencv
 from ..vectors import Array
-from .opencv import opencv
 
 FINE = 4
 """Bits of a pixel's fraction in OpenCV's drawing."""

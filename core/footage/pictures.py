@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..colours import scale_colours
+from ..opencv import opencv
 from ..vectors import Array
 from .background import BackgroundMotion, destabilise
 from .kinks import Kinks
-from .opencv import opencv
 from .sources import Source, frames
 from .tracking import BlockTrack
 

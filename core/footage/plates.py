@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..opencv import opencv
 from ..vectors import Array
 from .background import BackgroundMotion
-from .opencv import opencv
 from .sources import Source, frames
 
 SAMPLES = 15

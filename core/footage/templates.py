@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..opencv import opencv
 from ..vectors import Array
-from .opencv import opencv
 from .plates import Plates
 
 SHAPE_ERROR = 0.15

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..opencv import opencv, quiet_opencv
 from ..vectors import Array, Indices
 from .containers import codec_name, container_of, holds_sound, lacks_index
-from .opencv import opencv
 
 type Image = NDArray[np.uint8]
 type Report = Callable[[str], None]
@@ -436,13 +436,8 @@ def _capture(path: Path) -> Any:
 
 def _opened(path: Path, settings: list[int]) -> Any:
     """OpenCV's capture, by FFmpeg alone: other backends take a name with digits for a series of pictures."""
-    cv2 = opencv()
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
+    with quiet_opencv() as cv2:
         return cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, settings)
-    finally:
-        cv2.utils.logging.setLogLevel(level)
 
 
 def _refuse_other_files(path: Path) -> None:

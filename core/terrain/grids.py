@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Elevation grids: ESRI ASCII and GeoTIFF."""
+"""Elevation grids in text: ESRI ASCII."""
 
-import struct
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array
-from .crs import crs_beside, crs_from_geokeys
+from .crs import crs_beside
 from .source import Source
 from .text import all_numbers, read_text
 
@@ -24,9 +23,6 @@ ASC_KEYS = (
     "dy",
     "nodata_value",
 )
-PIXEL_IS_POINT, RASTER_TYPE = 2, 1025
-NO_HEIGHT = 1e30
-"""Beyond this a value is a filler that the file forgot to declare, as float32's lowest number often is."""
 
 
 def read_ascii_grid(path: Path) -> Source:
@@ -113,81 +109,3 @@ def _ascii_heights(lines: list[bytes], first: int, rows: int, columns: int, path
             advice="The file is truncated or its header is wrong: copy or export it again",
         )
     return values
-
-
-def read_geotiff(path: Path) -> Source:
-    """Read a GeoTIFF of heights (OGC 19-008r4); the first band of several.
-
-    Raises
-    ------
-    InputError : not a TIFF, truncated, without a georeference, an image instead of heights.
-    """
-    import tifffile
-
-    if not path.stat().st_size:
-        raise InputError("The file is empty", file=path, advice="Export it again")
-    try:
-        with tifffile.TiffFile(path) as tiff:
-            page = tiff.pages.first
-            tags = {tag.code: tag.value for tag in page.tags}
-            heights = np.asarray(page.asarray())
-            bands_first = page.planarconfig == tifffile.PLANARCONFIG.SEPARATE
-    except (tifffile.TiffFileError, struct.error, ValueError, OSError, RuntimeError, LookupError, TypeError) as error:
-        raise InputError(
-            f"The TIFF file cannot be read ({error})", file=path, advice="It may be truncated: copy or export it again"
-        ) from error
-    notes: list[str] = []
-    if heights.ndim == 3:
-        bands = heights.shape[0] if bands_first else heights.shape[2]
-        if heights.dtype == np.uint8:
-            raise InputError(
-                f"The TIFF is a picture of {bands} bands, not heights", file=path, advice="Choose the elevation model"
-            )
-        heights = heights[0] if bands_first else heights[:, :, 0]
-        notes.append(f"The first of {bands} bands is taken as the height.")
-    if heights.ndim != 2 or min(heights.shape) < 2 or not np.issubdtype(heights.dtype, np.number):
-        raise InputError(f"The TIFF holds no grid of heights (shape {heights.shape})", file=path)
-    heights = heights.astype(np.float64)
-    nodata = str(tags.get(42113, "")).strip("\0 ")
-    try:
-        no_value = float(nodata) if nodata else np.nan
-    except ValueError as error:
-        raise InputError(f'The NODATA value "{nodata}" is not a number', file=path) from error
-    heights[(heights == no_value) | (heights == np.float64(np.float32(no_value))) | (np.abs(heights) > NO_HEIGHT)] = (
-        np.nan
-    )
-    keys = _geokeys(tags.get(34735, ()))
-    rows, columns = heights.shape
-    half = 0.0 if dict(keys).get(RASTER_TYPE) == PIXEL_IS_POINT else 0.5
-    affine = _affine(tags, path)
-    column, row = np.meshgrid(np.arange(columns) + half, np.arange(rows) + half)
-    x = affine[0, 0] * column + affine[0, 1] * row + affine[0, 2]
-    y = affine[1, 0] * column + affine[1, 1] * row + affine[1, 2]
-    crs, geographic = crs_from_geokeys(keys)
-    if not crs and not geographic:
-        crs, geographic = crs_beside(path)
-    cell = np.hypot(*affine[:, :2])
-    notes.insert(0, f"Grid of {columns} × {rows} heights, cell {cell[0]:g} × {cell[1]:g}.")
-    points = np.stack([x, y, heights], axis=-1).reshape(-1, 3)
-    return Source(points, grid_shape=(rows, columns), crs=crs, geographic=geographic, notes=tuple(notes))
-
-
-def _geokeys(directory: object) -> list[tuple[int, int]]:
-    """(id, value) of the keys whose value stands in the directory itself."""
-    numbers = [int(n) for n in directory] if isinstance(directory, tuple | list) else []
-    return [(numbers[i], numbers[i + 3]) for i in range(4, len(numbers) - 3, 4) if numbers[i + 1] == 0]
-
-
-def _affine(tags: dict[int, tuple[float, ...]], path: Path) -> Array:
-    """(2, 3) from (column, row, 1) to x, y."""
-    if 34264 in tags:
-        matrix = np.array(tags[34264], dtype=np.float64).reshape(4, 4)
-        return matrix[:2, [0, 1, 3]]
-    if 33550 not in tags or 33922 not in tags:
-        raise InputError(
-            "The TIFF has no georeference (ModelPixelScale and ModelTiepoint, or ModelTransformation)",
-            file=path,
-            advice="Export it as a GeoTIFF; a world file (.tfw) is not read",
-        )
-    (sx, sy, *_), (i, j, _, x, y, *_) = tags[33550], tags[33922]
-    return np.array([[sx, 0.0, x - i * sx], [0.0, -sy, y + j * sy]])

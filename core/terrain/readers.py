@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array
-from . import advice, cleaning, clouds, grids, meshes, ply, triangulation, winding
+from . import advice, cleaning, clouds, geotiff, grids, meshes, ply, triangulation, winding
 from .crs import surely_different
 from .source import Source
 from .surface import Surface
@@ -25,8 +25,8 @@ READERS: dict[str, Callable[[Path], Source]] = {
     ".gltf": meshes.read_gltf,
     ".glb": meshes.read_gltf,
     ".asc": grids.read_ascii_grid,
-    ".tif": grids.read_geotiff,
-    ".tiff": grids.read_geotiff,
+    ".tif": geotiff.read_geotiff,
+    ".tiff": geotiff.read_geotiff,
     ".xyz": clouds.read_xyz,
     ".txt": clouds.read_xyz,
     ".csv": clouds.read_xyz,

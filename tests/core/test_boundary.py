@@ -16,7 +16,18 @@ ROOT = Path(rockfall.__file__).resolve().parent
 BLENDER_MODULES = {"bpy", "bmesh", "gpu", "blf", "mathutils", "bpy_extras", "gpu_extras", "addon_utils"}
 
 CORE_FLOORS = (
-    {"constants", "errors", "vectors", "compiled", "dependencies", "colours", "least_squares", "progress", "remarks"},
+    {
+        "constants",
+        "errors",
+        "vectors",
+        "compiled",
+        "dependencies",
+        "colours",
+        "least_squares",
+        "opencv",
+        "progress",
+        "remarks",
+    },
     {"georeference"},
     {"terrain", "footage", "camera", "impact_models"},
     {"reconstruction"},

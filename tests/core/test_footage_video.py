@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import rockfall.core.footage.video as module
 from rockfall.core.errors import InputError
-from rockfall.core.footage.opencv import FFMPEG_QUIET
 from rockfall.core.footage.video import frame_at, open_video, read_frame, read_frames
+from rockfall.core.opencv import FFMPEG_QUIET
 
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)  # read once a process, by whoever is first
 FOLDER = Path(__file__).parent.parent / "data" / "videos"

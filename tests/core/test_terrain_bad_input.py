@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Damaged and unsuitable terrain files: a message that names the file, the place and what to do."""
 
+import re
 from pathlib import Path
 
 import laspy
@@ -171,6 +172,44 @@ def test_truncated_tiff(tmp_path):
     for part in (4, 9, 100, len(data) // 2, len(data) - 4):
         path.write_bytes(data[:part])
         refused(path, "cannot be read|georeference")
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("zstd", "The TIFF's compression (ZSTD) cannot be read"),
+        ("lerc", "The TIFF's compression (LERC) cannot be read"),
+        ("lzw_two_bands", "The TIFF's 2 bands cannot be read with this compression (LZW)"),
+        ("lzw_float16", "The heights cannot be decoded"),
+    ],
+)
+def test_what_cannot_be_decoded_of_a_tiff_is_refused_in_words(name, problem):
+    message = refused(DATA / "geotiff" / f"refused_{name}.tif", re.escape(problem))
+    assert "Export the heights alone, uncompressed or with LZW or deflate" in message
+
+
+def test_damaged_compressed_tiff(tmp_path, capfd):
+    path = tmp_path / "a.tif"
+    for name in ("lzw_float32", "lzw_float32_tiles", "deflate_predictor3_float32", "packbits_int16"):
+        data = (DATA / "geotiff" / f"{name}.tif").read_bytes()
+        for part in range(60, len(data) - 2, 40):
+            path.write_bytes(data[:part])
+            refused(path, "cannot be read|cannot be decoded|no georeference|no grid of heights")
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("heights", "problem"),
+    [
+        (np.zeros((1, 20), np.float32), "The TIFF holds no grid of heights (shape (1, 20))"),
+        (np.zeros((20, 1), np.float32), "The TIFF holds no grid of heights (shape (20, 1))"),
+        (np.zeros((20, 20), bool), "The TIFF holds no grid of heights (shape (20, 20))"),
+        (np.zeros((20, 20), np.complex64), "The TIFF holds no grid of heights (shape (20, 20))"),
+    ],
+)
+def test_tiff_without_a_grid_of_heights(tmp_path, heights, problem):
+    tifffile.imwrite(tmp_path / "a.tif", heights)
+    refused(tmp_path / "a.tif", re.escape(problem))
 
 
 @pytest.mark.parametrize("name", ["sample_lareunion_epsg2975.laz", "las_chablais3.laz"])

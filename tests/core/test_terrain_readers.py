@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every terrain format: written by another program or by hand, read back, numbers compared; real lidar."""
 
+import re
 from pathlib import Path
 
 import laspy
 import numpy as np
 import pytest
+import rockfall.core.terrain.geotiff as geotiff_module
 import tifffile
 import trimesh
 from rockfall.core.errors import InputError
@@ -248,7 +250,7 @@ SCALE, TIEPOINT = (33550, 12, (2.0, 2.0, 0.0)), (33922, 12, (0.0, 0.0, 0.0, 2600
 HEIGHTS = np.array([[1, 2, 3], [4, 5, 6]], np.float32)
 
 
-@pytest.mark.parametrize("compression", [None, "deflate", "lzw", "zstd"])
+@pytest.mark.parametrize("compression", [None, "deflate"])
 def test_geotiff_georeference_and_crs(tmp_path, compression):
     tags = [SCALE, TIEPOINT, geokeys((1024, 1), (1025, 1), (3072, 2056))]
     surface = read_terrain(geotiff(tmp_path / "a.tif", HEIGHTS, tags, compression=compression))
@@ -258,6 +260,56 @@ def test_geotiff_georeference_and_crs(tmp_path, compression):
     assert said(surface, "EPSG:2056")
     with pytest.raises(InputError, match=r"EPSG:2056.*EPSG:21781"):
         read_terrain(tmp_path / "a.tif", shift=GlobalShift(crs="EPSG:21781"))
+
+
+def wavy(rows: int, columns: int, kind: str) -> np.ndarray:
+    """Heights that every kind of number holds exactly, but for the eighths of a metre that integers cut off."""
+    i, j = np.mgrid[:rows, :columns]
+    return (100 + (7 * i * i + 13 * j) % 101 / 8).astype(kind)
+
+
+FIXTURES = sorted((DATA / "geotiff").glob("[!r]*.tif"))
+
+
+@pytest.mark.parametrize("path", FIXTURES, ids=lambda path: path.stem)
+def test_geotiff_variants_of_another_program_are_equal_in_every_value(path):
+    """Compressions and predictors that tifffile alone can neither write nor read."""
+    assert len(FIXTURES) == 13
+    points = geotiff_module.read_geotiff(path).points
+    kind = next(word for word in re.split("[_.]", path.name) if word in np.sctypeDict)
+    np.testing.assert_array_equal(points[:, 2].reshape(19, 23), wavy(19, 23, kind))
+    np.testing.assert_array_equal(points[[0, 23], :2], [[2600001, 1200037], [2600001, 1200035]])
+
+
+INTEGERS = ("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
+
+
+@pytest.mark.parametrize(
+    ("kinds", "options"),
+    [
+        ((*INTEGERS, "f2", "f4", "f8"), {}),
+        ((*INTEGERS, "f2", "f4", "f8"), {"byteorder": ">", "rowsperstrip": 7}),
+        ((*INTEGERS, "f2", "f4", "f8"), {"tile": (16, 16), "bigtiff": True}),
+        ((*INTEGERS, "f2", "f4", "f8"), {"compression": "deflate", "tile": (32, 16)}),
+        (INTEGERS, {"compression": "deflate", "predictor": 2, "rowsperstrip": 5}),
+    ],
+    ids=["plain", "big endian", "BigTIFF", "deflated tiles", "differences"],
+)
+def test_plain_and_deflated_geotiffs_are_equal_in_every_value(tmp_path, kinds, options):
+    for kind in kinds:
+        heights = wavy(37, 41, kind)
+        source = geotiff_module.read_geotiff(geotiff(tmp_path / "a.tif", heights, [SCALE, TIEPOINT], **options))
+        np.testing.assert_array_equal(source.points[:, 2].reshape(37, 41), heights)
+
+
+@pytest.mark.parametrize("layout", ["contig", "separate"])
+def test_the_first_of_several_bands_of_a_geotiff_is_the_height(tmp_path, layout):
+    first = wavy(5, 6, "f4")
+    bands = np.stack([first, first * 0, first * 0 + 1], axis=0 if layout == "separate" else -1)
+    options = {"planarconfig": layout, "photometric": "minisblack"}
+    source = geotiff_module.read_geotiff(geotiff(tmp_path / "a.tif", bands, [SCALE, TIEPOINT], **options))
+    np.testing.assert_array_equal(source.points[:, 2].reshape(5, 6), first)
+    assert "The first of 3 bands is taken as the height." in source.notes
 
 
 def test_geotiff_pixel_is_point_nodata_and_transformation(tmp_path):

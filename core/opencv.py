@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""OpenCV, imported when it is first needed: it takes a moment, and half of Rockfall does without it."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+FFMPEG_QUIET = "-8"
+
+
+def opencv() -> Any:
+    """The module; what FFmpeg would print about a damaged file is told by our own messages."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)
+    import cv2
+
+    return cv2
+
+
+@contextmanager
+def quiet_opencv() -> Iterator[Any]:
+    """The module, which prints nothing meanwhile: our own messages say what is wrong with a file."""
+    cv2 = opencv()
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield cv2
+    finally:
+        cv2.utils.logging.setLogLevel(level)

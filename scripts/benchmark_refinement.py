@@ -27,7 +27,7 @@ from rockfall.core.camera.model import (
     rays,
     rotation_from_vector,
 )
-from rockfall.core.camera.motion import MovingCamera
+from rockfall.core.camera.path import CameraPath
 from rockfall.core.camera.resection import resect
 from rockfall.core.footage.clock import Clock
 from rockfall.core.georeference import GlobalShift
@@ -256,10 +256,10 @@ def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) ->
         steady = rotation_from_vector(rng.normal(size=(common.size, 3)) * SIGMA_STEADY / focal)
         still = np.zeros(common.size)
         positions = np.repeat(place[None], common.size, axis=0)
-        path = MovingCamera(camera, video, positions, held, still, still)
+        path = CameraPath(camera, video, positions, held, still, still)
         true_views.append(View(f"camera {number + 1}", path, Clock(offset), 0.0, least))
 
-        solved = MovingCamera(
+        solved = CameraPath(
             resected,
             video,
             positions + resected.position - place,
@@ -287,13 +287,13 @@ def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) ->
 
 def marked(surface: Surface, truth: Fall, true: View, solved: View, rng: np.random.Generator):
     """Picks in the first view: rays through pixels onto the terrain, at whole frames."""
-    path = true.camera
+    path = true.path
     frame = np.abs(np.asarray(true.clock.to_common(path.time_s))[:, None] - truth.time_s).argmin(axis=0)
     for _ in range(50):
-        pixel = project(path.camera, truth.contact, position=path.position[frame], rotation=path.rotation[frame])
+        pixel = project(path.reference, truth.contact, position=path.position[frame], rotation=path.rotation[frame])
         pixel = pixel + SIGMA_PICK * rng.normal(size=pixel.shape)
         origin, direction = rays(
-            solved.camera.camera, pixel, position=solved.camera.position[frame], rotation=solved.camera.rotation[frame]
+            solved.path.reference, pixel, position=solved.path.position[frame], rotation=solved.path.rotation[frame]
         )
         hit = cast_rays(surface, origin, direction)
         if np.isfinite(hit.distance).all() and (np.linalg.norm(hit.point - truth.contact, axis=1) < 10).all():
@@ -388,9 +388,9 @@ def add(tally: Tally, truth: Fall, raw, result: Refinement, footage: Footage, be
     tally.rn += (impacts.rn - truth.rn)[inner].tolist()
     tally.rn_sigma += impacts.sigma["rn"][inner].tolist()
     for true, solved, refined in zip(footage.true_views, footage.views, result.views, strict=True):
-        place = true.camera.camera.position
-        tally.camera_before.append(np.linalg.norm(solved.camera.camera.position - place) / case.distance_m)
-        tally.camera.append(np.linalg.norm(refined.camera.camera.position - place) / case.distance_m)
+        place = true.path.reference.position
+        tally.camera_before.append(np.linalg.norm(solved.path.reference.position - place) / case.distance_m)
+        tally.camera.append(np.linalg.norm(refined.path.reference.position - place) / case.distance_m)
     away = result.picks.position - truth.centre + RADIUS * result.picks.normal
     tally.place += np.linalg.norm(away, axis=1)[inner].tolist()
     tally.place_sigma += result.picks.sigma_position_m[inner].tolist()

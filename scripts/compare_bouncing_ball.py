@@ -94,7 +94,7 @@ def filmed(
 
 def pitch_deg(found: Refinement) -> float:
     """How far the camera looks up."""
-    return float(np.degrees(np.arcsin(found.views[0].camera.camera.rotation[2, 2])))
+    return float(np.degrees(np.arcsin(found.views[0].path.reference.rotation[2, 2])))
 
 
 def parabolas(ball: Ball) -> tuple[Array, Array, Array]:

@@ -78,12 +78,12 @@ def report(out: Path) -> int:
     block, camera_rows = rows_of(FOOTAGE / "truth" / "block.csv"), rows_of(FOOTAGE / "truth" / "camera.csv")
     place = shift.to_local(numbers(block, "x_m", "y_m", "z_m"))
     pixel, time = numbers(block, "u_px", "v_px"), numbers(block, "time_s")[:, 0]
-    path = read_camera(out / "camera.toml", shift).camera
+    path = read_camera(out / "camera.toml", shift).path
     position, rotation = path.poses_at(time)
     true_position = shift.to_local(numbers(camera_rows, "x_m", "y_m", "z_m"))
     track = rows_of(out / "track.csv")
     frames = numbers(track, "frame")[:, 0].astype(int)
-    seen = project(path.camera, place[frames], position=position[frames], rotation=rotation[frames]) - pixel[frames]
+    seen = project(path.reference, place[frames], position=position[frames], rotation=rotation[frames]) - pixel[frames]
     marked = numbers(track, "u_px", "v_px") - pixel[frames]
     distance = float(np.median(norm(place[frames] - true_position[frames])))
     away = norm((position - true_position).mean(axis=0))
@@ -91,7 +91,7 @@ def report(out: Path) -> int:
     print("\nAgainst the truth:")
     print(
         f"  camera   {away:.2f} m off at {distance:.0f} m ({100 * away / distance:.2f} %), focal length "
-        f"{100 * (path.camera.fx / 2100 - 1):+.2f} %; the block's place in the picture {rms(seen):.2f} px off"
+        f"{100 * (path.reference.fx / 2100 - 1):+.2f} %; the block's place in the picture {rms(seen):.2f} px off"
     )
     print(
         f"  track    {len(track)} of {visible} frames in which the block is seen; centre {rms(marked):.2f} px off, "

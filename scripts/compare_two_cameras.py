@@ -106,7 +106,7 @@ def predicted(table: Table, alone: Refinement, views: Sequence[View]) -> Array:
         time = samples.time_s[path]
         rows = rows[(when[rows] >= time[0]) & (when[rows] <= time[-1])]
         place = np.stack([np.interp(when[rows], time, axis) for axis in samples.position[path].T], axis=1)
-        error[rows] = seen.pixel[rows] - project(view.camera.camera, place)
+        error[rows] = seen.pixel[rows] - project(view.path.reference, place)
     return error[np.isfinite(error[:, 0])]
 
 
@@ -126,7 +126,7 @@ def miss_distances(table: Table, views: Sequence[View]) -> Array:
     near = (other[after] - other[before] < 1.2 / 30) & (second.trajectory[after] == first.trajectory[good])
     share = ((when[good] - other[before]) / (other[after] - other[before]))[near, None]
     pixel = (1 - share) * second.pixel[before[near]] + share * second.pixel[after[near]]
-    cameras = [view.camera.camera for view in views]
+    cameras = [view.path.reference for view in views]
     return triangulate(cameras, np.stack([first.pixel[good][near], pixel])).miss_distance
 
 
@@ -165,14 +165,14 @@ def main() -> None:
     seen, names = table.footage.observations, list(dict.fromkeys(table.picks.trajectory.tolist()))
     print(f"{len(names)} runs, {(table.picks.kind == 'impact').sum()} bounces, {len(seen)} pixels")
     for entry, solved in zip(table.footage.entries, table.footage.cameras, strict=True):
-        camera = solved.camera.camera
+        camera = solved.path.reference
         print(f"{entry.name}: f {camera.fx:.0f} px, at {camera.position.round(2)}, rmse {solved.rmse_px:.2f} px")
 
     both = fit(table, CAMERAS)
     held = both.views
     print(
         f"both: {both.rmse_px_by_view.round(2)} px, {both.outlier.sum()} outliers, noise x {both.noise_scale:.2f}; at "
-        + ", ".join(str(view.camera.camera.position.round(3)) for view in held)
+        + ", ".join(str(view.path.reference.position.round(3)) for view in held)
     )
     for name, (value, sigma) in both.unknowns.items():
         print(f"  {name} {value:.5f} ± {sigma:.5f}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The path of a camera: one pose for each frame of a video, and how it is found from features of the background."""
+"""How the path of a camera is found from features of the background."""
 
 import itertools
 from collections.abc import Callable, Mapping
@@ -11,75 +11,13 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..vectors import Array, Indices, Mask, norm
-from .model import Camera, project, rays, rotation_from_vector, undistort, vector_from_rotation
+from .model import Camera, project, rays, undistort
+from .path import CameraPath
 from .turning import LEAST_FEATURES, Turns, solve_turns
 from .walking import LEAST_POINTS, solve_poses
 
 type PointsOf = Callable[[Array, Array], Array]
 """Origins and directions of rays, (n, 3) each, to the points where they meet the terrain, (n, 3), NaN where nowhere."""
-
-
-@dataclass(frozen=True, eq=False)
-class MovingCamera:
-    """A camera with a pose for each of f frames; a fixed camera has one.
-
-    Attributes
-    ----------
-    camera : inner parameters; its pose is that of the frame that was solved.
-    time_s : (f,) video time, ascending [s].
-    position : (f, 3) local [m].
-    rotation : (f, 3, 3) from the world to the camera.
-    sigma_position_m, sigma_rotation : (f,) standard deviations of a component of the position [m] and of the rotation
-        [rad], relative to the solved frame; zeros when unknown.
-    """
-
-    camera: Camera
-    time_s: Array
-    position: Array
-    rotation: Array
-    sigma_position_m: Array
-    sigma_rotation: Array
-
-    def __post_init__(self) -> None:
-        f = self.time_s.size
-        shapes = (self.position.shape, self.rotation.shape, self.sigma_position_m.shape, self.sigma_rotation.shape)
-        if f == 0 or shapes != ((f, 3), (f, 3, 3), (f,), (f,)):
-            raise InputError(f"The path of a camera has {f} times, but its other columns have the shapes {shapes}")
-        if not (np.diff(self.time_s) > 0).all():
-            raise InputError("The times of a camera's path do not ascend")
-
-    @property
-    def is_fixed(self) -> bool:
-        """One pose for all times."""
-        return self.time_s.size == 1
-
-    def poses_at(self, time_s: ArrayLike) -> tuple[Array, Array]:
-        """Positions (n, 3) and rotations (n, 3, 3) at video times (n,) [s].
-
-        Between frames the position is linear and the rotation turns evenly about one axis; beyond the ends the last
-        pose is held.
-        """
-        times = np.clip(np.asarray(time_s, dtype=np.float64).reshape(-1), self.time_s[0], self.time_s[-1])
-        if self.is_fixed:
-            return np.repeat(self.position, times.size, axis=0), np.repeat(self.rotation, times.size, axis=0)
-        before = np.clip(np.searchsorted(self.time_s, times, side="right") - 1, 0, self.time_s.size - 2)
-        start = self.time_s[before]
-        share = ((times - start) / (self.time_s[before + 1] - start))[:, None]
-        position = (1 - share) * self.position[before] + share * self.position[before + 1]
-        step = vector_from_rotation(self.rotation[1:] @ np.swapaxes(self.rotation[:-1], 1, 2))
-        return position, rotation_from_vector(share * step[before]) @ self.rotation[before]
-
-
-def fixed(camera: Camera) -> MovingCamera:
-    """A camera that does not move."""
-    return MovingCamera(
-        camera=camera,
-        time_s=np.zeros(1),
-        position=camera.position[None].copy(),
-        rotation=camera.rotation[None].copy(),
-        sigma_position_m=np.zeros(1),
-        sigma_rotation=np.zeros(1),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +48,7 @@ class SolvedMotion:
     advice : sentences for the user.
     """
 
-    path: MovingCamera
+    path: CameraPath
     residual_px: Array
     features: Indices
     advice: tuple[str, ...]
@@ -175,8 +113,8 @@ def solve_motion(
     )
     position, rotation = _without_drift(times, position, rotation, keys)
     spread = _bridged(spread, sorted(keys)) if len(keys) > 1 else spread
-    path = MovingCamera(
-        camera=camera,
+    path = CameraPath(
+        reference=camera,
         time_s=times,
         position=position,
         rotation=rotation,
@@ -295,7 +233,7 @@ def _filled(times: Array, known: Mask, position: Array, rotation: Array) -> tupl
         return position, rotation
     zeros = np.zeros(int(known.sum()))
     any_camera = Camera(1, 1, 1.0, 1.0, 0.5, 0.5)
-    path = MovingCamera(any_camera, times[known], position[known], rotation[known], zeros, zeros)
+    path = CameraPath(any_camera, times[known], position[known], rotation[known], zeros, zeros)
     return path.poses_at(times)
 
 
@@ -304,7 +242,7 @@ def _without_drift(times: Array, position: Array, rotation: Array, keys: Mapping
     numbers = np.array(sorted(keys))
     cameras = [keys[number] for number in numbers.tolist()]
     zeros = np.zeros(numbers.size)
-    bend = MovingCamera(
+    bend = CameraPath(
         cameras[0],
         times[numbers],
         np.array([camera.position for camera in cameras]) - position[numbers],

@@ -17,7 +17,7 @@ from .progress import Progress
 
 if TYPE_CHECKING:
     from ..camera.model import Camera
-    from ..camera.motion import MovingCamera
+    from ..camera.path import CameraPath
     from ..camera.resection import Resection
     from ..exchange.cameras import Pairs
     from ..footage.video import Video
@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Solve, write the camera, the residuals and the picture, print the summary."""
-    from ..camera.motion import fixed
+    from ..camera.path import fixed
     from ..exchange.cameras import read_pairs, write_camera, write_pair_residuals
     from ..exchange.output import output_folder
 
@@ -198,10 +198,11 @@ def _follow(
     surface: "Surface | None",
     arguments: argparse.Namespace,
     progress: Progress,
-) -> "tuple[MovingCamera, list[str]]":
+) -> "tuple[CameraPath, list[str]]":
     """A pose for each frame from the background; and sentences about it."""
     from ..camera.model import vector_from_rotation
-    from ..camera.motion import FeatureTracks, fixed, solve_motion
+    from ..camera.motion import FeatureTracks, solve_motion
+    from ..camera.path import fixed
     from ..footage.background import background_motion
 
     first, last = arguments.frames or (0, video.frames - 1)
@@ -231,8 +232,8 @@ def _follow(
         key_frames={number - first: found.camera for number, found in solved.keys.items()},
     )
     path = made.path
-    turned = np.degrees(norm(vector_from_rotation(path.rotation @ path.camera.rotation.T)))
-    moved = norm(path.position - path.camera.position)
+    turned = np.degrees(norm(vector_from_rotation(path.rotation @ path.reference.rotation.T)))
+    moved = norm(path.position - path.reference.position)
     sentences = [
         f"Motion: a pose for each of {path.time_s.size} frames; it turns by up to {turned.max():.2f}°"
         + (f" and moves by up to {moved.max():.2f} m" if arguments.moving == "full" else "")
@@ -240,7 +241,7 @@ def _follow(
     ]
     sigma = path.sigma_rotation[np.isfinite(path.sigma_rotation)]
     if sigma.size:
-        wide = path.camera.fx * float(sigma.max())
+        wide = path.reference.fx * float(sigma.max())
         sentences.append(f"Relative to the solved frame, a pose is known to {wide:.2f} px in the image or better.")
     return path, [*sentences, *made.advice]
 
@@ -264,7 +265,7 @@ def _start(arguments: argparse.Namespace, size: tuple[int, int], shift: "GlobalS
     from ..exchange.cameras import read_camera
 
     if arguments.camera:
-        return read_camera(arguments.camera, shift).camera.camera
+        return read_camera(arguments.camera, shift).path.reference
     width, height = size
     if arguments.fov is not None and arguments.fov >= 180:
         raise InputError(f"--fov {arguments.fov:g} is no angle of view", advice="Give the horizontal angle, below 180°")
@@ -276,14 +277,14 @@ def _start(arguments: argparse.Namespace, size: tuple[int, int], shift: "GlobalS
     return Camera(width, height, focal, focal, width / 2, height / 2, shift=shift)
 
 
-def _residuals(path: "MovingCamera", pairs: "Pairs", video: "Video | None", frame: int) -> tuple[Array, Array]:
+def _residuals(path: "CameraPath", pairs: "Pairs", video: "Video | None", frame: int) -> tuple[Array, Array]:
     """Of all pairs, used or not: (n, 2) marked minus projected [px], and (n,) from the point to the ray [m]."""
     from ..camera.model import project, rays
 
     time_s = np.zeros(len(pairs)) if video is None else video.time_s[np.where(pairs.frame < 0, frame, pairs.frame)]
     position, rotation = path.poses_at(time_s)
-    seen = project(path.camera, pairs.point, position=position, rotation=rotation)
-    beam = rays(path.camera, pairs.pixel, position=position, rotation=rotation)
+    seen = project(path.reference, pairs.point, position=position, rotation=rotation)
+    beam = rays(path.reference, pairs.pixel, position=position, rotation=rotation)
     return pairs.pixel - seen, distance_to_ray(pairs.point, *beam)
 
 

@@ -122,7 +122,9 @@ def _picks(project: "Project", surface: "Surface | None", footage: "Footage") ->
     from ..exchange.tables import read_picks
 
     if project.picks is not None:
-        return read_picks(project.picks, footage.views[0].camera.camera.shift if surface is None else surface.shift), ()
+        return read_picks(
+            project.picks, footage.views[0].path.reference.shift if surface is None else surface.shift
+        ), ()
     names = sorted(set(footage.observations.trajectory.tolist()) - {""})
     alone = names[0] if len(names) == 1 else project.blocks[0].name if len(project.blocks) == 1 else "block"
     picks = picks_from_events(project, surface, name=alone)
@@ -208,7 +210,7 @@ def _write(
             sigma = {name: value for name, value in camera.sigma.items() if name not in POSE} | _pose_sigma(view)
             write_camera(
                 file,
-                view.camera,
+                view.path,
                 rmse_px=float(refined.rmse_px_by_view[i]),
                 sigma=sigma,
                 crs=camera.crs,

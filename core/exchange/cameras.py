@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..camera.model import Camera
-from ..camera.motion import MovingCamera
+from ..camera.path import CameraPath
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array, Indices, Mask, Names
@@ -36,7 +36,7 @@ class CameraFile:
 
     Attributes
     ----------
-    camera : the view, with a pose for each frame if it moves.
+    path : of the camera, with a pose for each frame if it moves.
     rmse_px : of the pairs it was solved from; None when unknown.
     sigma : standard deviations by name: those of `INTRINSICS` in their units, x, y, z [m], omega, phi, kappa [rad].
     crs : coordinate reference system of the position, empty when unknown.
@@ -45,7 +45,7 @@ class CameraFile:
     extra : keys that this version does not know.
     """
 
-    camera: MovingCamera
+    path: CameraPath
     rmse_px: float | None = None
     sigma: Mapping[str, float] = field(default_factory=dict)
     crs: str = ""
@@ -115,14 +115,13 @@ def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFil
         shift=shift,
         **numbers,
     )
-    moving = _path(top, camera)
     rmse = top.optional_number("rmse_px", zero_allowed=True)
     sigma = top.table("sigma")
     covariance = top.numbers("pose_covariance", (6, 6)) if top.has("pose_covariance") else None
     if covariance is not None and not _is_covariance(covariance):
         raise top.wrong("pose_covariance", "is not symmetric and positive", "Remove it, or solve the camera again")
     return CameraFile(
-        camera=moving,
+        path=_path(top, camera),
         rmse_px=rmse,
         sigma={name: sigma.number(name, 0.0, zero_allowed=True) for name in sigma.rest()},
         crs=crs,
@@ -132,8 +131,8 @@ def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFil
 
 
 def write_camera(
-    path: str | Path,
-    camera: MovingCamera,
+    file: str | Path,
+    path: CameraPath,
     *,
     rmse_px: float | None = None,
     sigma: Mapping[str, float] | None = None,
@@ -144,7 +143,7 @@ def write_camera(
     """Write camera.toml, each number so that it reads back as the same double; see `CameraFile`."""
     import tomli_w
 
-    one, more = camera.camera, dict(extra or {})
+    one, more = path.reference, dict(extra or {})
     to_survey = one.shift.to_survey
     tables = {key: value for key, value in more.items() if _is_table(value)}
     lines = [f"width = {one.width}", f"height = {one.height}"]
@@ -162,12 +161,12 @@ def write_camera(
         lines += ["", "[sigma]", *(_numbers(name, value) for name, value in known.items())]
     if tables:
         lines += ["", *tomli_w.dumps(tables).splitlines()]
-    for i, position in enumerate([] if camera.is_fixed else to_survey(camera.position)):
-        lines += ["", "[[frame]]", _numbers("time_s", camera.time_s[i]), _numbers("position", position)]
-        lines.append(_numbers("rotation", camera.rotation[i]))
-        deviations = {"sigma_position_m": camera.sigma_position_m[i], "sigma_rotation_rad": camera.sigma_rotation[i]}
+    for i, position in enumerate([] if path.is_fixed else to_survey(path.position)):
+        lines += ["", "[[frame]]", _numbers("time_s", path.time_s[i]), _numbers("position", position)]
+        lines.append(_numbers("rotation", path.rotation[i]))
+        deviations = {"sigma_position_m": path.sigma_position_m[i], "sigma_rotation_rad": path.sigma_rotation[i]}
         lines += [_numbers(name, value) for name, value in deviations.items() if value]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 
 def read_pairs(path: str | Path, shift: GlobalShift | None = None) -> Pairs:
@@ -239,7 +238,7 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(one, Mapping) for one in value))
 
 
-def _path(top: TomlTable, camera: Camera) -> MovingCamera:
+def _path(top: TomlTable, camera: Camera) -> CameraPath:
     """The poses of the frames; the camera's own where there are none."""
     frames = top.tables("frame")
     times = np.array([frame.signed("time_s") for frame in frames])
@@ -247,8 +246,8 @@ def _path(top: TomlTable, camera: Camera) -> MovingCamera:
         problem = f"is {times[i + 1]:g} s, after {times[i]:g} s"
         raise frames[i + 1].wrong("time_s", problem, "Put the frames in the order of their times, each time once")
     if not frames:
-        return MovingCamera(camera, np.zeros(1), camera.position[None], camera.rotation[None], np.zeros(1), np.zeros(1))
-    return MovingCamera(
+        return CameraPath(camera, np.zeros(1), camera.position[None], camera.rotation[None], np.zeros(1), np.zeros(1))
+    return CameraPath(
         camera,
         times,
         camera.shift.to_local(np.stack([frame.numbers("position", (3,)) for frame in frames])),

@@ -86,12 +86,12 @@ def open_footage(project: Project, shift: GlobalShift | None = None, name: str =
     tracks: list[Track] = []
     for entry, camera_file, track_file in used:
         camera, track = read_camera(camera_file, shift), read_track(track_file)
-        shift = camera.camera.camera.shift
+        shift = camera.path.reference.shift
         _check_inside(track, camera, entry)
         clock = clock_of(entry, track.frame, track.time_s)
         cameras.append(camera)
         tracks.append(track)
-        views.append(View(entry.name, camera.camera, clock, entry.row_time_s, camera.pose_covariance))
+        views.append(View(entry.name, camera.path, clock, entry.row_time_s, camera.pose_covariance))
     names = np.concatenate([np.where(track.trajectory == "", name, track.trajectory) for track in tracks])
     sigma = np.concatenate([track.sigma_px for track in tracks])
     observations = PixelObservations(
@@ -185,12 +185,12 @@ def _event_picks(
 ) -> tuple[Columns, Array]:
     """Columns of the picks, and the normals (n, 3) there."""
     chosen = np.flatnonzero(rows)
-    camera = read_camera(Path(str(entry.camera)), surface.shift).camera
+    path = read_camera(Path(str(entry.camera)), surface.shift).path
     clock = clock_of(entry, events.frame, events.time_s)
     names = np.where(events.trajectory == "", name, events.trajectory)[chosen]
-    position, rotation = camera.poses_at(events.time_s[chosen])
+    position, rotation = path.poses_at(events.time_s[chosen])
     pixel = events.pixel[chosen]
-    origins, directions = rays(camera.camera, pixel, position=position, rotation=rotation)
+    origins, directions = rays(path.reference, pixel, position=position, rotation=rotation)
     sizes = {one: block_of(project, one).diameter_m for one in set(names.tolist())}
     diameter = np.array([sizes[one] for one in names.tolist()])
     seen = np.isfinite(directions).all(axis=1)
@@ -204,7 +204,7 @@ def _event_picks(
             f"The ray through the pixel ({pixel[i, 0]:.1f}, {pixel[i, 1]:.1f}) of {entry.name} misses the terrain",
             "Check the camera and the event, or give a larger terrain",
         )
-    late = entry.row_time_s * (pixel[:, 1] - camera.camera.height / 2)
+    late = entry.row_time_s * (pixel[:, 1] - path.reference.height / 2)
     columns: Columns = {
         "trajectory": names,
         "time_s": clock.to_common(events.time_s[chosen]) + late,
@@ -232,10 +232,10 @@ def _open_ends(
     """Passes that close the flights before the first and after the last event of each trajectory, if there are any."""
     if entry.track is None:
         return []
-    track, camera = read_track(entry.track), read_camera(Path(str(entry.camera)), surface.shift).camera
+    track, path = read_track(entry.track), read_camera(Path(str(entry.camera)), surface.shift).path
     clock = clock_of(entry, track.frame, track.time_s)
     names = np.where(track.trajectory == "", name, track.trajectory)
-    row_s = entry.row_time_s * (track.pixel[:, 1] - camera.camera.height / 2)
+    row_s = entry.row_time_s * (track.pixel[:, 1] - path.reference.height / 2)
     times = np.asarray(clock.to_common(track.time_s)) + row_s
     sigma = np.where(np.isnan(track.sigma_px), SIGMA_PX, track.sigma_px)
     ends = []
@@ -249,15 +249,15 @@ def _open_ends(
             rows = np.flatnonzero((names == one) & beyond)
             if rows.size < END_FRAMES:
                 continue
-            position, rotation = camera.poses_at(track.time_s[rows])
-            origins, directions = rays(camera.camera, track.pixel[rows], position=position, rotation=rotation)
+            position, rotation = path.poses_at(track.time_s[rows])
+            origins, directions = rays(path.reference, track.pixel[rows], position=position, rotation=rotation)
             if not np.isfinite(directions).all():
                 continue
             centre = marked["position"][pick] + radius * normals[pick]
             flight = flight_through_rays(
                 centre, moment, origins, directions, times[rows], project.reconstruction.gravity_mps2
             )
-            miss_px = camera.camera.fx * np.sqrt(np.mean(flight.miss**2))
+            miss_px = path.reference.fx * np.sqrt(np.mean(flight.miss**2))
             if not miss_px <= max(END_MISS_PX, END_MISS_SIGMAS * float(np.median(sigma[rows]))):
                 continue
             i = int(np.argmin(times[rows]) if before else np.argmax(times[rows]))
@@ -307,7 +307,7 @@ def _file_rate(entry: VideoEntry, frame: Indices, time_s: Array) -> float:
 
 def _has_pose(camera: CameraFile, time_s: Array) -> Mask:
     """(m,) the frame was recognised: its pose has a standard deviation."""
-    path = camera.camera
+    path = camera.path
     near = np.clip(np.searchsorted(path.time_s, time_s), 0, path.time_s.size - 1)
     before = np.maximum(near - 1, 0)
     near = np.where(np.abs(path.time_s[before] - time_s) < np.abs(path.time_s[near] - time_s), before, near)
@@ -315,7 +315,7 @@ def _has_pose(camera: CameraFile, time_s: Array) -> Mask:
 
 
 def _check_inside(track: Track, camera: CameraFile, entry: VideoEntry) -> None:
-    one = camera.camera.camera
+    one = camera.path.reference
     size = np.array(one.size)
     outside = (track.pixel < -MARGIN * size) | (track.pixel > (1 + MARGIN) * size)
     for i in np.flatnonzero(outside.any(axis=1)):

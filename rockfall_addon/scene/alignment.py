@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ...core.camera.blender_lens import pose_from_blender
 from ...core.camera.model import Camera, project, rays, rotation_from_vector, vector_from_rotation, with_intrinsics
-from ...core.camera.motion import MovingCamera, fixed
+from ...core.camera.path import CameraPath, fixed
 from ...core.camera.resection import Resection, resect
 from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_rays
@@ -290,9 +290,9 @@ def point_at(
     scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Sequence[float], frame: int
 ) -> tuple[float, float, float] | None:
     """Where the ray of a pixel meets the terrain; None where it does not."""
-    path = videos.moving_camera(camera)
+    path = videos.camera_path(camera)
     position, rotation = path.poses_at(_times(camera, [frame]))
-    origin, direction = rays(path.camera, [pixel], position=position, rotation=rotation)
+    origin, direction = rays(path.reference, [pixel], position=position, rotation=rotation)
     return meet(scene, origin, direction)
 
 
@@ -316,11 +316,11 @@ def pixel_of(camera: bpy.types.Object, pair: Pair) -> tuple[float, float] | None
 
 def reprojections(camera: bpy.types.Object, pairs: Sequence[Pair], frame: int | None = None) -> Array:
     """(n, 2) where the camera sees the points, each in its pair's frame or all in one; NaN where it does not."""
-    path = videos.moving_camera(camera)
+    path = videos.camera_path(camera)
     points = np.array([pair.point if pair.point is not None else (np.nan,) * 3 for pair in pairs]).reshape(-1, 3)
     frames = [pair.frame if frame is None else frame for pair in pairs]
     position, rotation = path.poses_at(_times(camera, frames))
-    return project(path.camera, points, position=position, rotation=rotation)
+    return project(path.reference, points, position=position, rotation=rotation)
 
 
 def _times(camera: bpy.types.Object, frames: Sequence[int]) -> Array:
@@ -366,7 +366,7 @@ def keep_lens(camera: bpy.types.Object, values: Array) -> None:
 
 def lens_of(camera: bpy.types.Object) -> Array:
     """(9,) the lens as it is now."""
-    return videos.moving_camera(camera).camera.intrinsics
+    return videos.camera_path(camera).reference.intrinsics
 
 
 def focal_px(camera: bpy.types.Object) -> float:
@@ -391,10 +391,10 @@ def set_lens(scene: bpy.types.Scene, camera: bpy.types.Object, values: Array) ->
     """Solve the camera with what is known of its lens; where it cannot be solved, show it with (9,) this lens."""
     if solve(scene, camera):
         return
-    path = videos.moving_camera(camera)
-    changed = with_intrinsics(path.camera, values)
+    path = videos.camera_path(camera)
+    changed = with_intrinsics(path.reference, values)
     if videos.is_solved(camera):
-        videos.set_moving_camera(scene, camera, replace(path, camera=changed))
+        videos.set_camera_path(scene, camera, replace(path, reference=changed))
     else:
         videos.write_lens(camera, changed)
 
@@ -437,7 +437,7 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
         return False
     path = _path(camera, found.camera, {frame: key.camera for frame, key in keys.items()}, reference)
     camera[PLACED_KEY] = BY_PAIRS
-    videos.set_moving_camera(scene, camera, path, rmse_px=found.rmse_px, pose_covariance=found.pose_covariance)
+    videos.set_camera_path(scene, camera, path, rmse_px=found.rmse_px, pose_covariance=found.pose_covariance)
     used = _used_at(pairs, camera, reference)
     wrong = [pair.id for pair, good in zip(used, found.used.tolist(), strict=True) if not good]
     for frame, key in keys.items():
@@ -469,8 +469,8 @@ def _solve(
 ) -> tuple[Resection, dict[int, Resection], int]:
     """The camera of the reference frame and of other frames that have enough pairs."""
     width, height = videos.size_of(camera)
-    path = videos.moving_camera(camera)
-    start, free = replace(path.camera, shift=store.read_shift(scene)), free_of(camera)
+    path = videos.camera_path(camera)
+    start, free = replace(path.reference, shift=store.read_shift(scene)), free_of(camera)
     lens = known_lens(camera)
     if "f" in free:
         lens[:2] = lens_of(camera)[:2]
@@ -506,9 +506,9 @@ def _or(values: Sequence[float], instead: float) -> Array:
     return np.where(np.isnan(array), instead, array)
 
 
-def _path(camera: bpy.types.Object, solved: Camera, keys: dict[int, Camera], reference: int) -> MovingCamera:
+def _path(camera: bpy.types.Object, solved: Camera, keys: dict[int, Camera], reference: int) -> CameraPath:
     """The path that the camera had, bent so that it passes through the frames that are solved."""
-    path = videos.moving_camera(camera)
+    path = videos.camera_path(camera)
     if not moves(camera) or path.is_fixed:
         return fixed(solved)
     cameras = {reference: solved, **keys}
@@ -516,7 +516,7 @@ def _path(camera: bpy.types.Object, solved: Camera, keys: dict[int, Camera], ref
     times = _times(camera, frames)
     position, rotation = path.poses_at(times)
     zeros = np.zeros(len(frames))
-    bend = MovingCamera(
+    bend = CameraPath(
         solved,
         times,
         np.array([cameras[frame].position for frame in frames]) - position,
@@ -526,7 +526,7 @@ def _path(camera: bpy.types.Object, solved: Camera, keys: dict[int, Camera], ref
     )
     shift, turn = bend.poses_at(path.time_s)
     straight = rotation_from_vector(vector_from_rotation(turn @ path.rotation))
-    return replace(path, camera=solved, position=path.position + shift, rotation=straight)
+    return replace(path, reference=solved, position=path.position + shift, rotation=straight)
 
 
 def _checked_against(camera: bpy.types.Object, pairs: Sequence[Pair], solution: Solution) -> Solution:
@@ -534,11 +534,11 @@ def _checked_against(camera: bpy.types.Object, pairs: Sequence[Pair], solution: 
     complete = [pair for pair in pairs if pair.is_complete]
     if not complete or not is_placed(camera):
         return solution
-    path = videos.moving_camera(camera)
+    path = videos.camera_path(camera)
     marked, points = np.array([pair.pixel for pair in complete]), np.array([pair.point for pair in complete])
     position, rotation = path.poses_at(_times(camera, [pair.frame for pair in complete]))
-    seen = project(path.camera, points, position=position, rotation=rotation)
-    away = distance_to_ray(points, *rays(path.camera, marked, position=position, rotation=rotation))
+    seen = project(path.reference, points, position=position, rotation=rotation)
+    away = distance_to_ray(points, *rays(path.reference, marked, position=position, rotation=rotation))
     names = [pair.id for pair in complete]
     return replace(
         solution,
@@ -586,7 +586,7 @@ def fill_rows(camera: bpy.types.Object) -> None:
 def place_by_eye(scene: bpy.types.Scene, camera: bpy.types.Object, placed: Camera) -> None:
     """Put the camera where a person says that it stood."""
     migration.refuse_newer(scene)
-    videos.set_moving_camera(scene, camera, fixed(placed))
+    videos.set_camera_path(scene, camera, fixed(placed))
     camera[PLACED_KEY] = BY_EYE
     camera.pop(FOLLOWED_KEY, None)
     keep_lens(camera, placed.intrinsics)

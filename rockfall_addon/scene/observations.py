@@ -115,7 +115,7 @@ def propose(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> list
         raise RockfallError(f"The block of {name} is not tracked in {camera.name}. Track it first.")
     surface = picking.surface_of(scene)
     lens = picking.posed(camera, float(seen.time_s[0]))
-    path = videos.moving_camera(camera)
+    path = videos.camera_path(camera)
     place, turn = path.poses_at(seen.time_s)
     origin, direction = rays(lens, seen.pixel, position=place, rotation=turn)
     good = np.isfinite(direction).all(axis=1)

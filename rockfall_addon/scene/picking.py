@@ -140,9 +140,9 @@ def posed(camera: bpy.types.Object, video_s: float) -> Camera:
             f"The camera of {camera.name} is not aligned, so its pixels have no place on the terrain. Align it first, "
             "or pick on the terrain in a free view."
         )
-    path = videos.moving_camera(camera)
+    path = videos.camera_path(camera)
     position, rotation = path.poses_at([video_s])
-    return replace(path.camera, position=position[0], rotation=rotation[0])
+    return replace(path.reference, position=position[0], rotation=rotation[0])
 
 
 def in_picture(

@@ -51,7 +51,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     shading = None if surface is None else shade(surface)
     known = surface.shift if surface is not None else None if result is None else result.picks.shift
     found = project_videos.read_videos(project, known) if with_videos else []
-    cameras = [read.camera.camera.camera.shift for read in found if read.camera is not None]
+    cameras = [read.camera.path.reference.shift for read in found if read.camera is not None]
 
     names = [block.name for block in project.blocks] if result is None else result.picks.trajectory.tolist()
     shift = result.picks.shift if result is not None else known or next(iter(cameras), None)

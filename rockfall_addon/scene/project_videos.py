@@ -46,7 +46,7 @@ def read_videos(project: Project, shift: GlobalShift | None) -> list[ReadVideo]:
     found = []
     for entry in project.videos:
         camera = None if entry.camera is None else read_camera(entry.camera, shift)
-        shift = camera.camera.camera.shift if camera is not None and shift is None else shift
+        shift = camera.path.reference.shift if camera is not None and shift is None else shift
         track = None if entry.track is None else read_track(entry.track)
         video = _video(entry, camera, track)
         if video is None:
@@ -81,11 +81,11 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
         if first:
             scene[timing.ORIGIN_KEY] = float(read.clock.to_common(float(read.video.time_s[0])))
             videos.begin_with(scene, camera)
-        if read.camera is not None and read.camera.camera.camera.size == videos.size_of(camera):
-            videos.set_moving_camera(
+        if read.camera is not None and read.camera.path.reference.size == videos.size_of(camera):
+            videos.set_camera_path(
                 scene,
                 camera,
-                read.camera.camera,
+                read.camera.path,
                 rmse_px=read.camera.rmse_px,
                 pose_covariance=read.camera.pose_covariance,
             )
@@ -109,7 +109,7 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
             rmse = camera.get(videos.RMSE_KEY)
             write_camera(
                 files["camera"],
-                videos.moving_camera(camera),
+                videos.camera_path(camera),
                 rmse_px=None if rmse is None else float(rmse),
                 crs=store.read_shift(scene).crs,
                 pose_covariance=videos.pose_covariance(camera),
@@ -142,12 +142,12 @@ def _video(entry: VideoEntry, camera: CameraFile | None, track: Track | None) ->
     """The file, or, where it has moved, what the camera and the track tell of it; None when that is nothing."""
     if entry.file is not None and entry.file.is_file():
         return open_video(entry.file)
-    times = camera.camera.time_s if camera is not None and not camera.camera.is_fixed else None
+    times = camera.path.time_s if camera is not None and not camera.path.is_fixed else None
     if times is None and track is not None and len(track):
         times = np.unique(track.time_s)
     if entry.file is None or camera is None or times is None:
         return None
-    width, height = camera.camera.camera.size
+    width, height = camera.path.reference.size
     rate = 1 / float(np.median(np.diff(times))) if times.size > 1 else np.nan
     return Video(entry.file, width, height, 0, "", "", rate, 0, times, np.empty(0))
 

@@ -147,7 +147,7 @@ def _seen(scene: bpy.types.Scene, names: Sequence[str] | None) -> list[str]:
 
 def _view(camera: bpy.types.Object) -> View:
     return View(
-        camera.name, videos.moving_camera(camera), videos.clock_of(camera), videos.row_time_of(camera),
+        camera.name, videos.camera_path(camera), videos.clock_of(camera), videos.row_time_of(camera),
         videos.pose_covariance(camera),
     )  # fmt: skip
 
@@ -211,7 +211,7 @@ def _keep(
     if "camera" in free:
         poses = {}
         for camera, view in zip(cameras, found.views, strict=True):
-            path, one = view.camera, view.camera.camera
+            path, one = view.path, view.path.reference
             if view.pose_covariance is not None:
                 poses[camera[videos.ID_KEY]] = {
                     "reference": [*one.position.tolist(), *one.rotation.ravel().tolist()],
@@ -250,17 +250,17 @@ def _apply_shared(scene: bpy.types.Scene, kept: dict) -> None:
             camera = videos.by_id(scene, identifier)
             if camera is None:
                 continue
-            path, reference = videos.moving_camera(camera), np.array(poses["reference"])
-            one = replace(path.camera, position=reference[:3], rotation=reference[3:].reshape(3, 3))
+            path, reference = videos.camera_path(camera), np.array(poses["reference"])
+            one = replace(path.reference, position=reference[:3], rotation=reference[3:].reshape(3, 3))
             path = replace(
                 path,
-                camera=one,
+                reference=one,
                 position=np.array(poses["position"]).reshape(-1, 3),
                 rotation=np.array(poses["rotation"]).reshape(-1, 3, 3),
             )
             covariance = np.array(poses["covariance"]).reshape(6, 6)
             rmse_px = kept["rmse_px"][identifier]
-            videos.set_moving_camera(scene, camera, path, rmse_px=rmse_px, pose_covariance=covariance)
+            videos.set_camera_path(scene, camera, path, rmse_px=rmse_px, pose_covariance=covariance)
     if "gravity" in kept["free"]:
         scene[reconstruction.GRAVITY_KEY] = kept["gravity_mps2"]
     if "drag" in kept["free"] and kept["drag"] is not None:

@@ -17,13 +17,13 @@ from mathutils import Matrix
 
 from ...core.camera.blender_lens import BlenderLens, from_blender_lens, pose_to_blender, to_blender_lens
 from ...core.camera.model import INTRINSICS, Camera
-from ...core.camera.motion import MovingCamera, fixed
+from ...core.camera.path import CameraPath, fixed
 from ...core.errors import RockfallError
 from ...core.footage.advice import content_advice, rate_advice
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import FRAME_AT_TOLERANCE_S, Image, Video, open_video, read_frame
 from ...core.vectors import Array
-from . import camera_path, migration, picks, store, timing
+from . import camera_keys, migration, picks, store, timing
 
 ID_KEY = picks.ID_KEY
 FILE_KEY, FACTS_KEY = "rockfall_video_file", "rockfall_video_facts"
@@ -366,7 +366,7 @@ def is_solved(camera: bpy.types.Object) -> bool:
     return bool(camera.get(SOLVED_KEY, False))
 
 
-def moving_camera(camera: bpy.types.Object) -> MovingCamera:
+def camera_path(camera: bpy.types.Object) -> CameraPath:
     """The camera, local to the scene's shift: the solved one, in doubles; before that, Blender's as it stands."""
     width, height = size_of(camera)
     scene = next(iter(camera.users_scene), bpy.context.scene)
@@ -390,13 +390,13 @@ def moving_camera(camera: bpy.types.Object) -> MovingCamera:
         **numbers,
     )
     times = np.array(camera[POSE_TIMES_KEY], dtype=np.float64)
-    return MovingCamera(one, times, position, rotation, sigma[:, 0].copy(), sigma[:, 1].copy())
+    return CameraPath(one, times, position, rotation, sigma[:, 0].copy(), sigma[:, 1].copy())
 
 
-def set_moving_camera(
+def set_camera_path(
     scene: bpy.types.Scene,
     camera: bpy.types.Object,
-    moving: MovingCamera,
+    path: CameraPath,
     *,
     rmse_px: float | None = None,
     pose_covariance: Array | None = None,
@@ -405,28 +405,28 @@ def set_moving_camera(
 
     Parameters
     ----------
-    moving : its pictures have the size of the video's.
+    path : its pictures have the size of the video's.
     pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path.
 
     Raises
     ------
     RockfallError : the size is another one.
     """
-    if moving.camera.size != size_of(camera):
-        (width, height), (w, h) = moving.camera.size, size_of(camera)
+    if path.reference.size != size_of(camera):
+        (width, height), (w, h) = path.reference.size, size_of(camera)
         raise RockfallError(
             f"This camera is of {width} × {height} px pictures, the video {camera.name} has {w} × {h} px. "
             "Solve the camera with this video."
         )
-    shift, own = store.read_shift(scene), moving.camera.shift
-    one = moving.camera.in_shift(shift)
-    position = moving.position + own.vector - shift.vector
-    f = moving.time_s.size
+    shift, own = store.read_shift(scene), path.reference.shift
+    one = path.reference.in_shift(shift)
+    position = path.position + own.vector - shift.vector
+    f = path.time_s.size
     camera[CAMERA_KEY] = one.intrinsics.tolist()
     camera[REFERENCE_KEY] = [*one.position.tolist(), *one.rotation.ravel().tolist()]
-    camera[POSE_TIMES_KEY] = moving.time_s.tolist()
-    camera[POSES_KEY] = np.column_stack([position, moving.rotation.reshape(f, 9)]).ravel().tolist()
-    camera[POSE_SIGMA_KEY] = np.column_stack([moving.sigma_position_m, moving.sigma_rotation]).ravel().tolist()
+    camera[POSE_TIMES_KEY] = path.time_s.tolist()
+    camera[POSES_KEY] = np.column_stack([position, path.rotation.reshape(f, 9)]).ravel().tolist()
+    camera[POSE_SIGMA_KEY] = np.column_stack([path.sigma_position_m, path.sigma_rotation]).ravel().tolist()
     camera[SHIFT_KEY] = shift.vector.tolist()
     for key, value in ((RMSE_KEY, rmse_px), (COVARIANCE_KEY, pose_covariance)):
         if value is not None:
@@ -442,7 +442,7 @@ def unsolve(camera: bpy.types.Object) -> None:
     """The camera stands where it is shown, free to be moved; what was solved is forgotten."""
     camera[SOLVED_KEY] = False
     place = camera.matrix_world.copy()
-    camera_path.clear_keys(camera)
+    camera_keys.clear_keys(camera)
     camera.matrix_world = place
     _lock(camera, False)
 
@@ -454,11 +454,11 @@ def pose_covariance(camera: bpy.types.Object) -> Array | None:
 
 def write_keys(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """Put a solved camera where it is, with a key at each frame when it moves."""
-    moving = moving_camera(camera)
-    common = clock_of(camera).to_common(moving.time_s)
+    path = camera_path(camera)
+    common = clock_of(camera).to_common(path.time_s)
     frames = (common - origin_of(scene)) * timing.frame_rate(scene)
-    camera_path.write(camera, frames, pose_to_blender(moving.position, moving.rotation))
-    camera[camera_path.KEYED_KEY] = _keyed_with(scene, camera)
+    camera_keys.write(camera, frames, pose_to_blender(path.position, path.rotation))
+    camera[camera_keys.KEYED_KEY] = _keyed_with(scene, camera)
     _lock(camera, True)
 
 
@@ -466,7 +466,7 @@ def follow_clock(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
     """Move the keys of a moving camera to where its clock, the origin and the rate say; True when they had to move."""
     if not is_solved(camera) or len(camera[POSE_TIMES_KEY]) < 2:
         return False
-    if list(camera.get(camera_path.KEYED_KEY, ())) == _keyed_with(scene, camera):
+    if list(camera.get(camera_keys.KEYED_KEY, ())) == _keyed_with(scene, camera):
         return False
     write_keys(scene, camera)
     return True

@@ -284,9 +284,9 @@ def _sightings(
     place = (scene.session_uid, camera[videos.ID_KEY], name)
     if place in _seen and _seen[place][0] == key:
         return _seen[place][1]
-    moving = videos.moving_camera(camera)
-    position, rotation = moving.poses_at(seen.time_s)
-    origin, direction = rays(moving.camera, seen.pixel, position=position, rotation=rotation)
+    viewed = videos.camera_path(camera)
+    position, rotation = viewed.poses_at(seen.time_s)
+    origin, direction = rays(viewed.reference, seen.pixel, position=position, rotation=rotation)
     clock, late = videos.clock_of(camera), videos.row_time_of(camera)
     common = clock.to_common(seen.time_s) + late * (seen.pixel[:, 1] - videos.size_of(camera)[1] / 2)
     where = np.full((len(seen), 3), np.nan)

@@ -85,9 +85,9 @@ def ray(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: ArrayLike, comm
     """
     pixels = np.asarray(pixel, dtype=np.float64)
     rows = pixels.reshape(-1, 2)
-    moving = videos.moving_camera(camera)
-    position, rotation = moving.poses_at(_video_times(camera, common_s, rows))
-    origins, directions = model.rays(moving.camera, rows, position=position, rotation=rotation)
+    path = videos.camera_path(camera)
+    position, rotation = path.poses_at(_video_times(camera, common_s, rows))
+    origins, directions = model.rays(path.reference, rows, position=position, rotation=rotation)
     shape = (*pixels.shape[:-1], 3)
     return origins.reshape(shape), directions.reshape(shape)
 
@@ -96,9 +96,9 @@ def project(scene: bpy.types.Scene, camera: bpy.types.Object, points: ArrayLike,
     """Pixels (..., 2) of local points (..., 3) [m] at common times, one or (n,); NaN where they are not seen."""
     world = np.asarray(points, dtype=np.float64)
     rows = world.reshape(-1, 3)
-    moving = videos.moving_camera(camera)
-    position, rotation = moving.poses_at(_video_times(camera, common_s, rows))
-    pixel = model.project(moving.camera, rows, position=position, rotation=rotation)
+    path = videos.camera_path(camera)
+    position, rotation = path.poses_at(_video_times(camera, common_s, rows))
+    pixel = model.project(path.reference, rows, position=position, rotation=rotation)
     return pixel.reshape(*world.shape[:-1], 2)
 
 

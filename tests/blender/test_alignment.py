@@ -82,13 +82,13 @@ def mark_all(aligned, scene, camera, table, count) -> None:
 def test_imported_pairs_give_the_cores_camera(part, scene, aligned, camera, table) -> None:
     assert bpy.ops.rockfall.import_pairs(filepath=str(PAIRS)) == {"FINISHED"}
     found = solved_by_core(part, table)
-    moving = part("rockfall_addon.scene.videos").moving_camera(camera)
-    np.testing.assert_allclose(moving.camera.position, found.camera.position, atol=1e-6)
-    np.testing.assert_allclose(moving.camera.rotation, found.camera.rotation, atol=1e-9)
-    assert moving.camera.fx == pytest.approx(found.camera.fx, rel=1e-9)
-    assert abs(moving.camera.fx - 2100) < 10, "the truth"
+    moving = part("rockfall_addon.scene.videos").camera_path(camera)
+    np.testing.assert_allclose(moving.reference.position, found.camera.position, atol=1e-6)
+    np.testing.assert_allclose(moving.reference.rotation, found.camera.rotation, atol=1e-9)
+    assert moving.reference.fx == pytest.approx(found.camera.fx, rel=1e-9)
+    assert abs(moving.reference.fx - 2100) < 10, "the truth"
     place = np.array([float(cell) for cell in TRUTH.read_text().splitlines()[1].split(",")][2:5])
-    assert np.linalg.norm(moving.camera.shift.to_survey(moving.camera.position) - place) < 0.3, "the truth"
+    assert np.linalg.norm(moving.reference.shift.to_survey(moving.reference.position) - place) < 0.3, "the truth"
     solution = aligned.solution_of(camera)
     assert solution.rmse_px == pytest.approx(found.rmse_px, rel=1e-6)
     rows = camera.rockfall_alignment.rows
@@ -149,9 +149,9 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(part, scene, alig
     proposed = aligned.with_id(aligned.pairs_of(camera), pair)
     assert proposed.proposed == "point"
     assert not proposed.is_complete
-    moving = part("rockfall_addon.scene.videos").moving_camera(camera)
+    moving = part("rockfall_addon.scene.videos").camera_path(camera)
     np.testing.assert_allclose(
-        part("core.camera.model").project(moving.camera, [proposed.point])[0], table.pixel[8], atol=1e-6
+        part("core.camera.model").project(moving.reference, [proposed.point])[0], table.pixel[8], atol=1e-6
     )
     near = part("core.terrain.raycast").closest_points(surface, [proposed.point])
     assert near.distance[0] < 1e-3, "on the terrain"
@@ -175,13 +175,13 @@ def test_known_focal_length_needs_four_pairs(part, scene, aligned, camera, table
     for i in rows:
         aligned.mark(scene, camera, "pixel", table.pixel[i])
         aligned.mark(scene, camera, "point", table.point[i])
-    moving = part("rockfall_addon.scene.videos").moving_camera(camera)
+    moving = part("rockfall_addon.scene.videos").camera_path(camera)
     assert part("rockfall_addon.scene.videos").is_solved(camera)
-    assert moving.camera.fx == 2100.0
+    assert moving.reference.fx == 2100.0
     assert settings.focal_mm == pytest.approx(43.2666 * 2100 / np.hypot(1280, 720), rel=1e-5)
-    before = moving.camera.position
+    before = moving.reference.position
     settings.focal_px = 2150.0
-    after = part("rockfall_addon.scene.videos").moving_camera(camera).camera
+    after = part("rockfall_addon.scene.videos").camera_path(camera).reference
     assert after.fx == 2150.0
     assert np.linalg.norm(after.position - before) > 0.5, "the camera has gone back"
 
@@ -238,7 +238,7 @@ def test_bad_pairs_in_words(part, scene, aligned, camera, table) -> None:
 def test_file_keeps_the_doubles(part, scene, aligned, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     pairs, lens = aligned.pairs_of(camera), aligned.lens_of(camera).tolist()
-    pose = part("rockfall_addon.scene.videos").moving_camera(camera).camera.position.tolist()
+    pose = part("rockfall_addon.scene.videos").camera_path(camera).reference.position.tolist()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "aligned.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "aligned.blend"), load_ui=False)
@@ -246,7 +246,7 @@ def test_file_keeps_the_doubles(part, scene, aligned, camera, table, tmp_path) -
     again = videos.active_camera(bpy.context.scene)
     assert repr(aligned.pairs_of(again)) == repr(pairs)
     assert aligned.lens_of(again).tolist() == lens
-    assert videos.moving_camera(again).camera.position.tolist() == pose
+    assert videos.camera_path(again).reference.position.tolist() == pose
     assert len(again.rockfall_alignment.rows) == 14
     assert aligned.solution_of(again).rmse_px < 0.5
 
@@ -261,14 +261,14 @@ def test_pairs_and_camera_go_through_files(part, scene, aligned, camera, table, 
     assert bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
     file = part("core.exchange.cameras").read_camera(tmp_path / "camera.toml", table.shift)
     videos = part("rockfall_addon.scene.videos")
-    solved = videos.moving_camera(camera).camera
-    np.testing.assert_allclose(file.camera.camera.position, solved.position, atol=1e-8)
+    solved = videos.camera_path(camera).reference
+    np.testing.assert_allclose(file.path.reference.position, solved.position, atol=1e-8)
     assert file.rmse_px == pytest.approx(aligned.solution_of(camera).rmse_px)
     assert len((tmp_path / "pairs_residuals.csv").read_text().splitlines()) == 15
     bpy.ops.rockfall.delete_pair(every=True)
     videos.unsolve(camera)
     assert bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
-    np.testing.assert_allclose(videos.moving_camera(camera).camera.position, solved.position, atol=1e-8)
+    np.testing.assert_allclose(videos.camera_path(camera).reference.position, solved.position, atol=1e-8)
     assert aligned.placement(camera) == "file"
     text = (tmp_path / "camera.toml").read_text().replace("width = 1280", "width = 640")
     (tmp_path / "small.toml").write_text(text)
@@ -324,7 +324,7 @@ def test_hand_held_camera_is_followed_and_corrected(part, scene, aligned, camera
     known = following.followed(camera)
     assert (known["reference"], known["frames"]) == (0, 300)
     assert not following.is_stale(camera)
-    moving = videos.moving_camera(camera)
+    moving = videos.camera_path(camera)
     assert moving.time_s.size == 300
     true = _true_rotations()[:96]
     turned = moving.rotation[:96] @ np.swapaxes(true, 1, 2)
@@ -341,7 +341,7 @@ def test_hand_held_camera_is_followed_and_corrected(part, scene, aligned, camera
         assert np.hypot(*(np.array(pair.pixel) - there)) < 6
         aligned.move(scene, camera, pair.id, "pixel", there)
     assert aligned.solution_of(camera).keys == (90,)
-    corrected = videos.moving_camera(camera)
+    corrected = videos.camera_path(camera)
     assert not np.allclose(corrected.rotation[90], moving.rotation[90], atol=1e-9)
     np.testing.assert_allclose(corrected.rotation[0], moving.rotation[0], atol=1e-9)
     rows = [row for row in camera.rockfall_alignment.rows if row.frame == 90]

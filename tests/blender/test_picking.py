@@ -50,10 +50,10 @@ def site(part) -> bpy.types.Scene:
     )
     times = np.array([float(row["time_s"]) for row in poses])
     nothing = np.zeros(len(poses))
-    path = part("core.camera.motion").MovingCamera(lens, times, place, turn, nothing, nothing)
+    path = part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
     scene["rockfall_time_origin_s"] = OFFSET_S
     videos.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
-    videos.set_moving_camera(scene, camera, path)
+    videos.set_camera_path(scene, camera, path)
     scene.camera = camera
     scene.rockfall.block_diameter_m = 0.39
     return scene
@@ -103,9 +103,9 @@ def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -
 def test_the_middle_of_the_block_is_a_radius_from_the_ground(site, part, impacts) -> None:
     """The block's centre at the impact, as pixel → the contact that the truth has."""
     picking = part("rockfall_addon.scene.picking")
-    camera, motion = camera_of(site, part), part("core.camera.motion")
-    path = part("rockfall_addon.scene.videos").moving_camera(camera)
-    assert isinstance(path, motion.MovingCamera)
+    camera, paths = camera_of(site, part), part("core.camera.path")
+    path = part("rockfall_addon.scene.videos").camera_path(camera)
+    assert isinstance(path, paths.CameraPath)
     for row in impacts[:5]:
         frame = round(float(row["time_s"]) * 30)
         site.frame_set(frame)
@@ -180,7 +180,7 @@ def test_grazing_rays_are_warned_of(part) -> None:
     videos, picking = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.picking")
     camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
     lens = part("core.camera.model").look_at(1280, 720, (0, -60, 2), (0, 0, 0), focal_px=1000)
-    videos.set_moving_camera(scene, camera, part("core.camera.motion").fixed(lens))
+    videos.set_camera_path(scene, camera, part("core.camera.path").fixed(lens))
     place = picking.in_picture(scene, camera, np.array([640.0, 360.0]), "B01", centre=False)
     assert place.grazing_deg == pytest.approx(np.degrees(np.arctan2(2, 60)), abs=1e-6)
     assert "grazes the terrain at 1.9°" in place.warning
@@ -230,7 +230,7 @@ def test_two_views_make_one_point(site, part) -> None:
     videos.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, np.add(truth, (70, -40, 30)), truth, focal_px=2000)
     lens = replace(lens, shift=part("core.georeference").GlobalShift(*ORIGIN))
-    videos.set_moving_camera(site, second, part("core.camera.motion").fixed(lens))
+    videos.set_camera_path(site, second, part("core.camera.path").fixed(lens))
     frame = round(float(rows("impacts.csv")[3]["time_s"]) * 30)
     site.frame_set(frame)
     for camera in (first, second):

@@ -48,8 +48,8 @@ def site(part, truth) -> bpy.types.Scene:
     )
     times, nothing = np.array([float(row["time_s"]) for row in poses]), np.zeros(len(poses))
     videos.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
-    path = part("core.camera.motion").MovingCamera(lens, times, place, turn, nothing, nothing)
-    videos.set_moving_camera(scene, camera, path)
+    path = part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
+    videos.set_camera_path(scene, camera, path)
     scene.camera = camera
     scene.rockfall.block_diameter_m = 0.39
     scene.rockfall.normal_radius_m = 0.6

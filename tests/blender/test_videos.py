@@ -192,7 +192,7 @@ def test_pixels_that_are_not_square(part: Part) -> None:
     videos = part("rockfall_addon.scene.videos")
     video = replace(part("core.footage.video").open_video(DATA / "constant.mp4"), pixel_aspect=1.25)
     camera = videos.add_camera(scene(), video)
-    one = videos.moving_camera(camera).camera
+    one = videos.camera_path(camera).reference
     assert one.fy / one.fx == pytest.approx(1.25)
     scene().camera = camera
     scene().frame_set(1)
@@ -276,15 +276,15 @@ def test_render_size_follows_the_active_camera(part: Part) -> None:
 
 def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
     """A made-up path with all numbers in use."""
-    model, motion = part("core.camera.model"), part("core.camera.motion")
+    model, paths = part("core.camera.model"), part("core.camera.path")
     one = model.look_at(64, 48, (3.0, -20.0, 5.0), (0, 0, 1), focal_px=80)
     one = model.with_intrinsics(one, [80.1, 79.7, 31.2, 24.9, 0.01, -0.002, 0.0, 1e-4, 2e-4])
     if frames == 1:
-        return motion.fixed(one)
+        return paths.fixed(one)
     time = part("rockfall_addon.scene.videos").times_of(camera)[:frames]
     turn = model.rotation_from_vector(np.outer(np.sin(5 * time), [0.02, -0.03, 0.01])) @ one.rotation
     place = one.position + np.outer(time, [0.1, 0.0, 0.05])
-    return motion.MovingCamera(one, time, place, turn, 0.01 * np.ones(frames), 1e-4 * np.ones(frames))
+    return paths.CameraPath(one, time, place, turn, 0.01 * np.ones(frames), 1e-4 * np.ones(frames))
 
 
 @pytest.mark.parametrize("frames", [1, 20])
@@ -293,17 +293,17 @@ def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
     videos, model = part("rockfall_addon.scene.videos"), part("core.camera.model")
     camera = add(part, "variable.mp4")
     moving = solved(part, camera, frames)
-    videos.set_moving_camera(scene(), camera, moving, rmse_px=0.4, pose_covariance=np.diag(np.arange(1.0, 7.0)))
+    videos.set_camera_path(scene(), camera, moving, rmse_px=0.4, pose_covariance=np.diag(np.arange(1.0, 7.0)))
     scene().camera = camera
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "solved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "solved.blend"))
     (camera,) = videos.cameras(scene())
-    back = videos.moving_camera(camera)
+    back = videos.camera_path(camera)
     for name in ("time_s", "position", "rotation", "sigma_position_m", "sigma_rotation"):
         np.testing.assert_array_equal(getattr(back, name), getattr(moving, name))
-    np.testing.assert_array_equal(back.camera.intrinsics, moving.camera.intrinsics)
+    np.testing.assert_array_equal(back.reference.intrinsics, moving.reference.intrinsics)
     np.testing.assert_array_equal(videos.pose_covariance(camera), np.diag(np.arange(1.0, 7.0)))
-    straight = model.with_intrinsics(moving.camera, [*moving.camera.intrinsics[:4], 0, 0, 0, 0, 0])
+    straight = model.with_intrinsics(moving.reference, [*moving.reference.intrinsics[:4], 0, 0, 0, 0, 0])
     points = np.random.default_rng(3).uniform((-3, -3, -1), (3, 3, 3), (10, 3))
     for rate, index in ((30, 0), (30, 7), (24, 13)):
         scene().render.fps = rate
@@ -325,20 +325,20 @@ def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
     place = np.array(camera.matrix_world)
     videos.unsolve(camera)
     np.testing.assert_allclose(np.array(camera.matrix_world), place, atol=1e-5)
-    np.testing.assert_allclose(videos.moving_camera(camera).camera.fx, 80.1, rtol=1e-6)
+    np.testing.assert_allclose(videos.camera_path(camera).reference.fx, 80.1, rtol=1e-6)
 
 
 def test_solved_camera_of_another_size(part: Part) -> None:
     camera = add(part, "rotated.mov")
     with pytest.raises(part("core.errors").RockfallError, match="64 × 48"):
-        part("rockfall_addon.scene.videos").set_moving_camera(scene(), camera, solved(part, camera, 1))
+        part("rockfall_addon.scene.videos").set_camera_path(scene(), camera, solved(part, camera, 1))
 
 
 def test_pixels_and_rays(part: Part) -> None:
     videos, view = part("rockfall_addon.scene.videos"), part("rockfall_addon.view.image_view")
     camera = add(part, "variable.mp4")
     videos.set_clock(camera, part("core.footage.clock").Clock(5.0, 1e-3, 0.1, 0.25))
-    videos.set_moving_camera(scene(), camera, solved(part, camera, 20))
+    videos.set_camera_path(scene(), camera, solved(part, camera, 20))
     pixels = np.random.default_rng(4).uniform((5, 5), (59, 43), (12, 2))
     common = np.linspace(5.0, 5.1, 12)
     origins, directions = view.ray(scene(), camera, pixels, common)
@@ -541,9 +541,9 @@ def test_project_goes_out_as_it_came_in(part: Part, tmp_path: Path, moved: bool)
     assert after.file.resolve() == before.file.resolve()
     shift = part("rockfall_addon.scene.store").read_shift(scene())
     first, second = (cameras.read_camera(each.camera, shift) for each in (before, after))
-    np.testing.assert_allclose(second.camera.position, first.camera.position, atol=1e-9)
-    np.testing.assert_array_equal(second.camera.rotation, first.camera.rotation)
-    np.testing.assert_array_equal(second.camera.camera.intrinsics, first.camera.camera.intrinsics)
+    np.testing.assert_allclose(second.path.position, first.path.position, atol=1e-9)
+    np.testing.assert_array_equal(second.path.rotation, first.path.rotation)
+    np.testing.assert_array_equal(second.path.reference.intrinsics, first.path.reference.intrinsics)
     np.testing.assert_array_equal(second.pose_covariance, np.eye(6))
     track = part("core.exchange.footage_tables").read_track(after.track)
     np.testing.assert_array_equal(track.pixel, [[11.5, 12.25], [13, 14]])

@@ -68,7 +68,7 @@ def refused(capsys, table, *options):
 
 def test_the_camera_is_found_within_its_deviations(pairs, capsys):
     found, said = align(capsys, pairs, "--size", "1920x1080", "--sigma-px", SIGMA_PX)
-    camera = found.camera.camera
+    camera = found.path.reference
     assert abs(camera.fx - 1500) < 4 * found.sigma["fx"]
     assert found.sigma["fx"] < 10
     off = camera.position - truth().position
@@ -104,7 +104,7 @@ def test_a_wrong_pair_is_named_left_out_and_still_in_the_table(tmp_path, capsys)
     found, said = align(capsys, table, "--size", "1920x1080", "--sigma-px", SIGMA_PX)
     assert "15 of 16 pairs" in said
     assert "1 left out as wrong: P4" in said
-    assert abs(found.camera.camera.fx - 1500) < 4 * found.sigma["fx"]
+    assert abs(found.path.reference.fx - 1500) < 4 * found.sigma["fx"]
     residuals = read_table(table.parent / "out" / "pairs_residuals.csv", ("pair",), ())
     assert residuals.text("used") == ["0" if i == 4 else "1" for i in range(16)]
     assert residuals.numbers("residual_u_px")[4] == pytest.approx(35, abs=3)
@@ -126,27 +126,27 @@ def test_pairs_that_are_not_used_check_the_camera(tmp_path, capsys):
 
 def test_what_is_known_of_the_lens_is_kept(pairs, capsys):
     found, said = align(capsys, pairs, "--size", "1920 x 1080", "--focal", 1500)
-    assert found.camera.camera.fx == 1500.0
+    assert found.path.reference.fx == 1500.0
     assert "fx" not in found.sigma
     assert "Focal length: 1500.0 px" in said
-    assert norm(found.camera.camera.position - truth().position) < 0.2
+    assert norm(found.path.reference.position - truth().position) < 0.2
     fov = np.degrees(2 * np.arctan(960 / 1500))
     found, _ = align(capsys, pairs, "--size", "1920x1080", "--fov", repr(float(fov)))
-    assert found.camera.camera.fx == pytest.approx(1500.0)
+    assert found.path.reference.fx == pytest.approx(1500.0)
     both, _ = align(capsys, pairs, "--size", "1920x1080", "--focal", 1400, "--free", "f")
-    assert abs(both.camera.camera.fx - 1500) < 4 * both.sigma["fx"]
+    assert abs(both.path.reference.fx - 1500) < 4 * both.sigma["fx"]
 
 
 def test_a_rough_camera_gives_the_distortion_and_a_place_to_begin(tmp_path, capsys):
     lens = replace(truth(), k1=-0.12)
     table = write(tmp_path / "pairs.csv", *scene(lens))
     free, said = align(capsys, table, "--size", "1920x1080", "--free", "f,k1")
-    assert abs(free.camera.camera.k1 + 0.12) < 4 * free.sigma["k1"] < 0.1
+    assert abs(free.path.reference.k1 + 0.12) < 4 * free.sigma["k1"] < 0.1
     assert "Lens: k1 -0.1" in said
     (tmp_path / "rough.toml").write_bytes((tmp_path / "out" / "camera.toml").read_bytes())
     again, _ = align(capsys, table, "--size", "1920x1080", "--camera", tmp_path / "rough.toml", "--free", "none")
-    assert again.camera.camera.k1 == free.camera.camera.k1
-    assert again.camera.camera.position == pytest.approx(free.camera.camera.position, abs=1e-3)
+    assert again.path.reference.k1 == free.path.reference.k1
+    assert again.path.reference.position == pytest.approx(free.path.reference.position, abs=1e-3)
 
 
 def test_the_video_gives_the_size_and_the_check_picture(tmp_path, capsys):
@@ -158,13 +158,13 @@ def test_the_video_gives_the_size_and_the_check_picture(tmp_path, capsys):
         writer.write(np.full((240, 320, 3), shade, np.uint8))
     writer.release()
     found, said = align(capsys, table, "--video", video, "--frame", 1)
-    assert found.camera.camera.size == (320, 240)
+    assert found.path.reference.size == (320, 240)
     assert "align.png" in said
     picture = cv2.imread(str(tmp_path / "out" / "align.png"))
     assert picture.shape == (240, 320, 3)
     assert np.median(picture) == pytest.approx(90, abs=4)
     # The centre of each cross is green, at the pixel that holds the projected point.
-    for u, v in project(found.camera.camera, scene(camera)[0]):
+    for u, v in project(found.path.reference, scene(camera)[0]):
         b, g, r = picture[int(v) - 1 : int(v) + 2, int(u) - 1 : int(u) + 2].reshape(-1, 3).astype(int).max(axis=0)
         assert g > 150
         assert g > max(b, r) - 1
@@ -241,7 +241,7 @@ def test_a_camera_that_turns_has_a_pose_for_each_frame(tmp_path, capsys):
     filmed(tmp_path, poses)
     table = paired(tmp_path / "pairs.csv", poses, [0])
     found, said = align(capsys, table, "--video", tmp_path / "film.avi", "--moving", "rotation", "--sigma-px", 0.1)
-    path = found.camera
+    path = found.path
     assert path.time_s == pytest.approx(np.arange(FRAMES) / 25)
     assert "a pose for each of 24 frames" in said
     assert turn_px(path, poses) < 1.5
@@ -256,9 +256,9 @@ def test_a_camera_that_walks_is_tied_to_its_key_frames(tmp_path, capsys):
     options = ["--video", tmp_path / "film.avi", "--sigma-px", 0.1, "--terrain", tmp_path / "slope.asc"]
     found, said = align(capsys, table, *options, "--moving", "full", "--focal", 620, "--frame", 0)
     truth_m = np.array([one.position for one in poses])
-    position = found.camera.camera.shift.to_survey(found.camera.position) - SHIFT.vector
+    position = found.path.reference.shift.to_survey(found.path.position) - SHIFT.vector
     assert norm(position - truth_m).max() < 0.15
-    assert turn_px(found.camera, poses) < 2.0
+    assert turn_px(found.path, poses) < 2.0
     assert "Frame 23: 12 pairs fit to 0." in said
     assert "off the terrain" in said
     residuals = read_table(tmp_path / "out" / "pairs_residuals.csv", ("pair",), ())
@@ -274,7 +274,7 @@ def test_a_tripod_needs_one_pose(tmp_path, capsys):
     filmed(tmp_path, poses)
     table = paired(tmp_path / "pairs.csv", poses, [0])
     found, said = align(capsys, table, "--video", tmp_path / "film.avi", "--moving", "rotation")
-    assert found.camera.is_fixed
+    assert found.path.is_fixed
     assert "stands still" in said
     assert "--moving full needs the terrain" in refused_again(
         capsys, table, "--video", tmp_path / "film.avi", "--moving", "full"

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rotation_from_vector, vector_from_rotation
-from rockfall.core.camera.motion import FeatureTracks, MovingCamera, fixed, solve_motion
+from rockfall.core.camera.motion import FeatureTracks, solve_motion
+from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.errors import InputError
 from rockfall.core.vectors import Array, norm
 
@@ -184,7 +185,7 @@ def test_bad_tracks_are_refused() -> None:
 def test_poses_between_frames() -> None:
     camera = look_at(1920, 1080, (0, 0, 0), (0, 10, 0), fov_deg=60)
     turn = rotation_from_vector([[0, 0, 0], [0, 0.4, 0], [0.3, 0.4, 0]])
-    path = MovingCamera(
+    path = CameraPath(
         camera,
         np.array([1.0, 2.0, 4.0]),
         np.array([[0, 0, 0], [1.0, 2, 0], [1, 2, 8]]),
@@ -213,6 +214,4 @@ def test_a_path_has_times_that_ascend() -> None:
     camera = look_at(1920, 1080, (1, 2, 3), (0, 10, 0), fov_deg=60)
     path = fixed(camera)
     with pytest.raises(InputError, match="ascend"):
-        MovingCamera(
-            camera, np.zeros(2), np.zeros((2, 3)), np.repeat(path.rotation, 2, axis=0), np.zeros(2), np.zeros(2)
-        )
+        CameraPath(camera, np.zeros(2), np.zeros((2, 3)), np.repeat(path.rotation, 2, axis=0), np.zeros(2), np.zeros(2))

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, rotation_from_vector
-from rockfall.core.camera.motion import MovingCamera, fixed
+from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from rockfall.core.exchange.csv_text import read_table
@@ -30,19 +30,19 @@ def a_camera() -> Camera:
                   rotation=rotation, shift=SHIFT)  # fmt: skip
 
 
-def a_path() -> MovingCamera:
+def a_path() -> CameraPath:
     camera, rng = a_camera(), np.random.default_rng(3)
     time = np.sort(rng.random(7)) * 5 + 1.4
     position = SHIFT.to_local(SHIFT.to_survey(camera.position + 0.05 * rng.normal(size=(7, 3))))
     turns = rotation_from_vector(0.01 * rng.normal(size=(7, 3)))
     sigma = rng.random((2, 7))
     sigma[:, 3] = np.inf  # a frame in which nothing was recognised
-    return MovingCamera(camera, time, position, turns @ camera.rotation, 0.01 * sigma[0], 1e-4 * sigma[1])
+    return CameraPath(camera, time, position, turns @ camera.rotation, 0.01 * sigma[0], 1e-4 * sigma[1])
 
 
-def same(one: MovingCamera, other: MovingCamera) -> bool:
+def same(one: CameraPath, other: CameraPath) -> bool:
     names = ("time_s", "position", "rotation", "sigma_position_m", "sigma_rotation")
-    mine, yours = one.camera, other.camera
+    mine, yours = one.reference, other.reference
     return (
         mine.size == yours.size
         and np.array_equal(mine.intrinsics, yours.intrinsics)
@@ -62,14 +62,14 @@ def test_a_camera_is_the_same_after_writing_and_reading_to_the_last_bit(tmp_path
                  extra={"operator": "kept", "lens": {"make": "kept"}})  # fmt: skip
     read = read_camera(path, SHIFT)
     assert "\n  [" in path.read_text()
-    assert same(read.camera, camera)
+    assert same(read.path, camera)
     assert read.rmse_px == 1 / 3
     assert read.sigma == sigma
     assert read.crs == "EPSG:2056"
     assert np.array_equal(read.pose_covariance, (covariance + covariance.T) / 2)
     assert read.extra == {"operator": "kept", "lens": {"make": "kept"}}
     again = tmp_path / "again.toml"
-    write_camera(again, read.camera, rmse_px=read.rmse_px, sigma=read.sigma, crs=read.crs,
+    write_camera(again, read.path, rmse_px=read.rmse_px, sigma=read.sigma, crs=read.crs,
                  pose_covariance=read.pose_covariance, extra=read.extra)  # fmt: skip
     assert again.read_bytes() == path.read_bytes()
 
@@ -77,7 +77,7 @@ def test_a_camera_is_the_same_after_writing_and_reading_to_the_last_bit(tmp_path
 def test_the_file_has_survey_coordinates_and_a_shift_of_its_own_is_found(tmp_path):
     write_camera(tmp_path / "camera.toml", fixed(a_camera()))
     assert "2600123.456789012" in (tmp_path / "camera.toml").read_text()
-    camera = read_camera(tmp_path / "camera.toml").camera.camera
+    camera = read_camera(tmp_path / "camera.toml").path.reference
     assert np.abs(camera.position[:2]).max() < 100
     assert camera.shift.to_survey(camera.position).tolist() == [2_600_123.456789012, 1_200_045.1, 1_567.000000001]
 
@@ -90,7 +90,7 @@ def test_a_rotation_of_few_decimals_becomes_the_nearest_rotation(tmp_path):
     for value in exact.ravel().tolist():
         text = text.replace(repr(value), f"{value:.4f}")
     path.write_text(text)
-    rotation = read_camera(path).camera.camera.rotation
+    rotation = read_camera(path).path.reference.rotation
     assert np.abs(rotation @ rotation.T - np.eye(3)).max() < 1e-14
     assert 0 < np.abs(rotation - exact).max() < 1e-4
 
@@ -138,7 +138,7 @@ def test_a_wrong_camera_names_the_file_the_key_and_what_to_do(tmp_path, old, new
     assert old in SIMPLE
     path = tmp_path / "camera.toml"
     path.write_text(SIMPLE)
-    assert read_camera(path).camera.time_s.tolist() == [1.0, 1.5]
+    assert read_camera(path).path.time_s.tolist() == [1.0, 1.5]
     path.write_text(SIMPLE.replace(old, new, 1))
     with pytest.raises(InputError) as caught:
         read_camera(path)
@@ -258,5 +258,5 @@ def test_a_camera_that_looks_somewhere_reads_back_for_any_place(tmp_path):
         camera = look_at(640, 480, shift.to_local(survey), shift.to_local(survey + rng.normal(size=3)), fov_deg=50)
         write_camera(tmp_path / "camera.toml", fixed(camera if seed % 2 else Camera(**vars(camera) | {"shift": shift})))
         if not seed % 2:
-            read = read_camera(tmp_path / "camera.toml", shift).camera.camera
+            read = read_camera(tmp_path / "camera.toml", shift).path.reference
             assert shift.to_survey(read.position).tolist() == survey.tolist()

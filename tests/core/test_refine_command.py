@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
-from rockfall.core.camera.motion import MovingCamera, fixed
+from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.cli import main
 from rockfall.core.exchange.cameras import read_camera, write_camera
 from rockfall.core.exchange.csv_text import read_table
@@ -296,7 +296,7 @@ def test_a_camera_that_is_a_little_off_is_put_right(site, tmp_path):
     argv = ["refine", str(site / "project.toml"), "--free", "camera", "--out", str(tmp_path / "out")]
     assert main(argv) == 0
     found = read_camera(tmp_path / "out" / "camera_right.toml", SHIFT)
-    turn = np.arccos(np.clip((np.trace(found.camera.camera.rotation @ truth.rotation.T) - 1) / 2, -1, 1))
+    turn = np.arccos(np.clip((np.trace(found.path.reference.rotation @ truth.rotation.T) - 1) / 2, -1, 1))
     assert turn < 0.0005
     assert found.extra == {"operator": "kept"}
     assert found.pose_covariance[0, 0] < covariance[0, 0]
@@ -319,7 +319,7 @@ def test_a_camera_that_turns_and_loses_a_frame(site, tmp_path, capsys):
     turn[order[10:13]] = camera.rotation
     place = np.repeat(camera.position[None], time.size, axis=0)
     write_camera(
-        site / "left.toml", MovingCamera(camera, time[order], place, turn[order], np.zeros(time.size), lost[order])
+        site / "left.toml", CameraPath(camera, time[order], place, turn[order], np.zeros(time.size), lost[order])
     )
     assert main(["refine", str(site / "project.toml"), "--out", str(tmp_path / "out")]) == 0
     assert "3 pixels are not used" in capsys.readouterr().out

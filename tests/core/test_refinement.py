@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.camera.model import look_at, project, rotation_from_vector
-from rockfall.core.camera.motion import MovingCamera, fixed
+from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.footage.clock import Clock
 from rockfall.core.georeference import GlobalShift
@@ -64,13 +64,13 @@ def observe(views, *, rate=30.0, sigma=1.0, noise=0.0, seed=0, drag=0.0, gravity
     for number, one in enumerate(views):
         common = np.arange(TIME[0] + 0.01 + 0.004 * number, TIME[-1], 1 / rate)
         video = np.asarray(one.clock.to_video(common))
-        position, rotation = one.camera.poses_at(video)
+        position, rotation = one.path.poses_at(video)
         exposed, pixel = common, None
         for _ in range(8):
             pixel = project(
-                one.camera.camera, states(exposed, drag, gravity, lift)[1], position=position, rotation=rotation
+                one.path.reference, states(exposed, drag, gravity, lift)[1], position=position, rotation=rotation
             )
-            exposed = common + one.row_time_s * (pixel[:, 1] - one.camera.camera.height / 2)
+            exposed = common + one.row_time_s * (pixel[:, 1] - one.path.reference.height / 2)
         keep = (exposed > TIME[0]) & (exposed < TIME[-1])
         rows.append((np.full(keep.sum(), number), video[keep], pixel[keep]))
     index, video, pixel = (np.concatenate(column) for column in zip(*rows, strict=True))
@@ -132,7 +132,7 @@ def test_rolling_shutter():
 def test_a_camera_that_moves():
     camera, frames = camera_at(40.0), np.linspace(0, 6, 181)
     shake = 0.01 * np.sin(np.outer(frames, [3.0, 4.0, 5.0]))
-    path = MovingCamera(
+    path = CameraPath(
         camera,
         frames,
         camera.position + shake,
@@ -191,7 +191,7 @@ def test_a_pose_is_corrected_by_the_other_view():
     result = run(off, pixels, free=("camera",), **options)
     centres = PLACE + RADIUS * OUT
     true, before = project(camera, centres), project(turned, centres)
-    after = project(result.views[1].camera.camera, centres)
+    after = project(result.views[1].path.reference, centres)
     assert np.abs(before - true).max() > 1.5
     assert np.abs(after - true).max() < 0.3
     assert np.sqrt(np.diag(result.views[1].pose_covariance))[0] < 4e-4
@@ -252,7 +252,7 @@ def aimed(views, pixels, parts):
     for number, one in enumerate(views):
         mine = pixels.view == number
         place = states(np.asarray(one.clock.to_common(pixels.time_s[mine])))[1]
-        size = one.camera.camera.fx * 2 * RADIUS / np.linalg.norm(place - one.camera.camera.position, axis=1)
+        size = one.path.reference.fx * 2 * RADIUS / np.linalg.norm(place - one.path.reference.position, axis=1)
         off[mine] = size[:, None] * parts[number]
     return replace(pixels, pixel=pixels.pixel + off)
 

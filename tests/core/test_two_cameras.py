@@ -37,7 +37,7 @@ def test_the_cameras_come_from_the_pairs() -> None:
         number = 1 if focal == 1242.0 else 2
         pairs = read_pairs(EXAMPLE / f"pairs_{number}.csv")
         found = resect(pairs.pixel, pairs.point, 1280, 720, sigma_px=pairs.sigma_px, shift=pairs.shift)
-        camera = entry.camera.camera
+        camera = entry.path.reference
         assert found.camera.fx == pytest.approx(camera.fx, rel=1e-6)
         assert found.camera.position == pytest.approx(camera.position, abs=1e-4)
         assert camera.fx == pytest.approx(focal, abs=1.5)

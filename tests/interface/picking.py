@@ -47,8 +47,8 @@ def open_site(window):
     times, nothing = np.array([float(row["time_s"]) for row in poses]), np.zeros(len(poses))
     scene["rockfall_time_origin_s"] = OFFSET_S
     videos.set_clock(camera, window.part("core.footage.clock").Clock(OFFSET_S))
-    path = window.part("core.camera.motion").MovingCamera(lens, times, place, turn, nothing, nothing)
-    videos.set_moving_camera(scene, camera, path)
+    path = window.part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
+    videos.set_camera_path(scene, camera, path)
     scene.camera = camera
     camera.data.background_images[0].display_depth = "FRONT"
     camera.data.background_images[0].alpha = 0.9
@@ -350,7 +350,7 @@ def case_pick_in_two_views(window):
     videos.set_clock(second, window.part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, truth + np.array([60.0, -50.0, 30.0]), truth, focal_px=1500)
     lens = replace(lens, shift=window.part("core.georeference").GlobalShift(*ORIGIN))
-    videos.set_moving_camera(scene, second, window.part("core.camera.motion").fixed(lens))
+    videos.set_camera_path(scene, second, window.part("core.camera.path").fixed(lens))
     scene.camera = second
     with window.override():
         bpy.ops.rockfall.look_through()

@@ -329,11 +329,11 @@ def _pixel_rows(problem: Problem, state: Unknowns, motion: NodeMotion, segment: 
         if not mine.size:
             continue
         here = rows[mine]
-        reference = view.camera.camera.rotation
+        reference = view.path.reference.rotation
         to_frame = problem.rotation[here] @ reference.T
         rotation = to_frame @ rotation_from_vector(state.turn[number]) @ reference
         seen = project_with_derivatives(
-            view.camera.camera,
+            view.path.reference,
             places.position[mine],
             position=problem.position[here] + state.move[number],
             rotation=rotation,

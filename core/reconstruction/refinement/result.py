@@ -246,7 +246,7 @@ def _refined_views(views: tuple[View, ...], fit: _Fit) -> tuple[View, ...]:
     state, columns = fit.solution.state, fit.setup.problem.columns
     refined = []
     for i, view in enumerate(views):
-        path, pose = view.camera, columns.pose[i]
+        path, pose = view.path, columns.pose[i]
         clock = replace(
             view.clock,
             offset_s=view.clock.offset_s + float(state.offset_s[i]),
@@ -255,17 +255,17 @@ def _refined_views(views: tuple[View, ...], fit: _Fit) -> tuple[View, ...]:
         if pose[0] < 0:
             refined.append(replace(view, clock=clock))
             continue
-        reference = path.camera.rotation
+        reference = path.reference.rotation
         turned = rotation_from_vector(state.turn[i]) @ reference
-        camera = replace(path.camera, rotation=turned, position=path.camera.position + state.move[i])
+        camera = replace(path.reference, rotation=turned, position=path.reference.position + state.move[i])
         moved = replace(
             path,
-            camera=camera,
+            reference=camera,
             position=path.position + state.move[i],
             rotation=path.rotation @ reference.T @ turned,
         )
         covariance = fit.covariance[np.ix_(pose, pose)]
-        refined.append(replace(view, camera=moved, clock=clock, pose_covariance=covariance))
+        refined.append(replace(view, path=moved, clock=clock, pose_covariance=covariance))
     return tuple(refined)
 
 
@@ -397,7 +397,7 @@ def _grazing(fit: _Fit, at: Callable[[int], str]) -> list[str]:
     normal = setup.normals.normal[setup.nodes[nodes]]
     steepest = np.zeros(nodes.size)
     for i in np.unique(problem.view):
-        place = problem.views[i].camera.camera.position
+        place = problem.views[i].path.reference.position
         steepest = np.fmax(steepest, np.abs(dot(unit(state.centre[nodes] - place), normal)))
     found = np.flatnonzero(steepest < np.sin(np.radians(GRAZING_DEG)))
     return [

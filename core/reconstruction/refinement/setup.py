@@ -157,10 +157,10 @@ def set_up(
     centre = picks.position[nodes] + np.nan_to_num(ground.radius_m[:, None] * ground.normals.normal)[nodes]
     passes = _passes(picks, segments, chosen)
     delay = np.array([view.row_time_s for view in views])[seen.view]
-    height = np.array([view.camera.camera.height for view in views])[seen.view]
+    height = np.array([view.path.reference.height for view in views])[seen.view]
     position, rotation = np.empty((rows.size, 3)), np.empty((rows.size, 3, 3))
     for i, view in enumerate(views):
-        position[seen.view == i], rotation[seen.view == i] = view.camera.poses_at(seen.time_s[seen.view == i])
+        position[seen.view == i], rotation[seen.view == i] = view.path.poses_at(seen.time_s[seen.view == i])
     on_ground = np.flatnonzero(ground.grounded[nodes])
     given_time, given_place = picks.sigma_time_s[nodes], picks.sigma_position_m[nodes]
     problem = Problem(
@@ -243,11 +243,11 @@ def _pixel_sigmas(views: tuple[View, ...], seen: PixelObservations, middle: Arra
     """(m,) of the pixels together with what is not known of each frame's pose [px]."""
     variance = seen.sigma_px**2
     for i, view in enumerate(views):
-        path, mine = view.camera, seen.view == i
+        path, mine = view.path, seen.view == i
         if not mine.any():
             continue
-        distance = max(float(norm(middle - path.camera.position)), 1e-3)
-        focal = (path.camera.fx + path.camera.fy) / 2
+        distance = max(float(norm(middle - path.reference.position)), 1e-3)
+        focal = (path.reference.fx + path.reference.fy) / 2
         turn = np.interp(seen.time_s[mine], path.time_s, path.sigma_rotation)
         shift = np.interp(seen.time_s[mine], path.time_s, path.sigma_position_m)
         variance[mine] += focal**2 * (turn**2 + (shift / distance) ** 2)
@@ -263,7 +263,7 @@ def _block_sizes(
     position: Array,
 ) -> Array:
     """(m,) diameter of the block in the image [px], at the distance of the marked motion."""
-    focal = np.array([(view.camera.camera.fx + view.camera.camera.fy) / 2 for view in views])
+    focal = np.array([(view.path.reference.fx + view.path.reference.fy) / 2 for view in views])
     common = np.empty(len(seen))
     for i, view in enumerate(views):
         common[seen.view == i] = view.clock.to_common(seen.time_s[seen.view == i])

@@ -198,7 +198,7 @@ def find_clocks(problem: Problem, state: Unknowns) -> Unknowns:
         segment = segments_at(problem, state, time, problem.obs_group[each])
         used = np.flatnonzero(segment >= 0)
         places = places_at(motion, segment[used], time[used]).position
-        camera, here = problem.views[number].camera.camera, each[used]
+        camera, here = problem.views[number].path.reference, each[used]
         pixel = project(camera, places, position=problem.position[here], rotation=problem.rotation[here])
         miss = np.full(each.size, np.nan)
         miss[used] = norm(pixel - problem.pixel[here])

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...camera.motion import MovingCamera
+from ...camera.path import CameraPath
 from ...errors import InputError
 from ...footage.clock import Clock
 from ...georeference import GlobalShift
@@ -19,7 +19,7 @@ class View:
     Attributes
     ----------
     name : for people.
-    camera : its path.
+    path : of the camera.
     clock : from video time to the time of the picks.
     row_time_s : readout time of one row of the image [s], on the common clock; zero for a global shutter. The time of a
         frame is that of its middle row.
@@ -28,7 +28,7 @@ class View:
     """
 
     name: str
-    camera: MovingCamera
+    path: CameraPath
     clock: Clock = field(default_factory=Clock)
     row_time_s: float = 0.0
     pose_covariance: Array | None = None
@@ -45,11 +45,12 @@ class View:
 
     def in_shift(self, shift: GlobalShift) -> "View":
         """The same view in the local frame of another shift."""
-        old = self.camera.camera.shift
+        old = self.path.reference.shift
         if np.array_equal(old.vector, shift.vector):
             return self
-        position = shift.to_local(old.to_survey(self.camera.position))
-        return replace(self, camera=replace(self.camera, camera=self.camera.camera.in_shift(shift), position=position))
+        position = shift.to_local(old.to_survey(self.path.position))
+        path = replace(self.path, reference=self.path.reference.in_shift(shift), position=position)
+        return replace(self, path=path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,7 +79,7 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
     """
     migration.refuse_newer(scene)
     file = read_camera(path, store.read_shift(scene) if store.has_shift(scene) else None)
-    one, settings = file.camera.camera, camera.rockfall_alignment
+    one, settings = file.path.reference, camera.rockfall_alignment
     if one.size != videos.size_of(camera):
         width, height = videos.size_of(camera)
         raise InputError(
@@ -94,16 +94,16 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
         return
     if not store.has_shift(scene):
         store.write_shift(scene, one.shift)
-    if not file.camera.is_fixed and settings.motion == "FIXED":
+    if not file.path.is_fixed and settings.motion == "FIXED":
         settings.motion = "ROTATION"
-    videos.set_moving_camera(scene, camera, file.camera, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
+    videos.set_camera_path(scene, camera, file.path, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
     camera[alignment.PLACED_KEY] = alignment.FROM_FILE
     alignment.keep_check(camera, alignment.Solution(rmse_px=_number(file.rmse_px), sigma=dict(file.sigma)))
 
 
 def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> list[str]:
     """Write camera.toml and, when there are pairs, pairs_residuals.csv beside it. Returns the names of the files."""
-    path, solution, moving = Path(path), alignment.solution_of(camera), videos.moving_camera(camera)
+    path, solution, moving = Path(path), alignment.solution_of(camera), videos.camera_path(camera)
     write_camera(
         path,
         moving,
@@ -115,8 +115,8 @@ def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
     if not len(table):
         return [path.name]
     position, rotation = moving.poses_at(videos.times_of(camera)[table.frame])
-    seen = project(moving.camera, table.point, position=position, rotation=rotation)
-    away = distance_to_ray(table.point, *rays(moving.camera, table.pixel, position=position, rotation=rotation))
+    seen = project(moving.reference, table.point, position=position, rotation=rotation)
+    away = distance_to_ray(table.point, *rays(moving.reference, table.pixel, position=position, rotation=rotation))
     complete = [pair for pair in alignment.pairs_of(camera) if pair.is_complete]
     used = np.array([pair.enabled and pair.id not in solution.wrong for pair in complete])
     beside = path.with_name("pairs_residuals.csv")

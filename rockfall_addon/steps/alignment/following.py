@@ -14,7 +14,8 @@ import bpy
 import numpy as np
 
 from ....core.camera.model import Camera, vector_from_rotation
-from ....core.camera.motion import FeatureTracks, MovingCamera, SolvedMotion, fixed, solve_motion
+from ....core.camera.motion import FeatureTracks, SolvedMotion, solve_motion
+from ....core.camera.path import CameraPath, fixed
 from ....core.errors import RockfallError
 from ....core.footage.background import BackgroundMotion, TrackedFeatures, background_motion
 from ....core.footage.video import Video
@@ -108,11 +109,11 @@ def prepare(scene: bpy.types.Scene, camera: bpy.types.Object) -> Task:
     surface = terrain.surface_of_scene(scene)
     if settings.motion == "FULL" and surface is None:
         raise RockfallError("A camera that walks needs the terrain, to tell moving from turning. Import it first.")
-    solution, path = alignment.solution_of(camera), videos.moving_camera(camera)
+    solution, path = alignment.solution_of(camera), videos.camera_path(camera)
     times = videos.times_of(camera)
     position, rotation = path.poses_at(times[list(solution.keys)])
-    keys = {frame: _posed(path.camera, position[i], rotation[i]) for i, frame in enumerate(solution.keys)}
-    return Task(videos.video_of(camera), path.camera, solution.reference, keys, settings.motion.lower(), surface)
+    keys = {frame: _posed(path.reference, position[i], rotation[i]) for i, frame in enumerate(solution.keys)}
+    return Task(videos.video_of(camera), path.reference, solution.reference, keys, settings.motion.lower(), surface)
 
 
 def compute(task: Task, progress: Callable[[str], None]) -> SolvedMotion | None:
@@ -147,7 +148,7 @@ def apply(scene: bpy.types.Scene, camera: bpy.types.Object, task: Task, found: S
     """Give the camera the poses that were found; returns a sentence about them."""
     frames = len(camera[videos.TIMES_KEY])
     path = fixed(task.camera) if found is None else found.path
-    videos.set_moving_camera(
+    videos.set_camera_path(
         scene,
         camera,
         path,
@@ -202,10 +203,10 @@ def _points_of(surface: Surface) -> Callable[[Array, Array], Array]:
     return meet
 
 
-def _turn_deg(path: MovingCamera) -> float:
-    return float(np.degrees(norm(vector_from_rotation(path.rotation @ path.camera.rotation.T))).max())
+def _turn_deg(path: CameraPath) -> float:
+    return float(np.degrees(norm(vector_from_rotation(path.rotation @ path.reference.rotation.T))).max())
 
 
-def _sigma_px(path: MovingCamera) -> float | None:
+def _sigma_px(path: CameraPath) -> float | None:
     sigma = path.sigma_rotation[np.isfinite(path.sigma_rotation)]
-    return float(path.camera.fx * sigma.max()) if sigma.size else None
+    return float(path.reference.fx * sigma.max()) if sigma.size else None

@@ -182,7 +182,7 @@ def test(arguments: list[str]) -> int:
 
 
 def footage(arguments: list[str]) -> int:
-    return start(PYTHON, "scripts/compare_demo_footage.py", *arguments)[0]
+    return start(PYTHON, "scripts/comparisons/demo_footage.py", *arguments)[0]
 
 
 def lint(arguments: list[str]) -> int:

@@ -9,7 +9,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 
-from compare_bouncing_ball import FOCAL_PX, Ball, filmed, followed, parabolas, pitch_deg
+from comparisons.bouncing_ball import FOCAL_PX, Ball, filmed, followed, parabolas, pitch_deg
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 """Cameras from pairs: real ones with a known answer, and made ones under all conditions."""
 
 import csv
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,10 +14,13 @@ from rockfall.core.camera.resection import Resection, resect
 from rockfall.core.camera.starting import poses_from_three
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
-from rockfall.core.vectors import Array, norm, unit
+from rockfall.core.vectors import norm, unit
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
+
+from benchmarks.camera import HEIGHT, WIDTH, made
 
 DATA = Path(__file__).parent.parent / "data" / "opencv_calib"
-WIDTH, HEIGHT = 3840, 2160
 
 OPENCV_SAMPLE = Camera(
     640,
@@ -39,35 +43,6 @@ TABLE = np.array(
 image (tt_tracker by ckjellson, MIT)."""
 FIRST_TELEPHONE = np.array([[247, 327], [1021, 301], [1171, 77], [17, 114], [567, 122], [629, 366]])
 SECOND_TELEPHONE = np.array([[297, 374], [1035, 447], [1243, 274], [184, 150], [723, 239], [662, 458]])
-
-
-def made(
-    seed: int, n: int, *, noise: float = 0.5, planar: bool = False, sigma_m: float = 0.0
-) -> tuple[Camera, Array, Array]:
-    """A random camera of 20–400 mm, 5–500 m away, tilted −90…60° and rolled, with pairs: pixels and points."""
-    rng = np.random.default_rng(seed)
-    focal = np.exp(rng.uniform(np.log(20), np.log(400))) / 36 * WIDTH
-    distance = np.exp(rng.uniform(np.log(5), np.log(500)))
-    tilt, azimuth = np.radians(rng.uniform(-90, 60)), rng.uniform(0, 2 * np.pi)
-    forward = np.array([np.cos(tilt) * np.cos(azimuth), np.cos(tilt) * np.sin(azimuth), np.sin(tilt)])
-    place = rng.uniform(-100, 100, 3)
-    camera = look_at(WIDTH, HEIGHT, place, place + forward, focal_px=focal)
-    camera = replace(camera, rotation=rotation_from_vector([0, 0, rng.uniform(-0.3, 0.3)]) @ camera.rotation)
-    while True:
-        pixels = rng.uniform((0.05 * WIDTH, 0.05 * HEIGHT), (0.95 * WIDTH, 0.95 * HEIGHT), (n, 2))
-        extent = np.linalg.svd(pixels - pixels.mean(axis=0), compute_uv=False)
-        if extent[1] > 0.25 * extent[0]:
-            break
-    origins, directions = rays(camera, pixels)
-    along = distance * rng.uniform(0.6, 1.6, n)
-    if planar:
-        across = unit(np.cross(camera.rotation[2], rng.normal(size=3)))
-        normal = rotation_from_vector(across * np.radians(rng.uniform(25, 50))) @ camera.rotation[2]
-        along = distance * (camera.rotation[2] @ normal) / (directions @ normal)
-        if not ((along > 0) & (along < 10 * distance)).all():
-            return made(seed + 100_000, n, noise=noise, planar=planar, sigma_m=sigma_m)
-    points = origins + directions * along[:, None] + sigma_m * rng.normal(size=(n, 3))
-    return camera, np.clip(pixels + noise * rng.normal(size=(n, 2)), 0, (WIDTH, HEIGHT)), points
 
 
 def error_squared(found: Resection, camera: Camera) -> float:
@@ -237,7 +212,7 @@ def test_the_whole_lens_from_many_pairs() -> None:
 
 
 def test_uncertain_points_weigh_less() -> None:
-    camera, pixels, points = made(21, 12, noise=0.2)
+    camera, pixels, points = made(21, 12, sigma_px=0.2)
     points[5] += [0, 0, 1.0]
     sigma_m = np.where(np.arange(12) == 5, 1.0, 0.0)
     found = resect(pixels, points, WIDTH, HEIGHT, sigma_px=0.2, sigma_m=sigma_m)
@@ -327,7 +302,7 @@ def test_too_little_is_refused() -> None:
 
 def test_three_pairs_leave_the_true_pose_among_four() -> None:
     for seed in range(30):
-        camera, _, points = made(seed, 6, noise=0.0)
+        camera, _, points = made(seed, 6, sigma_px=0.0)
         seen = (points[:3] - camera.position) @ camera.rotation.T
         _, position, rotation = poses_from_three(unit(seen)[None], points[None, :3])
         assert 1 <= len(position) <= 4

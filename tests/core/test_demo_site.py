@@ -27,7 +27,7 @@ DEMO = ROOT / "assets" / "demo"
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 sys.path.insert(0, str(ROOT / "scripts"))
-from demo_site import blocks, campaign, terrain  # noqa: E402
+from making.demo_site import blocks, campaign, terrain  # noqa: E402
 
 
 def vectors(rows: list[dict[str, str]], *names: str) -> np.ndarray:

@@ -13,7 +13,18 @@ from rockfall.core.reconstruction.refinement.refine import Refinement
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
 
-from compare_two_cameras import CAMERAS, EXAMPLE, Table, bounces, fit, gravity, load, miss_distances, of_view, predicted
+from comparisons.two_cameras import (
+    CAMERAS,
+    EXAMPLE,
+    Table,
+    bounces,
+    fit,
+    gravity,
+    load,
+    miss_distances,
+    of_view,
+    predicted,
+)
 
 RUNS = ("run_0068", "run_0259", "run_0750", "run_0993", "run_1172", "run_1204", "run_1234")
 """Before and after the frame that camera 2 doubled."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the demo site, ``assets/demo``: a synthetic gully, fifteen falling blocks, what was marked, and the truth.
 
-Run ``python scripts/make_demo_site.py`` (about a minute). The same seed gives the same files.
+Run ``python scripts/making/demo_site/make.py`` (about a minute). The same seed gives the same files.
 """
 
 import argparse
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-from demo_site import campaign, terrain
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from making.demo_site import campaign, terrain
 from rockfall.core.exchange.project import (
     BlockEntry,
     Project,
@@ -26,7 +26,7 @@ from rockfall.core.exchange.project import (
 
 SEED = 2017
 SHIFT = (988_400.0, 6_375_600.0, 1_500.0)
-OUT = Path(__file__).parent.parent / "assets" / "demo"
+OUT = Path(__file__).resolve().parents[3] / "assets" / "demo"
 
 XYZ = ("x", "y", "z")
 PICK_COLUMNS = (
@@ -116,7 +116,7 @@ def write_ply(site: terrain.Terrain, path: Path) -> None:
     """Binary PLY with double coordinates: single precision would lose the survey's centimetres."""
     header = f"""ply
 format binary_little_endian 1.0
-comment Synthetic gully, made by scripts/make_demo_site.py; no real terrain
+comment Synthetic gully, made by a script; no real terrain
 comment crs {terrain.CRS}
 element vertex {len(site.survey)}
 property double x

@@ -14,7 +14,7 @@ import av
 import numpy as np
 
 WIDTH, HEIGHT = 64, 48
-FOLDER = Path(__file__).parent.parent / "tests" / "data" / "videos"
+FOLDER = Path(__file__).parents[2] / "tests" / "data" / "videos"
 MILLISECOND, FINE = Fraction(1, 1000), Fraction(1, 90_000)
 DARK, BRIGHT = 50, 205
 H264 = {"crf": "26"}

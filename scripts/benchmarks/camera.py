@@ -23,8 +23,17 @@ WIDTH, HEIGHT = 3840, 2160
 ACTION_CAMERA = {"k1": -0.28, "k2": 0.09, "k3": -0.012, "p1": 0.0007, "p2": -0.0011}
 
 
-def made(rng: np.random.Generator, n: int, *, planar: bool, bent: bool, sigma_m: float) -> tuple[Camera, Array, Array]:
-    """A camera of 20–400 mm, 5–500 m away, tilted −90…60° and rolled, and n pairs with 0.5 px of noise."""
+def made(
+    seed: int | np.random.Generator,
+    n: int,
+    *,
+    planar: bool = False,
+    bent: bool = False,
+    sigma_px: float = 0.5,
+    sigma_m: float = 0.0,
+) -> tuple[Camera, Array, Array]:
+    """A random camera of 20–400 mm, 5–500 m away, tilted −90…60° and rolled, with n pairs: pixels and points."""
+    rng = np.random.default_rng(seed)
     focal = np.exp(rng.uniform(np.log(20), np.log(400))) / 36 * WIDTH
     distance = np.exp(rng.uniform(np.log(5), np.log(500)))
     tilt, azimuth = np.radians(rng.uniform(-90, 60)), rng.uniform(0, 2 * np.pi)
@@ -37,16 +46,18 @@ def made(rng: np.random.Generator, n: int, *, planar: bool, bent: bool, sigma_m:
     while True:
         pixels = rng.uniform((0.05 * WIDTH, 0.05 * HEIGHT), (0.95 * WIDTH, 0.95 * HEIGHT), (n, 2))
         extent = np.linalg.svd(pixels - pixels.mean(axis=0), compute_uv=False)
+        if extent[1] <= 0.25 * extent[0]:
+            continue
         origins, directions = rays(camera, pixels)
         along = distance * rng.uniform(0.6, 1.6, n)
         if planar:
             across = unit(np.cross(camera.rotation[2], rng.normal(size=3)))
-            normal = rotation_from_vector(across * np.radians(rng.uniform(25, 60))) @ camera.rotation[2]
+            normal = rotation_from_vector(across * np.radians(rng.uniform(25, 50))) @ camera.rotation[2]
             along = distance * (camera.rotation[2] @ normal) / (directions @ normal)
-        if extent[1] > 0.25 * extent[0] and ((along > 0) & (along < 10 * distance)).all():
+        if ((along > 0) & (along < 10 * distance)).all():
             break
     points = origins + directions * along[:, None] + sigma_m * rng.normal(size=(n, 3))
-    return camera, np.clip(pixels + 0.5 * rng.normal(size=(n, 2)), 0, (WIDTH, HEIGHT)), points
+    return camera, np.clip(pixels + sigma_px * rng.normal(size=(n, 2)), 0, (WIDTH, HEIGHT)), points
 
 
 def reliability(cases: int) -> None:
@@ -106,7 +117,7 @@ def wrong_pairs(cases: int) -> None:
     for n, count, swap in ((8, 1, False), (10, 2, False), (12, 2, False), (12, 2, True), (20, 4, False)):
         rng, named = np.random.default_rng(n), 0
         for _ in range(cases):
-            _, pixels, points = made(rng, n, planar=False, bent=False, sigma_m=0.0)
+            _, pixels, points = made(rng, n)
             chosen = np.sort(rng.choice(n, count, replace=False))
             angle = rng.uniform(0, 2 * np.pi, count)
             if swap:
@@ -143,7 +154,7 @@ def by_opencv_and_scipy(pixels: Array, points: Array, focal: float) -> Array:
 
 def one_solve() -> None:
     """12 pairs with a free focal length."""
-    camera, pixels, points = made(np.random.default_rng(4), 12, planar=False, bent=False, sigma_m=0.0)
+    camera, pixels, points = made(4, 12)
     ours = timed(lambda: resect(pixels, points, WIDTH, HEIGHT, sigma_px=0.5), 15)
     theirs = timed(lambda: by_opencv_and_scipy(pixels, points, camera.fx * 1.2), 15)
     print(

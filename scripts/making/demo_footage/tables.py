@@ -5,11 +5,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from make_demo_site import TRUTH_COLUMNS, write_csv
 from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
 
-from . import scene, shot
+from ..demo_site.make import TRUTH_COLUMNS, write_csv
+from . import shot, sight
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ def write_block(path: Path, take: shot.Shot, tree: BVHTree, shift: tuple[float, 
     rows = []
     for frame, (centre, eye, pixel) in enumerate(zip(centres, positions, block_pixels(take), strict=True)):
         inside = bool(np.all((pixel > 0) & (pixel < (shot.WIDTH, shot.HEIGHT))))
-        seen = inside and scene.is_clear(tree, eye, centre, 1.2 * take.radius)
+        seen = inside and sight.is_clear(tree, eye, centre, 1.2 * take.radius)
         place = (f"{value:.6f}" for value in centre + np.array(shift))
         rows.append([str(frame), f"{times[frame]:.9f}", *(f"{value:.4f}" for value in pixel), *place, str(int(seen))])
     write_csv(path, ("frame", "time_s", "u_px", "v_px", "x_m", "y_m", "z_m", "visible"), rows)

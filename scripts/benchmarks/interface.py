@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 FOOTAGE = ROOT / "assets" / "demo" / "footage"
 TRIANGLES, RATE_HZ, CLIP_S, SIZE = 2_000_000, 30, 2.0, (3840, 2160)
 NAME = "B10"
@@ -203,6 +203,7 @@ def write_clip(path: Path) -> None:
 
 
 def main() -> int:
+    sys.path.insert(0, str(ROOT / "scripts"))
     import interface_tests
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

@@ -12,7 +12,7 @@ import numpy as np
 from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import MODELS
 
-TABLE = Path(__file__).parent.parent / "tests" / "data" / "kharaz2001.csv"
+TABLE = Path(__file__).parents[2] / "tests" / "data" / "kharaz2001.csv"
 RADIUS_M, SPEED_MPS, MASS_KG = 0.0025, 3.9, 2.6e-4
 RN, FRICTION = 0.98, 0.092
 SMOOTH = {"rg70": 0.0, "rg20": 0.0, "rg10": 0.0, "rn_spread": 0.0, "block_shape": "sphere"}

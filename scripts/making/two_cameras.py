@@ -19,7 +19,7 @@ from rockfall.core.footage.kinks import find_kinks
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.vectors import Array
 
-EXAMPLE = Path(__file__).parents[1] / "assets" / "examples" / "two_cameras"
+EXAMPLE = Path(__file__).parents[2] / "assets" / "examples" / "two_cameras"
 RATE_HZ, WIDTH, HEIGHT = 30.0, 1280, 720
 LENGTH_M, BREADTH_M, RADIUS_M = 2.74, 1.525, 0.02
 NAMES = ("left far", "right far", "right near", "left near", "net near", "net far")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make the demo site's footage, ``assets/demo/footage``: one block filmed by hand, ground control, and the truth.
 
-Run ``python scripts/make_demo_footage.py`` with Blender as a module (``pip install bpy``), numba, SciPy and OpenCV.
+Run ``python scripts/making/demo_footage/make.py`` in the environment of this checkout (Blender as a module).
 Rendering takes a quarter of an hour on two cores; frames are kept in ``--frames``, and ``--resume`` goes on from them.
 """
 
@@ -10,11 +10,11 @@ import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
-from demo_footage import scene, shot, tables
-from make_demo_site import SEED, SHIFT
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from making.demo_footage import rendering, scene, shot, sight, tables
+from making.demo_site.make import SEED, SHIFT
 
-OUT = Path(__file__).parent.parent / "assets" / "demo" / "footage"
+OUT = Path(__file__).resolve().parents[3] / "assets" / "demo" / "footage"
 
 
 def main() -> None:
@@ -28,33 +28,33 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     options.frames.mkdir(parents=True, exist_ok=True)
     take = shot.shot(SEED, SHIFT)
-    tree = scene.terrain_tree(take)
-    targets = scene.choose_targets(take, tree)
+    tree = sight.terrain_tree(take)
+    targets = sight.choose_targets(take, tree)
     path = options.out / "footage.mp4"
     if not options.tables_only:
         render(take, targets, options.frames, options.resume)
-        scene.encode(options.frames.resolve(), path.resolve())
+        rendering.encode(options.frames.resolve(), path.resolve())
     tables.write(take, tree, targets, path, SHIFT)
 
 
 def render(take: shot.Shot, targets: scene.Array, folder: Path, resume: bool) -> None:
     """All frames, and first the still that they are painted with."""
     stage = scene.build(take, targets)
-    worst = scene.check_projection(stage, take, targets)
+    worst = rendering.check_projection(stage, take, targets)
     print(f"Projection differs from Blender's by {worst:.4f} px at most")
     if worst > 0.01:
         raise RuntimeError("The truth's projection is not that of the pictures")
     still = folder.resolve() / "still.png"
     if not (resume and still.exists()):
-        scene.render_still(stage, take, folder.resolve() / "unfinished.png")
+        rendering.render_still(stage, take, folder.resolve() / "unfinished.png")
         (folder / "unfinished.png").rename(still)
-    scene.paint(stage, take, still)
+    rendering.paint(stage, take, still)
     pixels = tables.block_pixels(take)
     started = time.perf_counter()
     for frame in range(shot.FRAMES):
         path = folder.resolve() / f"{frame:04d}.png"
         if not (resume and path.exists()):
-            scene.render_frame(stage, frame, path, pixels[frame])
+            rendering.render_frame(stage, frame, path, pixels[frame])
         if frame % 25 == 24:
             print(f"{frame + 1} frames, {time.perf_counter() - started:.0f} s", flush=True)
 

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 
-from benchmark_terrain import rough_slope, row, seconds
+from terrain import rough_slope, row, seconds
 
 DRAWS = 3
 

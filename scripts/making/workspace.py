@@ -4,7 +4,7 @@
 Needs a window, in which nobody moves the mouse, and the extension, for the name of its tab in the sidebar:
 
     blender --factory-startup --enable-event-simulate --window-geometry 0 0 1600 1000 \\
-        --addons bl_ext.user_default.rockfall --python scripts/make_workspace.py
+        --addons bl_ext.user_default.rockfall --python scripts/making/workspace.py
 
 Blender keeps the shares of the areas, not their pixels, so that the workspace fits into any window at any interface
 scale. Two 3-D views: the camera's to the left with the tab Rockfall open, a free one to the right, the timeline below.
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import bpy
 
-OUT = Path(__file__).resolve().parent.parent / "assets" / "workspace.blend"
+OUT = Path(__file__).resolve().parents[2] / "assets" / "workspace.blend"
 NAME, KEY = "Rockfall", "rockfall_workspace"  # as rockfall_addon/view/workspace.py knows them
 CAMERA_SHARE, TIMELINE_SHARE = 0.66, 0.13
 SIDEBAR = 300  # width at interface scale 1 [px]

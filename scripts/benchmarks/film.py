@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How long the demo's film takes, with each engine that works here.
 
-python scripts/benchmark_film.py [frames] [preset]
+python scripts/benchmarks/film.py [frames] [preset]
 """
 
 import sys
@@ -14,7 +14,7 @@ from rockfall.core.film.engines import choose_engine
 from rockfall.core.film.job import FilmJob
 from rockfall.core.film.maker import film_maker
 
-PROJECT = Path(__file__).resolve().parent.parent / "assets" / "demo" / "project.toml"
+PROJECT = Path(__file__).resolve().parents[2] / "assets" / "demo" / "project.toml"
 MIDDLE = 200
 WHOLE = 452
 

@@ -14,7 +14,7 @@ from rockfall.core.reconstruction.flight import incident_velocity, restituted_ve
 from rockfall.core.reconstruction.picks import Picks
 from rockfall.core.vectors import Array, norm, unit
 
-EXAMPLE = Path(__file__).parents[1] / "assets" / "examples" / "chant_sura_lu2019"
+EXAMPLE = Path(__file__).parents[2] / "assets" / "examples" / "chant_sura_lu2019"
 GRAVITY_MPS2 = 9.81
 CONTACTS_S = (0.0, 0.1, 0.2)
 

@@ -24,7 +24,7 @@ from rockfall.core.reconstruction.triangulation import triangulate
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.vectors import Array
 
-EXAMPLE = Path(__file__).parents[1] / "assets" / "examples" / "two_cameras"
+EXAMPLE = Path(__file__).parents[2] / "assets" / "examples" / "two_cameras"
 CAMERAS = ("camera", "clock", "clock_drift")
 GRAVITY_MPS2 = 9.81
 SIGMA_TABLE_M = 0.002

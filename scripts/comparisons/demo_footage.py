@@ -20,7 +20,7 @@ from rockfall.core.exchange.project import read_project
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import Array, norm
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 FOOTAGE = ROOT / "assets" / "demo" / "footage"
 SHIPPED = ("camera.toml", "track.csv", "events.csv")
 SAME_IMPACT_S = 0.1

@@ -13,7 +13,7 @@ from rockfall.core.footage.sources import Pictures
 from rockfall.core.footage.tracking import track_block
 from rockfall.core.footage.video import open_video, read_frames
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BALL = ROOT / "assets" / "examples" / "bouncing_ball" / "balle1-vp9.avi"
 DEMO = ROOT / "assets" / "demo" / "footage"
 FOUND_PX = 5.0

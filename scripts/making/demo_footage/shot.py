@@ -9,10 +9,11 @@ corner, v down.
 from dataclasses import dataclass
 
 import numpy as np
-from demo_site import blocks, campaign, terrain
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
+
+from ..demo_site import blocks, campaign, terrain
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from rockfall.core.reconstruction.refinement.refine import Refinement, refine
 from rockfall.core.reconstruction.refinement.views import PixelObservations, View
 from rockfall.core.vectors import Array
 
-VIDEO = Path(__file__).parents[1] / "assets" / "examples" / "bouncing_ball" / "balle1-vp9.avi"
+VIDEO = Path(__file__).parents[2] / "assets" / "examples" / "bouncing_ball" / "balle1-vp9.avi"
 RATE_HZ = 187.35
 CLICK = (60, 147.0, 48.0)
 FIRST = 4

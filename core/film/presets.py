@@ -19,6 +19,9 @@ LARGEST_REMAP = 900
 """Blender's time stretching knows whole numbers up to this."""
 
 LARGEST_RATE = 32767
+SAME_RATE = 1e-9
+HALVINGS = 4
+"""Blender's writer of films keeps so many decimals of the number that the rate is divided by: 500.5, 250.25, …"""
 
 
 def find_preset(project: Project, name: str) -> RenderPreset:
@@ -49,12 +52,8 @@ class FilmTiming:
 
     @property
     def base(self) -> tuple[int, float]:
-        """Blender's two numbers for the frame rate: a whole one, and what it is divided by (30000, 1001).
-
-        Both are whole, since the writer of films cuts the digits of the second one off.
-        """
-        rate = Fraction(self.fps).limit_denominator(1001 if self.fps <= LARGEST_RATE / 1001 else 1)
-        return rate.numerator, float(rate.denominator)
+        """Blender's two numbers for the frame rate, see `blender_rate`."""
+        return blender_rate(self.fps)
 
     @property
     def remap(self) -> tuple[int, int]:
@@ -67,12 +66,28 @@ class FilmTiming:
     @property
     def frame_s(self) -> float:
         """Seconds of the fall from one frame to the next."""
-        old, new = self.remap
-        return old / new / self.fps
+        (old, new), (whole, base) = self.remap, self.base
+        return old / new * base / whole
 
     def last_frame(self, duration_s: float) -> int:
         """The film's last frame: the fall, and a moment to look at the finished picture."""
         return max(1, ceil(duration_s / self.frame_s - 1e-6) + round(AFTERGLOW_S * self.fps))
+
+
+def blender_rate(rate: float) -> tuple[int, float]:
+    """Blender's two numbers for a frame rate: a whole one, and what it is divided by, as in 30000 / 1001.
+
+    The second one is whole, or has halves, quarters … where the first would be too large: 60000 / 1001 is
+    30000 / 500.5, exact also in single precision, as Blender keeps it. A rate that is no such ratio is met closely.
+    """
+    rate, pairs = min(rate, LARGEST_RATE), []
+    for parts in (2**halvings for halvings in range(HALVINGS + 1)):
+        ratio = 1 / Fraction(parts / rate).limit_denominator(LARGEST_RATE)
+        pairs.append((ratio.numerator, ratio.denominator / parts))
+    error = [abs(whole / base / rate - 1) for whole, base in pairs]
+    return next(
+        (pair for pair, off in zip(pairs, error, strict=True) if off < SAME_RATE), pairs[error.index(min(error))]
+    )
 
 
 def parse_frames(text: str) -> tuple[int, int]:

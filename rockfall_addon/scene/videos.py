@@ -8,7 +8,6 @@ the origin on, times the scene's rate.
 import json
 import uuid
 from collections import OrderedDict
-from fractions import Fraction
 from pathlib import Path
 
 import bpy
@@ -19,6 +18,7 @@ from ...core.camera.blender_lens import BlenderLens, from_blender_lens, pose_to_
 from ...core.camera.model import INTRINSICS, Camera
 from ...core.camera.path import CameraPath, fixed
 from ...core.errors import RockfallError
+from ...core.film.presets import blender_rate
 from ...core.footage.advice import content_advice, rate_advice
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import FRAME_AT_TOLERANCE_S, Image, Video, open_video, read_frame
@@ -39,7 +39,6 @@ VIDEOS_KEY = "rockfall_known_videos"
 COLLECTION = "Cameras"
 GUESSED_FOCAL = 1.2
 """In widths of the image: 45°, as phones and camcorders have before zooming."""
-MOST_FPS = 32_000
 SAME_RATE = 1e-5
 FAR_M, NEAR_M = 20_000.0, 0.1
 KEPT_PICTURES = 6
@@ -499,15 +498,9 @@ def set_scene_rate(scene: bpy.types.Scene, rate_hz: float) -> None:
 
 
 def scene_rate(rate_hz: float) -> tuple[int, float]:
-    """`fps` and `fps_base` of a rate: whole numbers and those of television are exact."""
-    for ratio in (Fraction(round(rate_hz)), Fraction(1000 * round(1.001 * rate_hz), 1001)):
-        if ratio and abs(float(ratio) / rate_hz - 1) < SAME_RATE:
-            doublings = 0
-            while ratio.numerator > MOST_FPS << doublings:
-                doublings += 1  # exact in single precision
-            return ratio.numerator >> doublings, ratio.denominator / (1 << doublings)
-    fps = max(1, round(rate_hz))
-    return fps, fps / rate_hz
+    """`fps` and `fps_base` of a measured rate; near a whole number or a rate of television, it is that."""
+    usual = (float(round(rate_hz)), 1000 * round(1.001 * rate_hz) / 1001)
+    return blender_rate(next((rate for rate in usual if abs(rate / rate_hz - 1) < SAME_RATE), rate_hz))
 
 
 def remember(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:

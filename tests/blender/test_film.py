@@ -190,7 +190,7 @@ def test_frames_beyond_the_film(scene, preset, part, tmp_path: Path) -> None:
         render.render_film(scene, tmp_path / "film.mp4", (100_000, 100_001), lambda *_: None)
 
 
-def test_whole_job_in_another_process(picks: Path, tmp_path: Path) -> None:
+def test_whole_job_in_another_process(picks: Path, tmp_path: Path, part) -> None:
     """`rockfall render` as a user runs it, with Blender as a module."""
     import subprocess
     import sys
@@ -199,8 +199,8 @@ def test_whole_job_in_another_process(picks: Path, tmp_path: Path) -> None:
         pytest.skip("Blender itself renders in its own process")
     project = tmp_path / "project.toml"
     project.write_text(
-        'schema = 1\n[picks]\nfile = "picks.csv"\n[[render]]\nname = "tiny"\nwidth = 64\nheight = 36\nfps = 12.5\n'
-        'engine = "cycles"\nstagger_s = 0.0\n',
+        'schema = 1\n[picks]\nfile = "picks.csv"\n[[render]]\nname = "tiny"\nwidth = 64\nheight = 36\n'
+        f'fps = {60000 / 1001!r}\nengine = "cycles"\nstagger_s = 0.0\n',
         encoding="utf-8",
     )
     command = [sys.executable, "-m", "rockfall.core.cli", "render", str(project), "--preset", "tiny"]
@@ -212,7 +212,10 @@ def test_whole_job_in_another_process(picks: Path, tmp_path: Path) -> None:
     assert "frame 3/3" in done.stderr
     assert done.stdout.splitlines()[0] == "64×36, rendered with Cycles"
     clip = bpy.data.movieclips.load(str(out / "rockfall.mp4"))
-    assert (clip.frame_duration, round(clip.fps, 6)) == (3, 12.5)
+    assert (clip.frame_duration, round(clip.fps, 5)) == (3, 59.94006)
+    opencv = part("core.opencv").opencv()
+    header = opencv.VideoCapture(str(out / "rockfall.mp4")).get(opencv.CAP_PROP_FPS)
+    assert header == pytest.approx(60000 / 1001, rel=1e-12)
 
     (tmp_path / "picks.csv").write_text(HEADER + "A,zero,0,0,0,impact,ok,,,\n", encoding="utf-8")
     bad = subprocess.run(

@@ -47,6 +47,13 @@ def test_fit_is_inside_and_touches(forward: tuple, aspect: float) -> None:
     assert touching, "the camera stands farther away than it need"
 
 
+@pytest.mark.parametrize("downhill", [(1.0, 0, 0), (0.6, -0.8, 0)])
+def test_camera_stands_22_degrees_beside_the_fall_line(downhill: tuple) -> None:
+    forward = place_camera(slope(), np.array(downhill), 16 / 9).forward
+    along, across = -forward[:2] @ downhill[:2], forward[0] * downhill[1] - forward[1] * downhill[0]
+    assert abs(np.degrees(np.arctan2(across, along))) == pytest.approx(22.0)
+
+
 @pytest.mark.parametrize("angle_deg", [15.0, 40.0, 75.0])
 def test_camera_shows_all_trajectories_from_below(angle_deg: float) -> None:
     points = slope(angle_deg=angle_deg)

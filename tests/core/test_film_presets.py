@@ -24,12 +24,40 @@ def test_presets_that_every_project_has() -> None:
         find_preset(Project(render=(RenderPreset("mine"),)), "film")
 
 
-@pytest.mark.parametrize("fps", [24.0, 25.0, 29.97, 30000 / 1001, 23.976, 12.5, 240.0])
+@pytest.mark.parametrize(
+    "fps", [24.0, 25.0, 29.97, 30000 / 1001, 23.976, 12.5, 240.0, 59.94, 119.88, 187.35, 24000 / 1001, 0.1, 1000.0]
+)
 def test_blender_gets_the_frame_rate_exactly(fps: float) -> None:
     whole, base = FilmTiming(fps).base
     assert whole <= 32767
     assert base == round(base)
     assert whole / base == pytest.approx(fps, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fps", "pair"),
+    [(60000 / 1001, (30000, 500.5)), (120000 / 1001, (30000, 250.25)), (240000 / 1001, (30000, 125.125))],
+)
+def test_fast_rates_of_television_are_exact_with_halves(fps: float, pair: tuple[int, float]) -> None:
+    assert FilmTiming(fps).base == pair
+    assert pair[0] / pair[1] == fps
+
+
+@pytest.mark.parametrize("fps", [29.83, 59.9273847, 47.952047952, 29.8345678912, 7.77777, 0.0123456, 239.123456, 611.7])
+def test_any_other_rate_is_met_closely(fps: float) -> None:
+    """Of Blender's numbers, the second is kept in single precision, and four of its decimals reach the film."""
+    whole, base = FilmTiming(fps).base
+    assert whole <= 32767
+    assert np.float32(base) == base
+    assert base * 10_000 == round(base * 10_000)
+    assert whole / base == pytest.approx(fps, rel=1e-8)
+
+
+@pytest.mark.parametrize("fps", [59.94, 60000 / 1001, 187.35, 59.9273847, 1e5])
+def test_a_frame_lasts_as_long_as_blenders_rate_says(fps: float) -> None:
+    timing = FilmTiming(fps, 0.5)
+    whole, base = timing.base
+    assert timing.frame_s * whole / base == pytest.approx(0.5, rel=1e-15)
 
 
 @pytest.mark.parametrize(

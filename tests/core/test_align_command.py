@@ -280,9 +280,9 @@ def test_a_tripod_needs_one_pose(tmp_path, capsys):
         capsys, table, "--video", tmp_path / "film.avi", "--moving", "full"
     )
     assert "--video" in refused_again(capsys, table, "--size", "640x480", "--moving", "rotation")
-    assert "0 to 5" in refused_again(
-        capsys, table, "--video", tmp_path / "film.avi", "--moving", "rotation", "--frames", "0", "9"
-    )
+    moving = ["--video", tmp_path / "film.avi", "--moving", "rotation"]
+    assert "It has the frames 0 to 5." in refused_again(capsys, table, *moving, "--frames", "0", "9")
+    assert "on frame 0, outside of --frames 2 5" in refused_again(capsys, table, *moving, "--frames", "2", "5")
 
 
 @pytest.mark.parametrize(
@@ -325,7 +325,12 @@ def test_a_text_is_no_video(pairs, capsys, tmp_path):
 
 
 def test_usage(pairs, capsys):
-    assert main(["align", str(pairs), "--out", "x"]) == 2
-    assert main(["align", str(pairs), "--size", "10x10", "--video", "a.mp4", "--out", "x"]) == 2
-    assert main(["align", str(pairs), "--size", "1920x1080", "--sigma-px", "0", "--out", "x"]) == 2
-    capsys.readouterr()
+    for options, said in (
+        ([], "one of the arguments --size --video is required"),
+        (["--size", "10x10", "--video", "a.mp4"], "--video: not allowed with argument --size"),
+        (["--size", "1920x1080", "--sigma-px", "0"], "--sigma-px: 0 is not a number above zero"),
+        (["--size", "1920x1080", "--sigma-m", "-1"], "--sigma-m: -1 is not a number of zero or more"),
+        (["--size", "1920x1080", "--sigma-m", "inf"], "--sigma-m: inf is not a number of zero or more"),
+    ):
+        assert main(["align", str(pairs), *options, "--out", "x"]) == 2
+        assert said in capsys.readouterr().err

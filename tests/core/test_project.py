@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from rockfall.core.errors import InputError
+from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange import project as formats
+from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.project import (
     BlockEntry,
     CameraPlacement,
@@ -183,6 +184,7 @@ def test_the_smallest_project(folder: Path) -> None:
         ("schema = 1", "schema = true", ["schema is True"]),
         ("data/terrain.ply", "nowhere.ply", ["terrain.file", "nowhere.ply", "relative"]),
         ('file = "picks.csv"', "", ["picks.file is missing"]),
+        ('name = "Gully"', "name = 12", ["site.name is 12, not a text", "quotation marks"]),
         ('engine = "cycles"', 'engine = "povray"', ["render 1: engine", "povray", "cycles, eevee"]),
         ('up = "z"', 'up = "x"', ["terrain.up", "'x'"]),
         ("1234.5678901234567]", "]", ["terrain.shift", "three numbers"]),
@@ -201,6 +203,7 @@ def test_the_smallest_project(folder: Path) -> None:
         ("drift = -1e-5", "drift = 7", ["videos 1: drift is 7", "capture_rate_hz"]),
         ("capture_rate_hz = 240", "capture_rate_hz = 0", ["videos 1: capture_rate_hz", "above zero"]),
         ('name = "right"', "", ["videos 2: name is missing"]),
+        ('name = "right"', 'name = ""', ["videos 2: name is empty", "Give a name"]),
         ('name = "right"', 'name = "away"', ["videos names 'away' twice"]),
         ('"camera"]', '"lens"]', ["refinement.free has 'lens'", "camera, clock"]),
         ('free = ["clock", "camera"]', 'free = "clock"', ["refinement.free", '["camera"]']),
@@ -215,8 +218,10 @@ def test_bad_input_names_the_file_the_key_and_what_to_do(folder: Path, old: str,
     assert old in FULL
     with pytest.raises(InputError) as caught:
         read(folder, FULL.replace(old, new, 1))
-    for text in ["project.toml", *said]:
-        assert text in str(caught.value)
+    where, message = str(folder / "project.toml"), str(caught.value)
+    assert message.startswith(f"{where}: ")
+    for text in said:
+        assert text in message.removeprefix(where)
     assert caught.value.advice
 
 
@@ -237,8 +242,13 @@ def test_a_file_that_is_missing_or_no_text(folder: Path) -> None:
         read_project(folder / "binary.toml")
 
 
+def test_a_project_without_picks_is_not_reconstructed() -> None:
+    with pytest.raises(RockfallError, match=r"names no table of picks: add \[picks\]"):
+        open_project(Project())
+
+
 def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
-    with pytest.raises(InputError, match="preview"):
+    with pytest.raises(InputError, match=r"cinema.*preview"):
         read(folder, FULL).preset("cinema")
 
 

@@ -276,6 +276,19 @@ def test_nothing_is_left_of_output_that_failed(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+def test_only_an_error_of_the_output_itself_is_called_one(tmp_path):
+    with (
+        pytest.raises(InputError, match=r"out: The output cannot be written \("),
+        output_folder(tmp_path / "out") as out,
+    ):
+        (out / "missing" / "a.csv").write_text("1")
+    with pytest.raises(FileNotFoundError, match=r"other\.csv"), output_folder(tmp_path / "out"):
+        (tmp_path / "other.csv").read_text()
+    with pytest.raises(OSError, match=r"^no file at all$"), output_folder(tmp_path / "out"):
+        raise OSError("no file at all")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_output_does_not_replace_a_file_or_folder_of_another_kind(tmp_path):
     (tmp_path / "out").write_text("a file")
     with pytest.raises(InputError, match="not a folder"), output_folder(tmp_path / "out"):

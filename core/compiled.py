@@ -2,8 +2,8 @@
 """The one door to numba: plain Python functions, compiled when first needed.
 
 A module of kernels decorates its functions with `kernel` and is imported *inside* the function that first needs it,
-so that importing `rockfall` compiles nothing. Compiled code is kept in NUMBA_CACHE_DIR, else where numba likes. Kernels
-release the GIL; `in_chunks` spreads rows over the cores.
+so that importing `rockfall` compiles nothing. Compiled code is kept on disk (`kept_code`). Kernels release the GIL;
+`in_chunks` spreads rows over the cores.
 """
 
 import os
@@ -16,11 +16,15 @@ import numpy as np
 CHUNK_ROWS = 4096
 
 
-def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a plain Python function with numba: no Python objects, the GIL released, cached on disk."""
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a plain Python function with numba: no Python objects, the GIL released, kept on disk."""
     from numba import njit
 
-    return njit(cache=True, nogil=True, error_model="numpy")(function)
+    from .kept_code import KeptCode
+
+    dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
+    dispatcher._cache = KeptCode(function)
+    return dispatcher
 
 
 def in_chunks(function: Callable[[int, int], None], rows: int) -> None:

@@ -21,6 +21,7 @@ CORE_FLOORS = (
         "errors",
         "vectors",
         "compiled",
+        "kept_code",
         "dependencies",
         "colours",
         "least_squares",

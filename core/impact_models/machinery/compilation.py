@@ -6,11 +6,12 @@ it and every plain function that it calls; all models have one signature, so tha
 which takes the model as a function pointer. A compiled simulation does the same with `rebound_type`.
 """
 
-import hashlib
 from collections.abc import Callable
 from functools import cache
-from types import CodeType, FunctionType
+from types import FunctionType
 from typing import Any
+
+from ...compiled import kernel
 
 
 def compiled_rebound(rebound: Callable[..., Any]) -> Any:
@@ -51,32 +52,13 @@ def _rebound_signature() -> Any:
 
 @cache
 def _compiled(function: FunctionType, signature: Any = None) -> Any:
-    """The function and all plain functions that it calls, compiled and kept on disk.
-
-    Notes
-    -----
-    numba's cache looks at the file of a function only, not at the functions it calls: the name under which a function
-    is kept therefore carries a digest of all of them.
-    """
-    from numba import njit
-
-    called = {
-        name: _compiled(value) for name, value in _globals_of(function).items() if isinstance(value, FunctionType)
-    }
+    """The function and all plain functions that it calls, compiled; at once when its signature is given."""
+    used = {name: function.__globals__.get(name) for name in function.__code__.co_names}
+    called = {name: _compiled(value) for name, value in used.items() if isinstance(value, FunctionType)}
     copy = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
-    copy.__module__ = function.__module__
-    copy.__qualname__ = f"{function.__qualname__}_{_digest(function)}"
-    return njit(signature, cache=True, nogil=True, error_model="numpy")(copy)
-
-
-def _globals_of(function: FunctionType) -> dict[str, Any]:
-    return {name: function.__globals__[name] for name in function.__code__.co_names if name in function.__globals__}
-
-
-def _digest(function: FunctionType) -> str:
-    """Of the code and the constants of a function and of all plain functions that it calls."""
-    code: CodeType = function.__code__
-    parts = [code.co_code.hex(), repr([constant for constant in code.co_consts if not isinstance(constant, CodeType)])]
-    for name, value in sorted(_globals_of(function).items()):
-        parts.append(_digest(value) if isinstance(value, FunctionType) else f"{name}={value!r}")
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:12]
+    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
+    made = kernel(copy)
+    if signature is not None:
+        made.compile(signature)
+        made.disable_compile()
+    return made

@@ -5,6 +5,7 @@ import ast
 import re
 import subprocess
 import sys
+import tempfile
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -166,11 +167,22 @@ def tracked_files() -> list[Path]:
     return [ROOT / name for name in listing.stdout.decode().split("\0") if name and (ROOT / name).is_file()]
 
 
+def places_of_this_machine(root: Path) -> list[str]:
+    """Folders that no file may name: the checkout, where it lies, and the home; not the temporary folder."""
+    anywhere = {Path("/"), Path("/tmp"), Path(tempfile.gettempdir())}
+    return [f"{place}/" for place in (root, root.parent, Path.home()) if place not in anywhere]
+
+
+def test_a_checkout_in_the_temporary_folder_does_not_forbid_its_name() -> None:
+    temporary = Path(tempfile.gettempdir())
+    assert places_of_this_machine(temporary / "rockfall") == [f"{temporary / 'rockfall'}/", f"{Path.home()}/"]
+    assert f"{temporary / 'a'}/" in places_of_this_machine(temporary / "a" / "rockfall")
+
+
 def test_no_file_names_a_registry_or_a_place_of_one_machine() -> None:
     registries = [".".join(name) for name in (("pypi", "org"), ("pythonhosted", "org"), ("deb", "debian", "org"))]
     options = ["-".join(name) for name in (("index", "url"), ("find", "links"))]
-    places = [f"{ROOT.parent}/", f"{Path.home()}/"]
-    forbidden = re.compile("|".join(re.escape(text) for text in [*registries, *options, *places] if text != "//"))
+    forbidden = re.compile("|".join(map(re.escape, [*registries, *options, *places_of_this_machine(ROOT)])))
     found = []
     for path in tracked_files():
         content = path.read_bytes()

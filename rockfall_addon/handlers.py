@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .scene import footage, impact_rows, migration, picks, problems, sync, terrain, timing, videos
+from .scene import footage, impact_rows, migration, problems, store, sync, terrain, timing, videos
 
 _owner = object()
 
@@ -67,7 +67,7 @@ def _units_changed() -> None:
 def _chosen() -> None:
     thing = impact_rows.selected(bpy.context)
     if thing is not None:
-        impact_rows.highlight(bpy.context.scene, thing.get(picks.ID_KEY, ""))
+        impact_rows.highlight(bpy.context.scene, thing.get(store.ID, ""))
 
 
 @problems.guarded

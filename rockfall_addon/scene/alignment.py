@@ -22,14 +22,7 @@ from ...core.camera.resection import Resection, resect
 from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array, distance_to_ray
-from . import migration, store, terrain, videos
-
-PAIRS_KEY = "rockfall_pairs"
-OPEN_KEY = "rockfall_open_pair"
-SOLUTION_KEY = "rockfall_solution"
-LENS_KEY = "rockfall_known_lens"
-PLACED_KEY = "rockfall_placed"
-FOLLOWED_KEY = "rockfall_followed"
+from . import georeference, migration, store, terrain, videos
 
 COLOURS = 7
 GOOD_PAIRS = 8
@@ -113,17 +106,17 @@ class Solution:
 
 def pairs_of(camera: bpy.types.Object) -> list[Pair]:
     """The pairs of a camera, in the order in which they were made."""
-    return [_pair(values.to_dict()) for values in camera.get(PAIRS_KEY, ())]
+    return [_pair(values.to_dict()) for values in camera.get(store.PAIRS, ())]
 
 
 def keep_pairs(camera: bpy.types.Object, pairs: Sequence[Pair]) -> None:
     """Store the pairs; nothing is solved."""
     if pairs:
-        camera[PAIRS_KEY] = [_values(pair) for pair in pairs]
-    elif PAIRS_KEY in camera:
-        del camera[PAIRS_KEY]
-    if not any(pair.id == camera.get(OPEN_KEY) and pair.missing for pair in pairs):
-        camera[OPEN_KEY] = ""
+        camera[store.PAIRS] = [_values(pair) for pair in pairs]
+    elif store.PAIRS in camera:
+        del camera[store.PAIRS]
+    if not any(pair.id == camera.get(store.OPEN_PAIR) and pair.missing for pair in pairs):
+        camera[store.OPEN_PAIR] = ""
 
 
 def _values(pair: Pair) -> dict:
@@ -149,7 +142,7 @@ def with_id(pairs: Iterable[Pair], identifier: str) -> Pair | None:
 
 def open_pair(camera: bpy.types.Object) -> Pair | None:
     """The pair whose other side is clicked next."""
-    pair = with_id(pairs_of(camera), str(camera.get(OPEN_KEY, "")))
+    pair = with_id(pairs_of(camera), str(camera.get(store.OPEN_PAIR, "")))
     return pair if pair is not None and pair.missing else None
 
 
@@ -186,7 +179,7 @@ def mark(
     if pair is None:
         pair = _new(pairs, shown)
         pairs.append(pair)
-        camera[OPEN_KEY] = pair.id
+        camera[store.OPEN_PAIR] = pair.id
     there = pair.pixel if side == POINT else pair.point
     pair = replace(pair, pixel=place, frame=shown) if side == PIXEL else replace(pair, point=place)
     if there is None or pair.proposed not in ("", side):
@@ -336,7 +329,7 @@ def is_placed(camera: bpy.types.Object) -> bool:
 
 def placement(camera: bpy.types.Object) -> str:
     """How the camera came to its place: `BY_PAIRS`, `BY_EYE`, `FROM_FILE`, or empty."""
-    return str(camera.get(PLACED_KEY, FROM_FILE)) if videos.is_solved(camera) else ""
+    return str(camera.get(store.PLACED, FROM_FILE)) if videos.is_solved(camera) else ""
 
 
 def free_of(camera: bpy.types.Object) -> tuple[str, ...]:
@@ -353,15 +346,15 @@ def needed(free: Sequence[str]) -> int:
 
 def known_lens(camera: bpy.types.Object) -> Array:
     """(9,) what is taken of the lens where it is not free: as imported or typed, else as it is, without distortion."""
-    if LENS_KEY in camera:
-        return np.array(camera[LENS_KEY], dtype=np.float64)
+    if store.KNOWN_LENS in camera:
+        return np.array(camera[store.KNOWN_LENS], dtype=np.float64)
     width, height = videos.size_of(camera)
     return np.array([*lens_of(camera)[:2], width / 2, height / 2, 0, 0, 0, 0, 0], dtype=np.float64)
 
 
 def keep_lens(camera: bpy.types.Object, values: Array) -> None:
     """Remember what is known of the lens."""
-    camera[LENS_KEY] = [float(value) for value in values]
+    camera[store.KNOWN_LENS] = [float(value) for value in values]
 
 
 def lens_of(camera: bpy.types.Object) -> Array:
@@ -436,7 +429,7 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
         keep_check(camera, Solution(problem=str(error) if enough else ""))  # too few is no problem, but the beginning
         return False
     path = _path(camera, found.camera, {frame: key.camera for frame, key in keys.items()}, reference)
-    camera[PLACED_KEY] = BY_PAIRS
+    camera[store.PLACED] = BY_PAIRS
     videos.set_camera_path(scene, camera, path, rmse_px=found.rmse_px, pose_covariance=found.pose_covariance)
     used = _used_at(pairs, camera, reference)
     wrong = [pair.id for pair, good in zip(used, found.used.tolist(), strict=True) if not good]
@@ -470,7 +463,7 @@ def _solve(
     """The camera of the reference frame and of other frames that have enough pairs."""
     width, height = videos.size_of(camera)
     path = videos.camera_path(camera)
-    start, free = replace(path.reference, shift=store.read_shift(scene)), free_of(camera)
+    start, free = replace(path.reference, shift=georeference.read_shift(scene)), free_of(camera)
     lens = known_lens(camera)
     if "f" in free:
         lens[:2] = lens_of(camera)[:2]
@@ -554,12 +547,12 @@ def keep_check(camera: bpy.types.Object, solution: Solution) -> None:
 
 
 def _keep_solution(camera: bpy.types.Object, solution: Solution) -> None:
-    camera[SOLUTION_KEY] = json.dumps({f.name: getattr(solution, f.name) for f in fields(solution)})
+    camera[store.SOLUTION] = json.dumps({f.name: getattr(solution, f.name) for f in fields(solution)})
 
 
 def solution_of(camera: bpy.types.Object) -> Solution:
     """What the last solution said."""
-    values = json.loads(camera.get(SOLUTION_KEY, "{}"))
+    values = json.loads(camera.get(store.SOLUTION, "{}"))
     for name in ("wrong", "advice", "keys"):
         values[name] = tuple(values.get(name, ()))
     return Solution(**values)
@@ -587,8 +580,8 @@ def place_by_eye(scene: bpy.types.Scene, camera: bpy.types.Object, placed: Camer
     """Put the camera where a person says that it stood."""
     migration.refuse_newer(scene)
     videos.set_camera_path(scene, camera, fixed(placed))
-    camera[PLACED_KEY] = BY_EYE
-    camera.pop(FOLLOWED_KEY, None)
+    camera[store.PLACED] = BY_EYE
+    camera.pop(store.FOLLOWED, None)
     keep_lens(camera, placed.intrinsics)
     keep_check(camera, Solution())
 
@@ -664,7 +657,7 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     render = scene.render
     render.resolution_x, render.resolution_y = videos.size_of(camera)
     render.resolution_percentage = 100
-    render.pixel_aspect_x, render.pixel_aspect_y = camera.get(videos.ASPECT_KEY, (1.0, 1.0))
+    render.pixel_aspect_x, render.pixel_aspect_y = camera.get(store.ASPECT, (1.0, 1.0))
 
 
 def free_ray(rv3d: bpy.types.RegionView3D, width: float, height: float, x: float, y: float) -> tuple[Array, Array]:
@@ -705,5 +698,5 @@ def seen_camera(
     lens, (w, h) = lens_of(camera), videos.size_of(camera)
     if not keep_focal:
         lens[:2] = float(rv3d.window_matrix[0][0]) * w / 2 * np.array([1.0, lens[1] / lens[0]])
-    one = Camera(w, h, 1.0, 1.0, 0.0, 0.0, position=position, rotation=rotation, shift=store.read_shift(scene))
+    one = Camera(w, h, 1.0, 1.0, 0.0, 0.0, position=position, rotation=rotation, shift=georeference.read_shift(scene))
     return with_intrinsics(one, lens)

@@ -12,22 +12,19 @@ import bpy
 
 from . import picks, store, timing
 
-SHOWN_KEY = "rockfall_shown"
-GROUND_KEY = "rockfall_ground"
 """The terrain that the trajectories were computed on; empty or missing without."""
-TICK_RATE_KEY = "rockfall_tick_rate_hz"
 COMPLETE = "+"
 """Behind the fingerprint of a trajectory that has flights and a block."""
 _KEPT = (
-    picks.ID_KEY,
-    picks.KIND_KEY,
-    picks.STATUS_KEY,
-    picks.NORMAL_KEY,
-    picks.SIGMA_TIME_KEY,
-    picks.SIGMA_POSITION_KEY,
-    picks.SPIN_KEY,
-    picks.EXTRA_KEY,
-    picks.POSITION_KEY,
+    store.ID,
+    store.KIND,
+    store.STATUS,
+    store.NORMAL,
+    store.SIGMA_TIME,
+    store.SIGMA_POSITION,
+    store.SPIN,
+    store.EXTRA,
+    store.POSITION,
 )
 
 
@@ -35,7 +32,7 @@ def by_trajectory(things: Iterable[bpy.types.Object]) -> dict[str, list[bpy.type
     """The picks of each trajectory, in the order in which they come."""
     found: dict[str, list[bpy.types.Object]] = {}
     for thing in things:
-        found.setdefault(thing[picks.TRAJECTORY_KEY], []).append(thing)
+        found.setdefault(thing[store.TRAJECTORY], []).append(thing)
     return found
 
 
@@ -46,7 +43,7 @@ def fingerprint(things: Sequence[bpy.types.Object], rate: float) -> str:
         row = [picks.time_of(thing, rate)]
         for key in _KEPT:
             value = thing.get(key)
-            if key == picks.EXTRA_KEY:
+            if key == store.EXTRA:
                 row.append(str(value.get("confidence", "")) if value is not None else "")
             else:
                 row.append(value if value is None or isinstance(value, str) else tuple(value))
@@ -58,30 +55,30 @@ def fingerprint(things: Sequence[bpy.types.Object], rate: float) -> str:
 
 def remembered(scene: bpy.types.Scene) -> dict[str, str]:
     """Trajectory → fingerprint of what is shown of it."""
-    return json.loads(scene.get(SHOWN_KEY, "{}"))
+    return json.loads(scene.get(store.SHOWN, "{}"))
 
 
 def remember(scene: bpy.types.Scene, prints: dict[str, str]) -> None:
     """Store the fingerprints."""
     text = json.dumps(prints)
-    if scene.get(SHOWN_KEY) != text:
-        scene[SHOWN_KEY] = text
+    if scene.get(store.SHOWN) != text:
+        scene[store.SHOWN] = text
 
 
 def remember_all(scene: bpy.types.Scene) -> None:
     """All that is shown is up to date."""
     rate = timing.keyed_rate(scene)
     groups = by_trajectory(picks.things_of(scene))
-    flying = {o[picks.TRAJECTORY_KEY] for o in scene.objects if o.get(store.ROLE_KEY) == store.FLIGHTS_ROLE}
+    flying = {o[store.TRAJECTORY] for o in scene.objects if o.get(store.ROLE) == store.FLIGHTS_ROLE}
     remember(scene, {n: fingerprint(things, rate) + (COMPLETE if n in flying else "") for n, things in groups.items()})
-    scene[GROUND_KEY], scene[TICK_RATE_KEY] = ground(scene), timing.frame_rate(scene)
+    scene[store.GROUND], scene[store.TICK_RATE] = ground(scene), timing.frame_rate(scene)
 
 
 def ground(scene: bpy.types.Scene) -> str:
     """What the terrain is: its tiles, their sizes and places; empty without."""
     rows = []
     for thing in scene.objects:
-        if thing.get(store.ROLE_KEY) == store.TERRAIN_ROLE and thing.type == "MESH" and len(thing.data.polygons):
+        if thing.get(store.ROLE) == store.TERRAIN_ROLE and thing.type == "MESH" and len(thing.data.polygons):
             place = [round(value, 5) for row in thing.matrix_world for value in row]
             rows.append(f"{len(thing.data.vertices)} {len(thing.data.polygons)} {place}")
     return "\n".join(sorted(rows))

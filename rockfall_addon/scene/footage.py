@@ -17,10 +17,8 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.footage.video import Image
 from ...core.vectors import Array
-from . import migration, videos
+from . import migration, store, videos
 
-ACTIVE_KEY = "rockfall_active_camera"
-STILL_KEY = "rockfall_still"
 """On an image: the number of the picture that it holds."""
 
 
@@ -45,14 +43,14 @@ def use_size_of_active(scene: bpy.types.Scene, *, again: bool = False) -> None:
     again : also when the camera is the same as before.
     """
     camera = scene.camera
-    identifier = camera[videos.ID_KEY] if camera is not None and videos.is_video(camera) else ""
-    if camera is None or (scene.get(ACTIVE_KEY, "") == identifier and not again):
+    identifier = camera[store.ID] if camera is not None and videos.is_video(camera) else ""
+    if camera is None or (scene.get(store.ACTIVE_CAMERA, "") == identifier and not again):
         return
-    scene[ACTIVE_KEY] = identifier
+    scene[store.ACTIVE_CAMERA] = identifier
     if identifier:
         render = scene.render
         render.resolution_x, render.resolution_y = videos.size_of(camera)
-        render.pixel_aspect_x, render.pixel_aspect_y = camera.get(videos.ASPECT_KEY, (1.0, 1.0))
+        render.pixel_aspect_x, render.pixel_aspect_y = camera.get(store.ASPECT, (1.0, 1.0))
 
 
 def show_pictures(scene: bpy.types.Scene, cameras: list[bpy.types.Object]) -> None:
@@ -103,7 +101,7 @@ def hidden(camera: bpy.types.Object) -> int:
 
 def remove(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """Remove a video: its camera, its clip when nothing else uses it, and what is remembered of it."""
-    identifier, data = camera[videos.ID_KEY], camera.data
+    identifier, data = camera[store.ID], camera.data
     videos.unsolve(camera)
     bpy.data.objects.remove(camera)
     if not data.users:
@@ -185,9 +183,9 @@ def _background(camera: bpy.types.Object, source: str) -> bpy.types.CameraBackgr
 
 def _still(camera: bpy.types.Object, index: int, image: bpy.types.Image | None) -> bpy.types.Image:
     """A Blender image of a picture, by way of a file: pixels set from Python would have to be saved by the user."""
-    if image is not None and image.get(STILL_KEY) == index and Path(image.filepath).is_file():
+    if image is not None and image.get(store.STILL) == index and Path(image.filepath).is_file():
         return image
-    path = Path(bpy.app.tempdir) / f"rockfall_{camera[videos.ID_KEY]}.bmp"
+    path = Path(bpy.app.tempdir) / f"rockfall_{camera[store.ID]}.bmp"
     path.write_bytes(bitmap(videos.picture(camera, index)))
     if image is None:
         image = bpy.data.images.load(str(path))
@@ -195,7 +193,7 @@ def _still(camera: bpy.types.Object, index: int, image: bpy.types.Image | None) 
     elif image.filepath != str(path):
         image.filepath = str(path)
     image.reload()
-    image[STILL_KEY] = index
+    image[store.STILL] = index
     return image
 
 
@@ -214,11 +212,11 @@ def _heal(things: list[bpy.types.Object]) -> None:
     """A copy of a camera becomes a camera of its own: an id, a lens and footage of its own."""
     seen: set[str] = set()
     for thing in sorted(things, key=lambda one: one.session_uid):
-        if thing.get(videos.ID_KEY) and thing[videos.ID_KEY] not in seen:
-            seen.add(thing[videos.ID_KEY])
+        if thing.get(store.ID) and thing[store.ID] not in seen:
+            seen.add(thing[store.ID])
             continue
-        thing[videos.ID_KEY] = uuid.uuid4().hex
-        seen.add(thing[videos.ID_KEY])
+        thing[store.ID] = uuid.uuid4().hex
+        seen.add(thing[store.ID])
         if thing.data.users > 1:
             thing.data = thing.data.copy()
         for background in thing.data.background_images:
@@ -234,7 +232,7 @@ def _heal(things: list[bpy.types.Object]) -> None:
 
 def _remove_data(data: bpy.types.Camera) -> None:
     clips = {b.clip for b in data.background_images if b.clip is not None}
-    images = {b.image for b in data.background_images if b.image is not None and STILL_KEY in b.image}
+    images = {b.image for b in data.background_images if b.image is not None and store.STILL in b.image}
     bpy.data.cameras.remove(data)
     for clip in clips:
         if not clip.users:

@@ -3,7 +3,8 @@
 
 import bpy
 
-KEPT_KEY = "rockfall_blend"
+from . import store
+
 """The blend that comes back when the wipe ends."""
 
 
@@ -17,7 +18,11 @@ def blend_of(camera: bpy.types.Object) -> float:
     background = background_of(camera)
     if background is None:
         return 0.0
-    return float(camera.get(KEPT_KEY, background.alpha)) if camera.rockfall_alignment.use_wipe else background.alpha
+    return (
+        float(camera.get(store.IMAGE_BLEND, background.alpha))
+        if camera.rockfall_alignment.use_wipe
+        else background.alpha
+    )
 
 
 def set_blend(camera: bpy.types.Object, value: float) -> None:
@@ -28,7 +33,7 @@ def set_blend(camera: bpy.types.Object, value: float) -> None:
     background.display_depth = "FRONT"
     camera.data.show_background_images = True
     if camera.rockfall_alignment.use_wipe:
-        camera[KEPT_KEY] = float(value)
+        camera[store.IMAGE_BLEND] = float(value)
     else:
         background.alpha = value
 
@@ -39,8 +44,8 @@ def follow_wipe(camera: bpy.types.Object) -> None:
     if background is None:
         return
     if camera.rockfall_alignment.use_wipe:
-        camera[KEPT_KEY] = float(background.alpha)
+        camera[store.IMAGE_BLEND] = float(background.alpha)
         background.alpha = 0.0
     else:
         background.display_depth = "FRONT"
-        background.alpha = float(camera.get(KEPT_KEY, 1.0))
+        background.alpha = float(camera.get(store.IMAGE_BLEND, 1.0))

@@ -7,7 +7,6 @@ import bpy
 
 from . import picks, store
 
-RESULT_KEY = "rockfall_result"
 COLUMNS = ("speed1_mps", "speed2_mps", "rn", "rt", "r", "theta1_deg", "theta_dev_deg")
 
 
@@ -15,8 +14,8 @@ def fill(scene: bpy.types.Scene, trajectory: str | None = None) -> None:
     """Write the rows of one trajectory, or of all, from the results that are stored."""
     rows = scene.rockfall_impacts
     names = None if trajectory is None else [trajectory]
-    wanted = [thing for thing in picks.things_of(scene, names) if RESULT_KEY in thing]
-    wanted.sort(key=lambda thing: (thing[picks.TRAJECTORY_KEY], thing[picks.TIME_KEY]))
+    wanted = [thing for thing in picks.things_of(scene, names) if store.RESULT in thing]
+    wanted.sort(key=lambda thing: (thing[store.TRAJECTORY], thing[store.TIME]))
     there = [i for i, row in enumerate(rows) if trajectory is None or row.trajectory == trajectory]
     for _ in range(len(wanted) - len(there)):
         rows.add()
@@ -53,7 +52,7 @@ def go_to(context: bpy.types.Context, scene: bpy.types.Scene, thing: bpy.types.O
                 other.select_set(False)
         thing.select_set(True)
         layer.objects.active = thing
-    frame = thing.get(picks.KEY_FRAME_KEY)
+    frame = thing.get(store.KEY_FRAME)
     if frame is not None:
         scene.frame_set(math.floor(frame), subframe=frame % 1)
 
@@ -61,14 +60,14 @@ def go_to(context: bpy.types.Context, scene: bpy.types.Scene, thing: bpy.types.O
 def selected(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active pick."""
     thing = context.object
-    return thing if thing is not None and thing.get(store.ROLE_KEY) == store.PICK_ROLE else None
+    return thing if thing is not None and thing.get(store.ROLE) == store.PICK_ROLE else None
 
 
 def _write(row: bpy.types.PropertyGroup, thing: bpy.types.Object) -> None:
-    result = thing[RESULT_KEY]
-    row.pick, row.trajectory = thing[picks.ID_KEY], thing[picks.TRAJECTORY_KEY]
+    result = thing[store.RESULT]
+    row.pick, row.trajectory = thing[store.ID], thing[store.TRAJECTORY]
     row.number, row.flags = result["number"], result["flags"]
-    row.time_s = thing[picks.TIME_KEY]
+    row.time_s = thing[store.TIME]
     row.speed1_mps, row.speed2_mps = math.hypot(*result["incident_mps"]), math.hypot(*result["restituted_mps"])
     for name in COLUMNS[2:]:
         setattr(row, name, result[name][0])

@@ -7,28 +7,27 @@ import uuid
 import bpy
 
 from ...core.errors import RockfallError
-from . import keyframes, materials, picks, store, timing
+from . import georeference, keyframes, materials, picks, store, timing
 
-SCHEMA_KEY = "rockfall_schema"
 SCHEMA = 1
 
 
 def version(scene: bpy.types.Scene) -> int | None:
     """The schema of what is in a scene: 0 before there were numbers, None when nothing of ours is there."""
-    if SCHEMA_KEY in scene:
-        return int(scene[SCHEMA_KEY])
-    return 0 if any(store.ROLE_KEY in thing for thing in scene.objects) else None
+    if store.SCHEMA in scene:
+        return int(scene[store.SCHEMA])
+    return 0 if any(store.ROLE in thing for thing in scene.objects) else None
 
 
 def is_newer(scene: bpy.types.Scene) -> bool:
     """Whether the scene was saved by a Rockfall that this one does not understand."""
-    return SCHEMA_KEY in scene and int(scene[SCHEMA_KEY]) > SCHEMA
+    return store.SCHEMA in scene and int(scene[store.SCHEMA]) > SCHEMA
 
 
 def warning(scene: bpy.types.Scene) -> str:
     """What to say about a newer scene."""
     return (
-        f"This scene was saved by a newer Rockfall (schema {int(scene[SCHEMA_KEY])}, this one knows {SCHEMA}). "
+        f"This scene was saved by a newer Rockfall (schema {int(scene[store.SCHEMA])}, this one knows {SCHEMA}). "
         "Update the extension. Until then nothing is computed or changed here."
     )
 
@@ -46,32 +45,32 @@ def migrate(scene: bpy.types.Scene) -> bool:
         return False
     for step in STEPS[found:]:
         step(scene)
-    scene[SCHEMA_KEY] = SCHEMA
+    scene[store.SCHEMA] = SCHEMA
     return True
 
 
 def _from_0(scene: bpy.types.Scene) -> None:
     """Picks got ids, the frame of their key and their shift; blocks are text, which has no limit for names."""
-    blocks = scene.get("rockfall_blocks")
+    blocks = scene.get(store.BLOCKS)
     if blocks is not None and not isinstance(blocks, str):
-        scene["rockfall_blocks"] = json.dumps({name: list(values) for name, values in blocks.items()})
-    things = [thing for thing in picks.things_of(scene) if picks.TIME_KEY in thing and picks.POSITION_KEY in thing]
-    shift = store.read_shift(scene).vector.tolist()
+        scene[store.BLOCKS] = json.dumps({name: list(values) for name, values in blocks.items()})
+    things = [thing for thing in picks.things_of(scene) if store.TIME in thing and store.POSITION in thing]
+    shift = georeference.read_shift(scene).vector.tolist()
     for thing in things:
         for key, value in (
-            (picks.ID_KEY, uuid.uuid4().hex),
-            (picks.KIND_KEY, "impact"),
-            (picks.STATUS_KEY, "ok"),
-            (picks.ROW_KEY, 0),
-            (picks.EXTRA_KEY, {}),
-            (picks.PICK_SHIFT_KEY, shift),
+            (store.ID, uuid.uuid4().hex),
+            (store.KIND, "impact"),
+            (store.STATUS, "ok"),
+            (store.ROW, 0),
+            (store.EXTRA, {}),
+            (store.PICK_SHIFT, shift),
         ):
             if key not in thing:
                 thing[key] = value
         curves = keyframes.location_curves(thing)
-        if picks.KEY_FRAME_KEY not in thing and curves and len(curves[0].keyframe_points):
-            thing[picks.KEY_FRAME_KEY] = float(curves[0].keyframe_points[0].co[0])
-    if things and timing.OFFSETS_KEY not in scene:
+        if store.KEY_FRAME not in thing and curves and len(curves[0].keyframe_points):
+            thing[store.KEY_FRAME] = float(curves[0].keyframe_points[0].co[0])
+    if things and store.OFFSETS not in scene:
         try:
             timing.keep_offsets(scene, timing.offsets_of(scene, picks.picks_of(scene)))
         except RockfallError:  # two picks at one time: the panel will say so

@@ -20,26 +20,23 @@ from ...core.impact_models.registry import find_model
 from ...core.reconstruction.trajectory import Reconstruction
 from . import keyframes, store, terrain, timing, trails, trajectories
 
-MODELS_KEY = "rockfall_twin_models"
-PARAMETERS_KEY = "rockfall_model_parameters"
-MODEL_KEY = "rockfall_model"
 LINGER_S = 0.2
 """How long a twin lies where it has landed."""
 
 
 def shown_models(scene: bpy.types.Scene) -> tuple[str, ...]:
     """The models whose twins are in the scene."""
-    return tuple(filter(None, str(scene.get(MODELS_KEY, "")).split(" ")))
+    return tuple(filter(None, str(scene.get(store.SHOWN_MODELS, "")).split(" ")))
 
 
 def parameters_of(scene: bpy.types.Scene) -> dict[str, dict[str, Value]]:
     """Model → parameter → value, where the scene has another than the default."""
-    return json.loads(scene.get(PARAMETERS_KEY, "{}"))
+    return json.loads(scene.get(store.MODEL_PARAMETERS, "{}"))
 
 
 def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]]) -> None:
     """Store parameters with the scene: as text, which keeps every digit."""
-    scene[PARAMETERS_KEY] = json.dumps({name: dict(values) for name, values in parameters.items()})
+    scene[store.MODEL_PARAMETERS] = json.dumps({name: dict(values) for name, values in parameters.items()})
 
 
 def show_twins(
@@ -58,10 +55,10 @@ def show_twins(
         keep_parameters(scene, parameters)
     twins = find_twins(scene, result, models)
     _remove_objects(scene)
-    scene[MODELS_KEY] = " ".join(twins.models)
+    scene[store.SHOWN_MODELS] = " ".join(twins.models)
     offsets = timing.shown_offsets(scene, result.picks)
     begin_s = twins.time_s - np.array([offsets[name] for name in twins.trajectory.tolist()])
-    blocks = {thing["rockfall_trajectory"]: thing for thing in store.with_role(scene, store.BLOCK_ROLE)}
+    blocks = {thing[store.TRAJECTORY]: thing for thing in store.with_role(scene, store.BLOCK_ROLE)}
     for model in twins.models:
         which = np.flatnonzero((twins.model == model) & (twins.duration_s > 0))
         if not which.size:
@@ -101,13 +98,15 @@ def follow(scene: bpy.types.Scene, result: Reconstruction) -> None:
 def remove_twins(scene: bpy.types.Scene) -> None:
     """Show the real blocks only, coloured by speed again."""
     _remove_objects(scene)
-    if MODELS_KEY in scene:
-        del scene[MODELS_KEY]
+    if store.SHOWN_MODELS in scene:
+        del scene[store.SHOWN_MODELS]
     trails.paint_observed(scene)
 
 
 def _remove_objects(scene: bpy.types.Scene) -> None:
-    store.remove_objects(store.with_role(scene, store.TWIN_ROLE) + store.with_role(scene, store.TWIN_FLIGHTS_ROLE))
+    store.remove_objects(
+        store.with_role(scene, store.MODEL_BLOCK_ROLE) + store.with_role(scene, store.MODEL_FLIGHTS_ROLE)
+    )
     store.remove_collection(scene, "Twins")
 
 
@@ -117,8 +116,8 @@ def _show_flights(scene: bpy.types.Scene, model: str, twins: Twins, which: np.nd
         clock = trails.moments(0.0, float(twins.duration_s[index]))
         position, velocity = twins.launches.states(np.full(len(clock), index), clock)
         pieces.append((begin_s[index] + clock, position, np.linalg.norm(velocity, axis=1)))
-    thing = trails.trail(f"{model} flights", store.TWIN_FLIGHTS_ROLE, pieces)
-    thing[MODEL_KEY] = model
+    thing = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, pieces)
+    thing[store.MODEL] = model
     trails.paint(thing.data, np.array(model_colour(model)))
     _link(scene, thing, model)
 
@@ -133,12 +132,12 @@ def _show_block(
     begin_s: np.ndarray,
 ) -> None:
     """A block for the flights `which`, which follow each other without overlap."""
-    name = real["rockfall_trajectory"]
+    name = real[store.TRAJECTORY]
     thing = bpy.data.objects.new(
         f"{name} {model}{f' {number + 1}' if number else ''}",
         trajectories.block_mesh(f"Rockfall twin {model}", model_colour(model)),
     )
-    thing[store.ROLE_KEY], thing[MODEL_KEY], thing["rockfall_trajectory"] = store.TWIN_ROLE, model, name
+    thing[store.ROLE], thing[store.MODEL], thing[store.TRAJECTORY] = store.MODEL_BLOCK_ROLE, model, name
     thing.scale, thing.delta_location = real.scale, real.delta_location
     _link(scene, thing, model)
     rate = timing.frame_rate(scene)

@@ -14,9 +14,8 @@ from ...core.footage.tracking import BlockTrack
 from ...core.reconstruction.triangulation import contact_points
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array, Indices
-from . import picking, picks, sync, videos
+from . import picking, picks, store, sync, videos
 
-NAMES_KEY, ROWS_KEY = "rockfall_track_names", "rockfall_track"
 COLUMNS = 7  # number of the name, frame, video time, u, v, sigma, clicked by hand
 FAR_M = 100.0
 """Distance at which pixels are taken to be that meet no terrain; only a swaying camera tells the difference."""
@@ -87,7 +86,7 @@ def clicks_for(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> l
     clicked = zip(seen.frame[seen.by_hand].tolist(), seen.pixel[seen.by_hand].tolist(), strict=True)
     found = {frame: (u, v) for frame, (u, v) in clicked}
     for thing in picks.things_of(scene, [name]):
-        sighting = picking.sightings(thing).get(camera[videos.ID_KEY])
+        sighting = picking.sightings(thing).get(camera[store.ID])
         if sighting is not None and sighting.centre:
             found.setdefault(sighting.frame, (float(sighting.pixel[0]), float(sighting.pixel[1])))
     if not found:
@@ -135,7 +134,7 @@ def propose(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> list
     diameter = np.full(len(kinks), picking.block_of(scene, name).diameter_m)
     points, _ = contact_points(surface, origin, direction, diameter, picking.normal_radius(scene))
     clock, step = videos.clock_of(camera), picking.frame_step_s(camera)
-    there = [float(thing[picks.TIME_KEY]) for thing in picks.things_of(scene, [name])]
+    there = [float(thing[store.TIME]) for thing in picks.things_of(scene, [name])]
     made = []
     for i in range(len(kinks)):
         moment = picking.common_time(camera, float(kinks.time_s[i]), float(pixels[i, 1]))
@@ -150,7 +149,7 @@ def propose(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> list
             "note": "proposed from the track",
         }
         thing = picks.add_pick(scene, name, moment, points[i], extra=extra)
-        thing[picks.SIGMA_TIME_KEY] = [float(kinks.sigma_time_s[i]) * clock.speed]
+        thing[store.SIGMA_TIME] = [float(kinks.sigma_time_s[i]) * clock.speed]
         made.append(thing)
     sync.sync(scene, [name])
     return made
@@ -158,15 +157,15 @@ def propose(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> list
 
 def _tables(camera: bpy.types.Object) -> dict[str, Array]:
     """Name → (m, 6) rows: frame, video time, u, v, sigma, by hand."""
-    names = json.loads(camera.get(NAMES_KEY, "[]"))
-    rows = np.array(camera.get(ROWS_KEY, ()), dtype=np.float64).reshape(-1, COLUMNS)
+    names = json.loads(camera.get(store.TRACK_NAMES, "[]"))
+    rows = np.array(camera.get(store.TRACK_ROWS, ()), dtype=np.float64).reshape(-1, COLUMNS)
     return {name: rows[rows[:, 0] == i, 1:] for i, name in enumerate(names)}
 
 
 def _keep(camera: bpy.types.Object, tables: dict[str, Array]) -> None:
     tables = {name: rows for name, rows in tables.items() if len(rows)}
     if not tables:
-        for key in (NAMES_KEY, ROWS_KEY):
+        for key in (store.TRACK_NAMES, store.TRACK_ROWS):
             if key in camera:
                 del camera[key]
         return
@@ -174,5 +173,5 @@ def _keep(camera: bpy.types.Object, tables: dict[str, Array]) -> None:
         np.c_[np.full(len(rows), i), rows[np.argsort(rows[:, 0], kind="stable")]]
         for i, rows in enumerate(tables.values())
     ]
-    camera[NAMES_KEY] = json.dumps(list(tables))
-    camera[ROWS_KEY] = np.vstack(blocks).ravel().tolist()
+    camera[store.TRACK_NAMES] = json.dumps(list(tables))
+    camera[store.TRACK_ROWS] = np.vstack(blocks).ravel().tolist()

@@ -27,13 +27,12 @@ from ...core.terrain.surface import Surface
 from ...core.vectors import Array
 from . import picks, reconstruction, store, sync, timing, videos
 
-SEEN_KEY = "rockfall_seen"
 """Of a pick: id of a video → the sighting."""
 SAME_PICTURE = 0.6
 """A pick that is nearer in time than this belongs to the picture [frames]."""
 FIRST_NAME = "B01"
 NEAR_M, FAR_M = 1.0, 5000.0
-_VECTORS = (picks.POSITION_KEY, picks.NORMAL_KEY, picks.SIGMA_POSITION_KEY, picks.SIGMA_TIME_KEY)
+_VECTORS = (store.POSITION, store.NORMAL, store.SIGMA_POSITION, store.SIGMA_TIME)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +104,7 @@ def trajectory(scene: bpy.types.Scene) -> str:
 
 def trajectories(scene: bpy.types.Scene) -> list[str]:
     """Names of the trajectories that have picks, in the order of their names."""
-    return sorted({thing[picks.TRAJECTORY_KEY] for thing in picks.things_of(scene)})
+    return sorted({thing[store.TRAJECTORY] for thing in picks.things_of(scene)})
 
 
 def picture_time(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[int, float]:
@@ -225,8 +224,8 @@ def in_this_picture(
         times = dict.fromkeys(things, moment)
     else:
         step = 1 / timing.frame_rate(scene)
-        times = {thing: now(scene, thing[picks.TRAJECTORY_KEY]) for thing in things}
-    return [thing for thing in things if abs(thing[picks.TIME_KEY] - times[thing]) <= SAME_PICTURE * step]
+        times = {thing: now(scene, thing[store.TRAJECTORY]) for thing in things}
+    return [thing for thing in things if abs(thing[store.TIME] - times[thing]) <= SAME_PICTURE * step]
 
 
 def of_this_picture(
@@ -234,7 +233,7 @@ def of_this_picture(
 ) -> bpy.types.Object | None:
     """The pick that a trajectory has in the picture, or moment, that is shown: the one nearest to a common time."""
     near = in_this_picture(scene, camera, name)
-    return min(near, key=lambda one: abs(one[picks.TIME_KEY] - time_s), default=None)
+    return min(near, key=lambda one: abs(one[store.TIME] - time_s), default=None)
 
 
 def put(
@@ -257,23 +256,23 @@ def put(
         _begin_clock(scene, name)
     thing = picks.add_pick(scene, name, place.time_s, place.position, kind=kind)
     if np.isfinite(place.sigma_time_s):
-        thing[picks.SIGMA_TIME_KEY] = [place.sigma_time_s]
+        thing[store.SIGMA_TIME] = [place.sigma_time_s]
     move(scene, thing, camera, place)
     return thing, True
 
 
 def move(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object | None, place: Place) -> None:
     """Put a pick elsewhere on the terrain; its time stays. A click of its own picture tells its deviation too."""
-    thing[picks.POSITION_KEY] = place.position.tolist()
+    thing[store.POSITION] = place.position.tolist()
     thing.location = place.position
-    for key in (picks.NORMAL_KEY, SEEN_KEY):
+    for key in (store.NORMAL, store.SEEN):
         if key in thing:
             del thing[key]
     if camera is None:
         return
     _, video_s = picture_time(scene, camera)
-    if abs(thing[picks.TIME_KEY] - common_time(camera, video_s)) <= SAME_PICTURE * frame_step_s(camera):
-        thing[picks.SIGMA_POSITION_KEY] = [place.sigma_m]
+    if abs(thing[store.TIME] - common_time(camera, video_s)) <= SAME_PICTURE * frame_step_s(camera):
+        thing[store.SIGMA_POSITION] = [place.sigma_m]
         keep_sighting(scene, thing, camera, place)
         for column, text in (
             ("video", camera.name),
@@ -286,20 +285,20 @@ def move(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Obje
 
 def finish(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     """The person has let go: the trajectory follows."""
-    sync.sync(scene, [thing[picks.TRAJECTORY_KEY]])
+    sync.sync(scene, [thing[store.TRAJECTORY]])
 
 
 def remove(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     """Remove a pick; its trajectory follows."""
-    name = thing[picks.TRAJECTORY_KEY]
+    name = thing[store.TRAJECTORY]
     store.remove_objects([thing])
     sync.sync(scene, [name])
 
 
 def set_kind(scene: bpy.types.Scene, thing: bpy.types.Object, kind: str) -> None:
     """Make a pick one of another kind; its trajectory follows."""
-    thing[picks.KIND_KEY] = kind
-    sync.sync(scene, [thing[picks.TRAJECTORY_KEY]])
+    thing[store.KIND] = kind
+    sync.sync(scene, [thing[store.TRAJECTORY]])
 
 
 def normal_radius(scene: bpy.types.Scene) -> float | None:
@@ -309,9 +308,9 @@ def normal_radius(scene: bpy.types.Scene) -> float | None:
 
 def keep_sighting(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object, place: Place) -> None:
     """Remember what was clicked in a video for a pick."""
-    seen = thing[SEEN_KEY].to_dict() if SEEN_KEY in thing and _holds(thing) else {}
-    seen["position"] = list(thing[picks.POSITION_KEY])
-    seen[camera[videos.ID_KEY]] = {
+    seen = thing[store.SEEN].to_dict() if store.SEEN in thing and _holds(thing) else {}
+    seen["position"] = list(thing[store.POSITION])
+    seen[camera[store.ID]] = {
         "frame": int(place.frame),
         "pixel": place.pixel.tolist(),
         "sigma_px": float(place.sigma_px),
@@ -319,12 +318,12 @@ def keep_sighting(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.t
         "grazing_deg": float(place.grazing_deg),
         "centre": int(scene.rockfall_picking.aim == "CENTRE"),
     }
-    thing[SEEN_KEY] = seen
+    thing[store.SEEN] = seen
 
 
 def sightings(thing: bpy.types.Object) -> dict[str, Sighting]:
     """Id of a video → what was clicked in it for a pick that is still there."""
-    if SEEN_KEY not in thing or not _holds(thing):
+    if store.SEEN not in thing or not _holds(thing):
         return {}
     return {
         identifier: Sighting(
@@ -335,7 +334,7 @@ def sightings(thing: bpy.types.Object) -> dict[str, Sighting]:
             float(seen["grazing_deg"]),
             bool(seen["centre"]),
         )
-        for identifier, seen in thing[SEEN_KEY].items()
+        for identifier, seen in thing[store.SEEN].items()
         if identifier != "position"
     }
 
@@ -343,7 +342,7 @@ def sightings(thing: bpy.types.Object) -> dict[str, Sighting]:
 def elsewhere(thing: bpy.types.Object, camera: bpy.types.Object) -> bool:
     """Whether a pick was clicked in another video, and not in this one."""
     seen = sightings(thing)
-    return bool(seen) and camera[videos.ID_KEY] not in seen
+    return bool(seen) and camera[store.ID] not in seen
 
 
 def grazing_warning(thing: bpy.types.Object) -> str:
@@ -388,7 +387,7 @@ def second_view(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:
     found = triangulated(scene, thing)
     if found is None or not np.isfinite(found.point).all():
         return "Kept as this event's pixel in a second video."
-    away = float(np.linalg.norm(found.point[0] - np.array(thing[picks.POSITION_KEY])))
+    away = float(np.linalg.norm(found.point[0] - np.array(thing[store.POSITION])))
     return (
         f"Seen in a second video: the rays miss each other by {100 * found.miss_distance[0]:.1f} cm, {away:.2f} m from "
         "the pick. The pick stays; Use Triangulated Point moves it there."
@@ -405,18 +404,18 @@ def use_triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> float:
     found = triangulated(scene, thing)
     if found is None or not np.isfinite(found.point).all():
         raise RockfallError("Click the same event in a second aligned video first, while this pick is selected.")
-    point, seen = found.point[0], thing[SEEN_KEY].to_dict()
-    if thing[picks.KIND_KEY] != "pass" and any(one.centre for one in sightings(thing).values()):
+    point, seen = found.point[0], thing[store.SEEN].to_dict()
+    if thing[store.KIND] != "pass" and any(one.centre for one in sightings(thing).values()):
         point = closest_points(surface_of(scene), point).point[0]
-    thing[picks.POSITION_KEY], thing.location = point.tolist(), point
-    thing[picks.SIGMA_POSITION_KEY] = [float(np.sqrt(np.trace(found.covariance[0]) / 3))]
-    thing[SEEN_KEY] = seen | {"position": point.tolist()}
+    thing[store.POSITION], thing.location = point.tolist(), point
+    thing[store.SIGMA_POSITION] = [float(np.sqrt(np.trace(found.covariance[0]) / 3))]
+    thing[store.SEEN] = seen | {"position": point.tolist()}
     finish(scene, thing)
     return float(found.miss_distance[0])
 
 
 def _holds(thing: bpy.types.Object) -> bool:
-    return list(thing[SEEN_KEY].get("position", ())) == list(thing[picks.POSITION_KEY])
+    return list(thing[store.SEEN].get("position", ())) == list(thing[store.POSITION])
 
 
 def _time_of(camera: bpy.types.Object, frame: int) -> float:
@@ -428,7 +427,7 @@ def _time_of(camera: bpy.types.Object, frame: int) -> float:
 def _begin_clock(scene: bpy.types.Scene, name: str) -> None:
     """Without videos, the first trajectory of a scene lives on the scene's own clock: frame 0 is 0 s."""
     if not picks.things_of(scene):
-        scene[timing.ORIGIN_KEY] = 0.0
+        scene[store.TIME_ORIGIN] = 0.0
         scene.rockfall.playback = "REAL"
     elif timing.origin_s(scene) is None or scene.rockfall.playback != "REAL":
         timing.keep_offsets(scene, timing.kept_offsets(scene) | {name: 0.0})
@@ -437,7 +436,7 @@ def _begin_clock(scene: bpy.types.Scene, name: str) -> None:
 def snapshot(thing: bpy.types.Object) -> dict[str, object]:
     """What a click changes of a pick, as plain values."""
     kept = {key: list(thing[key]) for key in _VECTORS if key in thing}
-    for key in (SEEN_KEY, picks.EXTRA_KEY):
+    for key in (store.SEEN, store.EXTRA):
         if key in thing:
             kept[key] = thing[key].to_dict()
     return kept
@@ -445,16 +444,16 @@ def snapshot(thing: bpy.types.Object) -> dict[str, object]:
 
 def restore(thing: bpy.types.Object, kept: dict[str, object]) -> None:
     """Take back what was changed since the snapshot."""
-    for key in (*_VECTORS, SEEN_KEY, picks.EXTRA_KEY):
+    for key in (*_VECTORS, store.SEEN, store.EXTRA):
         if key in kept:
             thing[key] = kept[key]
         elif key in thing:
             del thing[key]
-    thing.location = kept[picks.POSITION_KEY]
+    thing.location = kept[store.POSITION]
 
 
 def described(thing: bpy.types.Object) -> str:
     """A pick in a sentence."""
-    sigma = thing.get(picks.SIGMA_POSITION_KEY)
+    sigma = thing.get(store.SIGMA_POSITION)
     known = "" if sigma is None else f", its place known to {100 * sigma[0]:.0f} cm"
-    return f"{thing[picks.TRAJECTORY_KEY]}: {thing[picks.KIND_KEY]} at {thing[picks.TIME_KEY]:.3f} s{known}."
+    return f"{thing[store.TRAJECTORY]}: {thing[store.KIND]} at {thing[store.TIME]:.3f} s{known}."

@@ -18,16 +18,7 @@ from ...core.reconstruction.picks import Picks, make_picks
 from ...core.terrain.raycast import closest_points
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
-from . import keyframes, materials, store, timing
-
-ID_KEY, TRAJECTORY_KEY, TIME_KEY = "rockfall_id", "rockfall_trajectory", "rockfall_time_s"
-POSITION_KEY, KIND_KEY, STATUS_KEY = "rockfall_position_m", "rockfall_kind", "rockfall_status"
-NORMAL_KEY, EXTRA_KEY, ROW_KEY = "rockfall_normal", "rockfall_extra", "rockfall_row"
-SIGMA_TIME_KEY, SIGMA_POSITION_KEY = "rockfall_sigma_time_s", "rockfall_sigma_position_m"
-SPIN_KEY = "rockfall_angular_velocity_radps"
-KEY_FRAME_KEY = "rockfall_key_frame"
-PICK_SHIFT_KEY = "rockfall_pick_shift_m"
-SOURCE_KEY = "rockfall_picks_source"
+from . import georeference, keyframes, materials, store, timing
 
 CONFIDENCE_SIGMA_M = {1: 0.50, 2: 0.20, 3: 0.05}
 """Standard deviation that a person's confidence in a place stands for, where the pick has none of its own [m]."""
@@ -50,17 +41,17 @@ def things_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None)
     return [
         thing
         for thing in scene.objects
-        if thing.get(store.ROLE_KEY) == store.PICK_ROLE
-        and TRAJECTORY_KEY in thing
-        and TIME_KEY in thing
-        and POSITION_KEY in thing
-        and (names is None or thing[TRAJECTORY_KEY] in names)
+        if thing.get(store.ROLE) == store.PICK_ROLE
+        and store.TRAJECTORY in thing
+        and store.TIME in thing
+        and store.POSITION in thing
+        and (names is None or thing[store.TRAJECTORY] in names)
     ]
 
 
 def with_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
     """The pick with an id."""
-    return next((thing for thing in things_of(scene) if thing.get(ID_KEY) == identifier), None)
+    return next((thing for thing in things_of(scene) if thing.get(store.ID) == identifier), None)
 
 
 def show_picks(
@@ -76,7 +67,7 @@ def show_picks(
     The object of each pick.
     """
     kept_rate = timing.keyed_rate(scene)
-    there = {(o[TRAJECTORY_KEY], time_of(o, kept_rate)): o for o in things_of(scene)}
+    there = {(o[store.TRAJECTORY], time_of(o, kept_rate)): o for o in things_of(scene)}
     rate, shown = timing.frame_rate(scene), []
     for i in range(len(picks.time_s)):
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
@@ -84,28 +75,28 @@ def show_picks(
         if thing is None:
             number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
             thing = _new(scene, trajectory, kind, number)
-        thing[TRAJECTORY_KEY], thing[TIME_KEY] = trajectory, time
-        thing[POSITION_KEY] = picks.position[i].tolist()
-        thing[KIND_KEY], thing[STATUS_KEY] = kind, str(picks.status[i])
-        thing[ROW_KEY] = int(picks.row[i])
+        thing[store.TRAJECTORY], thing[store.TIME] = trajectory, time
+        thing[store.POSITION] = picks.position[i].tolist()
+        thing[store.KIND], thing[store.STATUS] = kind, str(picks.status[i])
+        thing[store.ROW] = int(picks.row[i])
         for key, value in (
-            (NORMAL_KEY, picks.normal[i]),
-            (SPIN_KEY, picks.angular_velocity[i]),
-            (SIGMA_TIME_KEY, picks.sigma_time_s[i : i + 1]),
-            (SIGMA_POSITION_KEY, picks.sigma_position_m[i : i + 1]),
+            (store.NORMAL, picks.normal[i]),
+            (store.SPIN, picks.angular_velocity[i]),
+            (store.SIGMA_TIME, picks.sigma_time_s[i : i + 1]),
+            (store.SIGMA_POSITION, picks.sigma_position_m[i : i + 1]),
         ):
-            if np.isfinite(value).all() and not (key == SIGMA_POSITION_KEY and _of_confidence(picks, i)):
+            if np.isfinite(value).all() and not (key == store.SIGMA_POSITION and _of_confidence(picks, i)):
                 thing[key] = value.tolist()
             elif key in thing:
                 del thing[key]
         extra = {name: str(values[i]) for name, values in picks.extra.items()}
-        if EXTRA_KEY not in thing or thing[EXTRA_KEY].to_dict() != extra:
-            thing[EXTRA_KEY] = extra
-        thing[PICK_SHIFT_KEY] = picks.shift.vector.tolist()
+        if store.EXTRA not in thing or thing[store.EXTRA].to_dict() != extra:
+            thing[store.EXTRA] = extra
+        thing[store.PICK_SHIFT] = picks.shift.vector.tolist()
         pose(thing, normals[i], (time - offsets[trajectory]) * rate, radius_m)
         shown.append(thing)
     store.remove_objects(list(there.values()))
-    scene[SOURCE_KEY] = picks.source
+    scene[store.PICKS_SOURCE] = picks.source
     return shown
 
 
@@ -122,11 +113,11 @@ def add_pick(
     """A new pick at a local place; `live.sync` then makes the trajectory follow."""
     number = len(things_of(scene, [trajectory])) + 1
     thing = _new(scene, trajectory, kind, number)
-    thing[TRAJECTORY_KEY], thing[TIME_KEY], thing[ROW_KEY] = trajectory, float(time_s), 0
-    thing[POSITION_KEY] = _writable(scene, position_m)
-    thing[KIND_KEY], thing[STATUS_KEY] = kind, status
-    thing[EXTRA_KEY] = dict(extra or {})
-    thing[PICK_SHIFT_KEY] = store.read_shift(scene).vector.tolist()
+    thing[store.TRAJECTORY], thing[store.TIME], thing[store.ROW] = trajectory, float(time_s), 0
+    thing[store.POSITION] = _writable(scene, position_m)
+    thing[store.KIND], thing[store.STATUS] = kind, status
+    thing[store.EXTRA] = dict(extra or {})
+    thing[store.PICK_SHIFT] = georeference.read_shift(scene).vector.tolist()
     offset = timing.offset_of(scene, trajectory, float(time_s))
     frame = (float(time_s) - offset) * timing.frame_rate(scene)
     pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m)
@@ -135,7 +126,7 @@ def add_pick(
 
 def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float) -> None:
     """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay."""
-    marker = _marker(thing[KIND_KEY])
+    marker = _marker(thing[store.KIND])
     if thing.data is not marker:
         thing.data = marker
     up = Vector(normal) if np.isfinite(normal).all() else Vector((0.0, 0.0, 1.0))
@@ -146,12 +137,12 @@ def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float) 
         thing.rotation_quaternion = turn
     if (thing.scale - Vector((radius_m,) * 3)).length > 1e-6 * radius_m:
         thing.scale = (radius_m,) * 3
-    place = list(thing[POSITION_KEY])
+    place = list(thing[store.POSITION])
     if not _same_place(thing.location, place):
         thing.location = place
     if not _keyed_at(thing, frame):
         keyframes.key_location_once(thing, frame)
-    thing[KEY_FRAME_KEY] = float(np.float32(frame))
+    thing[store.KEY_FRAME] = float(np.float32(frame))
 
 
 def picks_of(scene: bpy.types.Scene) -> Picks:
@@ -167,7 +158,7 @@ def picks_of(scene: bpy.types.Scene) -> Picks:
 def ordered(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
     """Trajectories in the order of their starts, the picks of each in the order of time."""
     rate = timing.keyed_rate(scene)
-    rows = [(thing[TRAJECTORY_KEY], time_of(thing, rate), thing) for thing in things]
+    rows = [(thing[store.TRAJECTORY], time_of(thing, rate), thing) for thing in things]
     started: dict[str, float] = {}
     for name, time, _ in rows:
         started[name] = min(time, started.get(name, time))
@@ -186,39 +177,39 @@ def read(
     surface, reach_m : see `resting_place`; without a surface a moved pick is where its object is.
     """
     rate = timing.keyed_rate(scene)
-    extras = [thing[EXTRA_KEY].to_dict() if EXTRA_KEY in thing else {} for thing in things]
+    extras = [thing[store.EXTRA].to_dict() if store.EXTRA in thing else {} for thing in things]
     names = list(dict.fromkeys(name for extra in extras for name in extra))
     return make_picks(
-        [thing[TRAJECTORY_KEY] for thing in things],
+        [thing[store.TRAJECTORY] for thing in things],
         [time_of(thing, rate) for thing in things],
         [resting_place(thing, surface, reach_m) for thing in things],
-        kind=[thing[KIND_KEY] for thing in things],
-        status=[thing[STATUS_KEY] for thing in things],
+        kind=[thing[store.KIND] for thing in things],
+        status=[thing[store.STATUS] for thing in things],
         normal=[
             [np.nan] * 3
-            if NORMAL_KEY not in thing or (surface is not None and moved(thing))
-            else list(thing[NORMAL_KEY])
+            if store.NORMAL not in thing or (surface is not None and moved(thing))
+            else list(thing[store.NORMAL])
             for thing in things
         ],
-        sigma_time_s=_doubles(things, SIGMA_TIME_KEY, 1),
-        sigma_position_m=_doubles(things, SIGMA_POSITION_KEY, 1),
-        angular_velocity=_doubles(things, SPIN_KEY, 3),
-        row=[thing.get(ROW_KEY, 0) for thing in things],
+        sigma_time_s=_doubles(things, store.SIGMA_TIME, 1),
+        sigma_position_m=_doubles(things, store.SIGMA_POSITION, 1),
+        angular_velocity=_doubles(things, store.SPIN, 3),
+        row=[thing.get(store.ROW, 0) for thing in things],
         extra={name: np.array([str(extra.get(name, "")) for extra in extras], dtype=np.str_) for name in names},
-        source=str(scene.get(SOURCE_KEY, "")),
-        shift=store.read_shift(scene),
+        source=str(scene.get(store.PICKS_SOURCE, "")),
+        shift=georeference.read_shift(scene),
         sort=True,
     )
 
 
 def moved(thing: bpy.types.Object) -> bool:
     """Whether the object is elsewhere than the pick."""
-    return not _same_place(thing.location, thing[POSITION_KEY])
+    return not _same_place(thing.location, thing[store.POSITION])
 
 
 def frames_moved(thing: bpy.types.Object) -> float:
     """How far the key was moved in time since it was written [frames]; keys that were added do not count."""
-    kept = thing.get(KEY_FRAME_KEY)
+    kept = thing.get(store.KEY_FRAME)
     if kept is None:
         return 0.0
     for curve in keyframes.location_curves(thing):
@@ -233,7 +224,7 @@ def frames_moved(thing: bpy.types.Object) -> float:
 def time_of(thing: bpy.types.Object, rate: float) -> float:
     """The pick's time on the common clock [s], with the edit of its key. `rate` is the one that the keys have."""
     shift = frames_moved(thing)
-    return float(thing[TIME_KEY]) + (shift / rate if shift else 0.0)
+    return float(thing[store.TIME]) + (shift / rate if shift else 0.0)
 
 
 def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> Array:
@@ -242,11 +233,11 @@ def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: flo
     A pick that was on the terrain, that is nearer to it than `reach_m`, stays on it: it is moved along the terrain, to
     the point closest to its object. A pass is a point in the air and goes where it is put.
     """
-    stored = np.array(thing[POSITION_KEY])
+    stored = np.array(thing[store.POSITION])
     if not moved(thing):
         return stored
     place = np.array(thing.location, dtype=np.float64)
-    if surface is None or thing[KIND_KEY] == "pass":
+    if surface is None or thing[store.KIND] == "pass":
         return place
     near = closest_points(surface, np.stack([stored, place]))
     return near.point[1] if near.distance[0] <= reach_m else place
@@ -260,13 +251,13 @@ def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | N
     changed = False
     frames = frames_moved(thing)
     if frames:
-        thing[TIME_KEY] = float(thing[TIME_KEY]) + frames / timing.keyed_rate(scene)
-        thing[KEY_FRAME_KEY] = float(thing[KEY_FRAME_KEY]) + frames
+        thing[store.TIME] = float(thing[store.TIME]) + frames / timing.keyed_rate(scene)
+        thing[store.KEY_FRAME] = float(thing[store.KEY_FRAME]) + frames
         changed = True
     if moved(thing):
-        thing[POSITION_KEY] = _writable(scene, resting_place(thing, surface, reach_m))
-        if surface is not None and NORMAL_KEY in thing:
-            del thing[NORMAL_KEY]
+        thing[store.POSITION] = _writable(scene, resting_place(thing, surface, reach_m))
+        if surface is not None and store.NORMAL in thing:
+            del thing[store.NORMAL]
         changed = True
     return changed
 
@@ -284,7 +275,7 @@ def trusted(picks: Picks) -> Picks:
 
 def _writable(scene: bpy.types.Scene, place: Sequence[float] | Array) -> list[float]:
     """A place whose survey coordinates are doubles, so that a table gives it back to the last bit."""
-    shift = store.read_shift(scene)
+    shift = georeference.read_shift(scene)
     return shift.to_local(shift.to_survey(np.asarray(place, dtype=np.float64))).tolist()
 
 
@@ -296,19 +287,19 @@ def _of_confidence(picks: Picks, i: int) -> bool:
 
 def set_extra(thing: bpy.types.Object, name: str, text: str) -> None:
     """Keep a further column of the pick, such as its note; an empty one is dropped."""
-    extra = thing[EXTRA_KEY].to_dict() if EXTRA_KEY in thing else {}
+    extra = thing[store.EXTRA].to_dict() if store.EXTRA in thing else {}
     extra.pop(name, None)
-    thing[EXTRA_KEY] = extra | ({name: text} if text else {})
+    thing[store.EXTRA] = extra | ({name: text} if text else {})
 
 
 def extra_of(thing: bpy.types.Object, name: str) -> str:
     """A further column of the pick as text."""
-    return str(thing[EXTRA_KEY].get(name, "")) if EXTRA_KEY in thing else ""
+    return str(thing[store.EXTRA].get(name, "")) if store.EXTRA in thing else ""
 
 
 def _new(scene: bpy.types.Scene, trajectory: str, kind: str, number: int) -> bpy.types.Object:
     thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
-    thing[store.ROLE_KEY], thing[ID_KEY] = store.PICK_ROLE, uuid.uuid4().hex
+    thing[store.ROLE], thing[store.ID] = store.PICK_ROLE, uuid.uuid4().hex
     store.collection(scene, "Trajectories", trajectory).objects.link(thing)
     return thing
 

@@ -11,8 +11,6 @@ import numpy as np
 from ...core.reconstruction.trajectory import Reconstruction
 from . import fingerprints, migration, picks, store, timing
 
-PROBLEM_KEY = "rockfall_problem"
-TRAJECTORIES_KEY = "rockfall_trajectory_problems"
 MOST = 6
 BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon
 CAMERA_ROLE = "camera"
@@ -23,13 +21,13 @@ _troubles: list[str] = []  # our own errors, each told once
 def keep_trajectories(scene: bpy.types.Scene, sentences: dict[str, list[str]]) -> None:
     """Store what there is to say about the trajectories."""
     text = json.dumps({name: said for name, said in sentences.items() if said})
-    if scene.get(TRAJECTORIES_KEY, "{}") != text:
-        scene[TRAJECTORIES_KEY] = text
+    if scene.get(store.TRAJECTORY_PROBLEMS, "{}") != text:
+        scene[store.TRAJECTORY_PROBLEMS] = text
 
 
 def of_trajectories(scene: bpy.types.Scene) -> dict[str, list[str]]:
     """Trajectory → sentences."""
-    return json.loads(scene.get(TRAJECTORIES_KEY, "{}"))
+    return json.loads(scene.get(store.TRAJECTORY_PROBLEMS, "{}"))
 
 
 def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[str]]:
@@ -61,9 +59,9 @@ def first_instant(scene: bpy.types.Scene) -> float | None:
     """Common time of the first picture, or the time origin when the scene plays as filmed; None when neither is set."""
     starts = []
     for thing in scene.objects:
-        if thing.get(store.ROLE_KEY) == CAMERA_ROLE and "rockfall_video_times_s" in thing and "rockfall_clock" in thing:
-            times = thing["rockfall_video_times_s"]
-            offset, drift, origin, rate = thing["rockfall_clock"]
+        if thing.get(store.ROLE) == CAMERA_ROLE and store.VIDEO_TIMES in thing and store.CLOCK in thing:
+            times = thing[store.VIDEO_TIMES]
+            offset, drift, origin, rate = thing[store.CLOCK]
             if len(times):
                 starts.append(offset + (1 + drift) * rate * (times[0] - origin))
     if starts:
@@ -79,14 +77,14 @@ def tell(scene: bpy.types.Scene) -> None:
     if len(said) > MOST:
         said = [*said[: MOST - 1], f"… and {len(said) - MOST + 1} more."]
     text = "\n".join(said)
-    if scene.get(PROBLEM_KEY, "") != text:
-        scene[PROBLEM_KEY] = text
+    if scene.get(store.PROBLEM, "") != text:
+        scene[store.PROBLEM] = text
 
 
 def sentences(scene: bpy.types.Scene) -> list[str]:
     """What the panels show."""
     newer = [migration.warning(scene)] if migration.is_newer(scene) else []
-    return [*newer, *_troubles, *filter(None, str(scene.get(PROBLEM_KEY, "")).split("\n"))]
+    return [*newer, *_troubles, *filter(None, str(scene.get(store.PROBLEM, "")).split("\n"))]
 
 
 def guarded[**P, T](function: Callable[P, T]) -> Callable[P, T | None]:
@@ -124,7 +122,7 @@ def _of_scene(scene: bpy.types.Scene) -> list[str]:
             f"The scene's unit scale is {scale:g}. Rockfall counts one unit as one metre, so the lengths that Blender "
             "shows are not those of the slope: set Scene Properties > Units > Unit Scale to 1."
         )
-    if scene.get(fingerprints.GROUND_KEY) and not fingerprints.ground(scene):
+    if scene.get(store.GROUND) and not fingerprints.ground(scene):
         said.append(
             "The terrain is gone. What was computed stays; edited trajectories have no terrain normals and heights. "
             "Undo, or import the terrain again."

@@ -24,9 +24,7 @@ from ...core.exchange.tables import write_picks
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.shading import shade
 from ...core.terrain.writers import write_ply
-from . import migration, models, picks, project_videos, reconstruction, store, terrain
-
-DESCRIPTION_KEY, RENDER_KEY = "rockfall_site_description", "rockfall_render_presets"
+from . import georeference, migration, models, picks, project_videos, reconstruction, store, terrain
 
 
 def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True) -> Reconstruction | None:
@@ -56,10 +54,10 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     names = [block.name for block in project.blocks] if result is None else result.picks.trajectory.tolist()
     shift = result.picks.shift if result is not None else known or next(iter(cameras), None)
     if shift is not None:
-        store.write_shift(scene, shift)
+        georeference.write_shift(scene, shift)
     reconstruction.keep_settings(scene, project, sorted(set(names)))
-    scene[DESCRIPTION_KEY] = project.site.description
-    scene[RENDER_KEY] = json.dumps([asdict(preset) for preset in project.render])
+    scene[store.SITE_DESCRIPTION] = project.site.description
+    scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in project.render])
     models.keep_parameters(scene, parameters)
     if surface is not None and shading is not None:
         terrain.add_terrain(scene, surface, shading)
@@ -81,7 +79,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
     migration.refuse_newer(scene)
     if not picks.things_of(scene):
         raise RockfallError("There are no picks to export: import some first, or load the demo.")
-    table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), store.read_shift(scene)
+    table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), georeference.read_shift(scene)
     settings = reconstruction.project_settings(scene, table.trajectory.tolist())
     with output_folder(folder) as place:
         write_picks(table, place / "picks.csv")
@@ -90,14 +88,14 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
         parameters = models.parameters_of(scene)
         project = Project(
-            site=Site(str(scene.get(reconstruction.SITE_KEY, "")), str(scene.get(DESCRIPTION_KEY, ""))),
+            site=Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, ""))),
             terrain=None if surface is None else source,
             picks=place / "picks.csv",
             block=settings.block,
             blocks=settings.blocks,
             reconstruction=settings.reconstruction,
             videos=project_videos.write_videos(scene, place),
-            render=tuple(_preset(values) for values in json.loads(scene.get(RENDER_KEY, "[]"))),
+            render=tuple(_preset(values) for values in json.loads(scene.get(store.RENDER_PRESETS, "[]"))),
             extra={"models": parameters} if parameters else {},
         )
         write_project(project, place / "project.toml")

@@ -16,9 +16,7 @@ from ...core.exchange.project import Project, VideoEntry
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import Video, open_video
 from ...core.georeference import GlobalShift
-from . import footage, observations, store, timing, video_times, videos
-
-EVENTS_FILE_KEY = "rockfall_events_file"
+from . import footage, georeference, observations, store, video_times, videos
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,16 +68,16 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
     things = []
     for read in found:
         first = not videos.cameras(scene)
-        there = (c for c in videos.cameras(scene) if Path(str(c[videos.FILE_KEY])) == read.video.path.resolve())
+        there = (c for c in videos.cameras(scene) if Path(str(c[store.VIDEO_FILE])) == read.video.path.resolve())
         camera = next(there, None) or videos.add_camera(scene, read.video)
         camera.name = read.entry.name
         videos.set_clock(camera, read.clock)
-        camera[videos.CAPTURE_KEY] = read.entry.capture_rate_hz or 0.0
-        camera[videos.ROW_TIME_KEY] = read.entry.row_time_s
+        camera[store.CAPTURE_RATE] = read.entry.capture_rate_hz or 0.0
+        camera[store.ROW_TIME] = read.entry.row_time_s
         if read.entry.events is not None:
-            camera[EVENTS_FILE_KEY] = str(read.entry.events.resolve())
+            camera[store.EVENTS_FILE] = str(read.entry.events.resolve())
         if first:
-            scene[timing.ORIGIN_KEY] = float(read.clock.to_common(float(read.video.time_s[0])))
+            scene[store.TIME_ORIGIN] = float(read.clock.to_common(float(read.video.time_s[0])))
             videos.begin_with(scene, camera)
         if read.camera is not None and read.camera.path.reference.size == videos.size_of(camera):
             videos.set_camera_path(
@@ -106,19 +104,19 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
         files: dict[str, Path | None] = {"camera": None, "track": None, "events": None}
         if videos.is_solved(camera):
             files["camera"] = folder / f"{stem}_camera.toml"
-            rmse = camera.get(videos.RMSE_KEY)
+            rmse = camera.get(store.RMSE)
             write_camera(
                 files["camera"],
                 videos.camera_path(camera),
                 rmse_px=None if rmse is None else float(rmse),
-                crs=store.read_shift(scene).crs,
+                crs=georeference.read_shift(scene).crs,
                 pose_covariance=videos.pose_covariance(camera),
             )
         track = _track_of(camera)
         if track is not None:
             files["track"] = folder / f"{stem}_track.csv"
             write_track(track, files["track"])
-        events = Path(str(camera.get(EVENTS_FILE_KEY, "")))
+        events = Path(str(camera.get(store.EVENTS_FILE, "")))
         if events.is_file():
             files["events"] = folder / f"{stem}_events.csv"
             shutil.copyfile(events, files["events"])

@@ -7,20 +7,14 @@ import bpy
 import numpy as np
 
 from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
-from ...core.errors import RockfallError
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.terrain.surface import Surface
-from . import fingerprints, migration, models, problems, terrain, trajectories
+from . import fingerprints, migration, models, problems, store, terrain, trajectories
 from . import picks as pick_objects
-from .store import double
-
-SITE_KEY, GRAVITY_KEY = "rockfall_site", "rockfall_gravity_mps2"
-DEFAULT_BLOCK_KEY, NORMAL_RADIUS_KEY = "rockfall_default_block", "rockfall_normal_radius_m"
-BLOCKS_KEY, DRAG_KEY = "rockfall_blocks", "rockfall_drag"  # d1, d2, d3, density by trajectory, as text; ρ, C_D
 
 
 def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Reconstruction:
@@ -37,10 +31,10 @@ def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Rec
         picks,
         surface=ground(scene),
         block=blocks_of(scene, set(picks.trajectory.tolist())),
-        drag=Drag(*list(scene.get(DRAG_KEY, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT)))) if settings.use_drag else None,
-        gravity_mps2=float(scene.get(GRAVITY_KEY, GRAVITY_MPS2)),
-        normal_radius_m=_exact(scene, NORMAL_RADIUS_KEY, settings.normal_radius_m) or None,
-        site=str(scene.get(SITE_KEY, "")),
+        drag=Drag(*list(scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT)))) if settings.use_drag else None,
+        gravity_mps2=float(scene.get(store.GRAVITY, GRAVITY_MPS2)),
+        normal_radius_m=_exact(scene, store.NORMAL_RADIUS, settings.normal_radius_m) or None,
+        site=str(scene.get(store.SITE, "")),
         flights=settings.flights_join,
     )
 
@@ -53,7 +47,7 @@ def ground(scene: bpy.types.Scene) -> Surface | None:
 def blocks_of(scene: bpy.types.Scene, names: set[str]) -> dict[str, Block]:
     """The block of each trajectory: its own, or that of the settings."""
     default = Block(*_default_block(scene))
-    own = json.loads(scene.get(BLOCKS_KEY, "{}"))
+    own = json.loads(scene.get(store.BLOCKS, "{}"))
     return {name: Block(*own[name]) if name in own else default for name in names}
 
 
@@ -64,7 +58,7 @@ def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
     ------
     RockfallError : the twins that were shown cannot be had any more; they are gone, the rest is shown.
     """
-    scene[migration.SCHEMA_KEY] = migration.SCHEMA
+    scene[store.SCHEMA] = migration.SCHEMA
     trajectories.show_reconstruction(scene, result, ground(scene))
     fingerprints.remember_all(scene)
     problems.keep_trajectories(scene, problems.of_result(scene, result))
@@ -81,29 +75,16 @@ def refresh(scene: bpy.types.Scene) -> Reconstruction | None:
     return result
 
 
-def refresh_or_tell(scene: bpy.types.Scene) -> None:
-    """`refresh` for a changed setting, where nobody can catch an error: the panel shows it.
-
-    When one trajectory has a problem, the others still follow.
-    """
-    from . import sync
-
-    try:
-        refresh(scene)
-    except RockfallError:
-        sync.sync(scene, again=True)
-
-
 def keep_settings(scene: bpy.types.Scene, project: Project, names: list[str]) -> None:
     """Store a project's settings in the scene: doubles where they matter, the others where the panels show them."""
     settings, how = scene.rockfall, project.reconstruction
-    scene[SITE_KEY], scene[GRAVITY_KEY] = project.site.name, how.gravity_mps2
-    scene[DRAG_KEY] = [how.air_density_kgpm3, how.drag_coefficient]
+    scene[store.SITE], scene[store.GRAVITY] = project.site.name, how.gravity_mps2
+    scene[store.DRAG] = [how.air_density_kgpm3, how.drag_coefficient]
     blocks = {name: project.block_of(name) for name in names}
-    scene[BLOCKS_KEY] = json.dumps({n: [b.d1_m, b.d2_m, b.d3_m, b.density_kgpm3] for n, b in blocks.items()})
+    scene[store.BLOCKS] = json.dumps({n: [b.d1_m, b.d2_m, b.d3_m, b.density_kgpm3] for n, b in blocks.items()})
     default = project.block
-    scene[DEFAULT_BLOCK_KEY] = [default.d1_m, default.d2_m, default.d3_m, default.density_kgpm3]
-    scene[NORMAL_RADIUS_KEY] = how.normal_radius_m or 0.0
+    scene[store.DEFAULT_BLOCK] = [default.d1_m, default.d2_m, default.d3_m, default.density_kgpm3]
+    scene[store.NORMAL_RADIUS] = how.normal_radius_m or 0.0
     settings.block_diameter_m = (project.block.d1_m + project.block.d2_m + project.block.d3_m) / 3
     settings.density_kgpm3 = project.block.density_kgpm3
     settings.normal_radius_m = how.normal_radius_m or 0.0
@@ -114,14 +95,14 @@ def keep_settings(scene: bpy.types.Scene, project: Project, names: list[str]) ->
 def project_settings(scene: bpy.types.Scene, names: list[str]) -> Project:
     """The settings as a project keeps them; blocks for the trajectories that have their own."""
     settings = scene.rockfall
-    own = json.loads(scene.get(BLOCKS_KEY, "{}"))
-    density, coefficient = scene.get(DRAG_KEY, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))
+    own = json.loads(scene.get(store.BLOCKS, "{}"))
+    density, coefficient = scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))
     return Project(
         block=BlockEntry("", *_default_block(scene)),
         blocks=tuple(BlockEntry(name, *own[name]) for name in dict.fromkeys(names) if name in own),
         reconstruction=ReconstructionSettings(
-            normal_radius_m=_exact(scene, NORMAL_RADIUS_KEY, settings.normal_radius_m) or None,
-            gravity_mps2=float(scene.get(GRAVITY_KEY, GRAVITY_MPS2)),
+            normal_radius_m=_exact(scene, store.NORMAL_RADIUS, settings.normal_radius_m) or None,
+            gravity_mps2=float(scene.get(store.GRAVITY, GRAVITY_MPS2)),
             drag=settings.use_drag,
             drag_coefficient=coefficient,
             air_density_kgpm3=density,
@@ -133,15 +114,15 @@ def project_settings(scene: bpy.types.Scene, names: list[str]) -> Project:
 def _exact(scene: bpy.types.Scene, key: str, typed: float) -> float:
     """The double that is kept for a setting, unless the setting was changed since."""
     kept = scene.get(key)
-    return double(typed) if kept is None or np.float32(kept) != np.float32(typed) else float(kept)
+    return store.double(typed) if kept is None or np.float32(kept) != np.float32(typed) else float(kept)
 
 
 def _default_block(scene: bpy.types.Scene) -> list[float]:
     """d1, d2, d3 [m] and density [kg/m³] of the blocks that have none of their own."""
     settings = scene.rockfall
-    d1, d2, d3, density = scene.get(DEFAULT_BLOCK_KEY, (0.0, 0.0, 0.0, 0.0))
+    d1, d2, d3, density = scene.get(store.DEFAULT_BLOCK, (0.0, 0.0, 0.0, 0.0))
     if np.float32((d1 + d2 + d3) / 3) != np.float32(settings.block_diameter_m):
-        d1 = d2 = d3 = double(settings.block_diameter_m)
+        d1 = d2 = d3 = store.double(settings.block_diameter_m)
     if np.float32(density) != np.float32(settings.density_kgpm3):
-        density = double(settings.density_kgpm3)
+        density = store.double(settings.density_kgpm3)
     return [d1, d2, d3, density]

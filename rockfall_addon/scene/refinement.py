@@ -18,10 +18,8 @@ from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.picks import take
 from ...core.reconstruction.refinement.refine import PixelObservations, Refinement, View, refine
 from ...core.vectors import Array, norm
-from . import fingerprints, observations, picks, reconstruction, sync, trails, videos
+from . import fingerprints, observations, picks, reconstruction, store, sync, trails, videos
 
-PROPOSAL_KEY, PATH_KEY, ROWS_KEY = "rockfall_proposal", "rockfall_proposal_path", "rockfall_proposal_rows"
-POSES_KEY = "rockfall_proposal_poses"
 PROPOSED_COLOUR = (0.2, 0.9, 1.0)
 ROW = 9  # time, x, y, z, its sigma, sigma of the time, normal
 TINY = 1e-9
@@ -85,7 +83,7 @@ def proposal(scene: bpy.types.Scene) -> dict | None:
     names, before_px, after_px, pixels, outliers, by_video {name: px}, picks [[label, cm, ms, ± cm, ± ms]], advice,
     unknowns [[name, value, sigma]], free, stale.
     """
-    text = scene.get(PROPOSAL_KEY)
+    text = scene.get(store.PROPOSAL)
     if not text:
         return None
     kept = json.loads(text)
@@ -94,9 +92,9 @@ def proposal(scene: bpy.types.Scene) -> dict | None:
 
 def proposed_path(scene: bpy.types.Scene) -> tuple[Array, Array, np.ndarray] | None:
     """Points (n, 3) of the proposed flights, their colours (n, 3), and whether each is joined with the next."""
-    if PATH_KEY not in scene:
+    if store.PROPOSAL_PATH not in scene:
         return None
-    rows = np.array(scene[PATH_KEY], dtype=np.float64).reshape(-1, 4)
+    rows = np.array(scene[store.PROPOSAL_PATH], dtype=np.float64).reshape(-1, 4)
     return rows[:, :3], np.tile(PROPOSED_COLOUR, (len(rows), 1)), rows[:, 3] > 0
 
 
@@ -112,18 +110,18 @@ def apply(scene: bpy.types.Scene) -> int:
         raise RockfallError("Nothing is proposed. Refine first.")
     if kept["stale"]:
         raise RockfallError("The picks were changed since this was computed. Refine again.")
-    rows = np.array(scene[ROWS_KEY], dtype=np.float64).reshape(-1, ROW)
-    by_id = {thing.get(picks.ID_KEY): thing for thing in picks.things_of(scene)}
+    rows = np.array(scene[store.PROPOSAL_ROWS], dtype=np.float64).reshape(-1, ROW)
+    by_id = {thing.get(store.ID): thing for thing in picks.things_of(scene)}
     for identifier, row in zip(kept["ids"], rows.tolist(), strict=True):
         thing = by_id[identifier]
-        thing[picks.TIME_KEY] = row[0]
-        thing[picks.POSITION_KEY] = row[1:4]
+        thing[store.TIME] = row[0]
+        thing[store.POSITION] = row[1:4]
         thing.location = row[1:4]
-        for key, value in ((picks.SIGMA_POSITION_KEY, row[4]), (picks.SIGMA_TIME_KEY, row[5])):
+        for key, value in ((store.SIGMA_POSITION, row[4]), (store.SIGMA_TIME, row[5])):
             if np.isfinite(value):
                 thing[key] = [value]
         if np.isfinite(row[6:]).all():  # the place is a radius below the fitted centre, along this very normal
-            thing[picks.NORMAL_KEY] = row[6:]
+            thing[store.NORMAL] = row[6:]
     _apply_shared(scene, kept)
     discard(scene)
     if scene.rockfall.flights_join != kept["ends"]:
@@ -134,7 +132,7 @@ def apply(scene: bpy.types.Scene) -> int:
 
 def discard(scene: bpy.types.Scene) -> None:
     """Forget the proposal."""
-    for key in (PROPOSAL_KEY, PATH_KEY, ROWS_KEY, POSES_KEY):
+    for key in (store.PROPOSAL, store.PROPOSAL_PATH, store.PROPOSAL_ROWS, store.PROPOSAL_POSES):
         if key in scene:
             del scene[key]
 
@@ -181,7 +179,7 @@ def _keep(
     kept = {
         "names": list(used),
         "prints": _prints(scene, used),
-        "ids": [thing[picks.ID_KEY] for thing in things],
+        "ids": [thing[store.ID] for thing in things],
         "ends": found.reconstruction.ends,
         "free": list(free),
         "before_px": found.rmse_px_before,
@@ -196,30 +194,28 @@ def _keep(
         "unknowns": [[name, *pair] for name, pair in found.unknowns.items()],
         "advice": list(found.advice),
         "clocks": {
-            camera[videos.ID_KEY]: [v.clock.offset_s, v.clock.drift, v.clock.origin_s, v.clock.rate]
+            camera[store.ID]: [v.clock.offset_s, v.clock.drift, v.clock.origin_s, v.clock.rate]
             for camera, v in zip(cameras, found.views, strict=True)
         },
         "gravity_mps2": found.reconstruction.gravity_mps2,
         "drag": found.reconstruction.drag.coefficient if found.reconstruction.drag is not None else None,
-        "rmse_px": {
-            camera[videos.ID_KEY]: float(px) for camera, px in zip(cameras, found.rmse_px_by_view, strict=True)
-        },
+        "rmse_px": {camera[store.ID]: float(px) for camera, px in zip(cameras, found.rmse_px_by_view, strict=True)},
     }
-    scene[PROPOSAL_KEY] = json.dumps(kept)
-    scene[ROWS_KEY] = rows.ravel().tolist()
-    scene[PATH_KEY] = _path(found).ravel().tolist()
+    scene[store.PROPOSAL] = json.dumps(kept)
+    scene[store.PROPOSAL_ROWS] = rows.ravel().tolist()
+    scene[store.PROPOSAL_PATH] = _path(found).ravel().tolist()
     if "camera" in free:
         poses = {}
         for camera, view in zip(cameras, found.views, strict=True):
             path, one = view.path, view.path.reference
             if view.pose_covariance is not None:
-                poses[camera[videos.ID_KEY]] = {
+                poses[camera[store.ID]] = {
                     "reference": [*one.position.tolist(), *one.rotation.ravel().tolist()],
                     "position": path.position.ravel().tolist(),
                     "rotation": path.rotation.ravel().tolist(),
                     "covariance": np.asarray(view.pose_covariance).ravel().tolist(),
                 }
-        scene[POSES_KEY] = poses
+        scene[store.PROPOSAL_POSES] = poses
 
 
 def _path(found: Refinement) -> Array:
@@ -245,8 +241,8 @@ def _apply_shared(scene: bpy.types.Scene, kept: dict) -> None:
             if camera is not None:
                 videos.set_clock(camera, Clock(*values))
                 videos.follow_clock(scene, camera)
-    if "camera" in kept["free"] and POSES_KEY in scene:
-        for identifier, poses in scene[POSES_KEY].to_dict().items():
+    if "camera" in kept["free"] and store.PROPOSAL_POSES in scene:
+        for identifier, poses in scene[store.PROPOSAL_POSES].to_dict().items():
             camera = videos.by_id(scene, identifier)
             if camera is None:
                 continue
@@ -262,9 +258,9 @@ def _apply_shared(scene: bpy.types.Scene, kept: dict) -> None:
             rmse_px = kept["rmse_px"][identifier]
             videos.set_camera_path(scene, camera, path, rmse_px=rmse_px, pose_covariance=covariance)
     if "gravity" in kept["free"]:
-        scene[reconstruction.GRAVITY_KEY] = kept["gravity_mps2"]
+        scene[store.GRAVITY] = kept["gravity_mps2"]
     if "drag" in kept["free"] and kept["drag"] is not None:
         density = reconstruction.project_settings(scene, []).reconstruction.air_density_kgpm3
-        scene[reconstruction.DRAG_KEY] = [density, max(kept["drag"], TINY)]
+        scene[store.DRAG] = [density, max(kept["drag"], TINY)]
         if not scene.rockfall.use_drag:
             scene.rockfall.use_drag = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the scene. A number shown here is single precision: `scene.store.double` gives back what was typed."""
+"""Settings of the scene. A number shown here is single precision: `store.double` gives back what was typed."""
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
@@ -8,9 +8,9 @@ from ...core.constants import ROCK_DENSITY_KGPM3
 
 
 def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from . import reconstruction
+    from . import sync
 
-    reconstruction.refresh_or_tell(self.id_data)
+    sync.recompute(self.id_data)
 
 
 def _trails_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:

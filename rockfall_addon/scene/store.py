@@ -1,25 +1,86 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the project keeps in the scene as doubles: the global shift and the clock.
+"""Every name under which the .blend keeps something of ours, and the objects by their role.
 
-Blender's own properties are single precision; ID properties are doubles, are saved in the file and follow undo.
+All of it is stored in ID properties: they hold doubles, are saved in the file and follow undo. The spelling on the
+right is what saved files contain and never changes; `migration` says what is done when the meaning does.
 """
 
 import bpy
 
-from ...core.georeference import GlobalShift
-
-SHIFT_KEY = "rockfall_shift_m"
-CRS_KEY = "rockfall_crs"
-KEYED_RATE_KEY = "rockfall_keyed_rate_hz"
-
-ROLE_KEY = "rockfall_role"
-TERRAIN_ROLE = "terrain"
-PICK_ROLE = "pick"
-BLOCK_ROLE = "block"
-FLIGHTS_ROLE = "flights"
-TWIN_ROLE = "twin"
-TWIN_FLIGHTS_ROLE = "twin_flights"
+# of any object
+ROLE, ID = "rockfall_role", "rockfall_id"
+TERRAIN_ROLE, COARSE_VIEW_ROLE = "terrain", "terrain_view"
+PICK_ROLE, BLOCK_ROLE, FLIGHTS_ROLE = "pick", "block", "flights"
+MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 CAMERA_ROLE = "camera"
+COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
+
+# of the scene: the project
+SCHEMA = "rockfall_schema"
+SHIFT, CRS = "rockfall_shift_m", "rockfall_crs"
+SITE, SITE_DESCRIPTION = "rockfall_site", "rockfall_site_description"
+PICKS_SOURCE = "rockfall_picks_source"
+RENDER_PRESETS = "rockfall_render_presets"
+BEFORE_FILM = "rockfall_film_before"
+WORKSPACE = "rockfall_workspace"  # of the workspace
+
+# of the scene: how trajectories are computed
+GRAVITY, NORMAL_RADIUS = "rockfall_gravity_mps2", "rockfall_normal_radius_m"
+DEFAULT_BLOCK = "rockfall_default_block"  # d1, d2, d3, density
+BLOCKS = "rockfall_blocks"  # d1, d2, d3, density by trajectory, as text
+DRAG = "rockfall_drag"  # density of air, drag coefficient
+TIME_ORIGIN, OFFSETS = "rockfall_time_origin_s", "rockfall_offsets_s"
+KEYED_RATE, TICK_RATE = "rockfall_keyed_rate_hz", "rockfall_tick_rate_hz"
+
+# of the scene: what is shown
+SHOWN, GROUND = "rockfall_shown", "rockfall_ground"  # fingerprints
+PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems"
+SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
+MODEL = "rockfall_model"  # of what a model predicts
+MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
+
+# of a pick; blocks and flights have the trajectory, too
+TRAJECTORY, TIME, POSITION = "rockfall_trajectory", "rockfall_time_s", "rockfall_position_m"
+NORMAL, SPIN = "rockfall_normal", "rockfall_angular_velocity_radps"
+KIND, STATUS = "rockfall_kind", "rockfall_status"
+SIGMA_TIME, SIGMA_POSITION = "rockfall_sigma_time_s", "rockfall_sigma_position_m"
+ROW, EXTRA = "rockfall_row", "rockfall_extra"  # where it stood in a table, and the table's other columns
+KEY_FRAME, PICK_SHIFT = "rockfall_key_frame", "rockfall_pick_shift_m"
+SEEN = "rockfall_seen"  # in which video, frame and pixel
+RESULT = "rockfall_result"
+
+# of a tile of the terrain
+TERRAIN_FILE, TERRAIN_SUMMARY = "rockfall_file", "rockfall_summary"
+THIN_SHARE, REACH = "rockfall_thin_share", "rockfall_reach_m"
+COARSE_VIEW_OF = "rockfall_view_of"  # vertices and triangles of the full mesh, and triangles that were wanted
+
+# of the scene: its videos
+KNOWN_VIDEOS, ACTIVE_CAMERA = (
+    "rockfall_known_videos",
+    "rockfall_active_camera",
+)  # id → file of the cameras it has had: tells a deletion
+EVENTS, EVENTS_FILE = "rockfall_events", "rockfall_events_file"
+SYNCHRONISED, REFERENCE_CAMERA = "rockfall_synchronised", "rockfall_reference_camera"
+
+# of a camera: its video
+VIDEO_FILE, VIDEO_FACTS = "rockfall_video_file", "rockfall_video_facts"
+VIDEO_TIMES, VIDEO_SIZE = "rockfall_video_times_s", "rockfall_video_size"
+CLOCK, CAPTURE_RATE, ROW_TIME = "rockfall_clock", "rockfall_capture_rate_hz", "rockfall_row_time_s"
+STILL, IMAGE_BLEND = "rockfall_still", "rockfall_blend"
+
+# of a camera: where it stood and how it looked
+CAMERA, SOLVED, RMSE = "rockfall_camera", "rockfall_solved", "rockfall_rmse_px"
+POSE_TIMES, POSES = "rockfall_pose_times_s", "rockfall_poses"
+POSE_SIGMA, POSE_COVARIANCE = "rockfall_pose_sigma", "rockfall_pose_covariance"
+CAMERA_SHIFT, ASPECT, REFERENCE_POSE = "rockfall_camera_shift_m", "rockfall_aspect", "rockfall_reference_pose"
+CAMERA_KEYED = "rockfall_camera_keyed"
+PAIRS, OPEN_PAIR, SOLUTION = "rockfall_pairs", "rockfall_open_pair", "rockfall_solution"
+KNOWN_LENS, PLACED, FOLLOWED = "rockfall_known_lens", "rockfall_placed", "rockfall_followed"
+
+# of a camera: where a block is seen, and what its refinement proposes
+TRACK_NAMES, TRACK_ROWS = "rockfall_track_names", "rockfall_track"
+PROPOSAL, PROPOSAL_PATH = "rockfall_proposal", "rockfall_proposal_path"
+PROPOSAL_ROWS, PROPOSAL_POSES = "rockfall_proposal_rows", "rockfall_proposal_poses"
 
 
 def double(value: float) -> float:
@@ -27,43 +88,19 @@ def double(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def has_shift(scene: bpy.types.Scene) -> bool:
-    """Whether the project has its global shift already."""
-    return SHIFT_KEY in scene or "crs x" in scene
-
-
-def read_shift(scene: bpy.types.Scene) -> GlobalShift:
-    """The project's global shift; one left by BlenderGIS is honoured, none means no shift."""
-    if SHIFT_KEY in scene:
-        x, y, z = (float(value) for value in scene[SHIFT_KEY])
-        return GlobalShift(x, y, z, str(scene.get(CRS_KEY, "")))
-    if "crs x" in scene and "crs y" in scene:
-        return GlobalShift(float(scene["crs x"]), float(scene["crs y"]), 0.0, str(scene.get("SRID", "")))
-    return GlobalShift()
-
-
-def write_shift(scene: bpy.types.Scene, shift: GlobalShift) -> None:
-    """Store the global shift, also where BlenderGIS looks for it."""
-    scene[SHIFT_KEY] = [shift.x, shift.y, shift.z]
-    scene[CRS_KEY] = shift.crs
-    scene["crs x"], scene["crs y"] = shift.x, shift.y
-    if shift.crs:
-        scene["SRID"] = shift.crs
-
-
 def with_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
     """The scene's objects of one role, by name."""
-    return sorted((o for o in scene.objects if o.get(ROLE_KEY) == role), key=lambda o: o.name)
+    return sorted((o for o in scene.objects if o.get(ROLE) == role), key=lambda o: o.name)
 
 
 def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
     """The collection at a path below "Rockfall", created where it is missing."""
     parent = scene.collection
     for name in ("Rockfall", *path):
-        child = next((c for c in parent.children if c.get("rockfall_name") == name), None)
+        child = next((c for c in parent.children if c.get(COLLECTION_NAME) == name), None)
         if child is None:
             child = bpy.data.collections.new(name)
-            child["rockfall_name"] = name
+            child[COLLECTION_NAME] = name
             parent.children.link(child)
         parent = child
     return parent
@@ -71,9 +108,9 @@ def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
 
 def remove_collection(scene: bpy.types.Scene, name: str) -> None:
     """Remove a collection below "Rockfall" with those in it; their objects must be gone."""
-    ours = next((c for c in scene.collection.children if c.get("rockfall_name") == "Rockfall"), None)
+    ours = next((c for c in scene.collection.children if c.get(COLLECTION_NAME) == "Rockfall"), None)
     for child in ours.children if ours is not None else ():
-        if child.get("rockfall_name") == name:
+        if child.get(COLLECTION_NAME) == name:
             for each in (*child.children_recursive, child):
                 bpy.data.collections.remove(each)
             return

@@ -16,6 +16,7 @@ import numpy as np
 from ...core.errors import RockfallError
 from . import (
     fingerprints,
+    georeference,
     impact_rows,
     migration,
     models,
@@ -62,9 +63,9 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
         thing = update.id
         if isinstance(thing, bpy.types.Object):
-            role = thing.get(store.ROLE_KEY)
-            if role == store.PICK_ROLE and picks.TRAJECTORY_KEY in thing:
-                names.add(thing[picks.TRAJECTORY_KEY])
+            role = thing.get(store.ROLE)
+            if role == store.PICK_ROLE and store.TRAJECTORY in thing:
+                names.add(thing[store.TRAJECTORY])
             elif role == store.TERRAIN_ROLE:
                 names = None
         elif isinstance(thing, bpy.types.Collection) or (
@@ -120,7 +121,7 @@ def sync(
         return done
     wanted = None if names is None else set(names)
     things = picks.things_of(scene, wanted)
-    if not things and fingerprints.SHOWN_KEY not in scene:
+    if not things and store.SHOWN not in scene:
         return done
     if dragging:
         things, resample = _originals(things), False
@@ -150,6 +151,17 @@ def sync(
     return done
 
 
+def recompute(scene: bpy.types.Scene) -> None:
+    """Reconstruct everything anew, after a setting has changed; the panel shows what cannot be computed.
+
+    When one trajectory has a problem, the others still follow.
+    """
+    try:
+        reconstruction.refresh(scene)
+    except RockfallError:
+        sync(scene, again=True)
+
+
 def retime(thing: bpy.types.Object, text: str) -> None:
     """Give a pick the time that a person has typed; what is no number is not taken."""
     try:
@@ -157,15 +169,15 @@ def retime(thing: bpy.types.Object, text: str) -> None:
     except ValueError:
         return
     if np.isfinite(time):
-        thing[picks.TIME_KEY] = time
+        thing[store.TIME] = time
         for scene in thing.users_scene:
-            touch(scene, [thing[picks.TRAJECTORY_KEY]])
+            touch(scene, [thing[store.TRAJECTORY]])
 
 
 def nudge(scene: bpy.types.Scene, thing: bpy.types.Object, frames: float) -> None:
     """Move a pick in time by (parts of) a frame of the scene."""
-    thing[picks.TIME_KEY] = float(thing[picks.TIME_KEY]) + frames / timing.frame_rate(scene)
-    sync(scene, [thing[picks.TRAJECTORY_KEY]])
+    thing[store.TIME] = float(thing[store.TIME]) + frames / timing.frame_rate(scene)
+    sync(scene, [thing[store.TRAJECTORY]])
 
 
 def _has_changed(
@@ -227,10 +239,10 @@ def _rebuild(
 
 def _pose(scene: bpy.types.Scene, members: list[bpy.types.Object], result: object, offset: float) -> None:
     rate, radius = timing.frame_rate(scene), scene.rockfall.marker_radius_m
-    if store.KEYED_RATE_KEY not in scene:
-        scene[store.KEYED_RATE_KEY] = rate
+    if store.KEYED_RATE not in scene:
+        scene[store.KEYED_RATE] = rate
     for thing, normal in zip(members, trajectories.normals_of(result), strict=True):
-        picks.pose(thing, normal, (float(thing[picks.TIME_KEY]) - offset) * timing.keyed_rate(scene), radius)
+        picks.pose(thing, normal, (float(thing[store.TIME]) - offset) * timing.keyed_rate(scene), radius)
 
 
 def _complete(name: str, parts: trajectories.Parts) -> bool:
@@ -242,7 +254,7 @@ def _grey(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:
     """The last good flights stay, in grey."""
     trail = parts.get((store.FLIGHTS_ROLE, name))
     if trail is not None:
-        trail[trails.STALE_KEY] = True
+        trail[store.STALE] = True
         trails.paint_observed(scene, [trail])
 
 
@@ -257,8 +269,8 @@ def _forget(scene: bpy.types.Scene, name: str) -> None:
 
 def _finish(scene: bpy.types.Scene) -> None:
     """What concerns all trajectories, once nothing moves: the ends of the colour scales, the twins of the models."""
-    scene[migration.SCHEMA_KEY] = migration.SCHEMA
-    last = max((float(thing.get(picks.KEY_FRAME_KEY, 0.0)) for thing in picks.things_of(scene)), default=0.0)
+    scene[store.SCHEMA] = migration.SCHEMA
+    last = max((float(thing.get(store.KEY_FRAME, 0.0)) for thing in picks.things_of(scene)), default=0.0)
     if last > scene.frame_end:
         scene.frame_end = int(np.ceil(last + timing.frame_rate(scene)))
     if trails.set_tops(scene):
@@ -273,38 +285,38 @@ def _finish(scene: bpy.types.Scene) -> None:
 def _ground_changed(scene: bpy.types.Scene) -> bool:
     """Whether there is another terrain than the trajectories were computed with; one that is gone changes nothing."""
     now = fingerprints.ground(scene)
-    if not now or now == scene.get(fingerprints.GROUND_KEY, ""):
+    if not now or now == scene.get(store.GROUND, ""):
         return False
-    scene[fingerprints.GROUND_KEY] = now
+    scene[store.GROUND] = now
     return True
 
 
 def _rate_changed(scene: bpy.types.Scene) -> bool:
     """Whether the flights have their ticks at another frame rate than the scene's."""
     rate = timing.frame_rate(scene)
-    if scene.get(fingerprints.TICK_RATE_KEY) == rate:
+    if scene.get(store.TICK_RATE) == rate:
         return False
-    scene[fingerprints.TICK_RATE_KEY] = rate
+    scene[store.TICK_RATE] = rate
     return True
 
 
 def _heal(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:
     """Copies of picks become picks of their own; picks from another scene come to this one's origin."""
-    shift = store.read_shift(scene).vector
+    shift = georeference.read_shift(scene).vector
     seen: dict[str, bpy.types.Object] = {}
     for thing in sorted(things, key=lambda one: one.session_uid):
-        identifier = thing.get(picks.ID_KEY)
+        identifier = thing.get(store.ID)
         if identifier is None or identifier in seen:
-            thing[picks.ID_KEY] = uuid.uuid4().hex
+            thing[store.ID] = uuid.uuid4().hex
             if identifier is not None:
                 _begin_copy(scene, thing, seen[identifier])
-        seen[thing[picks.ID_KEY]] = thing
-        own = thing.get(picks.PICK_SHIFT_KEY)
+        seen[thing[store.ID]] = thing
+        own = thing.get(store.PICK_SHIFT)
         if own is None:
-            thing[picks.PICK_SHIFT_KEY] = shift.tolist()
+            thing[store.PICK_SHIFT] = shift.tolist()
         elif list(own) != shift.tolist():
-            place = np.array(thing[picks.POSITION_KEY]) + np.array(own) - shift
-            thing[picks.POSITION_KEY], thing[picks.PICK_SHIFT_KEY] = place.tolist(), shift.tolist()
+            place = np.array(thing[store.POSITION]) + np.array(own) - shift
+            thing[store.POSITION], thing[store.PICK_SHIFT] = place.tolist(), shift.tolist()
             thing.location = place
 
 
@@ -312,14 +324,14 @@ def _originals(things: list[bpy.types.Object]) -> list[bpy.types.Object]:
     """Without the copies that a person is just placing: they are picks once they are let go."""
     first: dict[str | None, bpy.types.Object] = {}
     for thing in sorted(things, key=lambda one: one.session_uid):
-        first.setdefault(thing.get(picks.ID_KEY), thing)
+        first.setdefault(thing.get(store.ID), thing)
     return list(first.values())
 
 
 def _begin_copy(scene: bpy.types.Scene, copy: bpy.types.Object, original: bpy.types.Object) -> None:
     """A copy is a pick at the moment that the scene shows, when that is another one than the original's."""
-    copy[picks.ROW_KEY] = 0
+    copy[store.ROW] = 0
     frame = scene.frame_current + scene.frame_subframe
-    kept = original.get(picks.KEY_FRAME_KEY)
-    if kept is not None and abs(frame - kept) > 0.5 and copy[picks.TIME_KEY] == original[picks.TIME_KEY]:
-        copy[picks.TIME_KEY] = float(copy[picks.TIME_KEY]) + (frame - kept) / timing.keyed_rate(scene)
+    kept = original.get(store.KEY_FRAME)
+    if kept is not None and abs(frame - kept) > 0.5 and copy[store.TIME] == original[store.TIME]:
+        copy[store.TIME] = float(copy[store.TIME]) + (frame - kept) / timing.keyed_rate(scene)

@@ -3,7 +3,6 @@
 
 import uuid
 import zlib
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -15,12 +14,8 @@ from ...core.georeference import LARGE_COORDINATE_M
 from ...core.terrain.joining import join, moved
 from ...core.terrain.shading import Shading
 from ...core.terrain.surface import Surface
-from . import materials, store, terrain_look, terrain_view
+from . import georeference, store, terrain_look, terrain_mesh, terrain_view
 
-ID_KEY = "rockfall_id"
-FILE_KEY = "rockfall_file"
-THIN_KEY = "rockfall_thin_share"
-REACH_KEY = "rockfall_reach_m"
 LEAST_THIN = 0.005
 
 
@@ -42,56 +37,22 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
 
     The first terrain gives the project its shift; later ones are moved to it.
     """
-    if store.has_shift(scene):
-        surface = moved(surface, store.read_shift(scene))
+    if georeference.has_shift(scene):
+        surface = moved(surface, georeference.read_shift(scene))
     else:
-        store.write_shift(scene, surface.shift)
-    values = dict(zip(terrain_look.SHADING, (shading.hillshade, shading.eye_dome, shading.thin), strict=True))
-    mesh = new_mesh(surface.name, surface.vertices, surface.faces, values)
+        georeference.write_shift(scene, surface.shift)
+    values = dict(zip(terrain_mesh.SHADING, (shading.hillshade, shading.eye_dome, shading.thin), strict=True))
+    mesh = terrain_mesh.new_mesh(surface.name, surface.vertices, surface.faces, values)
     thing = bpy.data.objects.new(surface.name, mesh)
-    thing[store.ROLE_KEY], thing[ID_KEY] = store.TERRAIN_ROLE, uuid.uuid4().hex
-    thing["rockfall_summary"], thing[FILE_KEY] = list(surface.summary), surface.name
-    thing[THIN_KEY] = float(np.mean(shading.thin))
-    thing[REACH_KEY] = float(np.abs(surface.bounds).max())
+    thing[store.ROLE], thing[store.ID] = store.TERRAIN_ROLE, uuid.uuid4().hex
+    thing[store.TERRAIN_SUMMARY], thing[store.TERRAIN_FILE] = list(surface.summary), surface.name
+    thing[store.THIN_SHARE] = float(np.mean(shading.thin))
+    thing[store.REACH] = float(np.abs(surface.bounds).max())
     store.collection(scene, "Terrain").objects.link(thing)
     _surfaces[_key(thing)] = _Known(surface, _contents(mesh))
     terrain_view.follow(scene)
     terrain_look.apply(scene)
     return thing
-
-
-def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping[str, np.ndarray]) -> bpy.types.Mesh:
-    """A smooth mesh with the terrain's material, the shading values (n,) as attributes, and a relief to be painted."""
-    mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(vertices))
-    mesh.attributes["position"].data.foreach_set("vector", vertices.astype(np.float32).ravel())
-    mesh.loops.add(3 * len(faces))
-    mesh.attributes[".corner_vert"].data.foreach_set("value", faces.astype(np.int32).ravel())
-    mesh.polygons.add(len(faces))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(faces), 3, dtype=np.int32))
-    mesh.update(calc_edges=True)
-    mesh.shade_smooth()
-    for name_, value in values.items():
-        attribute = mesh.attributes.new(name_, "FLOAT", "POINT")
-        attribute.data.foreach_set("value", np.ascontiguousarray(value, dtype=np.float32))
-    mesh.attributes.new(materials.RELIEF_COLOUR, "FLOAT_COLOR", "POINT")
-    mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.RELIEF_COLOUR
-    mesh.materials.append(materials.terrain_material())
-    return mesh
-
-
-def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) in single precision and triangles (m, 3) of a mesh, in its own coordinates."""
-    vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.attributes["position"].data.foreach_get("vector", vertices)  # many times as quick as mesh.vertices
-    if len(mesh.loops) == 3 * len(mesh.polygons):
-        faces = np.empty(len(mesh.loops), dtype=np.int32)
-        mesh.attributes[".corner_vert"].data.foreach_get("value", faces)
-    else:
-        mesh.calc_loop_triangles()
-        faces = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("vertices", faces)
-    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
 
 
 def tiles(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -180,7 +141,7 @@ def warnings(scene: bpy.types.Scene) -> list[str]:
     for tile in store.with_role(scene, store.TERRAIN_ROLE):
         if not has_faces(tile):
             said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
-        reach = float(tile.get(REACH_KEY, 0.0))
+        reach = float(tile.get(store.REACH, 0.0))
         if reach > LARGE_COORDINATE_M:
             step = float(np.spacing(np.float32(reach))) * 1000
             said.append(
@@ -201,7 +162,7 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
             f"The 3-D view draws {grouped(drawn)} of {grouped(faces)} triangles. "
             "Rays, normals and renders use them all."
         )
-    thin = [(len(tile.data.vertices), float(tile.get(THIN_KEY, 0.0))) for tile in grounds]
+    thin = [(len(tile.data.vertices), float(tile.get(store.THIN_SHARE, 0.0))) for tile in grounds]
     share = sum(count * part for count, part in thin) / max(1, sum(count for count, _ in thin))
     if share >= LEAST_THIN:
         said.append(f"{100 * share:.0f} % of the points have thin data (bluish): the surface is guessed there.")
@@ -220,12 +181,12 @@ def grouped(count: int) -> str:
 
 
 def _read(thing: bpy.types.Object) -> Surface:
-    vertices, faces = mesh_arrays(thing.data)
+    vertices, faces = terrain_mesh.mesh_arrays(thing.data)
     world = np.array(thing.matrix_world)
     local = vertices.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
     if np.linalg.det(world[:3, :3]) < 0:  # mirrored: the faces would look into the ground
         faces = np.ascontiguousarray(faces[:, ::-1])
-    return Surface(local, faces, store.read_shift(_scene_of(thing)), thing.name, ())
+    return Surface(local, faces, georeference.read_shift(_scene_of(thing)), thing.name, ())
 
 
 def _forget_gone() -> None:
@@ -238,7 +199,7 @@ def _forget_gone() -> None:
 def _key(thing: bpy.types.Object) -> tuple:
     mesh = thing.data
     place = tuple(round(value, 9) for row in thing.matrix_world for value in row)
-    shift = store.read_shift(_scene_of(thing))
+    shift = georeference.read_shift(_scene_of(thing))
     return mesh.session_uid, len(mesh.vertices), len(mesh.polygons), place, shift
 
 
@@ -248,7 +209,7 @@ def _scene_of(thing: bpy.types.Object) -> bpy.types.Scene:
 
 def _contents(mesh: bpy.types.Mesh) -> tuple[int, int]:
     """Checksums of the coordinates and the corners, some milliseconds for each million triangles."""
-    vertices, faces = mesh_arrays(mesh)
+    vertices, faces = terrain_mesh.mesh_arrays(mesh)
     return zlib.crc32(vertices), zlib.crc32(faces)
 
 

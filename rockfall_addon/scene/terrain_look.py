@@ -10,10 +10,8 @@ from dataclasses import asdict, dataclass
 import bpy
 import numpy as np
 
-from . import materials, store
+from . import materials, store, terrain_mesh
 
-SHADING = ("hillshade", "eye_dome", "thin")
-"""Attributes of a terrain's vertices, 0 … 1."""
 PLAIN_THIN = 5 / 7
 """Where the material hatches half of the thin data, colours are mixed everywhere, somewhat less."""
 
@@ -46,10 +44,8 @@ def apply(scene: bpy.types.Scene) -> None:
 
 def meshes(scene: bpy.types.Scene) -> list[bpy.types.Mesh]:
     """The meshes of the scene's tiles, and those that stand in for them in the 3-D view."""
-    from . import terrain_view
-
     tiles = [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if thing.type == "MESH"]
-    stand_ins = [stand_in for tile in tiles if (stand_in := terrain_view.stand_in(tile)) is not None]
+    stand_ins = [stand_in for tile in tiles if (stand_in := terrain_mesh.stand_in(tile)) is not None]
     return list({thing.data.name: thing.data for thing in (*tiles, *stand_ins)}.values())
 
 
@@ -57,10 +53,10 @@ def paint(which: Iterable[bpy.types.Mesh], look: Look) -> None:
     """Compute the relief colours of meshes anew; a mesh without the shading attributes stays as it is."""
     for mesh in which:
         relief = mesh.attributes.get(materials.RELIEF_COLOUR)
-        if relief is None or any(name not in mesh.attributes for name in SHADING):
+        if relief is None or any(name not in mesh.attributes for name in terrain_mesh.SHADING):
             continue
-        values = np.empty((len(SHADING), len(mesh.vertices)), dtype=np.float32)
-        for row, name in zip(values, SHADING, strict=True):
+        values = np.empty((len(terrain_mesh.SHADING), len(mesh.vertices)), dtype=np.float32)
+        for row, name in zip(values, terrain_mesh.SHADING, strict=True):
             mesh.attributes[name].data.foreach_get("value", row)
         relief.data.foreach_set("color", relief_colours(*values, look).ravel())
         mesh.update_tag()

@@ -10,13 +10,9 @@ import bpy
 import numpy as np
 
 from ...core.terrain.decimation import decimate
-from . import materials, store, terrain_look
+from . import materials, store, terrain_look, terrain_mesh
 
-MODIFIER = "Coarse view"
 GROUP = "Rockfall coarse view"
-STAND_IN = "Coarse mesh"
-VIEW_ROLE = "terrain_view"
-SOURCE_KEY = "rockfall_view_of"  # vertices and triangles of the full mesh, and triangles that were wanted
 SHARE = 3
 """A coarse view has this part of the triangles from which on views are coarse."""
 TOO_FINE = 2.0
@@ -38,67 +34,57 @@ def follow(scene: bpy.types.Scene) -> None:
         wanted = max(1, settings.view_limit // SHARE * len(tile.data.polygons) // total)
         if not _fits(tile, wanted):
             _make(tile, wanted)
-            terrain_look.paint([stand_in(tile).data], terrain_look.look_of(scene))
-        modifier = tile.modifiers[MODIFIER]
+            terrain_look.paint([terrain_mesh.stand_in(tile).data], terrain_look.look_of(scene))
+        modifier = tile.modifiers[terrain_mesh.MODIFIER]
         if modifier.show_viewport == settings.full_resolution:
             modifier.show_viewport = not settings.full_resolution
 
 
-def stand_in(tile: bpy.types.Object) -> bpy.types.Object | None:
-    """The object whose mesh the 3-D view shows in the place of a tile's own, if there is one."""
-    modifier = tile.modifiers.get(MODIFIER)
-    if modifier is None or modifier.type != "NODES" or modifier.node_group is None:
-        return None
-    return materials.get_input(modifier, STAND_IN)
-
-
 def is_coarse(scene: bpy.types.Scene) -> bool:
     """Whether a tile of the scene has a coarse view, be it switched on or off."""
-    return any(MODIFIER in tile.modifiers for tile in store.with_role(scene, store.TERRAIN_ROLE))
+    return any(terrain_mesh.MODIFIER in tile.modifiers for tile in store.with_role(scene, store.TERRAIN_ROLE))
 
 
 def drawn_triangles(tile: bpy.types.Object) -> int:
     """How many triangles the 3-D view draws of a tile."""
-    other = stand_in(tile)
-    coarse = other is not None and tile.modifiers[MODIFIER].show_viewport
+    other = terrain_mesh.stand_in(tile)
+    coarse = other is not None and tile.modifiers[terrain_mesh.MODIFIER].show_viewport
     return len((other if coarse else tile).data.polygons)
 
 
 def _fits(tile: bpy.types.Object, wanted: int) -> bool:
-    other = stand_in(tile)
+    other = terrain_mesh.stand_in(tile)
     if other is None:
         return False
-    vertices, faces, before = other.get(SOURCE_KEY, (0, 0, 0))
+    vertices, faces, before = other.get(store.COARSE_VIEW_OF, (0, 0, 0))
     same = (vertices, faces) == (len(tile.data.vertices), len(tile.data.polygons))
     return same and 1 / TOO_FINE < before / wanted < TOO_FINE
 
 
 def _make(tile: bpy.types.Object, wanted: int) -> None:
     """Make a tile's coarse mesh; its modifier shows it from then on."""
-    from .terrain import mesh_arrays, new_mesh
-
     full = tile.data
-    vertices, faces = mesh_arrays(full)
-    names = [name for name in terrain_look.SHADING if name in full.attributes]
+    vertices, faces = terrain_mesh.mesh_arrays(full)
+    names = [name for name in terrain_mesh.SHADING if name in full.attributes]
     values = np.empty((len(names), len(vertices)), dtype=np.float32)
     for row, name in zip(values, names, strict=True):
         full.attributes[name].data.foreach_get("value", row)
     coarse = decimate(vertices.astype(np.float64), faces, wanted, values.T)
-    mesh = new_mesh(
+    mesh = terrain_mesh.new_mesh(
         f"{full.name} coarse", coarse.vertices, coarse.faces, dict(zip(names, coarse.values.T, strict=True))
     )
     _remove(tile)
     other = bpy.data.objects.new(mesh.name, mesh)
-    other[store.ROLE_KEY] = VIEW_ROLE
-    other[SOURCE_KEY] = [len(full.vertices), len(full.polygons), wanted]
-    modifier = tile.modifiers.new(MODIFIER, "NODES")
+    other[store.ROLE] = store.COARSE_VIEW_ROLE
+    other[store.COARSE_VIEW_OF] = [len(full.vertices), len(full.polygons), wanted]
+    modifier = tile.modifiers.new(terrain_mesh.MODIFIER, "NODES")
     modifier.node_group = _group()
     modifier.show_render = modifier.show_expanded = False
-    materials.set_input(modifier, STAND_IN, other)
+    materials.set_input(modifier, terrain_mesh.STAND_IN, other)
 
 
 def _remove(tile: bpy.types.Object) -> None:
-    other, modifier = stand_in(tile), tile.modifiers.get(MODIFIER)
+    other, modifier = terrain_mesh.stand_in(tile), tile.modifiers.get(terrain_mesh.MODIFIER)
     if modifier is not None:
         tile.modifiers.remove(modifier)
     if other is not None:
@@ -113,7 +99,7 @@ def _group() -> bpy.types.GeometryNodeTree:
     group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")
     group.is_modifier = True
     group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    group.interface.new_socket(STAND_IN, in_out="INPUT", socket_type="NodeSocketObject")
+    group.interface.new_socket(terrain_mesh.STAND_IN, in_out="INPUT", socket_type="NodeSocketObject")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     new, link = group.nodes.new, group.links.new
     source, result, other = new("NodeGroupInput"), new("NodeGroupOutput"), new("GeometryNodeObjectInfo")
@@ -125,7 +111,7 @@ def _group() -> bpy.types.GeometryNodeTree:
     size.component = "MESH"
     there.data_type, there.operation = "INT", "GREATER_THAN"
     choice.input_type = "GEOMETRY"
-    link(source.outputs[STAND_IN], other.inputs["Object"])
+    link(source.outputs[terrain_mesh.STAND_IN], other.inputs["Object"])
     link(other.outputs["Geometry"], size.inputs["Geometry"])
     link(size.outputs["Face Count"], next(s for s in there.inputs if s.enabled and s.name == "A"))
     link(there.outputs["Result"], choice.inputs["Switch"])

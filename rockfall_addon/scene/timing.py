@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 from ...core.reconstruction.picks import Picks
 from . import store
 
-ORIGIN_KEY = "rockfall_time_origin_s"
-OFFSETS_KEY = "rockfall_offsets_s"
-
 
 def frame_rate(scene: bpy.types.Scene) -> float:
     """Frames per second of the scene, with its base (30 000 / 1 001)."""
@@ -25,7 +22,7 @@ def frame_rate(scene: bpy.types.Scene) -> float:
 
 def keyed_rate(scene: bpy.types.Scene) -> float:
     """Frames per second for which our keys are written; differs from `frame_rate` until they have followed a change."""
-    return float(scene.get(store.KEYED_RATE_KEY, 0.0)) or frame_rate(scene)
+    return float(scene.get(store.KEYED_RATE, 0.0)) or frame_rate(scene)
 
 
 def display_offsets(picks: Picks, real_time: bool, stagger_s: float, origin_s: float | None = None) -> dict[str, float]:
@@ -42,7 +39,7 @@ def display_offsets(picks: Picks, real_time: bool, stagger_s: float, origin_s: f
 
 def origin_s(scene: bpy.types.Scene) -> float | None:
     """Clock time of display time 0 when the scene plays as filmed; None when it is the first pick's."""
-    return float(scene[ORIGIN_KEY]) if ORIGIN_KEY in scene else None
+    return float(scene[store.TIME_ORIGIN]) if store.TIME_ORIGIN in scene else None
 
 
 def offsets_of(scene: bpy.types.Scene, picks: Picks) -> dict[str, float]:
@@ -58,12 +55,12 @@ def shown_offsets(scene: bpy.types.Scene, picks: Picks) -> dict[str, float]:
 
 def kept_offsets(scene: bpy.types.Scene) -> dict[str, float]:
     """The offsets with which the scene's keys were written."""
-    return json.loads(scene.get(OFFSETS_KEY, "{}"))
+    return json.loads(scene.get(store.OFFSETS, "{}"))
 
 
 def keep_offsets(scene: bpy.types.Scene, offsets: dict[str, float]) -> None:
     """Remember them: as text, since a trajectory's name may be longer than Blender's names."""
-    scene[OFFSETS_KEY] = json.dumps(offsets)
+    scene[store.OFFSETS] = json.dumps(offsets)
 
 
 def offset_of(scene: bpy.types.Scene, trajectory: str, first_s: float) -> float:
@@ -84,11 +81,11 @@ def offset_of(scene: bpy.types.Scene, trajectory: str, first_s: float) -> float:
 
 def follow_frame_rate(scene: bpy.types.Scene) -> bool:
     """Move all our keys to where their times are at the scene's present frame rate; True when they had to move."""
-    rate, keyed = frame_rate(scene), float(scene.get(store.KEYED_RATE_KEY, 0.0))
+    rate, keyed = frame_rate(scene), float(scene.get(store.KEYED_RATE, 0.0))
     if not keyed or abs(rate - keyed) < 1e-9:
         return False
     factor = rate / keyed
-    roles = (store.BLOCK_ROLE, store.PICK_ROLE, store.TWIN_ROLE)
+    roles = (store.BLOCK_ROLE, store.PICK_ROLE, store.MODEL_BLOCK_ROLE)
     objects = [thing for role in roles for thing in store.with_role(scene, role)]
     actions = {o.animation_data.action for o in objects if o.animation_data and o.animation_data.action}
     for action in actions:
@@ -98,9 +95,9 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
                     for curve in bag.fcurves:
                         _stretch(curve, factor)
     for thing in store.with_role(scene, store.PICK_ROLE):
-        if "rockfall_key_frame" in thing:
-            thing["rockfall_key_frame"] *= factor
-    scene[store.KEYED_RATE_KEY] = rate
+        if store.KEY_FRAME in thing:
+            thing[store.KEY_FRAME] *= factor
+    scene[store.KEYED_RATE] = rate
     scene.frame_end = max(1, round(scene.frame_end * factor))
     return True
 

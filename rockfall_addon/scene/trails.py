@@ -16,7 +16,6 @@ SAME_MOMENT_S = 1e-4
 BELOW_COLOUR = (1.0, 0.0, 0.0)
 STALE_COLOUR = (0.45, 0.45, 0.45)
 BELOW_ATTRIBUTE, DOUBT_ATTRIBUTE = "below_terrain", "doubt"
-MASS_KEY, STALE_KEY = "rockfall_mass_kg", "rockfall_stale"
 DOUBTFUL_SIGMA = 0.2
 """Relative standard deviation of the speed that counts as full doubt."""
 
@@ -71,7 +70,7 @@ def trail(
     edges = np.column_stack([first, first + 1]).astype(np.int32).ravel()
     if thing is None:
         thing = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-        thing[store.ROLE_KEY] = role
+        thing[store.ROLE] = role
     mesh = thing.data
     if len(mesh.vertices) != len(time) or len(mesh.edges) != len(first) or len(mesh.polygons):
         mesh.clear_geometry()
@@ -112,12 +111,12 @@ def paint_observed(scene: bpy.types.Scene, things: Sequence[bpy.types.Object] | 
 
     What passes below the terrain is red in any case, flights that are not up to date are grey.
     """
-    models_shown = bool(store.with_role(scene, store.TWIN_FLIGHTS_ROLE))
+    models_shown = bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE))
     for thing in store.with_role(scene, store.FLIGHTS_ROLE) if things is None else things:
         mesh = thing.data
         if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
             continue
-        if thing.get(STALE_KEY):
+        if thing.get(store.STALE):
             paint(mesh, np.array(STALE_COLOUR))
         elif models_shown:
             paint(mesh, np.array(OBSERVED_COLOUR))
@@ -132,9 +131,9 @@ def set_tops(scene: bpy.types.Scene) -> bool:
     """Set the ends of the colour scales to what is shown; True when they changed."""
     settings, speeds, energies = scene.rockfall, [0.0], [0.0]
     for thing in store.with_role(scene, store.FLIGHTS_ROLE):
-        top = float(thing.get("rockfall_top_speed_mps", 0.0))
+        top = float(thing.get(store.TOP_SPEED, 0.0))
         speeds.append(top)
-        energies.append(0.5 * float(thing.get(MASS_KEY, 0.0)) * top**2 / 1000)
+        energies.append(0.5 * float(thing.get(store.MASS, 0.0)) * top**2 / 1000)
     tops = rounded_top(max(speeds)), rounded_top(max(energies))
     before = settings.speed_top_mps, settings.energy_top_kj
     settings.speed_top_mps, settings.energy_top_kj = tops
@@ -144,7 +143,7 @@ def set_tops(scene: bpy.types.Scene) -> bool:
 def set_trails(scene: bpy.types.Scene) -> None:
     """Apply the trails' radius, their ticks, and whether they end at the current time."""
     settings = scene.rockfall
-    for thing in store.with_role(scene, store.FLIGHTS_ROLE) + store.with_role(scene, store.TWIN_FLIGHTS_ROLE):
+    for thing in store.with_role(scene, store.FLIGHTS_ROLE) + store.with_role(scene, store.MODEL_FLIGHTS_ROLE):
         set_trail(settings, thing)
 
 
@@ -165,8 +164,8 @@ def _colours(settings: bpy.types.PropertyGroup, thing: bpy.types.Object) -> Arra
     if settings.colour_by == "DOUBT" and DOUBT_ATTRIBUTE in mesh.attributes:
         return scale_colours(_read(mesh, DOUBT_ATTRIBUTE), 0.0, 1.0)
     speed = _read(mesh, materials.SPEED_ATTRIBUTE)
-    if settings.colour_by == "ENERGY" and MASS_KEY in thing:
-        return scale_colours(0.5 * float(thing[MASS_KEY]) * speed**2 / 1000, 0.0, settings.energy_top_kj)
+    if settings.colour_by == "ENERGY" and store.MASS in thing:
+        return scale_colours(0.5 * float(thing[store.MASS]) * speed**2 / 1000, 0.0, settings.energy_top_kj)
     return scale_colours(speed, 0.0, settings.speed_top_mps)
 
 

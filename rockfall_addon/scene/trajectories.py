@@ -18,7 +18,6 @@ from ...core.terrain.raycast import heights_above
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array, norm
 from . import impact_rows, keyframes, materials, picks, store, timing, trails
-from .impact_rows import RESULT_KEY
 
 BELOW_RADII = 0.2
 """A point of a flight that is deeper under the terrain than this part of the block's radius is shown as below it."""
@@ -39,7 +38,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
         _choose_sizes(settings, result)
     offsets = timing.offsets_of(scene, result.picks)
     things = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
-    scene[store.KEYED_RATE_KEY] = timing.frame_rate(scene)
+    scene[store.KEYED_RATE] = timing.frame_rate(scene)
     timing.keep_offsets(scene, offsets)
     store_results(things, result)
     parts = parts_of(scene)
@@ -68,17 +67,17 @@ def parts_of(scene: bpy.types.Scene, trajectories: Sequence[str] | None = None) 
     """
     found: dict[tuple[str, str], bpy.types.Object] = {}
     for thing in scene.objects:
-        role = thing.get(store.ROLE_KEY)
+        role = thing.get(store.ROLE)
         if role not in (store.FLIGHTS_ROLE, store.BLOCK_ROLE):
             continue
-        name = thing.get(picks.TRAJECTORY_KEY)
+        name = thing.get(store.TRAJECTORY)
         if name is None or (trajectories is not None and name not in trajectories):
             continue
         other = found.setdefault((role, name), thing)
         if other != thing:
             older, newer = sorted((other, thing), key=lambda each: each.session_uid)
             found[role, name] = older
-            del newer[store.ROLE_KEY]
+            del newer[store.ROLE]
     return found
 
 
@@ -148,11 +147,11 @@ def _show_flights(
     new = thing is None
     bare = new or "Trail" not in thing.modifiers or thing.modifiers["Trail"].node_group is None
     thing = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, pieces, marks, thing)
-    thing[picks.TRAJECTORY_KEY] = name
-    thing[trails.MASS_KEY] = _block_of(result, name).mass_kg
+    thing[store.TRAJECTORY] = name
+    thing[store.MASS] = _block_of(result, name).mass_kg
     ends = np.vstack([flights.start_velocity[which], flights.end_velocity[which]])
-    thing["rockfall_top_speed_mps"] = float(norm(ends).max(initial=0.0))
-    thing.pop(trails.STALE_KEY, None)
+    thing[store.TOP_SPEED] = float(norm(ends).max(initial=0.0))
+    thing.pop(store.STALE, None)
     if new:
         store.collection(scene, "Trajectories", name).objects.link(thing)
     if bare:
@@ -211,7 +210,7 @@ def _show_block(
     scale = scene.rockfall.block_scale
     if thing is None:
         thing = bpy.data.objects.new(f"{name} block", block_mesh())
-        thing[store.ROLE_KEY], thing[picks.TRAJECTORY_KEY] = store.BLOCK_ROLE, name
+        thing[store.ROLE], thing[store.TRAJECTORY] = store.BLOCK_ROLE, name
         store.collection(scene, "Trajectories", name).objects.link(thing)
     thing.scale = np.array([block.d1, block.d2, block.d3]) * scale / 2
     thing.delta_location.z = (scale - 1) * block.radius_m  # an enlarged block must not sink into the slope
@@ -259,9 +258,9 @@ def store_results(things: Sequence[bpy.types.Object], result: Reconstruction) ->
     i = 0
     for thing, kind in zip(things, result.picks.kind.tolist(), strict=True):
         if kind != "impact":
-            thing.pop(RESULT_KEY, None)
+            thing.pop(store.RESULT, None)
             continue
-        thing[RESULT_KEY] = {name: values[i] for name, values in rows.items()} | {
+        thing[store.RESULT] = {name: values[i] for name, values in rows.items()} | {
             "number": int(impacts.impact[i]),
             "flags": flags[i],
         }

@@ -9,10 +9,8 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
 from ...core.footage.clock import Clock, synchronise
-from . import footage, picks, reconstruction, store, timing, videos
+from . import footage, picks, reconstruction, store, videos
 
-EVENTS_KEY, RESULT_KEY = "rockfall_events", "rockfall_synchronised"
-REFERENCE_KEY = "rockfall_reference_camera"
 DRIFT_EVENTS = 3
 
 
@@ -53,7 +51,7 @@ def origin_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     ------
     RockfallError : the picks cannot be shown again.
     """
-    scene[timing.ORIGIN_KEY] = shown_common_s(scene, camera)
+    scene[store.TIME_ORIGIN] = shown_common_s(scene, camera)
     _shown_again(scene)
     go_to(scene, 0.0)
 
@@ -74,7 +72,7 @@ def zero_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     for each in videos.cameras(scene):
         old = videos.clock_of(each)
         videos.set_clock(each, Clock(old.offset_s - zero, old.drift, old.origin_s, old.rate))
-    scene[timing.ORIGIN_KEY] = 0.0
+    scene[store.TIME_ORIGIN] = 0.0
     _shown_again(scene)
     go_to(scene, 0.0)
 
@@ -100,7 +98,7 @@ def use_rate_of(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 def events_of(camera: bpy.types.Object) -> dict[int, float]:
     """Number of an event → video time at which this camera saw it [s]."""
-    return {int(number): float(time) for number, time in json.loads(camera.get(EVENTS_KEY, "{}")).items()}
+    return {int(number): float(time) for number, time in json.loads(camera.get(store.EVENTS, "{}")).items()}
 
 
 def mark_event(scene: bpy.types.Scene, camera: bpy.types.Object, number: int) -> float:
@@ -119,10 +117,10 @@ def clear_event(camera: bpy.types.Object, number: int) -> None:
 
 def reference_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The camera whose clock the others are set by: the chosen one, else the one that was added first."""
-    chosen = videos.by_id(scene, str(scene.get(REFERENCE_KEY, "")))
+    chosen = videos.by_id(scene, str(scene.get(store.REFERENCE_CAMERA, "")))
     if chosen is not None:
         return chosen
-    order = json.loads(scene.get(videos.VIDEOS_KEY, "{}"))
+    order = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
     return next((c for c in (videos.by_id(scene, one) for one in order) if c is not None), None)
 
 
@@ -151,7 +149,7 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]
         videos.set_clock(camera, fit.clock)
         sentence = _sentence(camera, reference, both, fit.residual_s, fit.sigma_offset_s, fit.clock.drift, drifts)
         notes = [note.replace("Event ", "Of the shared events, number ", 1) for note in fit.notes]
-        camera[RESULT_KEY] = "\n".join([sentence, *notes])
+        camera[store.SYNCHRONISED] = "\n".join([sentence, *notes])
         said += [sentence, *notes]
     if not said:
         raise RockfallError(
@@ -164,8 +162,8 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]
 
 def clock_changed(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """A number of the clock was typed: what was said about the fit does not hold any more."""
-    if RESULT_KEY in camera:
-        del camera[RESULT_KEY]
+    if store.SYNCHRONISED in camera:
+        del camera[store.SYNCHRONISED]
     footage.follow(scene)
 
 
@@ -194,7 +192,7 @@ def _frame_sigma_s(camera: bpy.types.Object) -> float:
 
 
 def _keep_events(camera: bpy.types.Object, events: dict[int, float]) -> None:
-    camera[EVENTS_KEY] = json.dumps({str(number): time for number, time in sorted(events.items())})
+    camera[store.EVENTS] = json.dumps({str(number): time for number, time in sorted(events.items())})
 
 
 def _shown_again(scene: bpy.types.Scene) -> None:

@@ -23,18 +23,7 @@ from ...core.footage.advice import content_advice, rate_advice
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import FRAME_AT_TOLERANCE_S, Image, Video, open_video, read_frame
 from ...core.vectors import Array
-from . import camera_keys, migration, picks, store, timing
-
-ID_KEY = picks.ID_KEY
-FILE_KEY, FACTS_KEY = "rockfall_video_file", "rockfall_video_facts"
-TIMES_KEY, SIZE_KEY = "rockfall_video_times_s", "rockfall_video_size"
-CLOCK_KEY, CAPTURE_KEY, ROW_TIME_KEY = "rockfall_clock", "rockfall_capture_rate_hz", "rockfall_row_time_s"
-CAMERA_KEY, SOLVED_KEY, RMSE_KEY = "rockfall_camera", "rockfall_solved", "rockfall_rmse_px"
-POSE_TIMES_KEY, POSES_KEY = "rockfall_pose_times_s", "rockfall_poses"
-POSE_SIGMA_KEY, COVARIANCE_KEY = "rockfall_pose_sigma", "rockfall_pose_covariance"
-SHIFT_KEY, ASPECT_KEY, REFERENCE_KEY = "rockfall_camera_shift_m", "rockfall_aspect", "rockfall_reference_pose"
-VIDEOS_KEY = "rockfall_known_videos"
-"""Id → name of the file, of the cameras that a scene has had; tells when one is deleted."""
+from . import camera_keys, georeference, migration, store, timing
 
 COLLECTION = "Cameras"
 GUESSED_FOCAL = 1.2
@@ -57,8 +46,8 @@ def is_video(thing: bpy.types.Object | None) -> bool:
     return (
         thing is not None
         and thing.type == "CAMERA"
-        and thing.get(store.ROLE_KEY) == store.CAMERA_ROLE
-        and TIMES_KEY in thing
+        and thing.get(store.ROLE) == store.CAMERA_ROLE
+        and store.VIDEO_TIMES in thing
     )
 
 
@@ -71,7 +60,7 @@ def active_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 def by_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
     """The camera of an id."""
-    return next((thing for thing in cameras(scene) if thing.get(ID_KEY) == identifier), None)
+    return next((thing for thing in cameras(scene) if thing.get(store.ID) == identifier), None)
 
 
 def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None = None) -> bpy.types.Object:
@@ -90,7 +79,7 @@ def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None
     others = cameras(scene)
     camera = add_camera(scene, video)
     if others:  # until they are synchronised, they begin together
-        starts = [float(clock_of(other).to_common(float(other[TIMES_KEY][0]))) for other in others]
+        starts = [float(clock_of(other).to_common(float(other[store.VIDEO_TIMES][0]))) for other in others]
         set_clock(camera, Clock(min(starts), 0.0, float(video.time_s[0])))
     if matrix is not None:
         camera.matrix_world = matrix
@@ -107,24 +96,24 @@ def add_camera(scene: bpy.types.Scene, video: Video) -> bpy.types.Object:
     data.show_background_images = True
     camera = bpy.data.objects.new(name, data)
     store.collection(scene, COLLECTION).objects.link(camera)
-    camera[store.ROLE_KEY], camera[ID_KEY] = store.CAMERA_ROLE, uuid.uuid4().hex
-    camera[CLOCK_KEY], camera[CAPTURE_KEY], camera[ROW_TIME_KEY] = [0.0, 0.0, 0.0, 1.0], 0.0, 0.0
-    camera[SOLVED_KEY] = False
+    camera[store.ROLE], camera[store.ID] = store.CAMERA_ROLE, uuid.uuid4().hex
+    camera[store.CLOCK], camera[store.CAPTURE_RATE], camera[store.ROW_TIME] = [0.0, 0.0, 0.0, 1.0], 0.0, 0.0
+    camera[store.SOLVED] = False
     write_video(camera, video)
     focal = GUESSED_FOCAL * video.width
     guess = Camera(video.width, video.height, focal, focal * video.pixel_aspect, video.width / 2, video.height / 2)
     write_lens(camera, guess)
     camera.matrix_world = Matrix(pose_to_blender(guess.position, guess.rotation).tolist())
-    scene[migration.SCHEMA_KEY] = migration.SCHEMA
+    scene[store.SCHEMA] = migration.SCHEMA
     remember(scene, [camera])
     return camera
 
 
 def write_video(camera: bpy.types.Object, video: Video) -> None:
     """Store what is known of the file, and put its clip behind the camera."""
-    camera[FILE_KEY] = str(video.path.resolve())
-    camera[TIMES_KEY] = video.time_s.tolist()
-    camera[SIZE_KEY] = [float(video.width), float(video.height)]
+    camera[store.VIDEO_FILE] = str(video.path.resolve())
+    camera[store.VIDEO_TIMES] = video.time_s.tolist()
+    camera[store.VIDEO_SIZE] = [float(video.width), float(video.height)]
     facts = {
         "codec": video.codec,
         "container": video.container,
@@ -136,13 +125,13 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
         "remarks": content_advice(video),
         "advice": rate_advice(video, capture_rate_hz=capture_rate_of(camera)),
     }
-    camera[FACTS_KEY] = json.dumps(facts)
+    camera[store.VIDEO_FACTS] = json.dumps(facts)
     for old in list(camera.data.background_images):
         old.clip = old.image = None  # removing does not count down their users
         camera.data.background_images.remove(old)
     if not video.path.is_file():  # of a project whose video has moved
         return
-    clip = bpy.data.movieclips.load(camera[FILE_KEY])
+    clip = bpy.data.movieclips.load(camera[store.VIDEO_FILE])
     clip.name = camera.name
     background = camera.data.background_images.new()
     background.source, background.clip = "MOVIE_CLIP", clip
@@ -160,17 +149,17 @@ def summary(camera: bpy.types.Object) -> str:
     """One sentence about a video that was added."""
     (width, height), known = size_of(camera), facts_of(camera)
     rate = f" at {known['rate_hz']:.4g} a second" if known.get("rate_hz") else ""
-    return f"{camera.name}: {width} × {height} px, {len(camera[TIMES_KEY])} frames{rate}."
+    return f"{camera.name}: {width} × {height} px, {len(camera[store.VIDEO_TIMES])} frames{rate}."
 
 
 def facts_of(camera: bpy.types.Object) -> dict:
     """What the file says about itself: codec, container, rotation_deg, header_rate_hz, rate_hz, remarks …"""
-    return json.loads(camera.get(FACTS_KEY, "{}"))
+    return json.loads(camera.get(store.VIDEO_FACTS, "{}"))
 
 
 def file_of(camera: bpy.types.Object) -> Path:
     """The video file, which may have moved; where Blender was told of another place, that."""
-    stored = Path(bpy.path.abspath(str(camera.get(FILE_KEY, ""))))
+    stored = Path(bpy.path.abspath(str(camera.get(store.VIDEO_FILE, ""))))
     clip = clip_of(camera)
     if not stored.is_file() and clip is not None:
         elsewhere = Path(bpy.path.abspath(clip.filepath))
@@ -181,13 +170,13 @@ def file_of(camera: bpy.types.Object) -> Path:
 
 def size_of(camera: bpy.types.Object) -> tuple[int, int]:
     """Width and height of the pictures [px]."""
-    width, height = camera[SIZE_KEY]
+    width, height = camera[store.VIDEO_SIZE]
     return round(width), round(height)
 
 
 def times_of(camera: bpy.types.Object) -> Array:
     """(f,) timestamps of the frames, video time [s]."""
-    return np.array(camera[TIMES_KEY], dtype=np.float64)
+    return np.array(camera[store.VIDEO_TIMES], dtype=np.float64)
 
 
 def stored_step_s(camera: bpy.types.Object) -> float:
@@ -270,12 +259,12 @@ def forget_files() -> None:
 
 def clock_of(camera: bpy.types.Object) -> Clock:
     """From the file's times to the common clock."""
-    return Clock(*(float(value) for value in camera[CLOCK_KEY]))
+    return Clock(*(float(value) for value in camera[store.CLOCK]))
 
 
 def set_clock(camera: bpy.types.Object, clock: Clock) -> None:
     """Store a clock; the camera's keys follow by `follow_clock`, when the scene is drawn next."""
-    camera[CLOCK_KEY] = [clock.offset_s, clock.drift, clock.origin_s, clock.rate]
+    camera[store.CLOCK] = [clock.offset_s, clock.drift, clock.origin_s, clock.rate]
 
 
 def set_capture_rate(camera: bpy.types.Object, capture_rate_hz: float | None) -> None:
@@ -290,19 +279,19 @@ def set_capture_rate(camera: bpy.types.Object, capture_rate_hz: float | None) ->
     old, video = clock_of(camera), stored_video(camera)
     clock = clock_for(video, capture_rate_hz or None, offset_s=old.offset_s, drift=old.drift, origin_s=old.origin_s)
     set_clock(camera, clock)
-    camera[CAPTURE_KEY] = float(capture_rate_hz or 0.0)
+    camera[store.CAPTURE_RATE] = float(capture_rate_hz or 0.0)
     known = facts_of(camera) | {"advice": rate_advice(video, capture_rate_hz=capture_rate_hz or None)}
-    camera[FACTS_KEY] = json.dumps(known)
+    camera[store.VIDEO_FACTS] = json.dumps(known)
 
 
 def capture_rate_of(camera: bpy.types.Object) -> float | None:
     """Pictures per second when filming; None when it is the rate of the file."""
-    return float(camera.get(CAPTURE_KEY, 0.0)) or None
+    return float(camera.get(store.CAPTURE_RATE, 0.0)) or None
 
 
 def row_time_of(camera: bpy.types.Object) -> float:
     """Readout time of one row of the image [s], 0 for a global shutter."""
-    return float(camera.get(ROW_TIME_KEY, 0.0))
+    return float(camera.get(store.ROW_TIME, 0.0))
 
 
 def origin_of(scene: bpy.types.Scene) -> float:
@@ -362,33 +351,33 @@ def scene_frame_of(scene: bpy.types.Scene, camera: bpy.types.Object, index: int)
 
 def is_solved(camera: bpy.types.Object) -> bool:
     """Whether the camera's place is known from alignment, and not only where someone put it."""
-    return bool(camera.get(SOLVED_KEY, False))
+    return bool(camera.get(store.SOLVED, False))
 
 
 def camera_path(camera: bpy.types.Object) -> CameraPath:
     """The camera, local to the scene's shift: the solved one, in doubles; before that, Blender's as it stands."""
     width, height = size_of(camera)
     scene = next(iter(camera.users_scene), bpy.context.scene)
-    shift = store.read_shift(scene)
-    if not is_solved(camera) or CAMERA_KEY not in camera:
+    shift = georeference.read_shift(scene)
+    if not is_solved(camera) or store.CAMERA not in camera:
         aspect = float(facts_of(camera).get("pixel_aspect", 1.0))
         lens = lens_of(camera, aspect)
         return fixed(from_blender_lens(lens, width, height, matrix=np.array(camera.matrix_world), shift=shift))
-    poses = np.array(camera[POSES_KEY], dtype=np.float64).reshape(-1, 12)
+    poses = np.array(camera[store.POSES], dtype=np.float64).reshape(-1, 12)
     position, rotation = poses[:, :3], poses[:, 3:].reshape(-1, 3, 3)
-    sigma = np.array(camera.get(POSE_SIGMA_KEY, np.zeros(2 * len(poses))), dtype=np.float64).reshape(-1, 2)
-    reference = np.array(camera[REFERENCE_KEY], dtype=np.float64)
-    position = position + np.array(camera.get(SHIFT_KEY, shift.vector)) - shift.vector
-    numbers = dict(zip(INTRINSICS, (float(value) for value in camera[CAMERA_KEY]), strict=True))
+    sigma = np.array(camera.get(store.POSE_SIGMA, np.zeros(2 * len(poses))), dtype=np.float64).reshape(-1, 2)
+    reference = np.array(camera[store.REFERENCE_POSE], dtype=np.float64)
+    position = position + np.array(camera.get(store.CAMERA_SHIFT, shift.vector)) - shift.vector
+    numbers = dict(zip(INTRINSICS, (float(value) for value in camera[store.CAMERA]), strict=True))
     one = Camera(
         width=width,
         height=height,
-        position=reference[:3] + np.array(camera.get(SHIFT_KEY, shift.vector)) - shift.vector,
+        position=reference[:3] + np.array(camera.get(store.CAMERA_SHIFT, shift.vector)) - shift.vector,
         rotation=reference[3:].reshape(3, 3),
         shift=shift,
         **numbers,
     )
-    times = np.array(camera[POSE_TIMES_KEY], dtype=np.float64)
+    times = np.array(camera[store.POSE_TIMES], dtype=np.float64)
     return CameraPath(one, times, position, rotation, sigma[:, 0].copy(), sigma[:, 1].copy())
 
 
@@ -417,29 +406,29 @@ def set_camera_path(
             f"This camera is of {width} × {height} px pictures, the video {camera.name} has {w} × {h} px. "
             "Solve the camera with this video."
         )
-    shift, own = store.read_shift(scene), path.reference.shift
+    shift, own = georeference.read_shift(scene), path.reference.shift
     one = path.reference.in_shift(shift)
     position = path.position + own.vector - shift.vector
     f = path.time_s.size
-    camera[CAMERA_KEY] = one.intrinsics.tolist()
-    camera[REFERENCE_KEY] = [*one.position.tolist(), *one.rotation.ravel().tolist()]
-    camera[POSE_TIMES_KEY] = path.time_s.tolist()
-    camera[POSES_KEY] = np.column_stack([position, path.rotation.reshape(f, 9)]).ravel().tolist()
-    camera[POSE_SIGMA_KEY] = np.column_stack([path.sigma_position_m, path.sigma_rotation]).ravel().tolist()
-    camera[SHIFT_KEY] = shift.vector.tolist()
-    for key, value in ((RMSE_KEY, rmse_px), (COVARIANCE_KEY, pose_covariance)):
+    camera[store.CAMERA] = one.intrinsics.tolist()
+    camera[store.REFERENCE_POSE] = [*one.position.tolist(), *one.rotation.ravel().tolist()]
+    camera[store.POSE_TIMES] = path.time_s.tolist()
+    camera[store.POSES] = np.column_stack([position, path.rotation.reshape(f, 9)]).ravel().tolist()
+    camera[store.POSE_SIGMA] = np.column_stack([path.sigma_position_m, path.sigma_rotation]).ravel().tolist()
+    camera[store.CAMERA_SHIFT] = shift.vector.tolist()
+    for key, value in ((store.RMSE, rmse_px), (store.POSE_COVARIANCE, pose_covariance)):
         if value is not None:
-            camera[key] = float(value) if key == RMSE_KEY else np.asarray(value, np.float64).ravel().tolist()
+            camera[key] = float(value) if key == store.RMSE else np.asarray(value, np.float64).ravel().tolist()
         elif key in camera:
             del camera[key]
-    camera[SOLVED_KEY] = True
+    camera[store.SOLVED] = True
     write_lens(camera, one)
     write_keys(scene, camera)
 
 
 def unsolve(camera: bpy.types.Object) -> None:
     """The camera stands where it is shown, free to be moved; what was solved is forgotten."""
-    camera[SOLVED_KEY] = False
+    camera[store.SOLVED] = False
     place = camera.matrix_world.copy()
     camera_keys.clear_keys(camera)
     camera.matrix_world = place
@@ -448,7 +437,7 @@ def unsolve(camera: bpy.types.Object) -> None:
 
 def pose_covariance(camera: bpy.types.Object) -> Array | None:
     """(6, 6) of the solved pose; None when unknown."""
-    return np.array(camera[COVARIANCE_KEY]).reshape(6, 6) if COVARIANCE_KEY in camera else None
+    return np.array(camera[store.POSE_COVARIANCE]).reshape(6, 6) if store.POSE_COVARIANCE in camera else None
 
 
 def write_keys(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
@@ -457,15 +446,15 @@ def write_keys(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     common = clock_of(camera).to_common(path.time_s)
     frames = (common - origin_of(scene)) * timing.frame_rate(scene)
     camera_keys.write(camera, frames, pose_to_blender(path.position, path.rotation))
-    camera[camera_keys.KEYED_KEY] = _keyed_with(scene, camera)
+    camera[store.CAMERA_KEYED] = _keyed_with(scene, camera)
     _lock(camera, True)
 
 
 def follow_clock(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
     """Move the keys of a moving camera to where its clock, the origin and the rate say; True when they had to move."""
-    if not is_solved(camera) or len(camera[POSE_TIMES_KEY]) < 2:
+    if not is_solved(camera) or len(camera[store.POSE_TIMES]) < 2:
         return False
-    if list(camera.get(camera_keys.KEYED_KEY, ())) == _keyed_with(scene, camera):
+    if list(camera.get(store.CAMERA_KEYED, ())) == _keyed_with(scene, camera):
         return False
     write_keys(scene, camera)
     return True
@@ -477,13 +466,13 @@ def write_lens(camera: bpy.types.Object, one: Camera) -> None:
     data.type, data.sensor_fit, data.lens_unit = "PERSP", lens.sensor_fit, "MILLIMETERS"
     data.sensor_width, data.sensor_height, data.lens = lens.sensor_width_mm, lens.sensor_height_mm, lens.lens_mm
     data.shift_x, data.shift_y = lens.shift_x, lens.shift_y
-    camera[ASPECT_KEY] = [lens.aspect_x, lens.aspect_y]
+    camera[store.ASPECT] = [lens.aspect_x, lens.aspect_y]
 
 
 def lens_of(camera: bpy.types.Object, pixel_aspect: float = 1.0) -> BlenderLens:
     """The lens as Blender's camera has it."""
     data = camera.data
-    x, y = camera.get(ASPECT_KEY, (max(1.0, pixel_aspect), max(1.0, 1 / pixel_aspect)))
+    x, y = camera.get(store.ASPECT, (max(1.0, pixel_aspect), max(1.0, 1 / pixel_aspect)))
     return BlenderLens(
         data.lens, data.sensor_width, data.sensor_height, data.sensor_fit, data.shift_x, data.shift_y, x, y
     )
@@ -505,24 +494,24 @@ def scene_rate(rate_hz: float) -> tuple[int, float]:
 
 def remember(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:
     """Remember which cameras there are, beside those that are gone."""
-    known = json.loads(scene.get(VIDEOS_KEY, "{}"))
-    known |= {thing[ID_KEY]: Path(str(thing[FILE_KEY])).name for thing in things}
+    known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
+    known |= {thing[store.ID]: Path(str(thing[store.VIDEO_FILE])).name for thing in things}
     text = json.dumps(known)
-    if scene.get(VIDEOS_KEY) != text:
-        scene[VIDEOS_KEY] = text
+    if scene.get(store.KNOWN_VIDEOS) != text:
+        scene[store.KNOWN_VIDEOS] = text
 
 
 def forget_id(scene: bpy.types.Scene, identifier: str) -> None:
     """A camera that is gone is not missed any more."""
-    known = json.loads(scene.get(VIDEOS_KEY, "{}"))
+    known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
     known.pop(identifier, None)
-    scene[VIDEOS_KEY] = json.dumps(known)
+    scene[store.KNOWN_VIDEOS] = json.dumps(known)
 
 
 def deleted(scene: bpy.types.Scene) -> dict[str, str]:
     """Id → name of the video, of cameras that someone deleted."""
-    there = {thing[ID_KEY] for thing in cameras(scene)}
-    known = json.loads(scene.get(VIDEOS_KEY, "{}"))
+    there = {thing[store.ID] for thing in cameras(scene)}
+    known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
     return {identifier: name for identifier, name in known.items() if identifier not in there}
 
 
@@ -531,8 +520,8 @@ def begin_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     video = stored_video(camera)
     if np.isfinite(video.rate_hz):
         set_scene_rate(scene, video.rate_hz)
-    if timing.ORIGIN_KEY not in scene:
-        scene[timing.ORIGIN_KEY] = 0.0
+    if store.TIME_ORIGIN not in scene:
+        scene[store.TIME_ORIGIN] = 0.0
     if scene.rockfall.playback != "REAL":
         scene.rockfall.playback = "REAL"
     scene.frame_start = int(np.floor(scene_frame_of(scene, camera, 0)))
@@ -541,7 +530,7 @@ def begin_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 
 def _keyed_with(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[float]:
-    return [*(float(value) for value in camera[CLOCK_KEY]), origin_of(scene), timing.frame_rate(scene)]
+    return [*(float(value) for value in camera[store.CLOCK]), origin_of(scene), timing.frame_rate(scene)]
 
 
 def _lock(camera: bpy.types.Object, locked: bool) -> None:

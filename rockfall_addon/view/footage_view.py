@@ -26,6 +26,7 @@ from ..scene import (
     picks,
     reconstruction,
     refinement,
+    store,
     sync,
     trails,
     trajectories,
@@ -120,8 +121,8 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
             _add_seen(found, scene, camera, lens, name, filmed.get(name), video_s)
     for members in things.values():
         for thing in members:
-            near = abs(thing[picks.TIME_KEY] - moment) <= picking.SAME_PICTURE * step
-            if near or thing == active or times[0] - step <= thing[picks.TIME_KEY] <= times[-1] + step:
+            near = abs(thing[store.TIME] - moment) <= picking.SAME_PICTURE * step
+            if near or thing == active or times[0] - step <= thing[store.TIME] <= times[-1] + step:
                 _add_pick(found, lens, thing, near, thing == active)
     if active is not None:
         _add_active(found, scene, camera, lens, active)
@@ -135,8 +136,8 @@ def path_of(scene: bpy.types.Scene, name: str, frames_s: Array | None = None) ->
     """
     how = reconstruction.project_settings(scene, [])
     key = (
-        fingerprints.remembered(scene).get(name), scene.get(fingerprints.GROUND_KEY, ""), how.reconstruction, how.block,
-        scene.rockfall.speed_top_mps, scene.get(reconstruction.BLOCKS_KEY, ""),
+        fingerprints.remembered(scene).get(name), scene.get(store.GROUND, ""), how.reconstruction, how.block,
+        scene.rockfall.speed_top_mps, scene.get(store.BLOCKS, ""),
         None if frames_s is None else zlib.crc32(np.ascontiguousarray(frames_s)),
     )  # fmt: skip
     place = (scene.session_uid, name)
@@ -278,10 +279,10 @@ def _sightings(
     scene: bpy.types.Scene, camera: bpy.types.Object, name: str, seen: observations.Seen, path: Path | None
 ) -> tuple[Array, Array]:
     """Points in space of sightings (m, 3), as deep as the path is then, and of the path (m, 3), NaN where it is not."""
-    rows = np.array(camera[observations.ROWS_KEY], dtype=np.float64)
-    poses = np.array(camera[videos.POSES_KEY], dtype=np.float64)
-    key = (zlib.crc32(rows), zlib.crc32(poses), list(camera[videos.CLOCK_KEY]), id(path))
-    place = (scene.session_uid, camera[videos.ID_KEY], name)
+    rows = np.array(camera[store.TRACK_ROWS], dtype=np.float64)
+    poses = np.array(camera[store.POSES], dtype=np.float64)
+    key = (zlib.crc32(rows), zlib.crc32(poses), list(camera[store.CLOCK]), id(path))
+    place = (scene.session_uid, camera[store.ID], name)
     if place in _seen and _seen[place][0] == key:
         return _seen[place][1]
     viewed = videos.camera_path(camera)
@@ -307,11 +308,11 @@ def _sightings(
 
 
 def _add_pick(found: Drawing, lens: Camera, thing: bpy.types.Object, near: bool, active: bool) -> None:
-    place = thing.location if picks.moved(thing) else thing[picks.POSITION_KEY]
+    place = thing.location if picks.moved(thing) else thing[store.POSITION]
     pixel = project(lens, [list(place)])[0]
     if np.isnan(pixel[0]):
         return
-    colour = picks.MARKER_COLOURS.get(thing[picks.KIND_KEY], (1.0, 1.0, 1.0))
+    colour = picks.MARKER_COLOURS.get(thing[store.KIND], (1.0, 1.0, 1.0))
     found.marks.append(Mark(pixel, "ring", (*colour, 1.0 if near else 0.6), 8.0 if near else 5.0))
     if active:
         found.marks.append(Mark(pixel, "ring", (1.0, 0.65, 0.1, 1.0), 12.0))
@@ -321,8 +322,8 @@ def _add_active(
     found: Drawing, scene: bpy.types.Scene, camera: bpy.types.Object, lens: Camera, thing: bpy.types.Object
 ) -> None:
     """Disc, ellipse and second view of the selected pick."""
-    place = np.array(thing.location if picks.moved(thing) else thing[picks.POSITION_KEY], dtype=np.float64)
-    radius = picking.block_of(scene, thing[picks.TRAJECTORY_KEY]).radius_m
+    place = np.array(thing.location if picks.moved(thing) else thing[store.POSITION], dtype=np.float64)
+    radius = picking.block_of(scene, thing[store.TRAJECTORY]).radius_m
     disc = around(place, np.array(thing.matrix_world.col[2].xyz), radius)
     found.lines.append(_closed(project(lens, disc), (1.0, 0.65, 0.1), 1.0, 0.9))
     sightings = picking.sightings(thing)

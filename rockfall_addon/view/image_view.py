@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...core.camera import model
 from ...core.vectors import Array
-from ..scene import videos
+from ..scene import store, videos
 
 SAME_SHAPE = 1e-3
 
@@ -52,7 +52,7 @@ def image_rectangle(
 def shape_agrees(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
     """Whether the scene's render size has the shape of the video; otherwise footage and terrain would not fit."""
     render, (width, height) = scene.render, videos.size_of(camera)
-    x, y = camera.get(videos.ASPECT_KEY, (1.0, 1.0))
+    x, y = camera.get(store.ASPECT, (1.0, 1.0))
     shape = render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
     return abs(shape * (height * y) / (width * x) - 1) < SAME_SHAPE
 

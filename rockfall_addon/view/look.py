@@ -92,7 +92,7 @@ class ROCKFALL_OT_show_impact(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         pick = context.object
-        return pick is not None and pick.get(store.ROLE_KEY) == store.PICK_ROLE and pick.animation_data is not None
+        return pick is not None and pick.get(store.ROLE) == store.PICK_ROLE and pick.animation_data is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         frame = context.object.animation_data.action.frame_range[0]

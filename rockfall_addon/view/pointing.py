@@ -92,7 +92,7 @@ def pick_at(context: bpy.types.Context, xy: Sequence[float], *, any_time: bool =
     things = [thing for thing in things if thing.visible_get()]
     if not things:
         return None
-    spots = on_screen(context, np.array([list(thing[picks.POSITION_KEY]) for thing in things]))
+    spots = on_screen(context, np.array([list(thing[store.POSITION]) for thing in things]))
     away = np.hypot(*(spots - np.asarray(xy, dtype=np.float64)).T)
     away[np.isnan(away)] = np.inf
     nearest = int(np.argmin(away))
@@ -101,9 +101,9 @@ def pick_at(context: bpy.types.Context, xy: Sequence[float], *, any_time: bool =
 
 def handle_of(context: bpy.types.Context, thing: bpy.types.Object) -> tuple[float, float]:
     """Where a pick is held by the mouse, in the region: by what is clicked in the footage, else by its place."""
-    place, camera = np.array(thing[picks.POSITION_KEY], dtype=np.float64), solved_camera_of(context)
+    place, camera = np.array(thing[store.POSITION], dtype=np.float64), solved_camera_of(context)
     if camera is not None and context.scene.rockfall_picking.aim == "CENTRE":
-        seen = picking.sightings(thing).get(camera[videos.ID_KEY])
+        seen = picking.sightings(thing).get(camera[store.ID])
         rectangle = image_view.image_rectangle(context.region, context.region_data, context.scene, camera)
         if (
             seen is not None
@@ -114,7 +114,7 @@ def handle_of(context: bpy.types.Context, thing: bpy.types.Object) -> tuple[floa
             x, y = image_view.to_region(rectangle, videos.size_of(camera), seen.pixel)
             return float(x), float(y)
         normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
-        radius = picking.block_of(context.scene, thing[picks.TRAJECTORY_KEY]).radius_m
+        radius = picking.block_of(context.scene, thing[store.TRAJECTORY]).radius_m
         place = place + radius * normal / max(float(np.linalg.norm(normal)), 1e-9)
     x, y = on_screen(context, place)[0]
     return float(x), float(y)
@@ -133,7 +133,7 @@ def active_pick(context: bpy.types.Context) -> bpy.types.Object | None:
     """The selected pick."""
     layer = context.view_layer
     thing = layer.objects.active if layer is not None else None
-    if thing is None or thing.get(store.ROLE_KEY) != store.PICK_ROLE or picks.TRAJECTORY_KEY not in thing:
+    if thing is None or thing.get(store.ROLE) != store.PICK_ROLE or store.TRAJECTORY not in thing:
         return None
     return thing
 

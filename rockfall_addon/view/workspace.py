@@ -8,12 +8,11 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import RockfallError
-from ..scene import videos
+from ..scene import store, videos
 from . import image_view
 
 FILE = Path(__file__).parents[2] / "assets" / "workspace.blend"
 NAME = "Rockfall"
-KEY = "rockfall_workspace"
 """Marks our workspace, which its owner may rename."""
 
 PICK_TOOL = "rockfall.pick_tool"
@@ -23,7 +22,7 @@ PROBE = 0.1
 
 def is_open(context: bpy.types.Context) -> bool:
     """Whether the window shows our workspace."""
-    return context.workspace is not None and KEY in context.workspace
+    return context.workspace is not None and store.WORKSPACE in context.workspace
 
 
 def open_workspace(context: bpy.types.Context) -> bool:
@@ -33,7 +32,7 @@ def open_workspace(context: bpy.types.Context) -> bool:
     ------
     RockfallError : its file is missing.
     """
-    ours = next((each for each in bpy.data.workspaces if KEY in each), None)
+    ours = next((each for each in bpy.data.workspaces if store.WORKSPACE in each), None)
     if ours is not None:
         context.window.workspace = ours
         return False

@@ -37,13 +37,15 @@ def camera(part, scene, monkeypatch):
         _opened.update({field.name: getattr(one, field.name) for field in fields(one)})
     kept = video.Video(**_opened)
     monkeypatch.setattr(part("rockfall_addon.scene.videos"), "open_video", lambda path: kept)
-    part("rockfall_addon.scene.store").write_shift(scene, part("core.georeference").GlobalShift(988400, 6375600, 0))
+    part("rockfall_addon.scene.georeference").write_shift(
+        scene, part("core.georeference").GlobalShift(988400, 6375600, 0)
+    )
     return part("rockfall_addon.scene.videos").add_video(scene, FOOTAGE / "footage.mp4")
 
 
 @pytest.fixture
 def table(part, scene):
-    return part("core.exchange.cameras").read_pairs(PAIRS, part("rockfall_addon.scene.store").read_shift(scene))
+    return part("core.exchange.cameras").read_pairs(PAIRS, part("rockfall_addon.scene.georeference").read_shift(scene))
 
 
 @pytest.fixture
@@ -295,7 +297,7 @@ def test_camera_that_is_gone(part, scene, aligned, camera) -> None:
 
 
 def test_video_that_has_moved(part, scene, aligned, table, tmp_path) -> None:
-    part("rockfall_addon.scene.store").write_shift(scene, table.shift)
+    part("rockfall_addon.scene.georeference").write_shift(scene, table.shift)
     file = tmp_path / "clip.mp4"
     shutil.copy(FOOTAGE / "footage.mp4", file)
     camera = part("rockfall_addon.scene.videos").add_video(scene, file)

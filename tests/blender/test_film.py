@@ -71,7 +71,9 @@ def test_camera_shows_every_point_of_the_trajectories(scene, preset, part) -> No
 def test_a_given_camera_stands_in_survey_coordinates(scene, preset, part) -> None:
     from dataclasses import replace
 
-    part("rockfall_addon.scene.store").write_shift(scene, part("core.georeference").GlobalShift(1000.0, 2000.0, 0.0))
+    part("rockfall_addon.scene.georeference").write_shift(
+        scene, part("core.georeference").GlobalShift(1000.0, 2000.0, 0.0)
+    )
     placement = part("core.exchange.project").CameraPlacement((1060.0, 2000.0, 30.0), (1000.0, 2000.0, 30.0), 50.0)
     part("rockfall_addon.steps.film.dressing").set_up_film(scene, replace(preset, camera=placement), "cycles")
     bpy.context.view_layer.update()

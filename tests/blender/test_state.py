@@ -200,7 +200,7 @@ def test_appended_into_a_scene_with_another_origin_and_rate(part, project: Path,
     scene = bpy.context.scene
     scene.render.fps = 50
     shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 390.0)
-    part("rockfall_addon.scene.store").write_shift(scene, shift)
+    part("rockfall_addon.scene.georeference").write_shift(scene, shift)
     with bpy.data.libraries.load(str(tmp_path / "a.blend")) as (source, target):
         target.objects = [name for name in source.objects if name.startswith("A ")]
     for thing in target.objects:

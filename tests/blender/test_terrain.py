@@ -20,7 +20,7 @@ def wave(path: Path) -> np.ndarray:
 def test_mesh_and_shift_give_the_survey_coordinates_back(part, tmp_path: Path) -> None:
     points = wave(tmp_path / "wave.asc")
     assert bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc")) == {"FINISHED"}
-    state, terrain = part("rockfall_addon.scene.store"), part("rockfall_addon.scene.terrain")
+    state, terrain = part("rockfall_addon.scene.georeference"), part("rockfall_addon.scene.terrain")
     ground = terrain.active_terrain(bpy.context.scene)
     coordinates = np.empty(3 * len(ground.data.vertices), dtype=np.float32)
     ground.data.vertices.foreach_get("co", coordinates)
@@ -46,7 +46,7 @@ def test_surface_of_a_mesh_is_the_mesh(part, tmp_path: Path) -> None:
 
 def test_second_tile_uses_the_projects_shift(part, tmp_path: Path) -> None:
     wave(tmp_path / "wave.asc")
-    state = part("rockfall_addon.scene.store")
+    state = part("rockfall_addon.scene.georeference")
     shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 400.0)
     state.write_shift(bpy.context.scene, shift)
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))

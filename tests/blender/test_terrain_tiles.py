@@ -67,7 +67,7 @@ def test_a_tile_in_another_shift_comes_to_the_projects(part, demo) -> None:
     first, second = halves(part, surface)
     other = part("core.georeference").GlobalShift(surface.shift.x - 1000, surface.shift.y + 500, surface.shift.z)
     add(part, [first, part("core.terrain.joining").moved(second, other)])
-    state, terrain = part("rockfall_addon.scene.store"), part("rockfall_addon.scene.terrain")
+    state, terrain = part("rockfall_addon.scene.georeference"), part("rockfall_addon.scene.terrain")
     assert state.read_shift(bpy.context.scene) == surface.shift
     joined = terrain.surface_of_scene(bpy.context.scene)
     np.testing.assert_allclose(joined.bounds, surface.bounds, atol=1e-9)

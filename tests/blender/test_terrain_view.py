@@ -144,7 +144,7 @@ def test_a_coarse_mesh_that_somebody_deletes_shows_the_full_one(part, slope) -> 
     ground, surface, _ = slope
     scene = bpy.context.scene
     scene.rockfall_terrain.view_limit = 12_000
-    bpy.data.objects.remove(part("rockfall_addon.scene.terrain_view").stand_in(ground))
+    bpy.data.objects.remove(part("rockfall_addon.scene.terrain_mesh").stand_in(ground))
     bpy.context.view_layer.update()
     assert drawn(ground) == len(surface.faces)
     scene.rockfall_terrain.brightness = 0.9

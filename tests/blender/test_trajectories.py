@@ -32,7 +32,7 @@ def table(tmp_path: Path) -> Path:
 @pytest.fixture
 def scene(part, table: Path) -> bpy.types.Scene:
     scene = bpy.context.scene
-    part("rockfall_addon.scene.store").write_shift(scene, part("core.georeference").GlobalShift(*SHIFT))
+    part("rockfall_addon.scene.georeference").write_shift(scene, part("core.georeference").GlobalShift(*SHIFT))
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     return scene
 

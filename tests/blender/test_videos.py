@@ -491,7 +491,7 @@ def test_footage_project(part: Part) -> None:
     assert videos.video_time(scene(), camera, 0) == pytest.approx(0.0), "frame 0 is the first picture"
     assert (scene().frame_start, scene().frame_end, scene().render.fps) == (0, 299, 30)
     pairs = part("core.exchange.cameras").read_pairs(
-        DEMO / "footage" / "pairs.csv", part("rockfall_addon.scene.store").read_shift(scene())
+        DEMO / "footage" / "pairs.csv", part("rockfall_addon.scene.georeference").read_shift(scene())
     )
     seen = view.project(scene(), camera, pairs.point, videos.common_time(scene(), 0))
     assert np.sqrt(np.mean((seen - pairs.pixel) ** 2)) < 2.0
@@ -538,7 +538,7 @@ def test_project_goes_out_as_it_came_in(part: Part, tmp_path: Path, moved: bool)
     for name in ("name", "offset_s", "drift", "origin_s", "capture_rate_hz", "row_time_s"):
         assert getattr(after, name) == getattr(before, name)
     assert after.file.resolve() == before.file.resolve()
-    shift = part("rockfall_addon.scene.store").read_shift(scene())
+    shift = part("rockfall_addon.scene.georeference").read_shift(scene())
     first, second = (cameras.read_camera(each.camera, shift) for each in (before, after))
     np.testing.assert_allclose(second.path.position, first.path.position, atol=1e-9)
     np.testing.assert_array_equal(second.path.rotation, first.path.rotation)

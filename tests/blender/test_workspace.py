@@ -134,7 +134,7 @@ def test_the_file_of_the_workspace(rockfall, part, tmp_path: Path) -> None:
         assert not there.scenes
         here.workspaces = there.workspaces
     (ours,) = here.workspaces
-    assert workspace.KEY in ours
+    assert part("rockfall_addon.scene.store").WORKSPACE in ours
     (screen,) = ours.screens
     views = sorted((area for area in screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
     assert len(views) == 2

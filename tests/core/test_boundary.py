@@ -249,3 +249,57 @@ def test_no_step_imports_another() -> None:
             if len(parts) > 3 and target[:2] == parts[:2] and len(target) > 2 and target[2] != parts[2]:
                 wrong.append(f"{Path(*parts)} imports {'.'.join(target)}")
     assert wrong == []
+
+
+STORED = re.compile(r"rockfall_[a-z0-9_]+")
+
+
+def registered_properties(paths: list[Path]) -> set[str]:
+    """Names that the add-on gives to Blender's own types: ``bpy.types.Scene.rockfall_picking = …``."""
+    return {
+        target.attr
+        for path in paths
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Attribute) and ast.unparse(target.value).startswith("bpy.types.")
+    }
+
+
+def stored_names_in(paths: list[Path], known: set[str]) -> list[str]:
+    """Literals spelled like a stored name; properties that Blender registers and names of layout panels are none."""
+    found = []
+    for path in paths:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        panels = {
+            id(node.args[0])
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "panel"
+        }
+        found += [
+            f"{path.name}:{node.lineno}: {node.value}"
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and STORED.fullmatch(node.value)
+            if node.value not in known and id(node) not in panels
+        ]
+    return found
+
+
+def test_stored_names_stand_in_one_place() -> None:
+    store = ROOT / "rockfall_addon" / "scene" / "store.py"
+    paths = list(modules_of("rockfall_addon"))
+    known = registered_properties(paths)
+    assert stored_names_in([path for path in paths if path != store], known) == []
+    names = [line.split(": ")[1] for line in stored_names_in([store], known)]
+    assert len(names) == len(set(names)) > 60
+    assert not known & set(names)
+
+
+def test_stored_names_elsewhere_are_found(tmp_path: Path) -> None:
+    """The check itself: a key is found, a registered property and a panel's name are not taken for one."""
+    path = tmp_path / "panel.py"
+    path.write_text(
+        "import bpy\nbpy.types.Scene.rockfall_rows = 1\nthing['rockfall_time_s'] = 'rockfall: ready'\n"
+        "layout.panel('rockfall_more')\nlayout.prop(scene, 'rockfall_rows')\n"
+    )
+    assert stored_names_in([path], registered_properties([path])) == ["panel.py:3: rockfall_time_s"]

@@ -19,7 +19,7 @@ def start(window):
     scene = bpy.context.scene
     opening, project = window.part("core.exchange.opening"), window.part("core.exchange.project")
     surface, result = opening.open_project(project.read_project(DEMO / "project.toml"))
-    window.part("rockfall_addon.scene.store").write_shift(scene, result.picks.shift)
+    window.part("rockfall_addon.scene.georeference").write_shift(scene, result.picks.shift)
     shading = window.part("core.terrain.shading").shade(surface)
     window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
     camera = window.part("rockfall_addon.scene.videos").add_video(scene, FOOTAGE / "footage.mp4")
@@ -43,7 +43,7 @@ def region_of(area):
 
 
 def table(window):
-    shift = window.part("rockfall_addon.scene.store").read_shift(bpy.context.scene)
+    shift = window.part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene)
     return window.part("core.exchange.cameras").read_pairs(FOOTAGE / "pairs.csv", shift)
 
 

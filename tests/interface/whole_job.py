@@ -139,7 +139,7 @@ def impacts():
 
 def misses(window):
     """Distances of the picks from where the block truly touched the ground [m]."""
-    shift = window.part("rockfall_addon.scene.store").read_shift(bpy.context.scene).vector
+    shift = window.part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene).vector
     axes = ("contact_x_m", "contact_y_m", "contact_z_m")
     truth = np.array([[float(row[name]) for name in axes] for row in impacts()]) - shift
     return np.linalg.norm([list(thing["rockfall_position_m"]) for thing in picking.picks()] - truth, axis=1)

@@ -16,8 +16,8 @@ def region(area, kind):
 def open_it(window):
     with window.override():
         assert bpy.ops.rockfall.open_workspace() == {"FINISHED"}
-    workspace = window.part("rockfall_addon.view.workspace")
-    yield from window.wait_for(lambda: workspace.KEY in window.window.workspace, what="the workspace")
+    store = window.part("rockfall_addon.scene.store")
+    yield from window.wait_for(lambda: store.WORKSPACE in window.window.workspace, what="the workspace")
     yield 1.5
 
 

@@ -12,7 +12,7 @@ from ....core.errors import InputError
 from ....core.exchange.cameras import Pairs, read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
 from ....core.vectors import distance_to_ray
-from ...scene import alignment, migration, store, videos
+from ...scene import alignment, georeference, migration, store, videos
 
 
 def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:
@@ -23,9 +23,9 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
     RockfallError : the table is bad, or a pixel is outside of the video's picture. Nothing has changed.
     """
     migration.refuse_newer(scene)
-    table = read_pairs(path, store.read_shift(scene) if store.has_shift(scene) else None)
+    table = read_pairs(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
     (width, height), shown = videos.size_of(camera), videos.true_frame(scene, camera)
-    frames = len(camera[videos.TIMES_KEY])
+    frames = len(camera[store.VIDEO_TIMES])
     pairs, added = alignment.pairs_of(camera), []
     for i, pixel in enumerate(table.pixel):
         if not (0 <= pixel[0] <= width and 0 <= pixel[1] <= height):
@@ -49,8 +49,8 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
                 sigma_m=float(table.sigma_m[i]),
             )
         )
-    if not store.has_shift(scene):
-        store.write_shift(scene, table.shift)
+    if not georeference.has_shift(scene):
+        georeference.write_shift(scene, table.shift)
     alignment.keep_pairs(camera, [*pairs, *added])
     alignment.solve(scene, camera)
     return len(added)
@@ -78,7 +78,7 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
     RockfallError : the file is bad, or of another size of picture.
     """
     migration.refuse_newer(scene)
-    file = read_camera(path, store.read_shift(scene) if store.has_shift(scene) else None)
+    file = read_camera(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
     one, settings = file.path.reference, camera.rockfall_alignment
     if one.size != videos.size_of(camera):
         width, height = videos.size_of(camera)
@@ -92,12 +92,12 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
     if lens_only:
         alignment.set_lens(scene, camera, one.intrinsics)
         return
-    if not store.has_shift(scene):
-        store.write_shift(scene, one.shift)
+    if not georeference.has_shift(scene):
+        georeference.write_shift(scene, one.shift)
     if not file.path.is_fixed and settings.motion == "FIXED":
         settings.motion = "ROTATION"
     videos.set_camera_path(scene, camera, file.path, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
-    camera[alignment.PLACED_KEY] = alignment.FROM_FILE
+    camera[store.PLACED] = alignment.FROM_FILE
     alignment.keep_check(camera, alignment.Solution(rmse_px=_number(file.rmse_px), sigma=dict(file.sigma)))
 
 
@@ -137,7 +137,7 @@ def _table(scene: bpy.types.Scene, camera: bpy.types.Object, path: Path) -> Pair
         used=np.array([pair.enabled for pair in complete], dtype=np.bool_),
         row=np.arange(2, n + 2),
         source=path,
-        shift=store.read_shift(scene),
+        shift=georeference.read_shift(scene),
     )
 
 

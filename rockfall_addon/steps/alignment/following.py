@@ -22,7 +22,7 @@ from ....core.footage.video import Video
 from ....core.terrain.raycast import cast_rays
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
-from ...scene import alignment, migration, terrain, videos
+from ...scene import alignment, migration, store, terrain, videos
 
 KEPT = 2
 
@@ -146,16 +146,16 @@ def compute(task: Task, progress: Callable[[str], None]) -> SolvedMotion | None:
 
 def apply(scene: bpy.types.Scene, camera: bpy.types.Object, task: Task, found: SolvedMotion | None) -> str:
     """Give the camera the poses that were found; returns a sentence about them."""
-    frames = len(camera[videos.TIMES_KEY])
+    frames = len(camera[store.VIDEO_TIMES])
     path = fixed(task.camera) if found is None else found.path
     videos.set_camera_path(
         scene,
         camera,
         path,
-        rmse_px=camera.get(videos.RMSE_KEY),
+        rmse_px=camera.get(store.RMSE),
         pose_covariance=videos.pose_covariance(camera),
     )
-    camera[alignment.FOLLOWED_KEY] = json.dumps(
+    camera[store.FOLLOWED] = json.dumps(
         {
             "reference": task.reference,
             "frames": frames,
@@ -175,7 +175,7 @@ def apply(scene: bpy.types.Scene, camera: bpy.types.Object, task: Task, found: S
 
 def followed(camera: bpy.types.Object) -> dict | None:
     """What the last following said: reference, frames, focal, turn_deg, features, residual_px, sigma_px, advice."""
-    return json.loads(camera[alignment.FOLLOWED_KEY]) if alignment.FOLLOWED_KEY in camera else None
+    return json.loads(camera[store.FOLLOWED]) if store.FOLLOWED in camera else None
 
 
 def is_stale(camera: bpy.types.Object) -> bool:

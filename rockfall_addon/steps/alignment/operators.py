@@ -8,7 +8,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 from ....core.errors import RockfallError
-from ...scene import alignment, footage_blend, terrain, videos
+from ...scene import alignment, footage_blend, store, terrain, videos
 from ...view import image_view, look
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
@@ -45,8 +45,8 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
     @reported
     def _begin(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        self._known = alignment.pairs_of(camera), str(camera.get(alignment.OPEN_KEY, ""))
-        self._camera = camera[videos.ID_KEY]
+        self._known = alignment.pairs_of(camera), str(camera.get(store.OPEN_PAIR, ""))
+        self._camera = camera[store.ID]
         rectangle = image_view.image_rectangle(context.region, context.region_data, scene, camera)
         if rectangle is None and context.region_data.view_perspective == "CAMERA":
             raise RockfallError(
@@ -101,7 +101,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
             return {"FINISHED"}
         elif event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
             pairs, opened = self._known
-            camera[alignment.OPEN_KEY] = opened
+            camera[store.OPEN_PAIR] = opened
             alignment.keep_pairs(camera, pairs)
             alignment.solve(context.scene, camera)
             self._show(context)
@@ -375,7 +375,7 @@ class ROCKFALL_OT_follow_background(bpy.types.Operator):
     @reported
     def _begin(self, context: bpy.types.Context) -> set[str]:
         camera = videos.active_camera(context.scene)
-        self._camera, self._scene = camera[videos.ID_KEY], context.scene.name
+        self._camera, self._scene = camera[store.ID], context.scene.name
         self._job = following.Job(following.prepare(context.scene, camera))
         following.running[:] = [self._job]
         self._job.start()

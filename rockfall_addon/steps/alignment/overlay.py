@@ -14,7 +14,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ...scene import alignment, problems, videos
+from ...scene import alignment, problems, store, videos
 from ...view import image_view
 
 TOOL = "rockfall.align_tool"
@@ -211,7 +211,7 @@ def _draw_wipe(context: bpy.types.Context, camera: bpy.types.Object, rectangle: 
     """The footage, drawn by us, to the left of the line."""
     share, scale = camera.rockfall_alignment.wipe, context.preferences.system.ui_scale
     frame = videos.true_frame(context.scene, camera)
-    key = (camera[videos.ID_KEY], frame)
+    key = (camera[store.ID], frame)
     if key not in _textures:
         _textures.clear()
         picture = videos.picture(camera, frame)[::-1].astype(np.float32) / 255.0

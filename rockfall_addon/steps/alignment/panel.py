@@ -5,7 +5,7 @@ import math
 
 import bpy
 
-from ...scene import alignment, store, videos
+from ...scene import alignment, georeference, videos
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 from . import following
 
@@ -239,7 +239,7 @@ class ROCKFALL_PT_alignment_files(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, camera = self.layout, videos.active_camera(context.scene)
         if videos.is_solved(camera):
-            place = store.read_shift(context.scene).to_survey(videos.camera_path(camera).reference.position)
+            place = georeference.read_shift(context.scene).to_survey(videos.camera_path(camera).reference.position)
             sigma = alignment.solution_of(camera).sigma or {}
             rows = []
             for axis, value in zip("xyz", place.tolist(), strict=True):

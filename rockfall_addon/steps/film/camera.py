@@ -13,7 +13,7 @@ from ....core.film.framing import Margins, Seen, View, downhill_direction, look_
 from ....core.terrain.raycast import cast_rays
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
-from ...scene import store, terrain
+from ...scene import georeference, store, terrain
 from .motions import Motion
 
 FRAMED_POINTS, WATCHED_POINTS = 2000, 160
@@ -50,7 +50,7 @@ def automatic_view(scene: bpy.types.Scene, motions: list[Motion], aspect: float,
 
 def given_view(scene: bpy.types.Scene, placement: CameraPlacement, aspect: float) -> View:
     """The view of a preset, whose coordinates are those of the survey."""
-    shift = store.read_shift(scene)
+    shift = georeference.read_shift(scene)
     position, target = (shift.to_local(np.array(place)) for place in (placement.position, placement.target))
     return look_at(position, target, float(np.radians(placement.fov_deg)), aspect)
 

@@ -12,7 +12,6 @@ from ....core.film.presets import FilmTiming
 from ....core.film.wording import compared_lines, fastest_speed, notes
 from ....core.impact_models.registry import find_model
 from ...scene import models, store, timing
-from ...scene.reconstruction import SITE_KEY
 from . import camera, layout, marks, presence, remembered
 from .engine import use_engine
 from .motions import Motion, motions_of
@@ -200,7 +199,7 @@ def _sheet(
 
 
 def _add(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
-    thing[store.ROLE_KEY] = FILM_ROLE
+    thing[store.ROLE] = FILM_ROLE
     thing.hide_select = thing.type != "CAMERA"
     store.collection(scene, "Film").objects.link(thing)
 
@@ -228,7 +227,7 @@ def _sources(names: tuple[str, ...]) -> tuple[layout.Source, ...]:
 
 
 def _title(scene: bpy.types.Scene) -> str:
-    return str(scene.get(SITE_KEY, "")) or "Rockfall"
+    return str(scene.get(store.SITE, "")) or "Rockfall"
 
 
 def _count(motions: list[Motion]) -> str:

@@ -14,7 +14,7 @@ COLOUR = (0.96, 0.96, 0.96)
 
 def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | None:
     """One mesh of a ring for each impact; None when there is none."""
-    things = [o for o in store.with_role(scene, store.PICK_ROLE) if o["rockfall_kind"] == "impact"]
+    things = [o for o in store.with_role(scene, store.PICK_ROLE) if o[store.KIND] == "impact"]
     if not things:
         return None
     angles = np.linspace(0.0, 2 * np.pi, CORNERS, endpoint=False)

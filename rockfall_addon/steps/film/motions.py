@@ -31,7 +31,7 @@ def _read(thing: bpy.types.Object) -> Motion:
     places = np.empty(3 * count, dtype=np.float32)
     mesh.vertices.foreach_get("co", places)
     time, speed = (_values(mesh, name, count) for name in (materials.TIME_ATTRIBUTE, materials.SPEED_ATTRIBUTE))
-    return Motion(str(thing["rockfall_trajectory"]), time, places.reshape(-1, 3).astype(np.float64), speed)
+    return Motion(str(thing[store.TRAJECTORY]), time, places.reshape(-1, 3).astype(np.float64), speed)
 
 
 def _values(mesh: bpy.types.Mesh, name: str, count: int) -> Array:

@@ -15,7 +15,7 @@ def show_while_moving(scene: bpy.types.Scene, motions: list[Motion]) -> None:
     rate = timing.frame_rate(scene)
     resting = _resting(scene)
     for thing in store.with_role(scene, store.BLOCK_ROLE):
-        motion = next((each for each in motions if each.name == thing["rockfall_trajectory"]), None)
+        motion = next((each for each in motions if each.name == thing[store.TRAJECTORY]), None)
         if motion is None:
             continue
         start, end = float(motion.time_s[0]) * rate, float(motion.time_s[-1] + LINGER_S) * rate
@@ -40,10 +40,10 @@ def _resting(scene: bpy.types.Scene) -> set[str]:
     """Trajectories whose last pick is a stop."""
     last: dict[str, bpy.types.Object] = {}
     for thing in store.with_role(scene, store.PICK_ROLE):
-        name = thing["rockfall_trajectory"]
-        if name not in last or thing["rockfall_time_s"] > last[name]["rockfall_time_s"]:
+        name = thing[store.TRAJECTORY]
+        if name not in last or thing[store.TIME] > last[name][store.TIME]:
             last[name] = thing
-    return {name for name, thing in last.items() if thing["rockfall_kind"] == "stop"}
+    return {name for name, thing in last.items() if thing[store.KIND] == "stop"}
 
 
 def _remove_curve(thing: bpy.types.Object, name: str) -> None:

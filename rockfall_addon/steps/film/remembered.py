@@ -3,7 +3,7 @@
 
 import bpy
 
-BEFORE_KEY = "rockfall_film_before"
+from ...scene import store
 
 SETTINGS = (
     "render.engine", "render.resolution_x", "render.resolution_y", "render.resolution_percentage",
@@ -16,20 +16,20 @@ SETTINGS = (
 
 
 def is_set_up(scene: bpy.types.Scene) -> bool:
-    return BEFORE_KEY in scene
+    return store.BEFORE_FILM in scene
 
 
 def remember(scene: bpy.types.Scene) -> None:
     """Keep the settings, unless they are kept already."""
-    if BEFORE_KEY not in scene:
+    if store.BEFORE_FILM not in scene:
         values = {name: getattr(*_owner(scene, name)) for name in SETTINGS}
-        scene[BEFORE_KEY] = {**values, "camera": scene.camera.name if scene.camera else ""}
+        scene[store.BEFORE_FILM] = {**values, "camera": scene.camera.name if scene.camera else ""}
 
 
 def put_back(scene: bpy.types.Scene) -> None:
     """Restore what was kept."""
-    before = scene[BEFORE_KEY].to_dict()
-    del scene[BEFORE_KEY]
+    before = scene[store.BEFORE_FILM].to_dict()
+    del scene[store.BEFORE_FILM]
     scene.camera = scene.objects.get(before.pop("camera"))
     for name, value in before.items():
         owner, attribute = _owner(scene, name)
@@ -44,4 +44,4 @@ def _owner(scene: bpy.types.Scene, name: str) -> tuple[bpy.types.bpy_struct, str
 
 def value(scene: bpy.types.Scene, name: str) -> object:
     """A setting as it was before."""
-    return scene[BEFORE_KEY][name]
+    return scene[store.BEFORE_FILM][name]

@@ -67,7 +67,7 @@ class ROCKFALL_OT_nudge_pick_time(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         pick = context.object
-        if pick is not None and pick.get(store.ROLE_KEY) == store.PICK_ROLE:
+        if pick is not None and pick.get(store.ROLE) == store.PICK_ROLE:
             return True
         cls.poll_message_set("Select a pick first")
         return False

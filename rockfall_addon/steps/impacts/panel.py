@@ -7,7 +7,6 @@ import bpy
 
 from ....core.reconstruction.summary import MEANINGS
 from ...scene import store
-from ...scene.impact_rows import RESULT_KEY
 from ...view.panel import RockfallPanel, facts, paragraph
 
 FLAG_WORDS = {
@@ -48,13 +47,13 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, pick = self.layout, context.object
-        if pick is None or pick.get(store.ROLE_KEY) != store.PICK_ROLE or "rockfall_trajectory" not in pick:
+        if pick is None or pick.get(store.ROLE) != store.PICK_ROLE or store.TRAJECTORY not in pick:
             layout.label(text="Click a disc on the slope.", icon="RESTRICT_SELECT_OFF")
             return
-        result = pick.get(RESULT_KEY)
+        result = pick.get(store.RESULT)
         number = f", impact {result['number']}" if result is not None else ""
         row = layout.row(align=True)
-        row.label(text=f"{pick['rockfall_trajectory']}{number}")
+        row.label(text=f"{pick[store.TRAJECTORY]}{number}")
         row.operator("rockfall.show_impact", text="", icon="TIME")
         _draw_editable(layout, pick.rockfall_pick)
         if result is None:

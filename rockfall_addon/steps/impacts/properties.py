@@ -8,6 +8,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ....core.reconstruction.picks import KINDS, STATUSES
+from ...scene import store
 
 CONFIDENCES = ("", "1", "2", "3")
 
@@ -20,22 +21,22 @@ def _edited(thing: bpy.types.Object) -> None:
 
 
 def _get_kind(self: bpy.types.PropertyGroup) -> int:
-    kind = self.id_data.get("rockfall_kind", "impact")
+    kind = self.id_data.get(store.KIND, "impact")
     return KINDS.index(kind) if kind in KINDS else 0
 
 
 def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
-    self.id_data["rockfall_kind"] = KINDS[value]
+    self.id_data[store.KIND] = KINDS[value]
     _edited(self.id_data)
 
 
 def _get_status(self: bpy.types.PropertyGroup) -> int:
-    status = self.id_data.get("rockfall_status", "ok")
+    status = self.id_data.get(store.STATUS, "ok")
     return STATUSES.index(status) if status in STATUSES else 0
 
 
 def _set_status(self: bpy.types.PropertyGroup, value: int) -> None:
-    self.id_data["rockfall_status"] = STATUSES[value]
+    self.id_data[store.STATUS] = STATUSES[value]
     _edited(self.id_data)
 
 
@@ -66,7 +67,7 @@ def _set_note(self: bpy.types.PropertyGroup, value: str) -> None:
 
 
 def _get_time(self: bpy.types.PropertyGroup) -> str:
-    return repr(float(self.id_data.get("rockfall_time_s", 0.0)))
+    return repr(float(self.id_data.get(store.TIME, 0.0)))
 
 
 def _set_time(self: bpy.types.PropertyGroup, value: str) -> None:

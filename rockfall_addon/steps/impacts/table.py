@@ -147,7 +147,7 @@ class ROCKFALL_UL_impacts(bpy.types.UIList):
 
     def filter_items(self, context: bpy.types.Context, data: bpy.types.Scene, name: str) -> tuple[list[int], list[int]]:
         pick = impact_rows.selected(context)
-        trajectory = pick["rockfall_trajectory"] if pick is not None else None
+        trajectory = pick[store.TRAJECTORY] if pick is not None else None
         shown, place = arranged(list(getattr(data, name)), context.scene.rockfall, trajectory)
         return [self.bitflag_filter_item if seen else 0 for seen in shown], place
 

@@ -5,7 +5,7 @@ import bpy
 from bpy.props import EnumProperty
 
 from ....core.errors import RockfallError
-from ...scene import observations, picking, picks
+from ...scene import observations, picking, picks, store
 from ...view import pointing
 from ...view.reporting import reported
 from .properties import KINDS
@@ -91,9 +91,9 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         else:
             self._kept, self._moved, self._place = picking.snapshot(thing), False, None
             self._xy = pointing.handle_of(context, thing)  # held by its middle: it does not jump
-            scene.rockfall_picking.trajectory = thing[picks.TRAJECTORY_KEY]
+            scene.rockfall_picking.trajectory = thing[store.TRAJECTORY]
         pointing.select(context, thing)
-        self._identifier = thing[picks.ID_KEY]
+        self._identifier = thing[store.ID]
         return True
 
     def _observe(self, context: bpy.types.Context, name: str) -> None:
@@ -109,7 +109,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
 
     def _follow(self, context: bpy.types.Context, thing: bpy.types.Object) -> None:
         try:
-            self._place = pointing.place_at(context, self._xy, thing[picks.TRAJECTORY_KEY])
+            self._place = pointing.place_at(context, self._xy, thing[store.TRAJECTORY])
         except RockfallError:
             return  # off the terrain: it waits where it is
         thing.location = self._place.position
@@ -140,7 +140,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         if thing not in picking.in_this_picture(scene, camera):
             return
         try:
-            place = pointing.place_at(context, self._press, thing[picks.TRAJECTORY_KEY])
+            place = pointing.place_at(context, self._press, thing[store.TRAJECTORY])
         except RockfallError as error:
             self.report({"WARNING"}, str(error))
             return

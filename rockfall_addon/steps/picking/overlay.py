@@ -6,7 +6,7 @@ import bpy
 import gpu
 import numpy as np
 
-from ...scene import picking, picks, problems, refinement, videos
+from ...scene import picking, picks, problems, refinement, store, videos
 from ...view import drawing, footage_view, image_view, pointing
 from ...view.footage_view import Drawing, Mark
 
@@ -80,12 +80,12 @@ def _draw_view() -> None:
 
 
 def _solid(scene: bpy.types.Scene, thing: bpy.types.Object) -> list[tuple[np.ndarray, tuple[float, float, float]]]:
-    place = np.array(thing.location if picks.moved(thing) else thing[picks.POSITION_KEY], dtype=np.float64)
+    place = np.array(thing.location if picks.moved(thing) else thing[store.POSITION], dtype=np.float64)
     normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
     normal /= np.linalg.norm(normal)
-    radius = picking.block_of(scene, thing[picks.TRAJECTORY_KEY]).radius_m
+    radius = picking.block_of(scene, thing[store.TRAJECTORY]).radius_m
     found = []
-    if thing[picks.KIND_KEY] != "pass":
+    if thing[store.KIND] != "pass":
         for axis in np.eye(3):  # the block's ball, tangent to the terrain
             found.append((footage_view.around(place + radius * normal, axis, radius), footage_view.OUTLINE))
     for seen in picking.sightings(thing).values():

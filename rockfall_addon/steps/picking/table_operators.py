@@ -6,7 +6,7 @@ from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from ....core.exchange.tables import read_picks
-from ...scene import reconstruction, store
+from ...scene import georeference, reconstruction, store
 from ...view import look
 from ...view.reporting import reported
 
@@ -27,10 +27,10 @@ class ROCKFALL_OT_import_picks(bpy.types.Operator, ImportHelper):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        picks = read_picks(self.filepath, store.read_shift(scene) if store.has_shift(scene) else None)
+        picks = read_picks(self.filepath, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
         result = reconstruction.reconstruct_scene(scene, picks)
-        if not store.has_shift(scene):
-            store.write_shift(scene, picks.shift)
+        if not georeference.has_shift(scene):
+            georeference.write_shift(scene, picks.shift)
         reconstruction.show(scene, result)
         look.show_relief(context, frame_all=True)
         count = len(set(picks.trajectory.tolist()))

@@ -8,7 +8,7 @@ import bpy
 
 from ....core.errors import RockfallError
 from ....core.footage.tracking import BlockTrack, track_block
-from ...scene import observations, picking, videos
+from ...scene import observations, picking, store, videos
 from ...view.of_video import OfVideo
 from ...view.reporting import reported
 
@@ -69,7 +69,7 @@ class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
     def _prepare(self, context: bpy.types.Context) -> dict[str, object]:
         scene = context.scene
         camera, self._name = _solved_name(context)
-        self._camera = camera[videos.ID_KEY]
+        self._camera = camera[store.ID]
         video = videos.video_of(camera)
         clicks, settings = observations.clicks_for(scene, camera, self._name), scene.rockfall_picking
         first, last = 0, video.frames - 1

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import picking, picks, refinement
+from ...scene import picking, refinement, store
 from ...view import pointing
 from ...view.reporting import reported
 
@@ -28,7 +28,7 @@ class ROCKFALL_OT_refine(bpy.types.Operator):
         names = None
         if settings.scope == "ACTIVE":
             thing = pointing.active_pick(context)
-            names = [picking.trajectory(scene) if thing is None else thing[picks.TRAJECTORY_KEY]]
+            names = [picking.trajectory(scene) if thing is None else thing[store.TRAJECTORY]]
         found = refinement.propose(scene, names, sorted(settings.free))
         self.report({"INFO"}, f"{found['before_px']:.2f} px before, {found['after_px']:.2f} px after.")
         return {"FINISHED"}
@@ -41,7 +41,7 @@ class _OfProposal:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if refinement.PROPOSAL_KEY in context.scene:
+        if store.PROPOSAL in context.scene:
             return True
         cls.poll_message_set("Refine first")
         return False

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import refinement
+from ...scene import refinement, store
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 
 MOST_ROWS = 12
@@ -18,7 +18,7 @@ class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
     def step_state(context: bpy.types.Context) -> State:
         if refinement.ready(context.scene):
             return "TO_DO"
-        return "ATTENTION" if context.scene.get(refinement.PROPOSAL_KEY) else "READY"  # it waits for a decision
+        return "ATTENTION" if context.scene.get(store.PROPOSAL) else "READY"  # it waits for a decision
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

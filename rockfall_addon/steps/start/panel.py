@@ -4,7 +4,6 @@
 import bpy
 
 from ...scene import alignment, observations, picking, refinement, store, videos
-from ...scene import picks as scene_picks
 from ...view import workspace
 from ...view.panel import RockfallPanel, paragraph
 
@@ -63,7 +62,7 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
             ("rockfall.apply_refinement", "Apply", "CHECKMARK"),
             ("rockfall.discard_refinement", "Discard", "X"),
         ]
-    refined = all(scene_picks.NORMAL_KEY in pick for pick in picks)
+    refined = all(store.NORMAL in pick for pick in picks)
     if camera is not None and not refined and not refinement.ready(scene):
         return "Look at each pick and correct it. Refine fits them all to the tracked pixels.", [
             PICK_TOOL,

@@ -71,7 +71,7 @@ def open_workspace(context: bpy.types.Context, *, arrange: bool = False) -> None
 def _arrange() -> None:
     """Once the areas are drawn: footage to the left, the slope to the right, and the tool of step 4 if it is time."""
     for window in bpy.context.window_manager.windows:
-        if workspace.KEY not in window.workspace:
+        if store.WORKSPACE not in window.workspace:
             continue
         workspace.show_tab(window.screen)
         with bpy.context.temp_override(window=window):

@@ -12,7 +12,7 @@ from ....core.georeference import GlobalShift
 from ....core.terrain.advice import sentences
 from ....core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
 from ....core.terrain.shading import shade
-from ...scene import materials, reconstruction, store, terrain, terrain_look
+from ...scene import georeference, materials, store, sync, terrain, terrain_look
 from ...view import look
 from ...view.reporting import reported
 
@@ -63,7 +63,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
     @reported
     def _ask(self, context: bpy.types.Context) -> set[str]:
         found = inspect_terrain(self.filepath)
-        shift = store.read_shift(context.scene) if store.has_shift(context.scene) else found.shift
+        shift = georeference.read_shift(context.scene) if georeference.has_shift(context.scene) else found.shift
         self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
         self.asked = True
         self.facts = [
@@ -85,7 +85,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
         layout.separator()
         layout.use_property_split = True
         column = layout.column(align=True)
-        known = store.has_shift(context.scene)
+        known = georeference.has_shift(context.scene)
         column.enabled = not known
         for name in ("shift_x", "shift_y", "shift_z"):
             column.prop(self, name)
@@ -109,7 +109,7 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
             ground_only={"AUTO": None, "GROUND": True, "ALL": False}[self.ground],
         )
         terrain.add_terrain(context.scene, surface, shade(surface))
-        reconstruction.refresh_or_tell(context.scene)
+        sync.recompute(context.scene)
         look.show_relief(context, frame_all=True)
         self.report({"INFO"}, " ".join(surface.summary))
         return {"FINISHED"}
@@ -128,9 +128,9 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
             raise RockfallError(
                 f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0."
             ) from None
-        if not store.has_shift(scene):
+        if not georeference.has_shift(scene):
             return given
-        shift = store.read_shift(scene)
+        shift = georeference.read_shift(scene)
         if given is not None and (given.x, given.y, given.z) != (shift.x, shift.y, shift.z):
             raise RockfallError(
                 f"This project has the shift ({shift.x:.10g}, {shift.y:.10g}, {shift.z:.10g}) m, so a terrain with the "

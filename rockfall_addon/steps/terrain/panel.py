@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import fingerprints, store, terrain, terrain_view
+from ...scene import georeference, store, terrain, terrain_view
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 
 
@@ -16,14 +16,14 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     def step_state(context: bpy.types.Context) -> State:
         scene = context.scene
         if not store.with_role(scene, store.TERRAIN_ROLE):
-            return "ATTENTION" if scene.get(fingerprints.GROUND_KEY) else "TO_DO"
+            return "ATTENTION" if scene.get(store.GROUND) else "TO_DO"
         return "ATTENTION" if terrain.warnings(scene) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         grounds = store.with_role(scene, store.TERRAIN_ROLE)
         if not grounds:
-            if scene.get(fingerprints.GROUND_KEY):
+            if scene.get(store.GROUND):
                 paragraph(context, layout, "The terrain is gone. Undo, or import it again.", "ERROR")
             else:
                 advise(context, layout, False, "Import your scan, or begin with the demo.")
@@ -44,7 +44,7 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("rockfall.show_relief", text="Show relief", icon="SHADING_SOLID")
         row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
-        shift = store.read_shift(scene)
+        shift = georeference.read_shift(scene)
         rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
         facts(layout, [*rows, ("System", shift.crs or "unknown")])
 
@@ -53,7 +53,7 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         for ground in grounds:
             column.label(text=ground.name, icon="MESH_GRID", translate=False)
             count = terrain.grouped(len(ground.data.polygons) if ground.type == "MESH" else 0)
-            file = str(ground.get(terrain.FILE_KEY, ground.name))
+            file = str(ground.get(store.TERRAIN_FILE, ground.name))
             column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")
 
 

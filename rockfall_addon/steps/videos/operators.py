@@ -9,7 +9,7 @@ from bpy_extras.io_utils import ImportHelper
 from mathutils import Matrix
 
 from ....core.errors import RockfallError
-from ...scene import footage, video_times, videos
+from ...scene import footage, store, video_times, videos
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
 from . import proxies
@@ -209,7 +209,7 @@ class ROCKFALL_OT_reference_video(OfVideo, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        scene[video_times.REFERENCE_KEY] = videos.active_camera(scene)[videos.ID_KEY]
+        scene[store.REFERENCE_CAMERA] = videos.active_camera(scene)[store.ID]
         return {"FINISHED"}
 
 

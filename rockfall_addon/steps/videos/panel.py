@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import video_times, videos
+from ...scene import store, video_times, videos
 from ...view import image_view
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 from . import proxies, wording
@@ -57,9 +57,9 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
             icon = "VIEW_CAMERA" if chosen else "CAMERA_DATA"
             row.operator(
                 "rockfall.look_through", text=camera.name, icon=icon, depress=chosen, translate=False
-            ).identifier = camera[videos.ID_KEY]
+            ).identifier = camera[store.ID]
             row.label(text="", icon="CHECKMARK" if videos.is_solved(camera) else "BLANK1")
-            row.operator("rockfall.remove_video", text="", icon="X").identifier = camera[videos.ID_KEY]
+            row.operator("rockfall.remove_video", text="", icon="X").identifier = camera[store.ID]
 
     def _proxies(self, camera: bpy.types.Object) -> None:
         layout = self.layout

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ...scene.store import double
+from ...scene import store
 
 MICRO = 1e-6
 
@@ -29,7 +29,7 @@ def _clock(name: str, unit: float = 1.0) -> dict:
         from ...scene import videos
 
         if _is_video(self.id_data):
-            clock = replace(videos.clock_of(self.id_data), **{name: double(value) * unit})
+            clock = replace(videos.clock_of(self.id_data), **{name: store.double(value) * unit})
             videos.set_clock(self.id_data, clock)
             _changed(self.id_data)
 
@@ -46,7 +46,7 @@ def _set_capture(self: bpy.types.PropertyGroup, value: float) -> None:
     from ...scene import videos
 
     if _is_video(self.id_data):
-        videos.set_capture_rate(self.id_data, double(value) or None)
+        videos.set_capture_rate(self.id_data, store.double(value) or None)
         _changed(self.id_data)
 
 
@@ -57,9 +57,8 @@ def _get_row_time(self: bpy.types.PropertyGroup) -> float:
 
 
 def _set_row_time(self: bpy.types.PropertyGroup, value: float) -> None:
-    from ...scene import videos
 
-    self.id_data[videos.ROW_TIME_KEY] = double(value) * MICRO
+    self.id_data[store.ROW_TIME] = store.double(value) * MICRO
 
 
 def _changed(camera: bpy.types.Object) -> None:

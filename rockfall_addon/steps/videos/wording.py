@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import footage, timing, video_times, videos
+from ...scene import footage, store, timing, video_times, videos
 from ...view import image_view
 
 OTHER_RATE = 1e-4
@@ -97,7 +97,7 @@ def synchronised(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[str]:
         return [f"The others are set by the clock of {camera.name}.", f"Events marked here: {marked}."]
     said = [f"{camera.name} is set by the clock of {reference.name}.", f"Events marked here: {marked}."]
     shared = set(own) & set(video_times.events_of(reference))
-    result = str(camera.get(video_times.RESULT_KEY, ""))
+    result = str(camera.get(store.SYNCHRONISED, ""))
     if result:
         return said + result.split("\n")
     if not shared:

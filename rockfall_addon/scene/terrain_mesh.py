@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The meshes of the terrain: arrays ↔ Blender meshes, and the mesh that stands in for a large one in the 3-D view."""
+
+from collections.abc import Mapping
+
+import bpy
+import numpy as np
+
+from . import materials
+
+SHADING = ("hillshade", "eye_dome", "thin")
+"""Attributes of a terrain's vertices, 0 … 1."""
+MODIFIER = "Coarse view"
+STAND_IN = "Coarse mesh"
+
+
+def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping[str, np.ndarray]) -> bpy.types.Mesh:
+    """A smooth mesh with the terrain's material, the shading values (n,) as attributes, and a relief to be painted."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.attributes["position"].data.foreach_set("vector", vertices.astype(np.float32).ravel())
+    mesh.loops.add(3 * len(faces))
+    mesh.attributes[".corner_vert"].data.foreach_set("value", faces.astype(np.int32).ravel())
+    mesh.polygons.add(len(faces))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * len(faces), 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    for name_, value in values.items():
+        attribute = mesh.attributes.new(name_, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", np.ascontiguousarray(value, dtype=np.float32))
+    mesh.attributes.new(materials.RELIEF_COLOUR, "FLOAT_COLOR", "POINT")
+    mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.RELIEF_COLOUR
+    mesh.materials.append(materials.terrain_material())
+    return mesh
+
+
+def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) in single precision and triangles (m, 3) of a mesh, in its own coordinates."""
+    vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", vertices)  # many times as quick as mesh.vertices
+    if len(mesh.loops) == 3 * len(mesh.polygons):
+        faces = np.empty(len(mesh.loops), dtype=np.int32)
+        mesh.attributes[".corner_vert"].data.foreach_get("value", faces)
+    else:
+        mesh.calc_loop_triangles()
+        faces = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
+        mesh.loop_triangles.foreach_get("vertices", faces)
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def stand_in(tile: bpy.types.Object) -> bpy.types.Object | None:
+    """The object whose mesh the 3-D view shows in the place of a tile's own, if there is one."""
+    modifier = tile.modifiers.get(MODIFIER)
+    if modifier is None or modifier.type != "NODES" or modifier.node_group is None:
+        return None
+    return materials.get_input(modifier, STAND_IN)

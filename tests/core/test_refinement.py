@@ -14,7 +14,8 @@ from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.node_motion import join_nodes, places_at
 from rockfall.core.reconstruction.picks import make_picks
-from rockfall.core.reconstruction.refinement.problem import evaluate, moved
+from rockfall.core.reconstruction.refinement.deviations import velocity_rows
+from rockfall.core.reconstruction.refinement.problem import evaluate, moved, solve_segments
 from rockfall.core.reconstruction.refinement.refine import PixelObservations, View, refine
 from rockfall.core.reconstruction.refinement.setup import prepare, set_up
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -234,6 +235,57 @@ def test_the_derivatives_are_right(drag):
         np.testing.assert_allclose(analytic[:, column] / size, numeric / size, atol=3e-6, err_msg=str(column))
 
 
+@pytest.mark.parametrize("drag", [None, Drag(coefficient=30.0)])
+def test_the_derivatives_of_the_velocities_at_the_nodes_are_right(drag):
+    """What the deviations of impacts are made of: by the nodes' places and times, drag and gravity."""
+    free = {"gravity"} | ({"drag"} if drag else set())
+    ground = prepare(marked(**EXACT), SURFACE, BLOCK, drag, None, 0.02)
+    setup = set_up(ground, (view(),), observe([view()], rate=12.0), ["a"], 9.81, frozenset(free))
+    problem, segments = setup.problem, np.arange(len(TIME) - 1)
+
+    def velocity(step, at_end):
+        motion = solve_segments(problem, moved(problem, setup.state, step))
+        return motion.end_velocity if at_end else motion.start_velocity
+
+    motion = solve_segments(problem, setup.state)
+    for at_end in (False, True):
+        rows = velocity_rows(problem, motion, segments, at_end=at_end)
+        for column in range(problem.columns.size):
+            step = np.zeros(problem.columns.size)
+            step[column] = 1e-5
+            numeric = (velocity(step, at_end) - velocity(-step, at_end)) / 2e-5
+            np.testing.assert_allclose(rows[:, :, column], numeric, atol=1e-5, rtol=1e-5, err_msg=f"{at_end} {column}")
+    assert not velocity_rows(problem, motion, np.array([-1]), at_end=True).any()
+
+
+def test_what_is_not_known_of_a_moving_pose_is_added_to_the_pixels():
+    """An angle is worth a focal length times it, a place a focal length times it over the distance."""
+    camera, frames = camera_at(40.0), np.linspace(0, 6, 181)
+    still = [np.repeat(one[None], frames.size, axis=0) for one in (camera.position, camera.rotation)]
+    views, middle = [], (PLACE + RADIUS * OUT).mean(axis=0)
+    for fx in (camera.fx, 0.9 * camera.fx):
+        reference = replace(camera, fx=fx)
+        views.append(View("hand", CameraPath(reference, frames, *still, np.full(181, 0.03), np.full(181, 2e-4))))
+    pixels = observe(views, sigma=0.5)
+    ground = prepare(marked(**EXACT), SURFACE, BLOCK, None, None, 0.02)
+    found = set_up(ground, tuple(views), pixels, ["a"], 9.81, frozenset()).problem.sigma_px
+    distance = np.linalg.norm(marked(**EXACT).position.mean(axis=0) + RADIUS * OUT - camera.position)
+    assert distance == pytest.approx(np.linalg.norm(middle - camera.position), rel=0.01)
+    for number, focal in enumerate((camera.fx, 0.95 * camera.fx)):
+        expected = np.sqrt(0.5**2 + focal**2 * (2e-4**2 + (0.03 / distance) ** 2))
+        np.testing.assert_allclose(found[pixels.view == number], expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("radius", "height", "lies"), [(0.2, 0.9, True), (0.2, 1.5, False), (1.0, 3.5, True)])
+def test_a_release_in_the_air_does_not_lie_on_the_terrain(radius, height, lies):
+    """In the air is what is more than a metre and more than two diameters off."""
+    place = PLACE.copy()
+    place[0] += height * OUT
+    picks = make_picks(["a"] * 5, TIME, place, kind=["release", *["impact"] * 4])
+    ground = prepare(picks, SURFACE, Block(2 * radius, 2 * radius, 2 * radius), None, None, 0.02)
+    assert ground.grounded.tolist() == [lies, True, True, True, True]
+
+
 def patches(normals):
     """A terrain of five squares of 2 m that the block touches at its contacts, each with its normal."""
     vertices, faces = [], []
@@ -422,3 +474,58 @@ def test_what_cannot_be_refined():
         run(views, pixels, make_picks(["a"] * 2, TIME[:2], PLACE[:2], status=["shattered", "ok"]))
     late = run(views, replace(pixels, time_s=pixels.time_s + 0.5))
     assert any("outside of the marked motion" in sentence for sentence in late.advice)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"sigma_aim": -0.1}, "The standard deviation of the aim must be a number not below zero, not -0.1."),
+        ({"sigma_aim": np.nan}, "The standard deviation of the aim must be a number not below zero, not nan."),
+        ({"loss": "l2"}, "Unknown loss 'l2'. Use one of huber, cauchy, linear."),
+        ({"gravity_mps2": 0.0}, "Gravity must be a positive number [m/s²], not 0.0."),
+        ({"gravity_mps2": np.inf}, "Gravity must be a positive number [m/s²], not inf."),
+        ({"sigma_terrain_m": 0.0}, "The standard deviation of the terrain must be a positive number [m], not 0.0."),
+        ({"normal_radius_m": np.nan}, "The normal's radius must be a positive number [m], not nan."),
+        ({"drag": Drag(coefficient=-1000.0)}, "No flight with this drag joins the picks. Check the times"),
+    ],
+)
+def test_parameters_out_of_range_are_refused(options, said):
+    views = [view()]
+    with pytest.raises(RockfallError) as refused:
+        run(views, observe(views), **options)
+    assert str(refused.value).startswith(said)
+
+
+def test_pixels_of_views_that_do_not_exist_are_refused():
+    views = [view(50.0), view(-20.0)]
+    pixels = observe(views)
+    for wrong in (-1, 2):
+        index = pixels.view.copy()
+        index[4] = wrong
+        with pytest.raises(InputError, match=r"A pixel belongs to view -?[12], but there are 2"):
+            run(views, replace(pixels, view=index))
+    with pytest.raises(InputError, match="There is no view"):
+        run([], pixels)
+    with pytest.raises(InputError, match="The columns of the pixels have different lengths"):
+        run(views, replace(pixels, sigma_px=pixels.sigma_px[1:]))
+    with pytest.raises(InputError, match="The columns of the pixels have different lengths"):
+        run(views, replace(pixels, pixel=pixels.pixel[:, :1]))
+    for column, value in (("time_s", np.nan), ("sigma_px", 0.0), ("pixel", [np.inf, 0.0])):
+        changed = getattr(pixels, column).copy()
+        changed[1] = value
+        with pytest.raises(InputError, match="Pixel 2 of view from 50° has a time, place or standard deviation"):
+            run(views, replace(pixels, **{column: changed}))
+
+
+@pytest.mark.parametrize("matrix", [np.eye(3), np.full((6, 6), np.nan), np.diag([1.0, 1, 1, 1, 1, -1])])
+def test_a_covariance_that_is_none_is_refused(matrix):
+    with pytest.raises(InputError, match="View from 50°: the covariance of the pose is not a positive definite 6 × 6"):
+        view(pose_covariance=matrix)
+
+
+def test_picks_too_close_in_time_are_refused():
+    views = [view()]
+    time = TIME.copy()
+    time[2] = time[1] + 5e-5
+    with pytest.raises(RockfallError, match="The picks are too close in time to be fitted"):
+        run(views, observe(views), make_picks(["a"] * 5, time, PLACE, **EXACT))

@@ -146,11 +146,11 @@ def test_a_camera_that_moves():
 
 
 def test_drag_of_a_light_block_is_found():
-    """A table-tennis ball: k about 0.11 1/m, which a vacuum's flights cannot imitate."""
+    """A ball as light as foam: its drag is one that flights in a vacuum cannot imitate."""
     ball = Block(RADIUS * 2, RADIUS * 2, RADIUS * 2, 22.0)
     law = Drag(coefficient=0.47)
     k = law.per_metre(ball)
-    assert k == pytest.approx(0.05, rel=0.3)
+    assert k == pytest.approx(0.5 * 1.2 * 0.47 * 3 / (4 * RADIUS * 22))  # ½ρC_D·A/m of a ball
     views = [view(50.0), view(-20.0)]
     pixels = observe(views, drag=k)
     check_exact(run(views, pixels, block=ball, drag=law), drag=k, atol=1e-8)
@@ -344,7 +344,7 @@ def test_ends_that_only_their_marks_hold_are_told():
 @pytest.mark.parametrize("sigma_aim", [0.0, 0.15])
 def test_intervals_cover_the_truth(sigma_aim):
     views = [view(50.0)]
-    inside, ratio, places = [], [], []
+    velocities, places, times = [], [], []
     for seed in range(60):
         rng = np.random.default_rng(100 + seed)
         picks = marked(seed, sigma_time_s=np.full(5, 0.01))
@@ -354,17 +354,19 @@ def test_intervals_cover_the_truth(sigma_aim):
         pixels = observe(views, noise=1.0, seed=seed, lift=lift)
         result = run(views, aimed(views, pixels, sigma_aim * rng.normal(size=(1, 2))), picks, sigma_aim=sigma_aim)
         away = result.picks.position - PLACE - lift[:, None] * OUT
-        places += (away / result.picks.sigma_position_m[:, None])[1:-1].ravel().tolist()
+        places.append((away / result.picks.sigma_position_m[:, None])[1:-1])
+        times.append(((result.picks.time_s - TIME) / result.picks.sigma_time_s)[1:-1])
         impacts = result.reconstruction.impacts
-        for found, true, sigma in (
-            (impacts.v1[1:], motion.end_velocity, impacts.sigma["v1"][1:]),
-            (impacts.v2[:-1], motion.start_velocity, impacts.sigma["v2"][:-1]),
-        ):
-            inside += (np.abs(found - true) < 1.96 * sigma).ravel().tolist()
-            ratio += ((found - true) / sigma).ravel().tolist()
-    assert 0.92 < np.mean(inside) < 0.98
-    assert 0.85 < np.std(ratio) < 1.15
-    assert 0.85 < np.sqrt(np.mean(np.square(places))) < 1.15
+        v1 = (impacts.v1[1:] - motion.end_velocity) / impacts.sigma["v1"][1:]
+        v2 = (impacts.v2[:-1] - motion.start_velocity) / impacts.sigma["v2"][:-1]
+        velocities.append(np.stack([v1, v2]))
+    # Over the standard deviation: (60 runs, v1 and v2, 4 impacts, xyz).
+    off = np.array(velocities)
+    assert 0.92 < np.mean(np.abs(off) < 1.96) < 0.98
+    assert off.std() == pytest.approx(1, abs=0.1)
+    np.testing.assert_allclose(np.sqrt(np.mean(off**2, axis=(0, 2))), 1, atol=0.2)
+    assert np.std(times) == pytest.approx(1, abs=0.15)
+    assert np.sqrt(np.mean(np.square(places))) == pytest.approx(1, abs=0.15)
 
 
 def test_outliers_are_left_out():
@@ -383,12 +385,14 @@ def test_outliers_are_left_out():
 
 def test_more_noise_than_stated_enlarges_the_standard_deviations():
     views = [view()]
-    honest = run(views, observe(views, sigma=3.0, noise=3.0), marked())
-    boasting = run(views, observe(views, sigma=1.0, noise=3.0), marked())
-    assert boasting.noise_scale == pytest.approx(3, rel=0.25)
+    pixels = observe(views, sigma=1.0, noise=3.0)
+    honest = run(views, replace(pixels, sigma_px=3 * pixels.sigma_px), marked())
+    boasting = run(views, pixels, marked())
+    assert honest.noise_scale == 1.0
+    assert boasting.noise_scale == pytest.approx((pixels.pixel - observe(views).pixel).std(), rel=0.05)
     assert any("as large as the stated" in sentence for sentence in boasting.advice)
     np.testing.assert_allclose(
-        boasting.reconstruction.impacts.sigma["v1"][1:], honest.reconstruction.impacts.sigma["v1"][1:], rtol=0.35
+        boasting.reconstruction.impacts.sigma["v1"][1:], honest.reconstruction.impacts.sigma["v1"][1:], rtol=0.03
     )
 
 

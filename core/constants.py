@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Physical constants and their sources."""
+"""Constants that several rooms use, and their sources."""
 
 GRAVITY_MPS2 = 9.81
 """Acceleration of gravity [m/s²], as in Noël et al. 2018, eq. 5."""
@@ -12,3 +12,9 @@ DRAG_COEFFICIENT = 0.9
 
 ROCK_DENSITY_KGPM3 = 2650.0
 """Density of a limestone or crystalline block [kg/m³], the usual textbook value; a project gives its own."""
+
+SAME_TIME_S = 1e-6
+"""Times that are closer than this [s] are one: tables keep six decimals."""
+
+IQR_PER_SD = 1.349
+"""Interquartile range of a normal distribution in standard deviations."""

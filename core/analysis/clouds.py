@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..constants import IQR_PER_SD
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..reconstruction.impact import Impacts
@@ -32,7 +33,6 @@ UNUSABLE = ("departing", "into_ground", "below_terrain", "contact", "shattered",
 """Flags of impacts whose restituted velocity is not that of a block that left the ground."""
 MOST_POOLED = 2000
 WEISZFELD_STEPS = 50
-IQR_PER_SD = 1.349
 """Interquartile range of a normal law in standard deviations."""
 HOPELESS = 1e9
 FEWEST_CLUSTERS = 5

@@ -20,6 +20,13 @@ from ..vectors import Array, cross, norm, unit
 INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 """The inner parameters of a camera, in the order of every array of them; the focal lengths and the centre in px."""
 
+FULL_FRAME_DIAGONAL_MM = 43.2666
+"""Of the 36 × 24 mm frame, by which cameras state their equivalent focal length."""
+GUESSED_FOCAL = 1.2
+"""Of a lens that nothing is known of, in widths of the image: 45°, as phones and camcorders have before zooming."""
+SIGMA_PX = 1.0
+"""Standard deviation of a picked pixel's u and of its v, where none is given [px]."""
+
 NEWTON_STEPS = 60
 TABLE_SIZE = 512
 
@@ -156,6 +163,11 @@ def look_at(
     right = unit(right)
     rotation = np.stack([right, cross(forward, right), forward])
     return Camera(width, height, focal, focal, width / 2, height / 2, position=place, rotation=rotation)
+
+
+def full_frame_mm(focal_px: float, size: tuple[int, int]) -> float:
+    """What a focal length [px] is on full frame, by the diagonal of the image [mm]."""
+    return FULL_FRAME_DIAGONAL_MM * focal_px / float(np.hypot(*size))
 
 
 def project(

@@ -16,12 +16,24 @@ from scipy.special import fdtri
 from ..errors import InputError, RockfallError
 from ..georeference import GlobalShift
 from ..vectors import Array, Mask, distance_to_ray, norm
-from .model import INTRINSICS, Camera, project_with_derivatives, rays, rotation_from_vector, with_intrinsics
+from .model import (
+    GUESSED_FOCAL,
+    INTRINSICS,
+    SIGMA_PX,
+    Camera,
+    project_with_derivatives,
+    rays,
+    rotation_from_vector,
+    with_intrinsics,
+)
 from .resection_advice import Geometry, advise
 from .starting import Starts, find_starts
 
 POSE = ("rx", "ry", "rz", "x", "y", "z")
 """The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
+
+POSE_PAIRS = 4
+"""Give the pose of a camera whose lens is known."""
 
 STEPS = 50
 ADJUSTED = 3
@@ -148,7 +160,7 @@ def resect(
     *,
     free: Sequence[str] = ("f",),
     camera: Camera | None = None,
-    sigma_px: ArrayLike = 1.0,
+    sigma_px: ArrayLike = SIGMA_PX,
     sigma_m: ArrayLike = 0.0,
     names: Sequence[str] | None = None,
     robust: bool = True,
@@ -315,7 +327,8 @@ def _starting_camera(
             raise InputError(
                 "The focal length is neither free nor known", advice="Free it, or give a camera that has it"
             )
-        return Camera(width, height, 1.2 * width, 1.2 * width, width / 2, height / 2, shift=shift)
+        focal = GUESSED_FOCAL * width
+        return Camera(width, height, focal, focal, width / 2, height / 2, shift=shift)
     if camera.size != (width, height):
         raise InputError(
             f"The known camera has {camera.width} × {camera.height} px, the image {width} × {height} px",
@@ -326,10 +339,11 @@ def _starting_camera(
 
 def _check_number(problem: _Problem, columns: tuple[str, ...], source: str | None) -> None:
     n, k = len(problem.points), len(columns)
-    needed = 4 if not k else max(5, (6 + k + 1) // 2 + 1)
+    needed = POSE_PAIRS if not k else max(5, (6 + k + 1) // 2 + 1)
     if n < needed:
         what = "the pose alone" if not k else f"the pose and {', '.join(columns)}"
-        easier = "Add pairs" if not k else "Add pairs (10 or more are good), or lock parameters: 4 pairs give the pose"
+        lock = f"Add pairs (10 or more are good), or lock parameters: {POSE_PAIRS} pairs give the pose"
+        easier = lock if k else "Add pairs"
         raise InputError(f"{n} pairs are too few: {what} needs {needed}", file=source, advice=easier)
     centred = problem.points - problem.points.mean(axis=0)
     extent = np.linalg.svd(centred, compute_uv=False)

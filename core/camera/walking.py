@@ -7,11 +7,10 @@ import numpy as np
 
 from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project_with_derivatives, rotation_from_vector
-from .turning import believed_scatter, sums_by
+from .turning import CUT, believed_scatter, sums_by
 
 LEAST_POINTS = 4
 ROUNDS = 9
-CUT = 3.0
 LOOSE = 12.0
 """Width of the weights at the start, in standard deviations."""
 

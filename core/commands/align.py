@@ -25,11 +25,7 @@ if TYPE_CHECKING:
     from ..terrain.surface import Surface
 
 FREE = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
-FILM_DIAGONAL_MM = 43.2666
-"""Of the 36 × 24 mm frame, by which cameras state their equivalent focal length."""
 WORST = 3
-KEY_PAIRS = 4
-"""The fewest that give a pose."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -150,6 +146,8 @@ class _Solved:
 
 def _solve(pairs: "Pairs", size: tuple[int, int], frame: int, arguments: argparse.Namespace) -> _Solved:
     """Solve the camera; of a moving one, each frame that has enough pairs."""
+    from ..camera.resection import POSE_PAIRS, resect
+
     told = arguments.focal is not None or arguments.fov is not None
     free = known_names(arguments.free, FREE, "--free") if arguments.free is not None else () if told else ("f",)
     here = pairs.used & ((pairs.frame < 0) | (pairs.frame == frame)) if arguments.moving else pairs.used
@@ -159,8 +157,6 @@ def _solve(pairs: "Pairs", size: tuple[int, int], frame: int, arguments: argpars
     used = np.zeros(len(pairs), dtype=np.bool_)
 
     def solve(rows: "Indices", free: tuple[str, ...], start: "Camera | None") -> "Resection":
-        from ..camera.resection import resect
-
         found = resect(
             pairs.pixel[rows],
             pairs.point[rows],
@@ -183,7 +179,7 @@ def _solve(pairs: "Pairs", size: tuple[int, int], frame: int, arguments: argpars
     notes: list[str] = []
     for other in np.unique(pairs.frame[pairs.used & ~here]).tolist():
         rows = np.flatnonzero(pairs.used & (pairs.frame == other))
-        if rows.size < KEY_PAIRS:
+        if rows.size < POSE_PAIRS:
             notes.append(f"Frame {other} has {rows.size} pairs, too few to be solved: they only check the path.")
             continue
         keys[other] = solve(rows, (), found.camera)
@@ -330,6 +326,8 @@ def _draw(
 
 
 def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
+    from ..camera.model import full_frame_mm
+
     found, used = solved.found, solved.used
     camera, sigma = found.camera, found.sigma
     left_out = len(found.wrong)
@@ -339,7 +337,7 @@ def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
         f"{int(found.used.sum())} of {total} pairs{where} fit to {found.rmse_px:.2f} px (root mean square){spare}."
         + (f" {left_out} left out as wrong: {', '.join(found.wrong)}." if left_out else "")
     ]
-    equivalent = FILM_DIAGONAL_MM * camera.fx / float(np.hypot(*camera.size))
+    equivalent = full_frame_mm(camera.fx, camera.size)
     sentences.append(
         f"Focal length: {camera.fx:.1f}{_plus_minus(sigma.get('fx'), 1)} px"
         + (f", {camera.fy:.1f}{_plus_minus(sigma.get('fy'), 1)} px down" if not _same(camera.fx, camera.fy) else "")

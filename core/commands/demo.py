@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..film.engines import ENGINES
+from ..reconstruction.sampling import STEP_S
 
 if TYPE_CHECKING:
     from ..reconstruction.trajectory import Reconstruction
     from ..terrain.surface import Surface
 
 SITE = Path(__file__).parents[2] / "assets" / "demo"
-STEP_S = 0.05
 FILES = {
     "impacts.csv": "each impact: velocities before and after, restitution coefficients, angles",
     "trajectories.csv": f"position, speed and height above ground every {STEP_S:g} s",

@@ -5,6 +5,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
+from ..reconstruction.sampling import STEP_S
 from .options import add_out, add_terrain_options, not_negative, positive, terrain_as_told
 from .progress import Progress
 
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     from ..reconstruction.block import Block
 
 DEFAULT_DIAMETER_M = 0.35
-DEFAULT_STEP_S = 0.05
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step",
         type=positive,
-        default=DEFAULT_STEP_S,
+        default=STEP_S,
         metavar="S",
         help="time step of trajectories.csv [s] (default %(default)s)",
     )

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from ..errors import InputError, RockfallError
+from ..reconstruction.choices import FREE, LOSSES, Loss
+from ..reconstruction.sampling import STEP_S
 from ..vectors import Array, norm
 from .options import add_out, known_names, not_negative, positive
 from .progress import Progress
-from .reconstruct import DEFAULT_STEP_S
 
 if TYPE_CHECKING:
     from ..exchange.footage import Footage
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from ..terrain.surface import Surface
 
 MOST_ROWS = 20
-LOSSES = ("huber", "cauchy", "linear")
 POSE = ("rx", "ry", "rz", "x", "y", "z")
 TINY = 1e-9
 """A fitted drag of zero is none: the project's must be above zero."""
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step",
         type=positive,
-        default=DEFAULT_STEP_S,
+        default=STEP_S,
         metavar="S",
         help="time step of trajectories.csv [s] (default %(default)s)",
     )
@@ -70,7 +70,6 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..exchange.project import read_project
     from ..reconstruction.refinement.refine import refine
-    from ..reconstruction.refinement.solver import Loss
 
     with output_folder(arguments.out) as folder, Progress() as progress:
         progress(f"Reading {arguments.project}")
@@ -109,7 +108,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> "RefinementSettings":
     """As the project says, but for what was typed."""
-    from ..exchange.project import FREE
 
     free = settings.free if arguments.free is None else known_names(arguments.free, FREE, "--free")
     aim = settings.sigma_aim if arguments.sigma_aim is None else arguments.sigma_aim

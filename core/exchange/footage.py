@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..camera.model import rays
+from ..camera.model import SIGMA_PX, rays
 from ..errors import InputError, RockfallError
 from ..footage.clock import Clock
 from ..georeference import GlobalShift
@@ -22,7 +22,6 @@ from .footage_tables import Events, Track, read_events, read_track
 from .opening import block_of
 from .project import Project, VideoEntry
 
-SIGMA_PX = 1.0
 """Of a tracked pixel without a standard deviation of its own."""
 MARGIN = 0.1
 """A tracked block may leave the image by this part of its size."""

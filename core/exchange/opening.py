@@ -5,8 +5,8 @@ from typing import cast
 
 from ..errors import RockfallError
 from ..reconstruction.block import Block
+from ..reconstruction.choices import FlightEnds
 from ..reconstruction.drag import Drag
-from ..reconstruction.motion import FlightEnds
 from ..reconstruction.picks import Picks
 from ..reconstruction.trajectory import Reconstruction, reconstruct
 from ..terrain.readers import read_terrain

@@ -13,15 +13,12 @@ from typing import Any
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
 from .toml_text import TomlTable, Vector3, read_toml
 
 SCHEMA = 1
 ENGINES = ("auto", "cycles", "eevee", "workbench")
 UP_AXES = ("auto", "z", "y")
-FLIGHTS = ("contacts", "centres")
-FREE = ("camera", "clock", "clock_drift", "drag", "gravity")
-LOSSES = ("huber", "cauchy", "linear")
-SIGMA_AIM = 0.15
 
 Extra = Mapping[str, Any]
 
@@ -83,7 +80,7 @@ class ReconstructionSettings:
     gravity_mps2 : acceleration of gravity.
     drag : whether the flights are computed with the drag of air.
     drag_coefficient, air_density_kgpm3 : C_D and ρ, used when ``drag`` is true.
-    flights : what the flights join, one of `FLIGHTS`: the marked contact points, or the block's centre at each contact.
+    flights : what the flights join, one of `FLIGHT_ENDS`: the contact points, or the block's centre at each contact.
     """
 
     normal_radius_m: float | None = None
@@ -343,7 +340,7 @@ def _reconstruction(table: TomlTable) -> ReconstructionSettings:
         drag=table.flag("drag", False),
         drag_coefficient=table.number("drag_coefficient", DRAG_COEFFICIENT),
         air_density_kgpm3=table.number("air_density_kgpm3", AIR_DENSITY_KGPM3),
-        flights=table.choice("flights", FLIGHTS, "contacts"),
+        flights=table.choice("flights", FLIGHT_ENDS, "contacts"),
         extra=table.rest(),
     )
 

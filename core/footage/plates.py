@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..constants import IQR_PER_SD
 from ..opencv import opencv
 from ..vectors import Array
 from .background import BackgroundMotion
@@ -22,7 +23,6 @@ WANDERED = 0.1
 """Share of the picture by which a moving camera may wander before it needs another plate."""
 NOISE_FLOOR = 2.0
 """Grey levels; compressed video shows none where nothing happens."""
-IQR_TO_SIGMA = 1.349
 QUARTILES = (0.5, 0.25, 0.75)
 
 
@@ -137,7 +137,7 @@ def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> P
         rest, fewer = np.stack([layer[part] for layer in ordered]), np.maximum(number[part] - 1, 0)
         for picture, q in zip((middle, low, high), QUARTILES, strict=True):
             picture[part] = rest[(q * fewer).astype(np.intp), np.arange(fewer.size)]
-    spread = (high.astype(np.float32) - low) / IQR_TO_SIGMA
+    spread = (high.astype(np.float32) - low) / IQR_PER_SD
     variance = opencv().blur(np.mean(spread**2, axis=2), (5, 5))
     return Plate(anchor, middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen)
 

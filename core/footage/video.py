@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..constants import SAME_TIME_S
 from ..errors import InputError
 from ..opencv import opencv, quiet_opencv
 from ..vectors import Array, Indices
@@ -21,7 +22,6 @@ from .containers import codec_name, container_of, holds_sound, lacks_index
 type Image = NDArray[np.uint8]
 type Report = Callable[[str], None]
 
-SAME_TIME_S = 1e-6
 FRAME_AT_TOLERANCE_S = 1e-5
 """Tables keep times with six decimals."""
 MILLISECOND_S = 1e-3

@@ -3,13 +3,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..vectors import Array, Indices
 from .block import Block, per_pick
 from .chains import Segments, find_segments
+from .choices import FlightEnds
 from .clearance import Clearance, clearances
 from .drag import Drag
 from .flight import Flights, solve_flights
@@ -19,8 +20,6 @@ from .placement import GroundNormals, pick_normals
 if TYPE_CHECKING:
     from ..terrain.surface import Surface
 
-FlightEnds = Literal["contacts", "centres"]
-"""What the flights join: the marked contact points, as Noël et al. 2018 do, or the block's centre at each contact."""
 GROUNDED = ("release", "impact", "contact", "stop")
 
 

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from ..constants import SAME_TIME_S
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array, Indices, Mask, Names, norm
 
 KINDS = ("impact", "release", "pass", "contact", "stop")
 STATUSES = ("ok", "doubtful", "shattered", "discarded")
-SAME_TIME_S = 1e-6
-"""Picks of one trajectory that are closer in time than this are at one time: no velocity can be told from them."""
 
 
 @dataclass(frozen=True, eq=False)

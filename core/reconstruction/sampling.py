@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .trajectory import Reconstruction
 
 
+STEP_S = 0.05
+"""Between the rows of a trajectory, where none is given."""
 NEARLY = 1e-6
 """Part of a step: an end of a segment that is this near to a multiple of the step takes its place."""
 

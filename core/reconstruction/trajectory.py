@@ -11,12 +11,13 @@ from ..constants import GRAVITY_MPS2
 from ..errors import RockfallError
 from ..vectors import Indices
 from .block import Block, per_pick
+from .choices import FlightEnds
 from .clearance import Clearance
 from .drag import Drag
 from .flight import Flights
 from .impact import DeviationForm, Impacts
 from .impact_rows import find_impacts
-from .motion import FlightEnds, solve_motion
+from .motion import solve_motion
 from .picks import Picks
 from .placement import check_placement
 

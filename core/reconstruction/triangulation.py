@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..camera.model import Camera, project, project_with_derivatives, rays
+from ..camera.model import SIGMA_PX, Camera, project, project_with_derivatives, rays
 from ..errors import InputError
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
@@ -14,6 +14,7 @@ from ..vectors import Array, Mask, across, cross, distance_to_ray, dot, norm, pe
 from .placement import terrain_normals
 
 GRAZING_DEG = 5.0
+"""Between a ray and the terrain; below it a pixel covers metres of ground."""
 ITERATIONS = 20
 SETTLED_M = 1e-10
 CONTACT_SETTLED_M = 1e-4
@@ -45,7 +46,7 @@ def pick_on_terrain(
     camera: Camera,
     pixels: Array,
     surface: Surface,
-    sigma_px: Array | float = 1.0,
+    sigma_px: Array | float = SIGMA_PX,
     *,
     position: Array | None = None,
     rotation: Array | None = None,
@@ -150,7 +151,7 @@ class SpacePoints:
     residual_px: Array
 
 
-def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | float = 1.0) -> SpacePoints:
+def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | float = SIGMA_PX) -> SpacePoints:
     """Points from their pixels in v views at one common time.
 
     Parameters

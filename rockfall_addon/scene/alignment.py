@@ -16,9 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.camera.blender_lens import pose_from_blender
-from ...core.camera.model import Camera, project, rays, rotation_from_vector, vector_from_rotation, with_intrinsics
+from ...core.camera.model import (
+    Camera,
+    full_frame_mm,
+    project,
+    rays,
+    rotation_from_vector,
+    vector_from_rotation,
+    with_intrinsics,
+)
 from ...core.camera.path import CameraPath, fixed
-from ...core.camera.resection import Resection, resect
+from ...core.camera.resection import POSE_PAIRS, Resection, resect
 from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array, distance_to_ray
@@ -26,9 +34,7 @@ from . import georeference, migration, store, terrain, videos
 
 COLOURS = 7
 GOOD_PAIRS = 8
-KEY_PAIRS = 4
 """From how many pairs a frame is solved by itself once the lens is known, as on the command line."""
-FULL_FRAME_DIAGONAL_MM = 43.2666
 PIXEL, POINT = "pixel", "point"
 NEAR_PX = 11.0
 """A click this near to a mark takes hold of it, in pixels at interface scale 1."""
@@ -369,7 +375,7 @@ def focal_px(camera: bpy.types.Object) -> float:
 
 def focal_mm(camera: bpy.types.Object, focal: float) -> float:
     """What a focal length [px] is on a camera of full frame [mm]."""
-    return FULL_FRAME_DIAGONAL_MM * focal / math.hypot(*videos.size_of(camera))
+    return full_frame_mm(focal, videos.size_of(camera))
 
 
 def set_focal(scene: bpy.types.Scene, camera: bpy.types.Object, focal: float) -> None:
@@ -489,7 +495,7 @@ def _solve(
         ready = _ready(pairs)
         for frame in sorted({pair.frame for pair in ready} - {reference}):
             there = [pair for pair in ready if pair.frame == frame]
-            if len(there) >= KEY_PAIRS:
+            if len(there) >= POSE_PAIRS:
                 keys[frame] = resected(there, (), found.camera)
     return found, keys, reference
 

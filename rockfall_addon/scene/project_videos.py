@@ -9,8 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.camera.model import SIGMA_PX
 from ...core.exchange.cameras import CameraFile, read_camera, write_camera
-from ...core.exchange.footage import SIGMA_PX
 from ...core.exchange.footage_tables import Track, read_track, write_track
 from ...core.exchange.project import Project, VideoEntry
 from ...core.footage.clock import Clock, clock_for

@@ -8,10 +8,8 @@ import numpy as np
 
 from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
-from ...core.footage.clock import Clock, synchronise
+from ...core.footage.clock import DRIFT_NEEDS, Clock, synchronise
 from . import footage, picks, reconstruction, store, videos
-
-DRIFT_EVENTS = 3
 
 
 def go_to(scene: bpy.types.Scene, frame: float) -> None:
@@ -143,7 +141,7 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]
             continue
         common = [clock.to_common(known[number]) for number in both]
         sigma = float(np.hypot(_frame_sigma_s(reference), _frame_sigma_s(camera)))
-        drifts = fit_drift and len(both) >= DRIFT_EVENTS
+        drifts = fit_drift and len(both) >= DRIFT_NEEDS
         own = videos.clock_of(camera)
         fit = synchronise(common, [seen[number] for number in both], rate=own.rate, fit_drift=drifts, sigma_s=sigma)
         videos.set_clock(camera, fit.clock)

@@ -15,7 +15,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.camera.blender_lens import BlenderLens, from_blender_lens, pose_to_blender, to_blender_lens
-from ...core.camera.model import INTRINSICS, Camera
+from ...core.camera.model import GUESSED_FOCAL, INTRINSICS, Camera
 from ...core.camera.path import CameraPath, fixed
 from ...core.errors import RockfallError
 from ...core.film.presets import blender_rate
@@ -26,8 +26,6 @@ from ...core.vectors import Array
 from . import camera_keys, georeference, migration, store, timing
 
 COLLECTION = "Cameras"
-GUESSED_FOCAL = 1.2
-"""In widths of the image: 45°, as phones and camcorders have before zooming."""
 SAME_RATE = 1e-5
 FAR_M, NEAR_M = 20_000.0, 0.1
 KEPT_PICTURES = 6

@@ -3,11 +3,9 @@
 
 import dataclasses
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from rockfall.core.errors import InputError, RockfallError
-from rockfall.core.exchange import project as formats
 from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.project import (
     BlockEntry,
@@ -22,8 +20,6 @@ from rockfall.core.exchange.project import (
     read_project,
     write_project,
 )
-from rockfall.core.reconstruction.motion import FlightEnds
-from rockfall.core.reconstruction.refinement import refine, solver
 
 FULL = """
 schema = 1
@@ -250,13 +246,6 @@ def test_a_project_without_picks_is_not_reconstructed() -> None:
 def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
     with pytest.raises(InputError, match=r"cinema.*preview"):
         read(folder, FULL).preset("cinema")
-
-
-def test_a_project_knows_what_a_refinement_knows() -> None:
-    assert formats.FREE == refine.FREE
-    assert formats.SIGMA_AIM == refine.SIGMA_AIM
-    assert set(formats.LOSSES) == set(solver.LOSSES)
-    assert set(formats.FLIGHTS) == set(get_args(FlightEnds))
 
 
 def test_a_project_cannot_be_changed_in_place(folder: Path) -> None:

@@ -10,24 +10,20 @@ import numpy as np
 from ...constants import GRAVITY_MPS2
 from ...errors import InputError, RockfallError
 from ..block import Block, per_pick
+from ..choices import FREE, LOSSES, SIGMA_AIM, Loss
 from ..drag import Drag
 from ..picks import Picks
 from ..placement import check_placement
 from .problem import evaluate
 from .result import Refinement, summarise
 from .setup import Setup, prepare, set_up
-from .solver import LOSSES, Loss, Solution, find_clocks, pixel_noise, solve
+from .solver import Solution, find_clocks, pixel_noise, solve
 from .views import PixelObservations, View, check_observations
 
 if TYPE_CHECKING:
     from ...terrain.surface import Surface
 
 __all__ = ["FREE", "SIGMA_AIM", "PixelObservations", "Refinement", "View", "refine"]
-
-FREE = ("camera", "clock", "clock_drift", "drag", "gravity")
-SIGMA_AIM = 0.15
-"""Standard deviation of the tracked spot about the block's centre, in parts of its diameter: its sunlit side draws the
-eye of people and of trackers."""
 
 
 def refine(

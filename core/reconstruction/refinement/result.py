@@ -8,21 +8,22 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...camera.model import rotation_from_vector
+from ...constants import SAME_TIME_S
 from ...vectors import Array, Mask, dot, norm, unit
 from ..block import Block
+from ..choices import FlightEnds
 from ..drag import Drag
-from ..motion import FlightEnds
 from ..node_motion import places_at
-from ..picks import SAME_TIME_S, Picks
+from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
 from ..trajectory import Reconstruction, reconstruct
+from ..triangulation import GRAZING_DEG
 from .deviations import impact_sigmas, velocity_rows
 from .problem import CLOCK_COLUMN, NODE, evaluate
 from .setup import Ground, Setup
 from .solver import UNEXPLAINED, Solution, normal_equations
 from .views import PixelObservations, View
 
-GRAZING_DEG = 5.0
 PULLED = 3.0
 HELD = 0.7
 """A time whose standard deviation stays above this part of the marked one is told by the mark for the most part."""

@@ -2,7 +2,6 @@
 """Levenberg–Marquardt with reweighting (Triggs et al. 2000, Bundle adjustment, §4)."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -10,6 +9,7 @@ from scipy.stats import chi2
 
 from ...camera.model import project
 from ...vectors import Array, Indices, Mask, norm
+from ..choices import Loss
 from ..node_motion import places_at
 from .problem import (
     Evaluation,
@@ -24,8 +24,6 @@ from .problem import (
     solve_segments,
 )
 
-Loss = Literal["huber", "cauchy", "linear"]
-LOSSES: tuple[Loss, ...] = ("huber", "cauchy", "linear")
 HUBER, CAUCHY = 2.5, 3.5
 """Length of a whitened pixel residual from which it counts less: 98 % efficient on normal noise in two dimensions."""
 REJECTED = 4.5

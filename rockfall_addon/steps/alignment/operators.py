@@ -7,6 +7,7 @@ from bpy.props import BoolProperty
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
+from ....core.camera.resection import POSE_PAIRS
 from ....core.errors import RockfallError
 from ...scene import alignment, footage_blend, store, terrain, videos
 from ...view import image_view, look
@@ -348,8 +349,8 @@ class ROCKFALL_OT_propose_pairs(bpy.types.Operator):
         count = alignment.propose_here(scene, camera)
         if not count:
             raise RockfallError("No other pair's point is in the picture here. Mark new pairs in this frame.")
-        if count < alignment.KEY_PAIRS:
-            self.report({"INFO"}, f"{count} points are in the picture; mark {alignment.KEY_PAIRS - count} more here.")
+        if count < POSE_PAIRS:
+            self.report({"INFO"}, f"{count} points are in the picture; mark {POSE_PAIRS - count} more here.")
         return {"FINISHED"}
 
 

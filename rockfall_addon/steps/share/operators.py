@@ -9,10 +9,8 @@ from bpy.props import StringProperty
 from ....core.exchange.output import output_folder
 from ....core.exchange.tables import write_impacts, write_picks, write_trajectories
 from ....core.reconstruction.sampling import sample_trajectories
-from ...scene import project, reconstruction, store, terrain
+from ...scene import project, reconstruction, store, terrain, trails
 from ...view.reporting import reported
-
-TRAJECTORY_STEP_S = 0.02
 
 
 class _IntoFolder:
@@ -45,7 +43,7 @@ class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         result = reconstruction.reconstruct_scene(scene)
-        samples = sample_trajectories(result, TRAJECTORY_STEP_S, surface=terrain.surface_of_scene(scene))
+        samples = sample_trajectories(result, trails.SAMPLE_STEP_S, surface=terrain.surface_of_scene(scene))
         with output_folder(Path(bpy.path.abspath(self.directory))) as folder:
             write_picks(result.picks, folder / "picks.csv")
             write_impacts(result.impacts, folder / "impacts.csv")

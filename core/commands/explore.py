@@ -2,6 +2,7 @@
 """``rockfall explore``: the live page on this machine, with a slider for every parameter."""
 
 import argparse
+import signal
 import webbrowser
 from collections.abc import Mapping
 from pathlib import Path
@@ -37,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Serve the page until interrupted."""
+    """Serve the page until interrupted or asked to end."""
     from ..analysis.courses import find_courses
     from ..analysis.explorer import Exploration, serve
     from ..analysis.extras import PAGES, demand
@@ -71,6 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise InputError(
                 error.problem, file=arguments.impacts, trajectory=error.trajectory, advice=error.advice
             ) from error
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         serve(
             Exploration(impacts, courses, models, save, given, arguments.seed, Path(arguments.impacts).name),
@@ -79,4 +81,6 @@ def run(arguments: argparse.Namespace) -> int:
         )
     except KeyboardInterrupt:
         print("\nStopped.")
+    finally:
+        signal.signal(signal.SIGTERM, before)
     return 0

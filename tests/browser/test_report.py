@@ -8,12 +8,14 @@
 Skipped where Chromium, its driver or one of the libraries is missing. Screenshots are left in out/screenshots.
 """
 
+import ctypes
 import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -43,6 +45,7 @@ ARGUMENTS = (
     "--window-size=1440,1000",
 )
 PATIENCE_S = 60
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 MODEL = "return Bokeh.documents[0].get_model_by_name(arguments[0])"
 ELEMENT = """
@@ -92,14 +95,29 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def with_us() -> None:
+    """In the new process: heed Ctrl-C, as a shell's background jobs do not, and end with the tests."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+@contextmanager
+def explored(tables: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The process of the live page, and the page's address."""
+    command = [sys.executable, "-m", "rockfall.core.cli", "explore", str(tables / "impacts.csv"), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tables, preexec_fn=with_us) as process:
+        try:
+            yield process, process.stdout.readline().split()[-1]
+        finally:
+            process.kill()
+
+
 @pytest.fixture(scope="module")
 def address(tables: Path) -> Iterator[str]:
     """Of the live page."""
-    command = [sys.executable, "-m", "rockfall.core.cli", "explore", str(tables / "impacts.csv"), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tables) as process:
-        yield process.stdout.readline().split()[-1]
-        process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE_S) == 0
+    with explored(tables) as (_, address):
+        yield address
 
 
 def opened(browser: webdriver.Chrome, url: str) -> None:
@@ -224,6 +242,15 @@ def test_another_model_a_draw_and_saved_parameters(browser, address, tables) -> 
     assert read_parameters(tables / "parameters.toml")["noel_2017"]["rt"] == 0.5
     browser.save_screenshot(str(SHOTS / "explore_draw.png"))
     assert_quiet_console(browser)
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_the_live_page_stops_when_asked(tables, name) -> None:
+    with explored(tables) as (process, _):
+        process.send_signal(signal.Signals[name])
+        rest, _ = process.communicate(timeout=PATIENCE_S)
+    assert rest.endswith("\nStopped.\n")
+    assert process.returncode == 0
 
 
 def test_calibrate(browser, address) -> None:

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""No test waits for ever: one that takes too long ends the run, and what it was doing is printed."""
+
+import faulthandler
+import os
+from collections.abc import Iterator
+
+import pytest
+
+LIMIT_S = 480
+STDERR = pytest.StashKey[int]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[STDERR] = os.dup(2)  # what a test prints is captured, and lost when the process ends
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    os.close(config.stash[STDERR])
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def limited(item: pytest.Item) -> Iterator[None]:
+    """Unlike pytest's own limit, also for the fixtures of a test that has failed."""
+    faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=item.config.stash[STDERR])
+    try:
+        return (yield)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+pytest_runtest_setup = pytest_runtest_call = pytest_runtest_teardown = limited

@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..vectors import Array
 from .crs import crs_beside
 from .source import Source
-from .text import all_numbers, read_text
+from .text import all_numbers, read_text, shown
 
 ASC_KEYS = (
     "ncols",
@@ -45,7 +45,7 @@ def read_ascii_grid(path: Path) -> Source:
         key = words[0].lower()
         if key not in ASC_KEYS or len(words) != 2:
             raise InputError(
-                f'"{line[:60].decode("utf-8", "replace").strip()}" is no header line of an ESRI ASCII grid',
+                f'"{shown(line)}" is no header line of an ESRI ASCII grid',
                 file=path,
                 row=row + 1,
                 advice="The header has ncols, nrows, xllcorner, yllcorner, cellsize and NODATA_value",
@@ -94,7 +94,7 @@ def _ascii_heights(lines: list[bytes], first: int, rows: int, columns: int, path
             if all_numbers(line) is None:
                 word = next(w for w in line.split() if all_numbers(w) is None)
                 raise InputError(
-                    f'"{word[:40].decode("utf-8", "replace")}" is not a number',
+                    f'"{shown(word)}" is not a number',
                     file=path,
                     row=row,
                     advice="Heights are needed here, with a point as the decimal mark",

@@ -6,11 +6,14 @@ import struct
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
-from .source import Source, check_face_indices, triangulated
-from .text import even_table, number_table, read_text
+from ..vectors import Array
+from .source import Source, check_face_indices
+from .text import all_numbers, number_table, read_text, shown
 
+BLANK, NEWLINE = 32, 10
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -31,38 +34,45 @@ def read_obj(path: Path) -> Source:
     points = number_table([lines[i][2:] for i in vertex_rows], [i + 1 for i in vertex_rows], path, "Coordinates")
     if points.shape[1] < 3:
         raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_rows[0] + 1)
-    plain = [re.sub(rb"/\S*", b"", lines[i][2:]) for i in face_rows]
-    triangles = even_table(plain, 3)
-    if triangles is not None and triangles.min() >= 1 and triangles.max() <= len(points) and (triangles % 1 == 0).all():
-        faces = triangles.astype(np.int64) - 1
-    else:
-        faces = triangulated(_polygons(lines, face_rows, vertex_rows, path))
-    return Source(np.ascontiguousarray(points[:, :3]), check_face_indices(faces, len(points), path))
+    faces = _obj_faces([lines[i] for i in face_rows], np.array(face_rows), np.array(vertex_rows), path)
+    return Source(np.ascontiguousarray(points[:, :3]), faces)
 
 
-def _polygons(lines: list[bytes], face_rows: list[int], vertex_rows: list[int], path: Path) -> list[list[int]]:
-    """The faces of an OBJ one by one: any number of corners, counted from the front or back."""
-    polygons, before = [], np.searchsorted(vertex_rows, face_rows).tolist()
-    for row, vertices_before in zip(face_rows, before, strict=True):
-        try:
-            polygon = [int(word) for word in re.sub(rb"/\S*", b"", lines[row][2:]).split()]
-        except ValueError as error:
-            raise InputError(
-                f'"{lines[row][:60].decode("utf-8", "replace")}" is no face', file=path, row=row + 1
-            ) from error
-        # Numbers count from 1; negative ones count back from the last vertex before the face.
-        polygon = [v - 1 if v > 0 else vertices_before + v for v in polygon]
-        if len(polygon) < 3 or min(polygon) < 0 or max(polygon) >= len(vertex_rows):
-            raise InputError(
-                f'"{lines[row][:60].decode("utf-8", "replace")}" names a vertex that does not exist'
-                if len(polygon) >= 3
-                else "A face needs three vertices",
-                file=path,
-                row=row + 1,
-                advice=f"The file has {len(vertex_rows)} vertices: export it again",
-            )
-        polygons.append(polygon)
-    return polygons
+def _obj_faces(
+    lines: list[bytes], face_rows: NDArray[np.intp], vertex_rows: NDArray[np.intp], path: Path
+) -> NDArray[np.int32]:
+    """(m, 3) polygons of any number of corners as fans of triangles; corners are counted from the front or back."""
+
+    def wrong(face: int, problem: str, advice: str | None = None) -> InputError:
+        return InputError(problem, file=path, row=int(face_rows[face]) + 1, advice=advice)
+
+    text = re.sub(rb"/\S*", b"", b"\n".join(line[2:] for line in lines))
+    number = _whole_numbers(text)
+    if number is None:
+        face = next(i for i, line in enumerate(text.split(b"\n")) if _whole_numbers(line) is None)
+        raise wrong(face, f'"{shown(lines[face])}" is no face')
+    code = np.frombuffer(text, np.uint8)
+    begins = np.flatnonzero((code > BLANK) & np.r_[True, code[:-1] <= BLANK])
+    corners = np.diff(np.searchsorted(begins, [0, *np.flatnonzero(code == NEWLINE).tolist(), code.size]))
+    if (corners < 3).any():
+        raise wrong(int(np.argmax(corners < 3)), "A face needs three vertices")
+    # Numbers count from 1; negative ones count back from the last vertex before the face.
+    of_face = np.repeat(np.arange(len(lines)), corners)
+    vertex = np.where(number > 0, number - 1, np.searchsorted(vertex_rows, face_rows)[of_face] + number)
+    outside = (vertex < 0) | (vertex >= len(vertex_rows)) | (number == 0)
+    if outside.any():
+        face = int(of_face[np.argmax(outside)])
+        advice = f"The file has {len(vertex_rows)} vertices: export it again"
+        raise wrong(face, f'"{shown(lines[face])}" names a vertex that does not exist', advice)
+    triangles = corners - 2
+    first = np.repeat(np.cumsum(corners) - corners, triangles)
+    turn = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return vertex[first[:, None] + np.stack([0 * turn, turn + 1, turn + 2], axis=1)].astype(np.int32)
+
+
+def _whole_numbers(text: bytes) -> Array | None:
+    number = all_numbers(text)
+    return number if number is not None and (np.isfinite(number) & (number == np.rint(number))).all() else None
 
 
 def read_stl(path: Path) -> Source:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from .source import Source, check_face_indices, triangulated
-from .text import even_table, number_table
+from .text import even_table, number_table, shown
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -232,7 +232,7 @@ def _ascii_faces(element: Element, lines: list[bytes], rows: list[int], path: Pa
                 raise ValueError
         except (ValueError, IndexError) as error:
             raise InputError(
-                f'"{line[:60].decode("utf-8", "replace")}" is no face: a count and as many vertex numbers are needed',
+                f'"{shown(line)}" is no face: a count and as many vertex numbers are needed',
                 file=path,
                 row=row,
                 advice="The file may be truncated: copy or export it again",

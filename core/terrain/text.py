@@ -51,7 +51,7 @@ def number_table(lines: Sequence[bytes], rows: Sequence[int] | range, path: Path
         for word in words:
             if not _is_number(word):
                 raise InputError(
-                    f'"{_shown(word)}" is not a number', file=path, row=row, advice=f"{what} are needed in this row"
+                    f'"{shown(word)}" is not a number', file=path, row=row, advice=f"{what} are needed in this row"
                 )
         if len(words) != columns:
             raise InputError(
@@ -89,5 +89,6 @@ def _is_number(word: bytes) -> bool:
     return b"_" not in word
 
 
-def _shown(word: bytes) -> str:
-    return word[:40].decode("utf-8", "replace")
+def shown(text: bytes) -> str:
+    """The beginning of a word or line, for a message."""
+    return text[:60].decode("utf-8", "replace").strip()

@@ -13,6 +13,7 @@ import trimesh
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
+from rockfall.core.terrain.meshes import read_obj
 from rockfall.core.terrain.readers import inspect_terrain, read_terrain
 from rockfall.core.terrain.writers import write_ply
 
@@ -138,6 +139,27 @@ def test_obj_keeps_doubles_and_understands_its_face_forms(tmp_path):
     surface = read_terrain(write(tmp_path / "a.obj", obj))
     assert surface.shift.to_survey(surface.vertices)[0, 0] == 2600000.123456789
     np.testing.assert_array_equal(surface.faces, [[0, 1, 2], [0, 2, 3], [1, 4, 2]])
+
+
+def test_obj_of_several_objects_with_polygons_and_relative_numbers(tmp_path):
+    """Numbers from the back count from the face on, not from the end of the file."""
+    text = "o one\nv 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 6 0\nv 0 4 0\ng pentagon\nusemtl stone\ns 1\nf -5 -4 -3 -2 -1\n"
+    text += "o two\nvt 0 0\nv 10 0 0\nv 14 0 0\nv 14 4 1\nl 1 2\nf -3/1 -2/1 -1/1\nf\t6//  8 7\n"
+    source = read_obj(write(tmp_path / "a.obj", text))
+    np.testing.assert_array_equal(source.faces, [[0, 1, 2], [0, 2, 3], [0, 3, 4], [5, 6, 7], [5, 7, 6]])
+    np.testing.assert_array_equal(source.points[[3, 7]], [[2, 6, 0], [14, 4, 1]])
+
+
+def test_obj_of_polygons_as_trimesh_reads_it(tmp_path):
+    rng = np.random.default_rng(4)
+    points = rng.normal(0, 1, (60, 3)) + LV95
+    corners = [rng.choice(60, count, replace=False) + 1 for count in rng.choice([3, 5, 6, 7], 300)]
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()] + ["vt 0 0", "vn 0 0 1"]
+    lines += ["f " + " ".join(f"{corner}/1/1" for corner in face) for face in corners]
+    path = write(tmp_path / "a.obj", "\n".join(lines))
+    source, other = read_obj(path), trimesh.load_mesh(path, process=False, maintain_order=True, skip_materials=True)
+    np.testing.assert_array_equal(source.points, other.vertices)
+    assert sorted(source.faces.tolist()) == sorted(other.faces.tolist())
 
 
 @pytest.mark.parametrize("extension", ["glb", "gltf"])

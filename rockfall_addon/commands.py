@@ -10,7 +10,8 @@ import bpy
 
 from ..core import cli
 from ..core.film.job import FilmJob
-from ..core.film.maker import FilmMaker, Report, inside_blender
+from ..core.film.maker import FilmMaker, inside_blender
+from ..core.progress import Progress
 
 _handles: list[object] = []
 
@@ -33,12 +34,12 @@ def run(arguments: list[str]) -> int:
         inside_blender.reset(token)
 
 
-def _make(job: FilmJob, report: Report) -> None:
+def _make(job: FilmJob, progress: Progress) -> None:
     from .steps.film.render import make
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     with _quiet():
-        make(job, report)
+        make(job, progress)
 
 
 def _probe_command() -> tuple[str, ...]:

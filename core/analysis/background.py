@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long work beside a live page: in a thread, with progress, and it can be cancelled."""
 
+import time
 from collections.abc import Callable
 from html import escape
 from threading import Event, Thread
 from typing import Any
 
 from ..errors import RockfallError
+from ..progress import CancelledError, Progress
+
+BETWEEN_S = 0.5
+"""Between two reports about the same work."""
 
 
 class Job:
@@ -16,26 +21,25 @@ class Job:
         self._document, self._say = document, say
         self._stop = Event()
         self._thread: Thread | None = None
+        self._said, self._said_at = "", 0.0
 
     @property
     def is_running(self) -> bool:
         """Whether work is going on."""
         return self._thread is not None
 
-    def begin[T](
-        self, work: Callable[[Callable[[str], None], Callable[[], bool]], T], done: Callable[[T | None], None]
-    ) -> None:
-        """Start ``work(progress, cancelled)``; `done` gets its result, or None when it was cancelled or refused."""
+    def begin[T](self, work: Callable[[Progress], T], done: Callable[[T | None], None]) -> None:
+        """Start ``work(progress)``; `done` gets its result, or None when it was cancelled or refused."""
         self._stop.clear()
 
         def run() -> None:
+            result, text = None, ""
             try:
-                result: T | None = work(
-                    lambda what: self._later(lambda: self._say(f"{escape(what)} …")), self._stop.is_set
-                )
-                text = ""
+                result = work(self._progress)
+            except CancelledError:
+                text = "Cancelled; nothing was kept."
             except RockfallError as error:
-                result, text = None, escape(str(error))
+                text = escape(str(error))
             self._later(lambda: self._end(done, result, text))
 
         self._thread = Thread(target=run, daemon=True)
@@ -45,8 +49,17 @@ class Job:
         """Ask the work to stop."""
         self._stop.set()
 
+    def _progress(self, text: str, done: int, total: int) -> None:
+        if self._stop.is_set():
+            raise CancelledError
+        now = time.monotonic()
+        if text != self._said or now - self._said_at >= BETWEEN_S:
+            self._said, self._said_at = text, now
+            line = f"{text}: {done} of {total}" if total > 1 else f"{text} …"
+            self._later(lambda: self._say(escape(line)))
+
     def _end[T](self, done: Callable[[T | None], None], result: T | None, text: str) -> None:
-        self._thread = None
+        self._thread, self._said = None, ""
         self._say(text)
         done(result)
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -10,12 +11,13 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
+from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices
 from .clouds import OBJECTIVE, Contest, Target, make_contest, measured_target
 from .courses import Spin, find_courses
 from .estimation import Estimate, Estimation, Question, ask, check_effort, estimate, paired_gain
-from .fitting import COARSE, Report, Stop, descend_from_best
+from .fitting import COARSE, descend_from_best, watched
 from .verdicts import holdout_verdict, use_verdict
 
 HoldOut = Literal["trajectory", "none"]
@@ -92,8 +94,7 @@ def calibrate(
     holdout: HoldOut = "trajectory",
     spin: Spin = "rolling",
     radius_m: float | None = None,
-    progress: Report | None = None,
-    cancelled: Stop | None = None,
+    progress: Progress = silent,
 ) -> Calibration:
     """Fit chosen parameters of one model to measured impacts.
 
@@ -110,12 +111,10 @@ def calibrate(
     resamples : of the trajectories, for the intervals.
     holdout : "trajectory" also predicts each fifth of the trajectories from the others.
     spin, radius_m : as for `compare`.
-    progress, cancelled : told what is going on; asked whether to stop.
 
     Raises
     ------
     InputError : unknown model or parameter, value out of range, too few impacts or none that can be used.
-    CancelledError : `cancelled` said so.
 
     Notes
     -----
@@ -138,16 +137,13 @@ def calibrate(
         seed=seed,
         resamples=resamples,
         progress=progress,
-        cancelled=cancelled,
     )
     counts = target.counts
     total = float(counts.sum())
     held: Array | None = None
     parts: tuple[Fold, ...] = ()
     if holdout == "trajectory" and target.clusters > 1:
-        if progress is not None:
-            progress("Predicting trajectories that were held out")
-        held, members = _hold_out(question, contest, found, seed, cancelled)
+        held, members = _hold_out(question, contest, found, seed, progress)
         parts = _folds(impacts, target, members, held, found.default_sums)
     return Calibration(
         model=chosen.name,
@@ -172,19 +168,20 @@ def calibrate(
 
 
 def _hold_out(
-    question: Question, contest: Contest, found: Estimation, seed: int, cancelled: Stop | None
+    question: Question, contest: Contest, found: Estimation, seed: int, progress: Progress
 ) -> tuple[Array, list[Indices]]:
     """(clusters,) sums of scores, each from a fit without its part; the parts."""
     counts = contest.target.counts
     n = counts.size
     members = np.array_split(np.random.default_rng([seed, 2]).permutation(n), min(FOLDS, n))
     held = np.empty(n)
-    for part in members:
+    for k, part in enumerate(members):
+        say = partial(progress, "Predicting trajectories that were held out", k, len(members))
         weights = np.ones(n)
         weights[part] = 0.0
         best, least = found.sums, np.inf
         for i, one in enumerate(found.fits):
-            sums = question.sums(contest, i, cancelled)
+            sums = watched(question.sums(contest, i), say)
             place = descend_from_best(sums, counts, weights, one.scanned, one.scanned_sums, 2, COARSE)
             here = sums(place)
             if weights @ here < least:

@@ -14,12 +14,12 @@ import numpy as np
 
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
+from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
 from ..vectors import Array
 from .clouds import Target, cloud_of, make_contest, make_target
 from .courses import Spin, find_courses
 from .estimation import Estimate, ask, check_effort, estimate
-from .fitting import Report, Stop
 from .verdicts import likeness_verdict
 
 OTHER_CHANCE = 1
@@ -78,8 +78,7 @@ def equivalent(
     resamples: int = 100,
     spin: Spin = "rolling",
     radius_m: float | None = None,
-    progress: Report | None = None,
-    cancelled: Stop | None = None,
+    progress: Progress = silent,
 ) -> Equivalence:
     """Parameters of `model_b` that behave most like `model_a` with `parameters_a`.
 
@@ -89,12 +88,11 @@ def equivalent(
     ----------
     parameters_a : those of the first model that are not to have their default.
     fit, fixed : parameters of the second model to find, and others that are not to have their default.
-    starts, seed, replicates, resamples, spin, radius_m, progress, cancelled : as for `calibrate`.
+    starts, seed, replicates, resamples, spin, radius_m, progress : as for `calibrate`.
 
     Raises
     ------
     InputError : unknown model or parameter, value out of range, too few impacts or none that can be used.
-    CancelledError : `cancelled` said so.
     """
     a, b = find_model(model_a), find_model(model_b)
     settings = a.settings(parameters_a)
@@ -104,9 +102,7 @@ def equivalent(
     cloud = cloud_of(a, impacts, courses, settings, replicates, seed)
     target = make_target(courses, cloud, np.asarray(np.isfinite(cloud).all(axis=(0, 2))))
     contest = make_contest(b, impacts, target, replicates, seed + OTHER_CHANCE)
-    found = estimate(
-        question, contest, fit, starts=starts, seed=seed, resamples=resamples, progress=progress, cancelled=cancelled
-    )
+    found = estimate(question, contest, fit, starts=starts, seed=seed, resamples=resamples, progress=progress)
     own, total = _own_scatter(target), float(target.counts.sum())
     distances = [
         float(np.sqrt(max(2 * (float(sums.sum()) - own) / total, 0.0))) for sums in (found.default_sums, found.sums)

@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from math import nan, prod
 
@@ -11,9 +12,10 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.parameters import ParameterSpec, Value
+from ..progress import Progress
 from ..vectors import Array
 from .clouds import Contest
-from .fitting import Axis, Fit, Report, Stop, Sums, cancellable, fit, interval, resample
+from .fitting import Axis, Fit, Sums, fit, interval, resample, watched
 from .verdicts import choice_verdict, number_verdict
 
 MOST_COMBINATIONS = 64
@@ -73,7 +75,7 @@ class Question:
         """The fitted numbers at a place of the unit cube."""
         return {spec.name: axis.value(x) for spec, axis, x in zip(self.numbers, self.axes, place.tolist(), strict=True)}
 
-    def sums(self, contest: Contest, combination: int, cancelled: Stop | None) -> Sums:
+    def sums(self, contest: Contest, combination: int) -> Sums:
         """The scores as a function of the place, for one combination."""
         base = self.model.numbers(self.combinations[combination])
         names = [spec.name for spec in self.model.parameters]
@@ -84,7 +86,7 @@ class Question:
             numbers[where] = [axis.value(x) for axis, x in zip(self.axes, place.tolist(), strict=True)]
             return contest.sums(numbers)
 
-        return cancellable(at, cancelled)
+        return at
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,26 +167,22 @@ def estimate(
     starts: int,
     seed: int,
     resamples: int,
-    progress: Report | None,
-    cancelled: Stop | None,
+    progress: Progress,
 ) -> Estimation:
     """Fit all combinations, take the best, and resample the trajectories for its intervals.
 
     Raises
     ------
     InputError : too few impacts.
-    CancelledError : `cancelled` said so.
     """
     counts = contest.target.counts
     _check_enough(question, int(counts.sum()))
-    fits = []
-    for i in range(len(question.combinations)):
-        if progress is not None:
-            of = f" ({i + 1} of {len(question.combinations)} combinations)" if len(question.combinations) > 1 else ""
-            progress(f"Fitting {question.model.name}{of}")
-        fits.append(fit(question.sums(contest, i, cancelled), counts, question.default_place(i), starts, seed))
+    fits, total = [], len(question.combinations)
+    for i in range(total):
+        sums = watched(question.sums(contest, i), partial(progress, f"Fitting {question.model.name}", i, total))
+        fits.append(fit(sums, counts, question.default_place(i), starts, seed))
     best = int(np.argmin([found.sums.sum() for found in fits]))
-    found, sums = fits[best], question.sums(contest, best, cancelled)
+    found, sums = fits[best], question.sums(contest, best)
     places = resample(sums, counts, found, resamples, seed, progress)
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = np.atleast_2d(np.corrcoef(places, rowvar=False)) if places.size else np.empty((0, 0))

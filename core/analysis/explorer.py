@@ -13,6 +13,7 @@ from typing import Any
 from ..errors import RockfallError
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
+from ..progress import Progress
 from ..reconstruction.impact import Impacts
 from .background import Job
 from .comparison import predict
@@ -242,7 +243,7 @@ class _Page:
             return
         fixed = {key: value for key, value in self.given[name].items() if key not in fitted}
 
-        def work(progress: Callable[[str], None], cancelled: Callable[[], bool]) -> Calibration:
+        def work(progress: Progress) -> Calibration:
             return calibrate(
                 self.start.impacts,
                 name,
@@ -251,7 +252,6 @@ class _Page:
                 seed=self.start.seed,
                 spin=self.start.courses.spin,
                 progress=progress,
-                cancelled=cancelled,
             )
 
         def done(result: Calibration | None) -> None:

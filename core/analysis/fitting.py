@@ -10,18 +10,17 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from math import asinh, sinh
 
 import numpy as np
 
-from ..errors import RockfallError
 from ..impact_models.machinery.parameters import ParameterSpec
+from ..progress import Progress
 from ..vectors import Array
 
 Sums = Callable[[Array], Array]
 """Place (k,) in the unit cube → (clusters,) sums of scores."""
-Report = Callable[[str], None]
-Stop = Callable[[], bool]
 
 SCAN_PER_PARAMETER = 64
 MOST_SCANNED = 512
@@ -30,10 +29,6 @@ WIDE = 20.0
 FINE, COARSE = 1e-6, 2e-3
 """How near the descent goes to the minimum, in the unit cube: for the fit, for a resample."""
 CONFIDENCE = 0.95
-
-
-class CancelledError(RockfallError):
-    """The caller asked to stop; nothing was kept."""
 
 
 @dataclass(frozen=True)
@@ -112,18 +107,16 @@ def descend_from_best(
     return best
 
 
-def resample(sums: Sums, counts: Array, found: Fit, resamples: int, seed: int, progress: Report | None = None) -> Array:
+def resample(sums: Sums, counts: Array, found: Fit, resamples: int, seed: int, progress: Progress) -> Array:
     """(resamples, k) places that fit when the clusters are drawn anew, with replacement."""
     n = counts.size
     draws = np.random.default_rng([seed, 1]).multinomial(n, np.full(n, 1 / n), size=resamples).astype(np.float64)
     places, scanned = np.vstack([found.place, found.scanned]), np.vstack([found.sums, found.scanned_sums])
-    step = max(resamples // 5, 1)
 
     def one(b: int) -> Array:
-        if progress is not None and b % step == 0:
-            progress(f"Resample {b} of {resamples}")
         start = places[np.argmin(_means(scanned, counts, draws[b]))]
-        return _descend(_weighted(sums, counts, draws[b]), start, 0.05, COARSE)
+        here = watched(sums, partial(progress, "Resampling the trajectories", b, resamples))
+        return _descend(_weighted(here, counts, draws[b]), start, 0.05, COARSE)
 
     if not found.place.size:
         return np.empty((resamples, 0))
@@ -159,17 +152,14 @@ def scan_places(default: Array, seed: int) -> Array:
     return np.vstack([default, Sobol(k, rng=np.random.default_rng([seed, 0])).random(number)])
 
 
-def cancellable(sums: Sums, cancelled: Stop | None) -> Sums:
-    """The same, asking before each evaluation whether to stop."""
-    if cancelled is None:
-        return sums
+def watched(sums: Sums, say: Callable[[], None]) -> Sums:
+    """The same, with a word before each evaluation, in which the work can be stopped."""
 
-    def asking(place: Array) -> Array:
-        if cancelled():
-            raise CancelledError("Cancelled; nothing was kept.")
+    def saying(place: Array) -> Array:
+        say()
         return sums(place)
 
-    return asking
+    return saying
 
 
 def _weighted(sums: Sums, counts: Array, weights: Array) -> Callable[[Array], float]:

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..vectors import Array, Indices, Mask, distance_to_ray, norm
 from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_told, whole
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..camera.model import Camera
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--moving follows the background through a video", advice="Give it with --video FILE")
     if arguments.moving == "full" and not arguments.terrain:
         raise InputError("--moving full needs the terrain", advice="Give it with --terrain MESH, or use rotation")
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         surface = terrain_as_told(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
         pairs = read_pairs(arguments.pairs, None if surface is None else surface.shift)
@@ -128,7 +128,7 @@ def _size(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _video(file: str, progress: Progress) -> "Video":
+def _video(file: str, progress: PrintedProgress) -> "Video":
     from ..footage.video import open_video
 
     return open_video(file, progress)
@@ -193,7 +193,7 @@ def _follow(
     frame: int,
     surface: "Surface | None",
     arguments: argparse.Namespace,
-    progress: Progress,
+    progress: PrintedProgress,
 ) -> "tuple[CameraPath, list[str]]":
     """A pose for each frame from the background; and sentences about it."""
     from ..camera.model import vector_from_rotation

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .fitting_options import add_fit_arguments, naming, parameter_names, parameter_values, table_of, wrapped
 from .options import add_out
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..analysis.calibration import Calibration
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     model = find_model(arguments.model)
     names, fixed = parameter_names(model, arguments.fit), parameter_values(model, arguments.set)
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
         with naming(arguments.impacts):

@@ -18,7 +18,7 @@ from .options import (
     terrain_as_told,
     whole,
 )
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..analysis.comparison import Predictions
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
     parameters = model_parameters(arguments, models)
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
         progress("Comparing")
@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _twins(
-    arguments: argparse.Namespace, impacts: "Impacts", predictions: "Predictions", progress: Progress
+    arguments: argparse.Namespace, impacts: "Impacts", predictions: "Predictions", progress: PrintedProgress
 ) -> "Twins":
     from ..analysis.twins import fly_twins
     from ..reconstruction.drag import Drag
@@ -133,7 +133,7 @@ def _draw(
     marks: "tuple[Score, ...]",
     folder: Path,
     origin: str,
-    progress: Progress,
+    progress: PrintedProgress,
 ) -> list[str]:
     """The figures and the page, as far as their libraries are there; returns what to install for the others."""
     from ..analysis.extras import FIGURES, PAGES, install_command, is_there

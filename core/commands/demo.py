@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..film.engines import ENGINES
 from ..reconstruction.sampling import STEP_S
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..reconstruction.trajectory import Reconstruction
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     maker = None if arguments.no_film else film_maker()  # what is missing is told before the work, not after
     project = read_project(SITE / "project.toml")
-    with output_folder(arguments.out) as folder:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         _say("The site", [f"{project.site.name}. {project.site.description}."])
         surface, result = open_project(project)
         _write_tables(result, surface, folder)
@@ -69,9 +70,11 @@ def run(arguments: argparse.Namespace) -> int:
         if maker is not None:
             _say("Picture and film", ["Rendered by Blender; the film takes two to three minutes on two cores."])
             common = {"source": SITE / "project.toml", "engine": arguments.engine}
-            done = maker.film(FilmJob(kind="slope", out=folder.absolute() / "slope.png", preset="hd", **common))
+            done = maker.film(
+                FilmJob(kind="slope", out=folder.absolute() / "slope.png", preset="hd", **common), progress
+            )
             film = FilmJob(kind="film", out=folder.absolute() / "rockfall.mp4", preset="preview", **common)
-            maker.film(film.with_engine(done.engine))
+            maker.film(film.with_engine(done.engine), progress)
         written = [name for name in FILES if (folder / name).exists()]
     print(f"Written to {arguments.out}:")
     for name in written:

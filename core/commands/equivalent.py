@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .fitting_options import add_fit_arguments, naming, parameter_names, parameter_values, table_of, wrapped
 from .options import add_out
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..analysis.equivalence import Equivalence
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     names = parameter_names(b, arguments.fit)
     of_b = [text for text in arguments.set if text.startswith(f"{b.name}.") and a is not b]
     given = parameter_values(a, [text for text in arguments.set if text not in of_b])
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
         with naming(arguments.impacts):

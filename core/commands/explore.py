@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .options import add_incident_options, whole
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..impact_models.machinery.parameters import Value
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.no_browser:
             webbrowser.open(address)
 
-    with Progress() as progress:
+    with PrintedProgress() as progress:
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
         try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from .options import positive
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..footage.video import Video
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..footage.video import open_video
 
     speed = _fastest(arguments.picks) if arguments.picks else arguments.speed
-    with Progress() as progress:
+    with PrintedProgress() as progress:
         video = open_video(arguments.video, progress, thorough=True)
     advice = content_advice(video) + rate_advice(
         video,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .options import add_out
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..exchange.database import Database, Merged
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     sites = _for_each(arguments.site, arguments.tables, "--site")
     licences = _for_each(arguments.licence, arguments.tables, "--licence")
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         parts = []
         for path, site, licence in zip(arguments.tables, sites, licences, strict=True):
             progress(f"Reading {path}")

@@ -11,8 +11,8 @@ from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..impact_models.machinery.parameters import Value
+    from ..progress import Progress
     from ..terrain.surface import Surface
-    from .progress import Progress
 
 UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
@@ -108,7 +108,7 @@ def terrain_as_told(arguments: argparse.Namespace, file: str, progress: "Progres
     """
     from ..terrain.readers import read_terrain
 
-    progress(f"Reading {file}")
+    progress(f"Reading {file}", 0, 0)
     return read_terrain(
         file,
         up=arguments.up,

@@ -2,25 +2,42 @@
 """Progress on standard error, for work that takes more than a second."""
 
 import sys
+import time
 from threading import Timer
 from types import TracebackType
+from typing import TextIO
 
 QUIET_S = 1.0
+"""Before the first line."""
+BETWEEN_S = 5.0
+"""Between two lines about the same work where a line cannot be written over (a log file)."""
+REDRAW_S = 0.1
 
 
-class Progress:
-    """Say what is going on, once the work has lasted a second.
+def progress_line(text: str, done: int, total: int, elapsed_s: float) -> str:
+    """ "Rendering: 120 of 375, 0:54 left"."""
+    if not total or not done:
+        return f"{text} …"
+    left = round(elapsed_s / done * (total - done))
+    return f"{text}: {done} of {total}, {left // 60}:{left % 60:02d} left"
 
-    Used as ``with Progress() as progress: progress("reading the terrain")``.
+
+class PrintedProgress:
+    """Say what is going on, once the work has lasted a second: over one line on a terminal, now and then in a log.
+
+    Used as ``with PrintedProgress() as progress: progress("Reading the terrain")``.
     """
 
-    def __init__(self) -> None:
-        self._latest = ""
-        self._loud = False
-        self._timer = Timer(QUIET_S, self._wake)
+    def __init__(self, stream: TextIO | None = None, quiet_s: float = QUIET_S) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._terminal = self._stream.isatty()
+        self._text = self._line = ""
+        self._since = self._printed = 0.0
+        self._is_loud = self._is_open = False
+        self._timer = Timer(quiet_s, self._wake)
         self._timer.daemon = True
 
-    def __enter__(self) -> "Progress":
+    def __enter__(self) -> "PrintedProgress":
         self._timer.start()
         return self
 
@@ -28,18 +45,29 @@ class Progress:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._timer.cancel()
+        self._end_line()
 
-    def __call__(self, what: str) -> None:
-        """Now doing `what`."""
-        self._latest = what
-        if self._loud:
-            self._say(what)
+    def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
+        """Now doing `text`."""
+        now, is_new, is_last = time.monotonic(), text != self._text, 0 < total == done
+        if is_new:
+            self._text, self._since = text, now
+            self._end_line()
+        self._line = progress_line(text, done, total, now - self._since)
+        if self._is_loud and (is_new or is_last or now - self._printed >= (REDRAW_S if self._terminal else BETWEEN_S)):
+            self._print(now)
 
     def _wake(self) -> None:
-        self._loud = True
-        if self._latest:
-            self._say(self._latest)
+        self._is_loud = True
+        if self._line:
+            self._print(time.monotonic())
 
-    @staticmethod
-    def _say(what: str) -> None:
-        print(f"{what} …", file=sys.stderr, flush=True)
+    def _print(self, now: float) -> None:
+        self._printed, self._is_open = now, self._terminal
+        print(f"\r{self._line}\x1b[K" if self._terminal else self._line, end="" if self._terminal else "\n",
+              file=self._stream, flush=True)  # fmt: skip
+
+    def _end_line(self) -> None:
+        if self._is_open:
+            print(file=self._stream, flush=True)
+        self._is_open = False

@@ -14,7 +14,7 @@ from ..reconstruction.choices import FREE, LOSSES, Loss
 from ..reconstruction.sampling import STEP_S
 from ..vectors import Array, norm
 from .options import add_out, known_names, not_negative, positive
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..exchange.footage import Footage
@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.project import read_project
     from ..reconstruction.refinement.refine import refine
 
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.project}")
         project = read_project(arguments.project)
         how = _settings(project.refinement, arguments)

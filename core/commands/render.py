@@ -7,6 +7,7 @@ from pathlib import Path
 from ..film.engines import ENGINES
 from ..film.presets import parse_frames
 from .options import add_parameter_options, model_parameters
+from .progress import PrintedProgress
 
 FILM, STILL = "rockfall.mp4", "rockfall.png"
 
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     preset = find_preset(project, arguments.preset)
     maker = film_maker()
     name = STILL if arguments.still else FILM
-    with output_folder(arguments.out) as folder:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         job = FilmJob(
             kind="still" if arguments.still else "film",
             source=arguments.project,
@@ -72,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
             models=models,
             parameters=parameters,
         )
-        done = maker.film(job)
+        done = maker.film(job, progress)
     print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")
     print(f"Written: {Path(arguments.out) / name}")
     return 0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import DependencyError
 from .options import add_out, add_terrain_options, terrain_as_told
-from .progress import Progress
+from .progress import PrintedProgress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..terrain.writers import write_ply
 
-    with output_folder(arguments.out) as folder, Progress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         surface = terrain_as_told(arguments, arguments.file, progress)
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from .options import add_out, positive, whole
-from .progress import Progress
+from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..exchange.footage_tables import Events, Track
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..opencv import opencv
 
     clicks, name = _clicks(arguments)
-    with Progress() as progress:
+    with PrintedProgress() as progress:
         video = open_video(arguments.video, progress)
         first = arguments.first or 0
         last = video.frames - 1 if arguments.last is None else arguments.last

@@ -11,12 +11,9 @@ from dataclasses import dataclass
 
 from ..dependencies import require_blender_libraries
 from ..errors import DependencyError, RockfallError
+from ..progress import Progress, silent
 from .engines import choose_engine
 from .job import FilmJob
-from .progress import Progress
-
-Report = Callable[[int, int], None]
-"""Called with the frames done and all frames."""
 
 CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try --engine cycles."
 LINES_TOLD = 5
@@ -32,11 +29,11 @@ class FilmMaker:
     probe : command that runs a Python text, ``{probe}``, in another Blender.
     """
 
-    make: Callable[[FilmJob, Report], None]
+    make: Callable[[FilmJob, Progress], None]
     probe: tuple[str, ...]
 
-    def film(self, job: FilmJob) -> FilmJob:
-        """Do a job, with progress on standard error; returns it with the engine that was used.
+    def film(self, job: FilmJob, progress: Progress = silent) -> FilmJob:
+        """Do a job; returns it with the engine that was used.
 
         Raises
         ------
@@ -45,14 +42,7 @@ class FilmMaker:
         """
         require_blender_libraries()
         chosen = job.with_engine(choose_engine(job.engine, self.probe))
-        progress: Progress | None = None
-
-        def report(done: int, total: int) -> None:
-            nonlocal progress
-            progress = progress or Progress(total)
-            progress.step()
-
-        self.make(chosen, report if job.kind == "film" else _silent)
+        self.make(chosen, progress)
         return chosen
 
 
@@ -77,7 +67,7 @@ inside_blender: ContextVar[FilmMaker | None] = ContextVar("inside_blender", defa
 """Set by the add-on while Blender itself runs a command."""
 
 
-def run_job(command: Sequence[str], name: str, report: Report) -> None:
+def run_job(command: Sequence[str], name: str, progress: Progress) -> None:
     """Run a process that makes the file `name`; its standard output tells how far it is (see `film/__main__.py`).
 
     Raises
@@ -93,7 +83,7 @@ def run_job(command: Sequence[str], name: str, report: Report) -> None:
                     word, _, rest = line.strip().partition(" ")
                     if word == "frame":
                         done, total = rest.split()
-                        report(int(done), int(total))
+                        progress("Rendering", int(done), int(total))
                     elif word == "error":
                         problem = rest
                 status = child.wait()
@@ -109,10 +99,6 @@ def run_job(command: Sequence[str], name: str, report: Report) -> None:
             raise RockfallError(CRASHED.format(name=name, status=status, said=said))
 
 
-def _make(job: FilmJob, report: Report) -> None:
+def _make(job: FilmJob, progress: Progress) -> None:
     package = __name__.partition(".core.")[0]
-    run_job([sys.executable, "-m", f"{package}.rockfall_addon.steps.film", job.to_json()], job.out.name, report)
-
-
-def _silent(done: int, total: int) -> None:
-    pass
+    run_job([sys.executable, "-m", f"{package}.rockfall_addon.steps.film", job.to_json()], job.out.name, progress)

@@ -6,13 +6,13 @@ are always compared with the frame in which they were found, not with the one be
 homography to the reference frame is estimated robustly (MAGSAC++, Barath et al. 2020), then by least squares.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..opencv import opencv
+from ..progress import Progress, silent
 from ..vectors import Array, Indices
 from .sources import Source, frames
 
@@ -27,8 +27,6 @@ FEWEST_SHARE = 0.25
 RENEW_SHARE = 0.6
 STILL_PX = 0.15
 """A tripod: the typical corner never moves further than this."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +87,7 @@ def destabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Arra
 
 
 def background_motion(
-    source: Source, *, first: int = 0, last: int | None = None, progress: Progress | None = None
+    source: Source, *, first: int = 0, last: int | None = None, progress: Progress = silent
 ) -> tuple[BackgroundMotion, TrackedFeatures]:
     """Follow the background; frame `first` is the reference.
 
@@ -101,8 +99,7 @@ def background_motion(
     follower, numbers, homographies, inliers, rms = None, [], [], [], []
     sightings: list[tuple[int, Indices, Array]] = []
     for frame, picture in frames(source, range(first, last + 1)):
-        if progress and frame % 25 == 0:
-            progress(f"Following the background: frame {frame} of {last}")
+        progress("Following the background", frame - first, last - first + 1)
         grey = opencv().cvtColor(picture, opencv().COLOR_BGR2GRAY)
         if follower is None:
             follower = _Follower(grey, frame)

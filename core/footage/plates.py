@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture without what moves: a median of frames that are laid on each other, and how much it varies."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..constants import IQR_PER_SD
 from ..opencv import opencv
+from ..progress import Progress, silent
 from ..vectors import Array
 from .background import BackgroundMotion
 from .sources import Source, frames
@@ -47,7 +47,7 @@ class Plate:
 class Plates:
     """Plates of a video, made where they are needed; the two latest are kept."""
 
-    def __init__(self, source: Source, motion: BackgroundMotion, progress: Callable[[str], None] | None = None) -> None:
+    def __init__(self, source: Source, motion: BackgroundMotion, progress: Progress = silent) -> None:
         self._source, self._motion, self._progress = source, motion, progress
         self._kept: list[Plate] = []
         self._margin = tuple(int(np.ceil(WANDERED * size)) for size in (source.width, source.height))
@@ -79,8 +79,7 @@ class Plates:
         return plate
 
     def _make(self, anchor: int) -> Plate:
-        if self._progress:
-            self._progress(f"Making the background around frame {anchor}")
+        self._progress(f"Making the background around frame {anchor}", 0, 0)
         low = max(anchor - REACH, int(self._motion.frames[0]))
         high = min(anchor + REACH, int(self._motion.frames[-1]))
         near = [frame for frame in range(low, high + 1) if self._wandered(frame, anchor) < 1 - SHARED]

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import InputError
+from ..progress import Progress, silent
 from ..vectors import Array, Indices
 from .background import BackgroundMotion, background_motion, destabilise, stabilise
 from .kinks import find_kinks
@@ -38,8 +39,6 @@ KINK_SIGMAS = 4.0
 NEIGHBOURS = 8
 SHAPE = 0.005
 """Standard deviation of the centre of a block that is no sphere, in diameters."""
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,7 @@ def track_block(
     background: BackgroundMotion | None = None,
     first: int | None = None,
     last: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> BlockTrack:
     """Follow the block forwards and backwards from a click.
 
@@ -236,14 +235,13 @@ def _between(follow: Callable[[_Start, int], tuple[list[_Row], str]], start: _St
 
 
 def _follow(
-    video: Source, plates: Plates, motion: BackgroundMotion, start: _Start, end: int, progress: Progress | None
+    video: Source, plates: Plates, motion: BackgroundMotion, start: _Start, end: int, progress: Progress
 ) -> tuple[list[_Row], str]:
     """Rows from the start, its own frame first, and why they end."""
     step = 1 if end >= start.frame else -1
     state = _State(start, video, motion)
     for frame, picture in frames(video, range(start.frame, end + step, step)):
-        if progress and frame % 25 == 0:
-            progress(f"Following the block: frame {frame}")
+        progress("Following the block", abs(frame - start.frame), abs(end - start.frame))
         reason = state.advance(frame, picture, plates)
         if reason:
             return state.credible(), reason

@@ -5,7 +5,7 @@ The header's rate and number of frames are only reported. Video time counts from
 players show it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ..constants import SAME_TIME_S
 from ..errors import InputError
 from ..opencv import opencv, quiet_opencv
+from ..progress import Progress, silent
 from ..vectors import Array, Indices
 from .containers import codec_name, container_of, holds_sound, lacks_index
 
 type Image = NDArray[np.uint8]
-type Report = Callable[[str], None]
 
 FRAME_AT_TOLERANCE_S = 1e-5
 """Tables keep times with six decimals."""
@@ -33,7 +33,6 @@ SAME_RATE = 0.02
 FEW_FRAMES = 48
 FAR_FRAMES = 40
 """Beyond this many frames a seek is quicker than grabbing on: it goes back 16 frames itself, then to a keyframe."""
-REPORT_EVERY = 200
 MOST_REORDERED = 16
 SEEKS = 5
 DAMAGED = 30
@@ -166,7 +165,7 @@ class Video:
         return np.flatnonzero(self.step_s < SAME_TIME_S) + 1
 
 
-def open_video(path: str | Path, progress: Report | None = None, *, thorough: bool = False) -> Video:
+def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool = False) -> Video:
     """Find the frames of a video file and their timestamps.
 
     The timestamps come from the packets, without decoding, where decoding the frames at both ends of the video finds
@@ -174,7 +173,6 @@ def open_video(path: str | Path, progress: Report | None = None, *, thorough: bo
 
     Parameters
     ----------
-    progress : is told what is going on.
     thorough : decode every frame, and compare each picture with the one before.
 
     Raises
@@ -183,13 +181,12 @@ def open_video(path: str | Path, progress: Report | None = None, *, thorough: bo
         without timestamps, or interlaced.
     """
     path = Path(path)
-    say = progress or _silent
     _refuse_other_files(path)
-    say(f"Reading the timestamps of {path.name}")
+    progress(f"Reading the timestamps of {path.name}", 0, 0)
     packet_times, keyframes = _packets(path)
     video = replace(_described(path), time_s=packet_times, keyframe_s=keyframes)
     if thorough or not _decodes_as_told(video):
-        video = _decoded(video, say)
+        video = _decoded(video, progress)
     if video.frames > 1 and video.time_s[-1] - video.time_s[0] < SAME_TIME_S:
         raise InputError(
             f"The {video.frames} frames of this file have no timestamps",
@@ -362,7 +359,7 @@ def _decodes_as_told(video: Video) -> bool:
     return not _grab(last)
 
 
-def _decoded(video: Video, say: Report) -> Video:
+def _decoded(video: Video, progress: Progress) -> Video:
     """The frames as decoding them all finds them."""
     capture, before = _capture(video.path), None
     times: list[float] = []
@@ -371,8 +368,7 @@ def _decoded(video: Video, say: Report) -> Video:
         there, picture = capture.retrieve()
         if not there:
             continue
-        if len(times) % REPORT_EVERY == 0:
-            say(f"Decoding {video.path.name}, frame {len(times)} of about {video.frames}")
+        progress(f"Decoding {video.path.name}", len(times), max(video.frames, len(times)))
         sample = picture[::SAMPLE, ::SAMPLE].copy()
         if before is not None and np.array_equal(sample, before):
             repeated.append(len(times))
@@ -501,7 +497,3 @@ def _undecodable(video: Video, index: int) -> InputError:
 
 def _convert(path: Path) -> str:
     return CONVERT.format(name=path.name, stem=path.stem)
-
-
-def _silent(_: str) -> None:
-    pass

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..progress import Progress, silent
 from ..vectors import Array
 from . import advice, cleaning, clouds, geotiff, grids, meshes, ply, triangulation, winding
 from .crs import surely_different
 from .source import Source
 from .surface import Surface
-
-type Progress = Callable[[str], None]
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".ply": ply.read_ply,
@@ -69,7 +68,7 @@ def read_terrain(
     unit_m: float = 1.0,
     max_edge_m: float | None = None,
     ground_only: bool | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Surface:
     """Read a mesh, grid or cloud; grids and clouds are meshed.
 
@@ -81,15 +80,13 @@ def read_terrain(
     unit_m : length of the file's unit [m], 0.001 for millimetres.
     max_edge_m : longest edge of a meshed cloud, in plan [m]; from the point spacing when None.
     ground_only : use the ground class of LAS and LAZ: None if there is one, True always, False never.
-    progress : is told in a few words what is going on.
 
     Raises
     ------
     InputError : anything wrong with the file, with what to do about it.
     """
     path = Path(path)
-    tell = progress or (lambda _: None)
-    tell(f"Reading {path.name}")
+    progress(f"Reading {path.name}", 0, 2)
     source = _read(path, ground_only)
     points = _placed(source, up, unit_m, path)
     notes = list(source.notes)
@@ -102,7 +99,7 @@ def read_terrain(
     shift = _shift(shift, low, high, source.crs, path)
     local = points - shift.vector
     del points
-    tell("Meshing" if source.kind != "mesh" else "Orienting faces")
+    progress("Meshing" if source.kind != "mesh" else "Orienting faces", 1, 2)
     try:
         if source.grid_shape is not None:
             meshed = triangulation.mesh_grid(local, source.grid_shape)

@@ -27,7 +27,7 @@ def measure(engine: str, count: int, preset: str) -> None:
         frames = (MIDDLE, MIDDLE + count - 1)
         job = FilmJob("film", PROJECT, Path(folder) / "film.mp4", engine, preset, frames)
         start = time.perf_counter()
-        maker.make(job, lambda done, total: times.append(time.perf_counter() - start))
+        maker.make(job, lambda *_: times.append(time.perf_counter() - start))
     each = (times[-1] - times[0]) / (len(times) - 1)
     print(
         f"{engine:<10} {preset}: first frame after {times[0]:5.1f} s, then {each:.3f} s a frame: "

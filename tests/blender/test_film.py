@@ -176,7 +176,7 @@ def test_film_of_three_frames(scene, preset, part, tmp_path: Path) -> None:
     part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
     scene.cycles.samples = 1
     path, reported = tmp_path / "film.mp4", []
-    part("rockfall_addon.steps.film.render").render_film(scene, path, (10, 12), lambda *done: reported.append(done))
+    part("rockfall_addon.steps.film.render").render_film(scene, path, (10, 12), lambda *done: reported.append(done[1:]))
     assert reported == [(1, 3), (2, 3), (3, 3)]
     assert [file.name for file in tmp_path.iterdir() if file.suffix == ".mp4"] == ["film.mp4"]
     clip = bpy.data.movieclips.load(str(path))
@@ -211,7 +211,7 @@ def test_whole_job_in_another_process(picks: Path, tmp_path: Path, part) -> None
         [*command, "--out", str(out), "--frames", "0-2"], capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
-    assert "frame 3/3" in done.stderr
+    assert "Rendering: 3 of 3" in done.stderr
     assert done.stdout.splitlines()[0] == "64×36, rendered with Cycles"
     clip = bpy.data.movieclips.load(str(out / "rockfall.mp4"))
     assert (clip.frame_duration, round(clip.fps, 5)) == (3, 59.94006)

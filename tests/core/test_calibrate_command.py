@@ -138,12 +138,12 @@ def test_bad_tables_are_refused_with_their_name(impacts, tmp_path, capsys):
 
 
 def test_an_interrupted_calibration_leaves_nothing(impacts, tmp_path, monkeypatch, capsys):
-    class Interrupted(command.Progress):
-        def __call__(self, what: str) -> None:
-            if what.startswith("Resample"):
+    class Interrupted(command.PrintedProgress):
+        def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
+            if text.startswith("Resampl"):
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "Progress", Interrupted)
+    monkeypatch.setattr(command, "PrintedProgress", Interrupted)
     argv = ["calibrate", str(impacts), "--model", "noel_2017", "--fit", "rt", "--out", str(tmp_path / "out"), *QUICK]
     assert main(argv) == 130
     assert "nothing was written" in capsys.readouterr().err

@@ -11,9 +11,10 @@ from rockfall.core.analysis.clouds import make_contest, measured_target
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.equivalence import equivalent
-from rockfall.core.analysis.fitting import Axis, CancelledError, interval
+from rockfall.core.analysis.fitting import Axis, interval
 from rockfall.core.errors import InputError
 from rockfall.core.impact_models.registry import MODELS
+from rockfall.core.progress import CancelledError
 from rockfall.core.reconstruction.impact import Impacts, apparent
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -215,18 +216,25 @@ def test_few_trajectories_are_told():
 
 
 def test_cancelling_stops():
-    calls = []
-    with pytest.raises(CancelledError, match="nothing was kept"):
-        calibrate(slope(5), "noel_2017", ["rt"], cancelled=lambda: len(calls) > 30 or calls.append(1))
-    with pytest.raises(CancelledError):
-        calibrate(slope(5), "noel_2017", ["rt"], cancelled=lambda: len(calls) > 200 or calls.append(1))
+    for most in (30, 200):
+        calls = []
+
+        def progress(*said, calls=calls, most=most):
+            calls.append(said)
+            if len(calls) > most:
+                raise CancelledError
+
+        with pytest.raises(CancelledError):
+            calibrate(slope(5), "noel_2017", ["rt"], progress=progress)
+        assert most < len(calls) < most + 250, "other threads end at their next word"
 
 
 def test_progress_is_told():
-    told = []
-    calibrate(slope(5), "noel_2017", ["rt"], resamples=20, progress=told.append)
-    assert told[0] == "Fitting noel_2017"
-    assert "Resample 16 of 20" in told
+    said = []
+    calibrate(slope(5), "noel_2017", ["rt"], resamples=20, progress=lambda *one: said.append(one))
+    assert said[0] == ("Fitting noel_2017", 0, 1)
+    assert ("Resampling the trajectories", 16, 20) in said
+    assert said[-1] == ("Predicting trajectories that were held out", 4, 5)
 
 
 BAD = {

@@ -57,7 +57,7 @@ def test_the_probe_gets_the_script() -> None:
 def test_frames_of_a_process_are_reported() -> None:
     seen = []
     script = "print('frame 1 2'); print('frame 2 2')"
-    run_job([sys.executable, "-c", script], "x.mp4", lambda done, total: seen.append((done, total)))
+    run_job([sys.executable, "-c", script], "x.mp4", lambda _, done, total: seen.append((done, total)))
     assert seen == [(1, 2), (2, 2)]
 
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Presets, frames and words of a film."""
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ from rockfall.core.errors import InputError
 from rockfall.core.exchange.project import Project, RenderPreset
 from rockfall.core.film.job import FilmJob
 from rockfall.core.film.presets import AFTERGLOW_S, FilmTiming, find_preset, parse_frames
-from rockfall.core.film.progress import Progress, progress_line
 from rockfall.core.film.wording import fastest_speed, notes
 
 
@@ -99,15 +97,6 @@ def test_notes() -> None:
     assert notes(4.0) == "Blocks drawn 4× their size"
     assert notes(1.5, 0.25, rings=True) == "Blocks drawn 1.5× their size, rings mark impacts, slowed down 4×"
     assert notes(1.0, 2.0) == "Sped up 2×"
-
-
-def test_progress() -> None:
-    assert progress_line(120, 375, 25.2) == "frame 120/375, 0.21 s a frame, 0:54 left"
-    log = io.StringIO()
-    progress = Progress(2, log)
-    progress.step()
-    progress.step()
-    assert log.getvalue().startswith("  frame 2/2, ")
 
 
 def test_job_survives_the_way_to_another_process() -> None:

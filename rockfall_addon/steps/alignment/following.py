@@ -19,6 +19,7 @@ from ....core.camera.path import CameraPath, fixed
 from ....core.errors import RockfallError
 from ....core.footage.background import BackgroundMotion, TrackedFeatures, background_motion
 from ....core.footage.video import Video
+from ....core.progress import CancelledError, Progress
 from ....core.terrain.raycast import cast_rays
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
@@ -75,22 +76,17 @@ class Job:
             self.found = compute(self.task, self._progress)
         except RockfallError as error:
             self.problem = str(error)
-        except _StoppedError:
+        except CancelledError:
             pass
         except Exception as error:  # noqa: BLE001 - a thread has nobody else to tell
             self.problem = f"Something went wrong in Rockfall (following): {type(error).__name__}: {error}"
 
-    def _progress(self, said: str) -> None:
+    def _progress(self, text: str, done: int, total: int) -> None:
         if self.stopped:
-            raise _StoppedError
-        self.said = said
-        numbers = [int(word) for word in said.replace(":", " ").split() if word.isdecimal()]
-        if len(numbers) == 2 and numbers[1]:
-            self.part = 0.9 * min(1.0, numbers[0] / numbers[1])
-
-
-class _StoppedError(Exception):
-    """A person has pressed Escape."""
+            raise CancelledError
+        self.said = text
+        if total:
+            self.part = 0.9 * done / total
 
 
 def prepare(scene: bpy.types.Scene, camera: bpy.types.Object) -> Task:
@@ -116,7 +112,7 @@ def prepare(scene: bpy.types.Scene, camera: bpy.types.Object) -> Task:
     return Task(videos.video_of(camera), path.reference, solution.reference, keys, settings.motion.lower(), surface)
 
 
-def compute(task: Task, progress: Callable[[str], None]) -> SolvedMotion | None:
+def compute(task: Task, progress: Progress) -> SolvedMotion | None:
     """Follow the background and solve each frame; None when the camera stands still. Without Blender.
 
     Raises
@@ -132,7 +128,7 @@ def compute(task: Task, progress: Callable[[str], None]) -> SolvedMotion | None:
     background, seen = _tracks[key]
     if background.still and not task.keys:
         return None
-    progress("Solving the camera of each frame")
+    progress("Solving the camera of each frame", 0, 0)
     return solve_motion(
         task.camera,
         FeatureTracks(seen.frame, seen.feature, seen.pixel),

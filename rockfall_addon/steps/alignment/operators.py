@@ -9,6 +9,7 @@ from mathutils import Vector
 
 from ....core.camera.resection import POSE_PAIRS
 from ....core.errors import RockfallError
+from ....core.progress import silent
 from ...scene import alignment, footage_blend, store, terrain, videos
 from ...view import image_view, look
 from ...view.of_video import OfVideo, has_video
@@ -418,7 +419,7 @@ class ROCKFALL_OT_follow_background(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
         task = following.prepare(scene, camera)
-        self.report({"INFO"}, following.apply(scene, camera, task, following.compute(task, lambda said: None)))
+        self.report({"INFO"}, following.apply(scene, camera, task, following.compute(task, silent)))
         return {"FINISHED"}
 
 

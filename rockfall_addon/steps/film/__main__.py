@@ -31,7 +31,7 @@ def main(text: str) -> NoReturn:
     try:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         rockfall_addon.register()
-        make(FilmJob.from_json(text), lambda done, total: say(f"frame {done} {total}"))
+        make(FilmJob.from_json(text), lambda _, done, total: say(f"frame {done} {total}"))
     except RockfallError as error:
         say(f"error {error}".replace("\n", " "))
         status = 1

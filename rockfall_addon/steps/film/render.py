@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rendering a scene that is set up, and whole jobs from a project file to a film."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -10,17 +9,15 @@ from ....core.errors import InputError, RockfallError
 from ....core.exchange.project import RenderPreset, read_project
 from ....core.film.job import FilmJob
 from ....core.film.presets import HD, FilmTiming, find_preset
+from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
 from ...scene import models
 from ...scene.project import load_project
 from . import dressing
 from .engine import use_engine
 
-Report = Callable[[int, int], None]
-"""Called with the frames done and all frames."""
 
-
-def make(job: FilmJob, report: Report) -> None:
+def make(job: FilmJob, progress: Progress) -> None:
     """Do a job in an empty file, which is filled.
 
     Raises
@@ -41,16 +38,16 @@ def make(job: FilmJob, report: Report) -> None:
         else:
             dressing.set_up_film(scene, preset, job.engine)
     if job.kind == "film":
-        render_film(scene, job.out, job.frames, report)
+        render_film(scene, job.out, job.frames, progress)
     else:
         if job.kind == "still":
             use_engine(scene, job.engine, still=True)
             scene.frame_set(min(job.frames[0] if job.frames else scene.frame_end, scene.frame_end))
         render_picture(scene, job.out)
-        report(1, 1)
+        progress("Rendering", 1, 1)
 
 
-def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | None, report: Report) -> None:
+def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | None, progress: Progress) -> None:
     """Render frames of a scene to an MP4 with H.264.
 
     Raises
@@ -67,7 +64,7 @@ def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | No
     def written(*_: object) -> None:
         nonlocal done
         done += 1
-        report(done, total)
+        progress("Rendering", done, total)
 
     bpy.app.handlers.render_write.append(written)
     try:

@@ -8,15 +8,12 @@ import bpy
 
 from ....core.errors import RockfallError
 from ....core.footage.tracking import BlockTrack, track_block
+from ....core.progress import CancelledError
 from ...scene import observations, picking, store, videos
 from ...view.of_video import OfVideo
 from ...view.reporting import reported
 
 POLL_S = 0.15
-
-
-class _StoppedError(Exception):
-    """A person pressed Esc."""
 
 
 def _solved_name(context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
@@ -83,10 +80,10 @@ class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
         return {"video": video, "frame": frame, "pixel": (u, v), "clicks": clicks[1:], "first": first, "last": last}
 
     def _run(self, work: dict[str, object]) -> None:
-        def progress(text: str) -> None:
+        def progress(text: str, done: int, total: int) -> None:
             if self._stop.is_set():
-                raise _StoppedError
-            self._said.put(text)
+                raise CancelledError
+            self._said.put(f"{text}: {done} of {total}" if total else text)
 
         try:
             self._found.append(track_block(**work, progress=progress))
@@ -96,8 +93,8 @@ class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
     def _end(self, context: bpy.types.Context) -> set[str]:
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
-        found = self._found[0] if self._found else _StoppedError()
-        if isinstance(found, _StoppedError):
+        found = self._found[0] if self._found else CancelledError()
+        if isinstance(found, CancelledError):
             self.report({"INFO"}, "Tracking was stopped; nothing has changed.")
             return {"CANCELLED"}
         if isinstance(found, Exception):

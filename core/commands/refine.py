@@ -272,7 +272,7 @@ def _summary(before: "Picks", footage: "Footage", refined: "Refinement") -> list
             + (f" (median; at most {max(off):.0f} %)." if len(off) > 1 else ".")
         )
     sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in refined.unknowns.items()]
-    return [*sentences, *_impact_lines(refined.reconstruction.impacts), *refined.advice]
+    return [*sentences, *_impact_lines(refined.reconstruction.impacts), *map(str, refined.remarks)]
 
 
 def _impact_lines(impacts: "Impacts") -> list[str]:

@@ -192,7 +192,7 @@ def _keep(
             for i in range(len(new))
         ],
         "unknowns": [[name, *pair] for name, pair in found.unknowns.items()],
-        "advice": list(found.advice),
+        "advice": [remark.text for remark in found.remarks],
         "clocks": {
             camera[store.ID]: [v.clock.offset_s, v.clock.drift, v.clock.origin_s, v.clock.rate]
             for camera, v in zip(cameras, found.views, strict=True)

@@ -399,7 +399,7 @@ def add(tally: Tally, truth: Fall, raw, result: Refinement, footage: Footage, be
     for covariance in [view.pose_covariance[3:, 3:] for view in footage.true_views] if solved else best[2]:
         away = draws @ np.linalg.cholesky(covariance).T
         tally.camera_best += (np.linalg.norm(away, axis=1) / case.distance_m).tolist()
-    tally.unsettled += any("did not settle" in sentence for sentence in result.advice)
+    tally.unsettled += not result.converged
 
 
 def row_of(case: Case, tally: Tally, rng: np.random.Generator) -> dict[str, str]:

@@ -100,6 +100,7 @@ def check_exact(result, atol=1e-9, drag=0.0, gravity=9.81):
     np.testing.assert_allclose(flights.end_velocity[:-1], motion.end_velocity[:-1], atol=100 * atol)
     np.testing.assert_allclose(flights.start_velocity[1:], motion.start_velocity[1:], atol=100 * atol)
     assert result.rmse_px < 1e-6
+    assert result.converged
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -176,9 +177,9 @@ def test_a_clock_is_found_from_far_off():
     assert result.views[1].clock.offset_s == value
     check_exact(result)
     held = run([views[0], replace(views[1], clock=Clock(1.35))], pixels)
-    told = [sentence for sentence in held.advice if "fit the clocks" in sentence]
-    assert len(told) == 1
-    assert float(told[0].split("about ")[1].split(" ms")[0]) == pytest.approx(-50, abs=10)
+    (late,) = [remark for remark in held.remarks if "fit the clocks" in remark.text]
+    assert (late.severity, late.about) == ("advice", "clock from -20°")
+    assert float(late.text.split("about ")[1].split(" ms")[0]) == pytest.approx(-50, abs=10)
 
 
 def test_a_pose_is_corrected_by_the_other_view():
@@ -327,18 +328,20 @@ def test_contacts_with_an_uneven_terrain_tell_where_the_tracked_spot_is():
     assert ignored.aim == {}
     assert np.linalg.norm(ignored.picks.position - touched, axis=1)[1:-1].min() > 0.05
     far = run(views, pixels, picks, sigma_aim=0.05, **options)
-    assert any("of the block's diameter off its centre" in sentence for sentence in far.advice)
+    off = [remark for remark in far.remarks if "of the block's diameter off its centre" in remark.text]
+    assert [(remark.severity, remark.about) for remark in off] == [("warning", "a")] * len(off) != []
 
 
 def test_ends_that_only_their_marks_hold_are_told():
     views = [view(50.0), view(-20.0)]
     picks = marked(normal=np.tile(OUT, (5, 1)))
     floating = run(views, observe(views, noise=1.0), picks, surface=None)
-    (told,) = [sentence for sentence in floating.advice if "begins or ends" in sentence]
-    assert "2.0" in told
-    assert "4.59" in told
+    (told,) = [remark for remark in floating.remarks if "begins or ends" in remark.text]
+    assert (told.severity, told.about) == ("advice", "a")
+    assert "2.0" in told.text
+    assert "4.59" in told.text
     lying = run(views, observe(views, noise=1.0), picks)
-    assert not any("begins or ends" in sentence for sentence in lying.advice)
+    assert not any("begins or ends" in remark.text for remark in lying.remarks)
 
 
 @pytest.mark.parametrize("sigma_aim", [0.0, 0.15])
@@ -390,7 +393,7 @@ def test_more_noise_than_stated_enlarges_the_standard_deviations():
     boasting = run(views, pixels, marked())
     assert honest.noise_scale == 1.0
     assert boasting.noise_scale == pytest.approx((pixels.pixel - observe(views).pixel).std(), rel=0.05)
-    assert any("as large as the stated" in sentence for sentence in boasting.advice)
+    assert any("as large as the stated" in remark.text for remark in boasting.remarks)
     np.testing.assert_allclose(
         boasting.reconstruction.impacts.sigma["v1"][1:], honest.reconstruction.impacts.sigma["v1"][1:], rtol=0.03
     )
@@ -415,7 +418,7 @@ def test_a_flight_without_pixels_rests_on_its_picks():
     dark = (pixels.time_s > TIME[1] - 0.05) & (pixels.time_s < TIME[2] + 0.05)
     picks = marked(sigma_time_s=np.full(5, 0.01), sigma_position_m=np.full(5, 0.2))
     result = run(views, pixels.take(~dark), picks)
-    assert sum("has no pixels" in sentence for sentence in result.advice) == 1
+    assert sum("has no pixels" in remark.text for remark in result.remarks) == 1
     seen = run(views, pixels, picks).reconstruction.impacts.sigma
     sigma = result.reconstruction.impacts.sigma
     assert (sigma["v1"][2] > 1.1 * seen["v1"][2]).all()
@@ -449,7 +452,7 @@ def test_several_trajectories(free):
     np.testing.assert_allclose(result.picks.time_s[11], TIME[1], atol=1e-8)
     np.testing.assert_array_equal(result.picks.time_s[5:10], one.time_s)
     np.testing.assert_array_equal(result.picks.position[5:10], one.position)
-    assert any("Trajectory b has no pixels" in sentence for sentence in result.advice)
+    assert [remark.about for remark in result.remarks if "Trajectory b has no pixels" in remark.text] == ["b"]
     assert (result.reconstruction.impacts.sigma["kinetic1_j"][6:10] > 1).all()
     assert (result.reconstruction.impacts.sigma["v1"][6:10] > 1).all()
     if free:
@@ -477,7 +480,7 @@ def test_what_cannot_be_refined():
     with pytest.raises(InputError, match="that nothing interrupts"):
         run(views, pixels, make_picks(["a"] * 2, TIME[:2], PLACE[:2], status=["shattered", "ok"]))
     late = run(views, replace(pixels, time_s=pixels.time_s + 0.5))
-    assert any("outside of the marked motion" in sentence for sentence in late.advice)
+    assert any("outside of the marked motion" in remark.text for remark in late.remarks)
 
 
 @pytest.mark.parametrize(

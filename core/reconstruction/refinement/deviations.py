@@ -1,14 +1,54 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Standard deviations of refined impacts, from the covariance of the refinement's unknowns."""
+"""Standard deviations: of a refinement's unknowns, and of the impacts that follow from them."""
+
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from ...vectors import Array, Indices, dot, perpendicular
 from ..impact import Impacts, apparent
 from ..node_motion import NodeMotion
 from .problem import NODE, Problem
+from .setup import Setup
+from .solver import UNEXPLAINED, Solution
 
 SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A solved problem with the covariance (size, size) of its unknowns.
+
+    Attributes
+    ----------
+    scale : factor on the stated standard deviations, which the covariance contains.
+    """
+
+    setup: Setup
+    solution: Solution
+    covariance: Array
+    scale: float
+
+
+def with_covariance(setup: Setup, solution: Solution) -> Fit:
+    """The covariance, enlarged when the residuals are larger than the stated noise allows."""
+    used = solution.weight > 0
+    pixels = solution.evaluation.pixels.residual[used]
+    squares = float((solution.weight[used, None] * pixels**2).sum())
+    count = 2 * int(used.sum())
+    for rows in solution.evaluation.others:
+        squares += float((rows.residual**2).sum())
+        count += rows.residual.size
+    spare = count - setup.problem.columns.size
+    scale = 1.0
+    if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
+        scale = float(np.sqrt(squares / spare))
+    information = solution.information
+    size = np.sqrt(np.diag(information))
+    size[size == 0] = 1.0
+    covariance = np.linalg.pinv(information / np.outer(size, size), hermitian=True) / np.outer(size, size)
+    return Fit(setup, solution, scale**2 * covariance, scale)
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

@@ -9,15 +9,16 @@ import numpy as np
 
 from ...constants import GRAVITY_MPS2
 from ...errors import InputError, RockfallError
+from ...progress import Progress, silent
 from ..block import Block, per_pick
 from ..choices import FREE, LOSSES, SIGMA_AIM, Loss
 from ..drag import Drag
 from ..picks import Picks
 from ..placement import check_placement
-from .problem import evaluate
 from .result import Refinement, summarise
 from .setup import Setup, prepare, set_up
-from .solver import Solution, find_clocks, pixel_noise, solve
+from .solver import Solution, pixel_noise, solve
+from .starts import check_start, find_clocks
 from .views import PixelObservations, View, check_observations
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def refine(
     sigma_aim: float = SIGMA_AIM,
     loss: Loss = "huber",
     site: str = "",
+    progress: Progress = silent,
 ) -> Refinement:
     """Fit the places and times of the picks to where the block's centre is seen in the frames.
 
@@ -98,22 +100,22 @@ def refine(
     names = [name for name in dict.fromkeys(picks.trajectory.tolist()) if name in set(observations.trajectory.tolist())]
     groups = [names] if free_set else [[name] for name in names]
     setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set, sigma_aim) for group in groups]
-    solved = [_solve(setup, loss, free_set) for setup in setups]
+    solved = [_solve(setup, loss, free_set, _part(progress, i, len(setups))) for i, setup in enumerate(setups)]
     return summarise(
         ground, moved_views, observations, [pair[0] for pair in solved], [pair[1] for pair in solved],
         block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, site=site,
     )  # fmt: skip
 
 
-def _solve(setup: Setup, loss: Loss, free: frozenset[str]) -> tuple[Setup, Solution]:
+def _solve(setup: Setup, loss: Loss, free: frozenset[str], progress: Progress) -> tuple[Setup, Solution]:
     """Solve, once more with larger standard deviations of the pixels if these scatter more than stated."""
-    _check_start(setup)
+    check_start(setup)
     problem = setup.problem
-    solution = solve(problem, find_clocks(problem, setup.state) if "clock" in free else setup.state, loss)
+    solution = solve(problem, find_clocks(problem, setup.state) if "clock" in free else setup.state, loss, progress)
     noise = pixel_noise(problem, solution)
     if noise > 1:
         problem = replace(problem, sigma_px=noise * problem.sigma_px)
-        solution = solve(problem, solution.state, loss)
+        solution = solve(problem, solution.state, loss, progress)
     return replace(setup, problem=problem, noise=noise), solution
 
 
@@ -133,22 +135,10 @@ def _check_parameters(
     return frozenset(free)
 
 
-def _check_start(setup: Setup) -> None:
-    """Raise when the marked motion cannot be seen at all."""
-    start = evaluate(setup.problem, setup.state)
-    if start.valid:
-        return
-    problem = setup.problem
-    if not np.isfinite(start.motion.inverse).all():
-        raise RockfallError("No flight with this drag joins the picks. Check the times, and the block's size.")
-    lost = np.flatnonzero(~np.isfinite(start.pixels.residual).all(axis=1))
-    if not lost.size:
-        raise RockfallError("The picks are too close in time to be fitted. Remove one of each pair.")
-    view = problem.views[problem.view[lost[0]]]
-    segment = start.segment[lost[0]]
-    raise InputError(
-        f"The block is behind the camera of view {view.name}, or outside of what its lens can see, at "
-        f"{problem.video_s[lost[0]]:.3f} s of the video",
-        trajectory=str(setup.picks.trajectory[setup.nodes[problem.first[segment]]]),
-        advice="Check the camera's solution, and that picks and camera are in the same coordinates",
-    )
+def _part(progress: Progress, done: int, total: int) -> Progress:
+    """The steps towards one solution, as progress through all of them."""
+
+    def of_all(text: str, _step: int, _most: int) -> None:
+        progress(text, done, total)
+
+    return of_all

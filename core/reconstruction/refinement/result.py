@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What refinement found: picks, impacts with their standard deviations, residuals, and advice."""
+"""What refinement found: picks, impacts with their standard deviations, and residuals."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from ...camera.model import rotation_from_vector
 from ...constants import SAME_TIME_S
-from ...vectors import Array, Mask, dot, norm, unit
+from ...remarks import Remark
+from ...vectors import Array, Mask
 from ..block import Block
 from ..choices import FlightEnds
 from ..drag import Drag
@@ -17,17 +17,12 @@ from ..node_motion import places_at
 from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
 from ..trajectory import Reconstruction, reconstruct
-from ..triangulation import GRAZING_DEG
-from .deviations import impact_sigmas, velocity_rows
-from .problem import CLOCK_COLUMN, NODE, evaluate
+from .advice import remarks_on
+from .deviations import Fit, impact_sigmas, velocity_rows, with_covariance
+from .problem import NODE, evaluate
 from .setup import Ground, Setup
-from .solver import UNEXPLAINED, Solution, normal_equations
+from .solver import Solution
 from .views import PixelObservations, View
-
-PULLED = 3.0
-HELD = 0.7
-"""A time whose standard deviation stays above this part of the marked one is told by the mark for the most part."""
-CLOCK_SIGNIFICANCE = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +49,8 @@ class Refinement:
     unknowns : fitted values with their standard deviations: gravity_mps2, drag_coefficient, "offset_s NAME",
         "drift NAME".
     iterations : the most that a trajectory took.
-    advice : sentences.
+    converged : every search has come to its end.
+    remarks : on where it rests on little, and what does not fit; about the trajectory or the clock.
     """
 
     picks: Picks
@@ -69,17 +65,8 @@ class Refinement:
     aim: Mapping[tuple[str, str], tuple[Array, Array]]
     unknowns: Mapping[str, tuple[float, float]]
     iterations: int
-    advice: tuple[str, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """One solved problem: with the covariance (size, size) of its unknowns, and the scale of its noise."""
-
-    setup: Setup
-    solution: Solution
-    covariance: Array
-    scale: float
+    converged: bool
+    remarks: tuple[Remark, ...]
 
 
 def summarise(
@@ -96,7 +83,7 @@ def summarise(
     site: str,
 ) -> Refinement:
     """Make the result of the solved problems."""
-    fits = [_fit(setup, solution) for setup, solution in zip(setups, solutions, strict=True)]
+    fits = [with_covariance(setup, solution) for setup, solution in zip(setups, solutions, strict=True)]
     picks, normals = _refined_picks(ground, fits, normal_radius_m)
     columns, state = fits[0].setup.problem.columns, fits[0].solution.state
     if columns.law[0] >= 0 and drag is not None:
@@ -134,7 +121,8 @@ def summarise(
         aim={key: value for fit in fits for key, value in _aim(views, fit).items()},
         unknowns=_unknowns(views, fits[0]),
         iterations=max(fit.solution.iterations for fit in fits),
-        advice=_advice(ground, observations, residual, fits),
+        converged=all(fit.solution.settled for fit in fits),
+        remarks=remarks_on(ground, observations, residual, fits),
     )
 
 
@@ -143,27 +131,7 @@ def _rms(residual: Array) -> float:
     return float(np.sqrt((finite**2).sum(axis=1).mean())) if len(finite) else float("nan")
 
 
-def _fit(setup: Setup, solution: Solution) -> _Fit:
-    """The covariance, enlarged when the residuals are larger than the stated noise allows."""
-    used = solution.weight > 0
-    pixels = solution.evaluation.pixels.residual[used]
-    squares = float((solution.weight[used, None] * pixels**2).sum())
-    count = 2 * int(used.sum())
-    for rows in solution.evaluation.others:
-        squares += float((rows.residual**2).sum())
-        count += rows.residual.size
-    spare = count - setup.problem.columns.size
-    scale = 1.0
-    if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
-        scale = float(np.sqrt(squares / spare))
-    information = solution.information
-    size = np.sqrt(np.diag(information))
-    size[size == 0] = 1.0
-    covariance = np.linalg.pinv(information / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    return _Fit(setup, solution, scale**2 * covariance, scale)
-
-
-def _refined_picks(ground: Ground, fits: Sequence[_Fit], normal_radius_m: float | None) -> tuple[Picks, GroundNormals]:
+def _refined_picks(ground: Ground, fits: Sequence[Fit], normal_radius_m: float | None) -> tuple[Picks, GroundNormals]:
     picks = ground.picks
     position, time = picks.position.copy(), picks.time_s.copy()
     sigma_time, sigma_place = picks.sigma_time_s.copy(), picks.sigma_position_m.copy()
@@ -175,7 +143,7 @@ def _refined_picks(ground: Ground, fits: Sequence[_Fit], normal_radius_m: float 
         sigma_time[nodes] = np.sqrt(variance[:, 3])
         sigma_place[nodes] = np.sqrt(variance[:, :3].mean(axis=1))
         on_node[nodes] = True
-        _settle_passes(fit, time, position)
+        _passes_on_flights(fit, time, position)
 
     known = np.isfinite(ground.normals.normal[:, 0]) & on_node
     anew = known & np.isnan(picks.normal[:, 0])
@@ -197,8 +165,8 @@ def _refined_picks(ground: Ground, fits: Sequence[_Fit], normal_radius_m: float 
     return refined, normals
 
 
-def _settle_passes(fit: _Fit, time: Array, position: Array) -> None:
-    """Put the passes between nodes onto their flights, within the time of the flight."""
+def _passes_on_flights(fit: Fit, time: Array, position: Array) -> None:
+    """Move the passes between nodes onto their flights, within the time of the flight."""
     setup, motion = fit.setup, fit.solution.evaluation.motion
     first = setup.segments.first_pick[setup.chosen]
     last = setup.segments.last_pick[setup.chosen]
@@ -209,7 +177,7 @@ def _settle_passes(fit: _Fit, time: Array, position: Array) -> None:
         position[between] = places_at(motion, np.full(between.size, segment), time[between]).position
 
 
-def _with_sigmas(made: Reconstruction, fits: Sequence[_Fit], normals: GroundNormals) -> Reconstruction:
+def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNormals) -> Reconstruction:
     impacts = made.impacts
     own = np.flatnonzero(made.picks.kind == "impact")
     covariance = np.full((own.size, 6, 6), np.nan)
@@ -242,7 +210,7 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[_Fit], normals: GroundNorm
     return replace(made, impacts=replace(impacts, sigma=sigma))
 
 
-def _refined_views(views: tuple[View, ...], fit: _Fit) -> tuple[View, ...]:
+def _refined_views(views: tuple[View, ...], fit: Fit) -> tuple[View, ...]:
     """All shared unknowns are in the first problem, which is then the only one."""
     state, columns = fit.solution.state, fit.setup.problem.columns
     refined = []
@@ -270,16 +238,16 @@ def _refined_views(views: tuple[View, ...], fit: _Fit) -> tuple[View, ...]:
     return tuple(refined)
 
 
-def _aim(views: tuple[View, ...], fit: _Fit) -> dict[tuple[str, str], tuple[Array, Array]]:
+def _aim(views: tuple[View, ...], fit: Fit) -> dict[tuple[str, str], tuple[Array, Array]]:
     aim, columns = fit.solution.state.aim, fit.setup.problem.columns.aim
     deviation = np.sqrt(np.diag(fit.covariance))
     return {
-        (views[i].name, _group_name(fit.setup, j)): (aim[i, j], deviation[columns[i, j]])
+        (views[i].name, fit.setup.names[j]): (aim[i, j], deviation[columns[i, j]])
         for i, j in np.argwhere(columns[:, :, 0] >= 0)
     }
 
 
-def _unknowns(views: tuple[View, ...], fit: _Fit) -> dict[str, tuple[float, float]]:
+def _unknowns(views: tuple[View, ...], fit: Fit) -> dict[str, tuple[float, float]]:
     columns, state, variance = fit.setup.problem.columns, fit.solution.state, np.diag(fit.covariance)
     found: dict[str, tuple[float, float]] = {}
     for name, column, value in (
@@ -296,139 +264,3 @@ def _unknowns(views: tuple[View, ...], fit: _Fit) -> dict[str, tuple[float, floa
             if column >= 0:
                 found[f"{name} {view.name}"] = (value, float(np.sqrt(variance[column])))
     return found
-
-
-def _advice(ground: Ground, observations: PixelObservations, residual: Array, fits: Sequence[_Fit]) -> tuple[str, ...]:
-    sentences: list[str] = []
-    seen = set(observations.trajectory.tolist())
-    for name in dict.fromkeys(ground.picks.trajectory.tolist()):
-        if name not in seen:
-            sentences.append(f"Trajectory {name} has no pixels: its picks are as they were.")
-    outside = int(np.isnan(residual[:, 0]).sum())
-    if outside:
-        sentences.append(
-            f"{outside} of {len(residual)} pixels lie outside of the marked motion and were not used: mark one pick "
-            "further, impact or pass, on each side."
-        )
-    for fit in fits:
-        sentences += _fit_advice(fit)
-    return tuple(sentences)
-
-
-def _fit_advice(fit: _Fit) -> list[str]:
-    setup, solution, problem = fit.setup, fit.solution, fit.setup.problem
-    picks, state = setup.picks, solution.state
-
-    def at(node: int) -> str:
-        return f"{picks.kind[setup.nodes[node]]} at {state.time_s[node]:.3f} s of trajectory {_name(setup, node)}"
-
-    sentences: list[str] = []
-    if not solution.settled:
-        sentences.append(f"The fit of {_names(setup)} did not settle: check the picks with the largest changes.")
-    scale = fit.scale * setup.noise
-    if scale > 1:
-        sentences.append(
-            f"{_names(setup)}: the residuals are {scale:.1f} times as large as the stated standard deviations "
-            "allow, which were enlarged by this factor."
-        )
-    count = np.bincount(solution.evaluation.segment[solution.weight > 0], minlength=len(problem.first))
-    for segment in np.flatnonzero((count == 0) & ~problem.contact):
-        start, end = state.time_s[problem.first[segment]], state.time_s[problem.last[segment]]
-        sentences.append(
-            f"The flight from {start:.3f} to {end:.3f} s of trajectory {_name(setup, problem.first[segment])} has no "
-            "pixels: it rests on its picks."
-        )
-    pulled = np.abs(state.time_s - problem.time_s) > PULLED * problem.sigma_time_s
-    for node in np.flatnonzero(pulled):
-        change = 1e3 * (state.time_s[node] - problem.time_s[node])
-        sentences.append(
-            f"The {at(int(node))} was moved by {change:+.0f} ms, more than its time allows: check the pick."
-        )
-    sentences += _open_ends(fit) + _off_centre(fit) + _grazing(fit, at) + _late_views(fit)
-    return sentences
-
-
-def _open_ends(fit: _Fit) -> list[str]:
-    """Trajectories whose motion ends in picks that no pixels beyond, and no terrain, tell the time of."""
-    setup, problem = fit.setup, fit.setup.problem
-    nodes = np.arange(setup.nodes.size)
-    end = ~(np.isin(nodes, problem.first) & np.isin(nodes, problem.last)) & (setup.picks.kind[setup.nodes] != "pass")
-    found = np.sqrt(np.diag(fit.covariance)[: NODE * nodes.size].reshape(-1, NODE)[:, 3])
-    held = np.flatnonzero(end & (found > HELD * fit.scale * problem.sigma_time_s))
-    owner = setup.picks.trajectory[setup.nodes[held]]
-    sentences = []
-    for name in dict.fromkeys(owner.tolist()):
-        times = [f"{time:.3f} s" for time in fit.solution.state.time_s[held[owner == name]]]
-        sentences.append(
-            f"Where the motion of trajectory {name} begins or ends, at {' and '.join(times)}, little but the "
-            "pick's own time holds it: mark one pick further, impact or pass, on each side."
-        )
-    return sentences
-
-
-def _off_centre(fit: _Fit) -> list[str]:
-    """Views in which what was tracked is hardly the block."""
-    problem, aim = fit.setup.problem, fit.solution.state.aim
-    far = np.argwhere(np.abs(aim).max(axis=2) > PULLED * problem.sigma_aim) if problem.sigma_aim > 0 else ()
-    return [
-        f"What was tracked of trajectory {_group_name(fit.setup, j)} in view {problem.views[i].name} lies "
-        f"{100 * float(norm(aim[i, j])):.0f} % of the block's diameter off its centre: check the track, the camera, "
-        "its clock and the block's size."
-        for i, j in far
-    ]
-
-
-def _name(setup: Setup, node: int) -> str:
-    return str(setup.picks.trajectory[setup.nodes[node]])
-
-
-def _group_name(setup: Setup, group: int) -> str:
-    return _name(setup, setup.problem.first[np.argmax(setup.problem.group == group)])
-
-
-def _names(setup: Setup) -> str:
-    names = list(dict.fromkeys(setup.picks.trajectory[setup.nodes].tolist()))
-    return f"Trajectory {names[0]}" if len(names) == 1 else f"{len(names)} trajectories"
-
-
-def _grazing(fit: _Fit, at: Callable[[int], str]) -> list[str]:
-    """Contacts that no view sees at more than a few degrees above the ground."""
-    setup, problem, state = fit.setup, fit.setup.problem, fit.solution.state
-    nodes = problem.grounded
-    normal = setup.normals.normal[setup.nodes[nodes]]
-    steepest = np.zeros(nodes.size)
-    for i in np.unique(problem.view):
-        place = problem.views[i].path.reference.position
-        steepest = np.fmax(steepest, np.abs(dot(unit(state.centre[nodes] - place), normal)))
-    found = np.flatnonzero(steepest < np.sin(np.radians(GRAZING_DEG)))
-    return [
-        f"The {at(int(nodes[i]))} is seen at {np.degrees(np.arcsin(steepest[i])):.0f}° above the ground: its place "
-        "rests on the flights beside it."
-        for i in found
-    ]
-
-
-def _late_views(fit: _Fit) -> list[str]:
-    """Views whose clock would be another if it were free, as one step of the search tells."""
-    problem, solution = fit.setup.problem, fit.solution
-    seen, size = np.unique(problem.view[solution.weight > 0]), problem.columns.size
-    sentences: list[str] = []
-    for i in seen[1:]:
-        if problem.columns.clock[i, 0] >= 0:
-            continue
-        rows = solution.evaluation.pixels
-        columns = rows.columns.copy()
-        columns[problem.view == i, CLOCK_COLUMN] = size
-        freed = replace(problem, columns=replace(problem.columns, size=size + 1))
-        evaluation = replace(solution.evaluation, pixels=replace(rows, columns=columns))
-        information, gradient = normal_equations(freed, evaluation, solution.weight)
-        scale = np.sqrt(np.diag(information))
-        scale[scale == 0] = 1.0
-        inverse = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
-        late = -float(inverse[-1] @ gradient)
-        if abs(late) > CLOCK_SIGNIFICANCE * fit.scale * float(np.sqrt(inverse[-1, -1])):
-            sentences.append(
-                f"{_names(fit.setup)}: the clock of view {problem.views[i].name} seems to be off by about "
-                f"{1e3 * late:+.0f} ms: fit the clocks too."
-            )
-    return sentences

@@ -43,6 +43,7 @@ class Setup:
     rows : (m,) which of the given pixels.
     radius_m : (n,) of the block of each pick.
     normals : of the picks.
+    names : of the trajectories, in the order of the problem's groups.
     noise : factor on the stated standard deviations of the pixels.
     """
 
@@ -56,6 +57,7 @@ class Setup:
     rows: Indices
     radius_m: Array
     normals: GroundNormals
+    names: tuple[str, ...]
     noise: float = 1.0
 
 
@@ -208,7 +210,9 @@ def set_up(
         coefficient=ground.coefficient,
         gravity=gravity_mps2,
     )
-    return Setup(problem, state, picks, segments, chosen, nodes, node_of, rows, ground.radius_m, ground.normals)
+    return Setup(
+        problem, state, picks, segments, chosen, nodes, node_of, rows, ground.radius_m, ground.normals, tuple(names)
+    )
 
 
 def _passes(picks: Picks, segments: Segments, chosen: Indices) -> tuple[Indices, Indices]:

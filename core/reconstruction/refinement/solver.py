@@ -7,21 +7,17 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.stats import chi2
 
-from ...camera.model import project
+from ...progress import Progress, silent
 from ...vectors import Array, Indices, Mask, norm
 from ..choices import Loss
-from ..node_motion import places_at
 from .problem import (
     Evaluation,
     Problem,
     Rows,
     Unknowns,
     chains_at,
-    common_times,
     evaluate,
     moved,
-    segments_at,
-    solve_segments,
 )
 
 HUBER, CAUCHY = 2.5, 3.5
@@ -65,9 +61,9 @@ class Solution:
     settled: bool
 
 
-def solve(problem: Problem, state: Unknowns, loss: Loss) -> Solution:
+def solve(problem: Problem, state: Unknowns, loss: Loss, progress: Progress = silent) -> Solution:
     """Search from a first state; once more without outliers, and as long as pixels join or leave the ends of chains."""
-    found = _search(problem, state, chains_at(problem, state), loss, reject=False)
+    found = _search(problem, state, chains_at(problem, state), loss, progress, reject=False)
     iterations = found.iterations
     for _ in range(MOST_ROUNDS):
         reject = loss != "linear" and bool(found.outlier.any())
@@ -75,18 +71,21 @@ def solve(problem: Problem, state: Unknowns, loss: Loss) -> Solution:
         unchanged = bool(((chain >= 0) == (found.evaluation.segment >= 0)).all())
         if unchanged and reject == bool((found.weight[found.evaluation.segment >= 0] == 0).any()):
             break
-        found = _search(problem, found.state, chain, loss, reject=reject)
+        found = _search(problem, found.state, chain, loss, progress, reject=reject)
         iterations += found.iterations
     return replace(found, iterations=iterations)
 
 
-def _search(problem: Problem, state: Unknowns, chain: Indices, loss: Loss, *, reject: bool) -> Solution:
+def _search(
+    problem: Problem, state: Unknowns, chain: Indices, loss: Loss, progress: Progress, *, reject: bool
+) -> Solution:
     damping, settled, iteration = 1e-4, False, 0
     here = evaluate(problem, state, chain)
     weight, outlier = _weights(here, loss, reject)
     information, gradient = normal_equations(problem, here, weight)
     while iteration < MOST_ITERATIONS and not settled:
         iteration += 1
+        progress("Fitting", iteration, MOST_ITERATIONS)
         improved = False
         while not improved and damping < HEAVIEST:
             step = _step(information, gradient, damping)
@@ -177,31 +176,3 @@ def _add(rows: Rows, weight: Array, size: int, information: Array, gradient: Arr
     information += np.bincount(cells.ravel(), squares.ravel(), information.size)
     products = (turned @ rows.residual[:, :, None])[:, :, 0]
     gradient += np.bincount(place.ravel(), products.ravel(), gradient.size)
-
-
-CLOCK_REACH_S, CLOCK_STEP_S, CLOCK_PIXELS = 1.0, 1 / 60, 60
-"""How far off a free clock may be, and the steps in which it is sought first, with how many pixels of a view."""
-
-
-def find_clocks(problem: Problem, state: Unknowns) -> Unknowns:
-    """A first guess of the free clocks: the offsets at which the median pixel lies closest to the marked motion."""
-    motion = solve_segments(problem, state)
-    offsets = np.arange(-CLOCK_REACH_S, CLOCK_REACH_S + CLOCK_STEP_S / 2, CLOCK_STEP_S)
-    times, shift = common_times(problem, state), state.offset_s.copy()
-    for number in np.flatnonzero(problem.columns.clock[:, 0] >= 0):
-        mine = np.flatnonzero(problem.view == number)
-        mine = mine[:: max(1, mine.size // CLOCK_PIXELS)]
-        each = np.tile(mine, offsets.size)
-        time = times[each] + np.repeat(offsets, mine.size)
-        segment = segments_at(problem, state, time, problem.obs_group[each])
-        used = np.flatnonzero(segment >= 0)
-        places = places_at(motion, segment[used], time[used]).position
-        camera, here = problem.views[number].path.reference, each[used]
-        pixel = project(camera, places, position=problem.position[here], rotation=problem.rotation[here])
-        miss = np.full(each.size, np.nan)
-        miss[used] = norm(pixel - problem.pixel[here])
-        table = miss.reshape(offsets.size, mine.size)
-        enough = np.flatnonzero(np.isfinite(table).sum(axis=1) >= 0.5 * mine.size)
-        if enough.size:
-            shift[number] += offsets[enough[np.argmin(np.nanmedian(table[enough], axis=1))]]
-    return replace(state, offset_s=shift)

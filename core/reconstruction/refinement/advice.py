@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a user should know about a refinement: where it rests on little, and what does not fit."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...remarks import Remark
+from ...vectors import Array, dot, norm, unit
+from ..triangulation import GRAZING_DEG
+from .deviations import Fit
+from .problem import CLOCK_COLUMN, NODE
+from .setup import Ground, Setup
+from .solver import normal_equations
+from .views import PixelObservations
+
+PULLED = 3.0
+"""A time that moves by more standard deviations than this contradicts its pick."""
+HELD = 0.7
+"""A time whose standard deviation stays above this part of the marked one rests on the mark for the most part."""
+CLOCK_SIGNIFICANCE = 6.0
+
+
+def remarks_on(
+    ground: Ground, observations: PixelObservations, residual: Array, fits: Sequence[Fit]
+) -> tuple[Remark, ...]:
+    """Remarks on solved problems; residual (m, 2) is NaN for pixels that were not used."""
+    remarks: list[Remark] = []
+    seen = set(observations.trajectory.tolist())
+    for name in dict.fromkeys(ground.picks.trajectory.tolist()):
+        if name not in seen:
+            remarks.append(Remark(f"Trajectory {name} has no pixels: its picks are as they were.", "note", name))
+    outside = int(np.isnan(residual[:, 0]).sum())
+    if outside:
+        text = (
+            f"{outside} of {len(residual)} pixels lie outside of the marked motion and were not used: mark one pick "
+            "further, impact or pass, on each side."
+        )
+        remarks.append(Remark(text, "advice", "pixels"))
+    for fit in fits:
+        remarks += [
+            *_on_the_search(fit),
+            *_without_pixels(fit),
+            *_pulled(fit),
+            *_open_ends(fit),
+            *_off_centre(fit),
+            *_grazing(fit),
+            *_late_views(fit),
+        ]
+    return tuple(remarks)
+
+
+def _on_the_search(fit: Fit) -> Iterator[Remark]:
+    names, scale = fit.setup.names, fit.scale * fit.setup.noise
+    about = names[0] if len(names) == 1 else ""
+    if not fit.solution.settled:
+        text = "the fit has not converged: check the picks with the largest changes."
+        yield Remark(f"{_who(fit.setup)}: {text}", "warning", about)
+    if scale > 1:
+        text = (
+            f"the residuals are {scale:.1f} times as large as the stated standard deviations allow, which were "
+            "enlarged by this factor."
+        )
+        yield Remark(f"{_who(fit.setup)}: {text}", "note", about)
+
+
+def _without_pixels(fit: Fit) -> Iterator[Remark]:
+    problem, time = fit.setup.problem, fit.solution.state.time_s
+    count = np.bincount(fit.solution.evaluation.segment[fit.solution.weight > 0], minlength=len(problem.first))
+    for segment in np.flatnonzero((count == 0) & ~problem.contact):
+        first, last = problem.first[segment], problem.last[segment]
+        name = _trajectory(fit.setup, first)
+        text = f"The flight from {time[first]:.3f} to {time[last]:.3f} s of trajectory {name} has no pixels: it rests "
+        yield Remark(f"{text}on its picks.", "note", name)
+
+
+def _pulled(fit: Fit) -> Iterator[Remark]:
+    problem, time = fit.setup.problem, fit.solution.state.time_s
+    for node in np.flatnonzero(np.abs(time - problem.time_s) > PULLED * problem.sigma_time_s):
+        change = 1e3 * (time[node] - problem.time_s[node])
+        text = f"The {_pick(fit, node)} was moved by {change:+.0f} ms, more than its time allows: check the pick."
+        yield Remark(text, "warning", _trajectory(fit.setup, node))
+
+
+def _open_ends(fit: Fit) -> Iterator[Remark]:
+    """Trajectories whose motion ends in picks whose time neither pixels beyond them nor the terrain determine."""
+    setup, problem = fit.setup, fit.setup.problem
+    nodes = np.arange(setup.nodes.size)
+    end = ~(np.isin(nodes, problem.first) & np.isin(nodes, problem.last)) & (setup.picks.kind[setup.nodes] != "pass")
+    found = np.sqrt(np.diag(fit.covariance)[: NODE * nodes.size].reshape(-1, NODE)[:, 3])
+    held = np.flatnonzero(end & (found > HELD * fit.scale * problem.sigma_time_s))
+    owner = setup.picks.trajectory[setup.nodes[held]]
+    for name in dict.fromkeys(owner.tolist()):
+        times = [f"{time:.3f} s" for time in fit.solution.state.time_s[held[owner == name]]]
+        text = (
+            f"Where the motion of trajectory {name} begins or ends, at {' and '.join(times)}, little but the "
+            "pick's own time holds it: mark one pick further, impact or pass, on each side."
+        )
+        yield Remark(text, "advice", name)
+
+
+def _off_centre(fit: Fit) -> Iterator[Remark]:
+    """Views in which what was tracked is hardly the block."""
+    problem, aim = fit.setup.problem, fit.solution.state.aim
+    if problem.sigma_aim == 0:
+        return
+    for i, j in np.argwhere(np.abs(aim).max(axis=2) > PULLED * problem.sigma_aim):
+        name = fit.setup.names[j]
+        text = (
+            f"What was tracked of trajectory {name} in view {problem.views[i].name} lies "
+            f"{100 * float(norm(aim[i, j])):.0f} % of the block's diameter off its centre: check the track, the "
+            "camera, its clock and the block's size."
+        )
+        yield Remark(text, "warning", name)
+
+
+def _grazing(fit: Fit) -> Iterator[Remark]:
+    """Contacts that no view sees at more than a few degrees above the ground."""
+    setup, problem, state = fit.setup, fit.setup.problem, fit.solution.state
+    nodes = problem.grounded
+    normal = setup.normals.normal[setup.nodes[nodes]]
+    steepest = np.zeros(nodes.size)
+    for i in np.unique(problem.view):
+        place = problem.views[i].path.reference.position
+        steepest = np.fmax(steepest, np.abs(dot(unit(state.centre[nodes] - place), normal)))
+    for i in np.flatnonzero(steepest < np.sin(np.radians(GRAZING_DEG))):
+        text = (
+            f"The {_pick(fit, nodes[i])} is seen at {np.degrees(np.arcsin(steepest[i])):.0f}° above the ground: its "
+            "place rests on the flights beside it."
+        )
+        yield Remark(text, "note", _trajectory(setup, nodes[i]))
+
+
+def _late_views(fit: Fit) -> Iterator[Remark]:
+    """Views whose clock would be another if it were free, as one step of the search shows."""
+    problem, solution = fit.setup.problem, fit.solution
+    seen, size = np.unique(problem.view[solution.weight > 0]), problem.columns.size
+    for i in seen[1:]:
+        if problem.columns.clock[i, 0] >= 0:
+            continue
+        rows = solution.evaluation.pixels
+        columns = rows.columns.copy()
+        columns[problem.view == i, CLOCK_COLUMN] = size
+        freed = replace(problem, columns=replace(problem.columns, size=size + 1))
+        evaluation = replace(solution.evaluation, pixels=replace(rows, columns=columns))
+        information, gradient = normal_equations(freed, evaluation, solution.weight)
+        scale = np.sqrt(np.diag(information))
+        scale[scale == 0] = 1.0
+        inverse = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        late = -float(inverse[-1] @ gradient)
+        if abs(late) > CLOCK_SIGNIFICANCE * fit.scale * float(np.sqrt(inverse[-1, -1])):
+            name = problem.views[i].name
+            text = f"the clock of view {name} seems to be off by about {1e3 * late:+.0f} ms: fit the clocks too."
+            yield Remark(f"{_who(fit.setup)}: {text}", "advice", f"clock {name}")
+
+
+def _who(setup: Setup) -> str:
+    return f"Trajectory {setup.names[0]}" if len(setup.names) == 1 else f"{len(setup.names)} trajectories"
+
+
+def _trajectory(setup: Setup, node: int) -> str:
+    return str(setup.picks.trajectory[setup.nodes[node]])
+
+
+def _pick(fit: Fit, node: int) -> str:
+    """A node's pick in words."""
+    setup = fit.setup
+    kind, time = setup.picks.kind[setup.nodes[node]], fit.solution.state.time_s[node]
+    return f"{kind} at {time:.3f} s of trajectory {_trajectory(setup, node)}"

@@ -272,16 +272,19 @@ def test_another_shift_is_the_same_place() -> None:
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "said"),
     [
-        {"fx": 0.0},
-        {"k1": np.nan},
-        {"width": 0},
-        {"position": np.array([0, np.inf, 0])},
-        {"rotation": np.diag([1.0, 1, -1])},
-        {"rotation": np.eye(3) * 1.1},
+        ({"fx": 0.0}, "focal length is not positive"),
+        ({"fy": -1.0}, "focal length is not positive"),
+        ({"k1": np.nan}, "inner parameters are not finite"),
+        ({"width": 0}, "image is 0 × .* px, which is no size"),
+        ({"height": -1}, "× -1 px, which is no size"),
+        ({"position": np.array([0, np.inf, 0])}, "position is not three finite numbers"),
+        ({"position": np.zeros(2)}, "position is not three finite numbers"),
+        ({"rotation": np.diag([1.0, 1, -1])}, "or it mirrors"),
+        ({"rotation": np.eye(3) * 1.1}, "not at right angles"),
     ],
 )
-def test_impossible_cameras_are_refused(change: dict[str, object]) -> None:
-    with pytest.raises(InputError):
+def test_impossible_cameras_are_refused(change: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
         replace(some_camera(), **change)

@@ -356,10 +356,15 @@ def test_bad_tables_and_options_are_refused_with_their_place(site, capsys):
     assert "row 2" in (message := refused(capsys, site))
     assert "does not name the trajectory" in message
     lines = good.splitlines()
-    lines[3] = "B1,627,12.6,5000,100,0.3"
+    row = lines[3].split(",")
+    lines[3] = ",".join([*row[:3], "5000", *row[4:]])
     (site / "left.csv").write_text("\n".join(lines) + "\n")
     message = refused(capsys, site)
-    assert "row 4" in message or "does not come after" in message
+    assert "left.csv, row 4, trajectory B1: The pixel (5000, " in message
+    assert "lies far outside the image of camera left.toml" in message
+    lines[3] = "B1,627,12.6,500,100,0.3"
+    (site / "left.csv").write_text("\n".join(lines) + "\n")
+    assert "left.csv, row 5, trajectory B1: The time 12.563 s does not come after 12.6 s" in refused(capsys, site)
     (site / "left.csv").write_text(good)
     assert "There is no trajectory 'B7'. The picks have: B1, B2" in refused(capsys, site, "--trajectory", "B7")
     assert "Did you mean clock?" in refused(capsys, site, "--free", "clok")

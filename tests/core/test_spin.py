@@ -41,14 +41,17 @@ def test_a_given_axis_and_sense():
 
 
 @pytest.mark.parametrize(
-    ("time", "turns", "more"),
+    ("time", "turns", "more", "said"),
     [
-        ([1.0], [0], {}),
-        ([1.0, 1.0], [0, 1], {}),
-        ([0, 1], [0, 1], {"sigma_turns": -1}),
-        ([0, 1], [0, 1], {"axis": [0, 0, 0]}),
+        ([1.0], [0], {}, "two marks or more"),
+        ([1.0, 2.0], [0, 1, 2], {}, "two marks or more"),
+        ([1.0, 1.0], [0, 1], {}, "are at one time"),
+        ([0, 1], [0, np.nan], {}, "are at one time, or not numbers"),
+        ([0, 1], [0, 1], {"sigma_turns": -1}, "negative or not a number"),
+        ([0, 1], [0, 1], {"sigma_time_s": np.nan}, "negative or not a number"),
+        ([0, 1], [0, 1], {"axis": [0, 0, 0]}, "axis of the spin has length zero"),
     ],
 )
-def test_what_cannot_be_measured(time, turns, more):
-    with pytest.raises(InputError):
+def test_what_cannot_be_measured(time, turns, more, said):
+    with pytest.raises(InputError, match=said):
         measure_spin(time, turns, **more)

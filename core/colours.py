@@ -21,23 +21,8 @@ SPEED_SCALE = np.array(
 )
 
 OBSERVED_COLOUR = (0.86, 0.16, 0.10)
-"""Of the real blocks."""
-
-# sRGB after Okabe & Ito (2008), told apart with any colour vision; without their vermilion, which is near the observed.
-MODEL_COLOURS = {
-    "azimi_desvarreux_1977": (0.90, 0.62, 0.00),
-    "dorren_2015": (0.00, 0.62, 0.45),
-    "noel_2017": (0.34, 0.71, 0.91),
-    "pfeiffer_bowen_1989": (0.94, 0.89, 0.26),
-    "stevens_1998": (0.80, 0.47, 0.65),
-    "wyllie_2014": (0.00, 0.45, 0.70),
-}
-OTHER_MODEL_COLOUR = (0.95, 0.95, 0.95)
-
-
-def model_colour(name: str) -> tuple[float, float, float]:
-    """The colour of an impact model, the same one everywhere."""
-    return MODEL_COLOURS.get(name, OTHER_MODEL_COLOUR)
+"""Of the real blocks. Each impact model has a colour of its own: after Okabe & Ito (2008), distinct with any colour
+vision, and without their vermilion, which is near this one."""
 
 
 def srgb_to_linear(colours: Array) -> Array:

@@ -16,13 +16,18 @@ import numpy as np
 CHUNK_ROWS = 4096
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a plain Python function with numba: no Python objects, the GIL released, kept on disk."""
+def kernel(function: Callable[..., Any], *, inline: bool = False) -> Any:
+    """Compile a plain Python function with numba: no Python objects, the GIL released, kept on disk.
+
+    Parameters
+    ----------
+    inline : whether it becomes a part of each compiled function that calls it.
+    """
     from numba import njit
 
     from .kept_code import KeptCode
 
-    dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
+    dispatcher: Any = njit(nogil=True, error_model="numpy", forceinline=inline)(function)
     dispatcher._cache = KeptCode(function)
     return dispatcher
 

@@ -94,7 +94,8 @@ class KeptCode:
 
     def _file(self, signature: Any, codegen: Any) -> Path:
         version = sys.implementation.cache_tag
-        key = hashlib.sha256(repr((str(signature), codegen.magic_tuple(), version)).encode()).hexdigest()[:16]
+        fields = [getattr(one, "fields", ()) for one in getattr(signature, "args", signature)]  # of named tuples
+        key = hashlib.sha256(repr((str(signature), fields, codegen.magic_tuple(), version)).encode()).hexdigest()[:16]
         name = self._function.__qualname__.replace("<", "").replace(">", "")
         return Path(self._numba.locator.get_cache_path(), f"{self._function.__module__}.{name}-{key}.kernel")
 
@@ -132,7 +133,7 @@ def _parts(function: FunctionType, call: Callable[[FunctionType], None]) -> Iter
             return f"{value.dtype}{value.shape}{value.tobytes().hex()}"
         if isinstance(value, tuple | list):
             return f"({','.join(map(described, value))})"
-        return f"{type(value).__qualname__} {getattr(value, '__name__', '')}"
+        return f"{type(value).__qualname__} {getattr(value, '__name__', '')} {getattr(value, '_fields', '')}"
 
     yield function.__qualname__
     yield described(function.__defaults__)

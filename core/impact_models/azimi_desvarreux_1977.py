@@ -13,24 +13,35 @@ read. That its coefficients are ratios of velocities is the classical reading; l
 energies.
 """
 
-from collections.abc import Sequence
 from math import sqrt
+from typing import NamedTuple
 
-from .machinery.base import ImpactModel
+from .machinery.base import ImpactModel, NoDraws
 from .machinery.contact import leaving, rolling, split
-from .machinery.parameters import ParameterSpec
-from .machinery.triples import Vector, scaled
+from .machinery.parameters import choice, number
+from .machinery.triples import Motion, Vector, scaled
 
-ENERGY = 1.0
+DEFINITIONS = ("velocity", "energy")
+ENERGY = DEFINITIONS.index("energy")
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    rn: float = number(0.35, 0, 1, "normal coefficient of restitution", "Noël et al. 2018", symbol="R_N")
+    rt: float = number(0.85, 0, 1, "tangential coefficient of restitution", "Noël et al. 2018", symbol="R_T")
+    definition: float = choice(
+        "velocity",
+        DEFINITIONS,
+        "whether the coefficients are ratios of velocities or of energies",
+        "the classical reading is velocity",
+        verified=False,
+    )
+
+
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: NoDraws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    rn, rt, definition = p[0], p[1], p[2]
-    if definition == ENERGY:
-        rn, rt = sqrt(rn), sqrt(rt)
+    rn, rt = (sqrt(p.rn), sqrt(p.rt)) if p.definition == ENERGY else (p.rn, p.rt)
     approach, tangential, _ = split(v1, n)
     after = scaled(tangential, rt)
     return leaving(n, rn * approach, after), rolling(n, after, radius)
@@ -41,37 +52,8 @@ MODEL = ImpactModel(
     title="Azimi & Desvarreux 1977",
     reference="Azimi, C., Desvarreux, P. (1977): Calcul de chutes de blocs et vérification sur modèle réduit. ADRGT.",
     function=rebound,
+    parameter_type=Parameters,
+    colour=(0.90, 0.62, 0.00),
+    compared=True,
     energy_never_grows=False,
-    parameters=(
-        ParameterSpec(
-            "rn",
-            "R_N",
-            "",
-            0.35,
-            0.0,
-            1.0,
-            description="normal coefficient of restitution",
-            source="Noël et al. 2018",
-        ),
-        ParameterSpec(
-            "rt",
-            "R_T",
-            "",
-            0.85,
-            0.0,
-            1.0,
-            description="tangential coefficient of restitution",
-            source="Noël et al. 2018",
-        ),
-        ParameterSpec(
-            "definition",
-            "",
-            "",
-            "velocity",
-            choices=("velocity", "energy"),
-            description="whether the coefficients are ratios of velocities or of energies",
-            source="the classical reading is velocity",
-            verified=False,
-        ),
-    ),
 )

@@ -14,28 +14,39 @@ whose codes differ in signs; ranges of V½, φ and R_t as in PlatRock. Not verif
 R_t is ours.
 """
 
-from collections.abc import Sequence
 from math import radians, tan
+from typing import NamedTuple
 
-from .machinery.base import ImpactModel
+from .machinery.base import ImpactModel, NoDraws
 from .machinery.contact import leaving, slip, split
-from .machinery.parameters import ParameterSpec
-from .machinery.triples import Vector, add, cross, length, scaled
+from .machinery.parameters import number
+from .machinery.triples import Motion, Vector, add, cross, length, scaled
+
+HALF, ANGLE, OURS = "PlatRock, 0–50", "PlatRock, 0–40", "range of PlatRock; the default is ours"
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    half_speed: float = number(
+        10, 0.01, 1000, "normal velocity at which R_n is one half", HALF, unit="m/s", symbol="V½", verified=False
+    )
+    rt: float = number(0.9, 0, 1, "tangential coefficient beside friction", OURS, symbol="R_t", verified=False)
+    friction_angle: float = number(
+        20, 0, 89, "angle of friction between block and ground", ANGLE, unit="deg", symbol="φ", verified=False
+    )
+
+
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: NoDraws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    half_speed, rt, friction_deg = p[0], p[1], p[2]
     approach, tangential, _ = split(v1, n)
-    rn = half_speed / (approach + half_speed)
+    rn = p.half_speed / (approach + p.half_speed)
     s = slip(n, tangential, omega1, radius)
     slipping = length(s)
-    impulse = min(2.0 / 7.0 * rt * slipping, tan(radians(friction_deg)) * (1.0 + rn) * approach)
+    impulse = min(2.0 / 7.0 * p.rt * slipping, tan(radians(p.friction_angle)) * (1.0 + rn) * approach)
     unit_slip = scaled(s, 1.0 / slipping) if slipping > 0.0 else s
-    after = add(scaled(tangential, rt), scaled(unit_slip, -impulse))
-    omega2 = add(scaled(omega1, rt), scaled(cross(n, unit_slip), 2.5 * impulse / radius))
+    after = add(scaled(tangential, p.rt), scaled(unit_slip, -impulse))
+    omega2 = add(scaled(omega1, p.rt), scaled(cross(n, unit_slip), 2.5 * impulse / radius))
     return leaving(n, rn * approach, after), omega2
 
 
@@ -44,39 +55,5 @@ MODEL = ImpactModel(
     title="Friction-limited rebound (Bourrier, Hungr)",
     reference="Bourrier, F. et al. (2009): Nat. Hazards Earth Syst. Sci. 9, 831–842, for the idea; see the module.",
     function=rebound,
-    parameters=(
-        ParameterSpec(
-            "half_speed",
-            "V½",
-            "m/s",
-            10.0,
-            0.01,
-            1000.0,
-            description="normal velocity at which R_n is one half",
-            source="PlatRock, 0–50",
-            verified=False,
-        ),
-        ParameterSpec(
-            "rt",
-            "R_t",
-            "",
-            0.9,
-            0.0,
-            1.0,
-            description="tangential coefficient beside friction",
-            source="range of PlatRock; the default is ours",
-            verified=False,
-        ),
-        ParameterSpec(
-            "friction_angle",
-            "φ",
-            "deg",
-            20.0,
-            0.0,
-            89.0,
-            description="angle of friction between block and ground",
-            source="PlatRock, 0–40",
-            verified=False,
-        ),
-    ),
+    parameter_type=Parameters,
 )

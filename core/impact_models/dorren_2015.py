@@ -30,14 +30,14 @@ limit, the axis of the deviation (a turn about the normal contradicts Noël et a
 Shape "none" (0) is not a block and left out.
 """
 
-from collections.abc import Sequence
 from math import cos, isnan, log, pi, radians, sin, sqrt
+from typing import NamedTuple
 
 from .machinery.base import ImpactModel
 from .machinery.chance import uniform
 from .machinery.contact import leaving, rolling, spin_in_plane, split, with_length
-from .machinery.parameters import SWITCH, ParameterSpec
-from .machinery.triples import Vector, add, cross, dot, length, scaled, turned
+from .machinery.parameters import choice, number, switch
+from .machinery.triples import Motion, Vector, add, cross, dot, length, scaled, turned
 from .rockyfor3d_tables import (
     DEVIATION_LIMITS_DEG,
     DEVIATION_SHARES,
@@ -49,13 +49,95 @@ from .rockyfor3d_tables import (
 
 NORMAL_SPEED_MPS = 9.0
 INERTIA = tuple(inertia for _, inertia in SHAPES)
-NORMAL, CONE = 1.0, 2.0
-DOWNSLOPE = 1.0
-ON = 1.0
+FIRST_SHAPE = 1
+AXES = ("vertical", "normal", "cone")
+NORMAL, CONE = AXES.index("normal"), AXES.index("cone")
+SIDES = ("random", "downslope")
+DOWNSLOPE = SIDES.index("downslope")
 HARD_RN, SOFTEST_RN = 0.34, 0.1
 """No penetration from the first on; below the second the density of the soil would near zero, so it stays."""
 UP = (0.0, 0.0, 1.0)
 STOPPED = (0.0, 0.0, 0.0)
+SOIL_TYPES = tuple(str(soil) for soil in range(len(SOILS)))
+SOIL_NAMES = "; ".join(f"{soil} {name}" for soil, (name, _) in enumerate(SOILS))
+SOIL_RN = tuple(rn for _, rn in SOILS)
+SHAPE_NAMES = tuple(name for name, _ in SHAPES)
+PAPER, MANUAL = "Noël et al. 2018", "Rockyfor3D v5.2; not verified"
+
+
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    soil_type: float = choice("5", SOIL_TYPES, SOIL_NAMES, f"type 5: {PAPER}")
+    rn: float = number(
+        SOILS[5][1],
+        0,
+        1,
+        "mean normal coefficient; when it is not given, that of the soil type",
+        f"0.43 for type 5: {PAPER}; other soils not verified",
+        symbol="R_n",
+        follows=("soil_type", SOIL_RN),
+    )
+    rn_spread: float = number(
+        0.10, 0, 1, "R_n = mean · U(1 − spread, 1 + spread)", f"±10 %: {PAPER}; that it is uniform is not verified"
+    )
+    rg70: float = number(0, 0, 100, "obstacle height of 70 % of the rebounds", PAPER, unit="m", symbol="Rg70")
+    rg20: float = number(0.05, 0, 100, "obstacle height of 20 % of the rebounds", PAPER, unit="m", symbol="Rg20")
+    rg10: float = number(0.10, 0, 100, "obstacle height of 10 % of the rebounds", PAPER, unit="m", symbol="Rg10")
+    block_shape: float = choice(
+        "rectangular",
+        SHAPE_NAMES,
+        "shape of the block for its moment of inertia, with three equal diameters",
+        f"rectangular: {PAPER}; moments of inertia not verified",
+        first_code=FIRST_SHAPE,
+    )
+    deviation: float = switch(
+        "on", "lateral deviation at random, by classes that depend on the speed", MANUAL, verified=False
+    )
+    deviation_axis: float = choice(
+        "vertical",
+        AXES,
+        "what the deviation turns about; cone: the same angle in any direction",
+        f"inferred from {PAPER}, who find R_N > 1",
+        verified=False,
+    )
+    deviation_side: float = choice(
+        "random", SIDES, "to either side, or towards the dip of the ground", MANUAL, verified=False
+    )
+    rt_spread: float = number(
+        0, 0, 1, "R_t · U(1 − spread, 1 + spread), at most 1; 0.1 to have it", MANUAL, verified=False
+    )
+    slope_reduction: float = number(
+        0, 0, 45, "the slope is less steep by U(0, this) at a rebound; 4 to have it", MANUAL, unit="deg", verified=False
+    )
+    penetration: float = switch(
+        "on",
+        "penetration of the block into soils with R_n below 0.34",
+        "Pichler et al. 2005; not verified",
+        symbol="D_p",
+        verified=False,
+    )
+    deviation_limit: float = number(
+        55,
+        45,
+        180,
+        "upper limit of the third class of the deviation; 67.5 is the rival",
+        MANUAL,
+        unit="deg",
+        verified=False,
+    )
+
+
+class Draws(NamedTuple):
+    """The chance of one impact."""
+
+    rn: float
+    obstacle: float
+    rt: float
+    reduction: float
+    deviation_class: float
+    deviation_angle: float
+    deviation_side: float
 
 
 def obstacle_height(u: float, rg70: float, rg20: float, rg10: float) -> float:
@@ -121,190 +203,43 @@ def lowered(v1: Vector, n: Vector, angle: float) -> Vector:
     return flat if dot(v1, flat) < 0.0 else n
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: Draws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    mean_rn, rn_spread, rg70, rg20, rg10, shape = p[1], p[2], p[3], p[4], p[5], p[6]
-    deviation, axis, side, rt_spread, reduction, penetration, limit = p[7], p[8], p[9], p[10], p[11], p[12], p[13]
-    if reduction > 0.0:
-        n = lowered(v1, n, radians(uniform(draws[3], 0.0, reduction)))
-    rn = min(1.0, mean_rn * uniform(draws[0], 1.0 - rn_spread, 1.0 + rn_spread))
+    if p.slope_reduction > 0.0:
+        n = lowered(v1, n, radians(uniform(u.reduction, 0.0, p.slope_reduction)))
+    rn = min(1.0, p.rn * uniform(u.rn, 1.0 - p.rn_spread, 1.0 + p.rn_spread))
     if rn <= 0.0:
         return STOPPED, STOPPED
     approach, tangential, tangential_speed = split(v1, n)
     speed = length(v1)
-    depth = penetration_depth(rn, speed, radius, mass) if penetration == ON else 0.0
-    rt = radius / (radius + obstacle_height(draws[1], rg70, rg20, rg10) + depth)
-    rt = min(1.0, rt * uniform(draws[2], 1.0 - rt_spread, 1.0 + rt_spread))
-    c = INERTIA[int(shape) - 1]
+    depth = penetration_depth(rn, speed, radius, mass) if p.penetration else 0.0
+    rt = radius / (radius + obstacle_height(u.obstacle, p.rg70, p.rg20, p.rg10) + depth)
+    rt = min(1.0, rt * uniform(u.rt, 1.0 - p.rt_spread, 1.0 + p.rt_spread))
+    c = INERTIA[int(p.block_shape) - FIRST_SHAPE]
     spin = radius * spin_in_plane(n, omega1)
     restituted = sqrt((c * spin * spin + tangential_speed * tangential_speed) * rt / (1.0 + c))
     after = with_length(tangential, tangential_speed, restituted)
     ratio = approach / NORMAL_SPEED_MPS
     v2, omega2 = leaving(n, approach * rn / (1.0 + ratio * ratio), after), rolling(n, after, radius)
-    if isnan(draws[4]) or deviation != ON:
+    if isnan(u.deviation_class) or not p.deviation:
         return v2, omega2
-    angle = deviation_angle(speed, draws[4], draws[5], limit)
-    if axis == CONE:
-        about = cone_axis(v2, draws[6])
+    angle = deviation_angle(speed, u.deviation_class, u.deviation_angle, p.deviation_limit)
+    if p.deviation_axis == CONE:
+        about = cone_axis(v2, u.deviation_side)
     else:
-        angle *= side_of(draws[6], v1, n, side == DOWNSLOPE)
-        about = n if axis == NORMAL else UP
+        angle *= side_of(u.deviation_side, v1, n, p.deviation_side == DOWNSLOPE)
+        about = n if p.deviation_axis == NORMAL else UP
     return turned(v2, about, angle), turned(omega2, about, angle)
 
 
-MANUAL = "Rockyfor3D v5.2; not verified"
 MODEL = ImpactModel(
     name="dorren_2015",
     title="Rockyfor3D v5.2 (Dorren 2015)",
     reference="Dorren, L. (2015): Rockyfor3D (v5.2) revealed. ecorisQ.",
     function=rebound,
-    draws=7,
+    parameter_type=Parameters,
+    draw_type=Draws,
+    colour=(0.00, 0.62, 0.45),
+    compared=True,
     turns_with_the_frame=False,
-    parameters=(
-        ParameterSpec(
-            "soil_type",
-            "",
-            "",
-            "5",
-            choices=tuple(str(number) for number in range(len(SOILS))),
-            description="; ".join(f"{number} {name}" for number, (name, _) in enumerate(SOILS)),
-            source="type 5: Noël et al. 2018",
-        ),
-        ParameterSpec(
-            "rn",
-            "R_n",
-            "",
-            SOILS[5][1],
-            0.0,
-            1.0,
-            description="mean normal coefficient; when it is not given, that of the soil type",
-            source="0.43 for type 5: Noël et al. 2018; other soils not verified",
-            follows=("soil_type", tuple(rn for _, rn in SOILS)),
-        ),
-        ParameterSpec(
-            "rn_spread",
-            "",
-            "",
-            0.10,
-            0.0,
-            1.0,
-            description="R_n = mean · U(1 − spread, 1 + spread)",
-            source="±10 %: Noël et al. 2018; that it is uniform is not verified",
-        ),
-        ParameterSpec(
-            "rg70",
-            "Rg70",
-            "m",
-            0.0,
-            0.0,
-            100.0,
-            description="obstacle height of 70 % of the rebounds",
-            source="Noël et al. 2018",
-        ),
-        ParameterSpec(
-            "rg20",
-            "Rg20",
-            "m",
-            0.05,
-            0.0,
-            100.0,
-            description="obstacle height of 20 % of the rebounds",
-            source="Noël et al. 2018",
-        ),
-        ParameterSpec(
-            "rg10",
-            "Rg10",
-            "m",
-            0.10,
-            0.0,
-            100.0,
-            description="obstacle height of 10 % of the rebounds",
-            source="Noël et al. 2018",
-        ),
-        ParameterSpec(
-            "block_shape",
-            "",
-            "",
-            "rectangular",
-            choices=tuple(name for name, _ in SHAPES),
-            first_code=1,
-            description="shape of the block for its moment of inertia, with three equal diameters",
-            source="rectangular: Noël et al. 2018; moments of inertia not verified",
-        ),
-        ParameterSpec(
-            "deviation",
-            "",
-            "",
-            "on",
-            choices=SWITCH,
-            description="lateral deviation at random, by classes that depend on the speed",
-            source=MANUAL,
-            verified=False,
-        ),
-        ParameterSpec(
-            "deviation_axis",
-            "",
-            "",
-            "vertical",
-            choices=("vertical", "normal", "cone"),
-            description="what the deviation turns about; cone: the same angle in any direction",
-            source="inferred from Noël et al. 2018, who find R_N > 1",
-            verified=False,
-        ),
-        ParameterSpec(
-            "deviation_side",
-            "",
-            "",
-            "random",
-            choices=("random", "downslope"),
-            description="to either side, or towards the dip of the ground",
-            source=MANUAL,
-            verified=False,
-        ),
-        ParameterSpec(
-            "rt_spread",
-            "",
-            "",
-            0.0,
-            0.0,
-            1.0,
-            description="R_t · U(1 − spread, 1 + spread), at most 1; 0.1 to have it",
-            source=MANUAL,
-            verified=False,
-        ),
-        ParameterSpec(
-            "slope_reduction",
-            "",
-            "deg",
-            0.0,
-            0.0,
-            45.0,
-            description="the slope is less steep by U(0, this) at a rebound; 4 to have it",
-            source=MANUAL,
-            verified=False,
-        ),
-        ParameterSpec(
-            "penetration",
-            "D_p",
-            "",
-            "on",
-            choices=SWITCH,
-            description="penetration of the block into soils with R_n below 0.34",
-            source="Pichler et al. 2005; not verified",
-            verified=False,
-        ),
-        ParameterSpec(
-            "deviation_limit",
-            "",
-            "deg",
-            55.0,
-            45.0,
-            180.0,
-            description="upper limit of the third class of the deviation; 67.5 is the rival",
-            source=MANUAL,
-            verified=False,
-        ),
-    ),
 )

@@ -21,19 +21,50 @@ Source: the poster, whose equations were read. Its "maximum corresponding to 20 
 open which tangential velocity, and whether velocity or energy: the restituted one, and velocity, are our reading.
 """
 
-from collections.abc import Sequence
 from math import sqrt
+from typing import NamedTuple
 
 from .machinery.base import ImpactModel
 from .machinery.chance import normal
 from .machinery.contact import CUBE_INERTIA, gripped, incident_angle_deg, leaving, split
-from .machinery.parameters import ParameterSpec
-from .machinery.triples import Vector, length, scaled
+from .machinery.parameters import choice, number
+from .machinery.triples import Motion, Vector, length, scaled
 
 LIMIT_ANGLE_DEG = 4.0
 RN_FACTOR, RN_FLOOR = 10.0, 0.08
 SD_ANGLE_DEG = 100.0
-ENERGY = 1.0
+BASES = ("velocity", "energy")
+ENERGY = BASES.index("energy")
+POSTER = "the poster"
+
+
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    rn_limit: float = number(2, 0, 10, "greatest R_N before it is paid for", POSTER)
+    transfer: float = number(
+        0.20, 0, 1, "greatest part of the tangential velocity (or energy) that can become normal", POSTER, symbol="f"
+    )
+    transfer_basis: float = choice(
+        "velocity",
+        BASES,
+        "whether the transfer is a part of the restituted tangential velocity or of its energy",
+        "the poster says velocity; our reading",
+        verified=False,
+    )
+    rn_exponent: float = number(-1.08, -3, 0, "mean exponent of R_N = 10 (θ1 − 4)^μ_N + 0.08", POSTER, symbol="μ_N")
+    rn_exponent_sd: float = number(
+        0.15, 0, 1, "its standard deviation at θ1 = 0; at θ1 it is (1 − θ1/100) times that", POSTER, symbol="σ_N"
+    )
+    rt: float = number(0.69, 0, 1, "mean factor of the tangential velocity without slip", POSTER, symbol="μ_T")
+    rt_sd: float = number(0.13, 0, 1, "its standard deviation", POSTER)
+
+
+class Draws(NamedTuple):
+    """The chance of one impact: of the exponent and of the tangential factor."""
+
+    rn_exponent: float
+    rt: float
 
 
 def normal_coefficient(theta1_deg: float, exponent: float, limit: float) -> float:
@@ -42,22 +73,19 @@ def normal_coefficient(theta1_deg: float, exponent: float, limit: float) -> floa
     return min(limit, RN_FACTOR * base**exponent + RN_FLOOR) if base > 0.0 else limit
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: Draws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    limit, transfer, basis = p[0], p[1], p[2]
     approach, tangential, speed = split(v1, n)
     theta1 = incident_angle_deg(approach, speed)
-    exponent = normal(draws[0], p[3], p[4] * (1.0 - theta1 / SD_ANGLE_DEG))
-    rn = normal_coefficient(theta1, exponent, limit)
-    rt = min(1.0, abs(normal(draws[1], p[5], p[6])))
+    exponent = normal(u.rn_exponent, p.rn_exponent, p.rn_exponent_sd * (1.0 - theta1 / SD_ANGLE_DEG))
+    rn = normal_coefficient(theta1, exponent, p.rn_limit)
+    rt = min(1.0, abs(normal(u.rt, p.rt, p.rt_sd)))
     grip, omega2 = gripped(n, tangential, omega1, radius, CUBE_INERTIA)
     after = scaled(grip, rt)
     if rn <= 1.0:
         return leaving(n, rn * approach, after), omega2
     restituted = length(after)
-    part = transfer if basis == ENERGY else 1.0 - (1.0 - transfer) ** 2
+    part = p.transfer if p.transfer_basis == ENERGY else 1.0 - (1.0 - p.transfer) ** 2
     give = min((rn * rn - 1.0) * approach * approach, part * restituted * restituted)
     kept = sqrt(max(restituted * restituted - give, 0.0)) / restituted if give > 0.0 else 1.0
     return leaving(n, sqrt(approach * approach + give), scaled(after, kept)), omega2
@@ -68,61 +96,8 @@ MODEL = ImpactModel(
     title="Noël et al. 2017",
     reference="Noël, F. et al. (2017): poster EGU2017-16699, EGU General Assembly.",
     function=rebound,
-    draws=2,
-    parameters=(
-        ParameterSpec(
-            "rn_limit", "", "", 2.0, 0.0, 10.0, description="greatest R_N before it is paid for", source="the poster"
-        ),
-        ParameterSpec(
-            "transfer",
-            "f",
-            "",
-            0.20,
-            0.0,
-            1.0,
-            description="greatest part of the tangential velocity (or energy) that can become normal",
-            source="the poster",
-        ),
-        ParameterSpec(
-            "transfer_basis",
-            "",
-            "",
-            "velocity",
-            choices=("velocity", "energy"),
-            description="whether the transfer is a part of the restituted tangential velocity or of its energy",
-            source="the poster says velocity; our reading",
-            verified=False,
-        ),
-        ParameterSpec(
-            "rn_exponent",
-            "μ_N",
-            "",
-            -1.08,
-            -3.0,
-            0.0,
-            description="mean exponent of R_N = 10 (θ1 − 4)^μ_N + 0.08",
-            source="the poster",
-        ),
-        ParameterSpec(
-            "rn_exponent_sd",
-            "σ_N",
-            "",
-            0.15,
-            0.0,
-            1.0,
-            description="its standard deviation at θ1 = 0; at θ1 it is (1 − θ1/100) times that",
-            source="the poster",
-        ),
-        ParameterSpec(
-            "rt",
-            "μ_T",
-            "",
-            0.69,
-            0.0,
-            1.0,
-            description="mean factor of the tangential velocity without slip",
-            source="the poster",
-        ),
-        ParameterSpec("rt_sd", "", "", 0.13, 0.0, 1.0, description="its standard deviation", source="the poster"),
-    ),
+    parameter_type=Parameters,
+    draw_type=Draws,
+    colour=(0.34, 0.71, 0.91),
+    compared=True,
 )

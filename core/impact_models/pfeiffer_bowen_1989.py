@@ -19,18 +19,44 @@ text: the ranges, and how the three-dimensional roughness is shared (CRSP is two
 al. 2018.
 """
 
-from collections.abc import Sequence
 from math import atan, isnan, sqrt
+from typing import NamedTuple
 
 from .machinery.base import ImpactModel
 from .machinery.chance import uniform
 from .machinery.contact import SPHERE_INERTIA, leaving, rolling, slip, spin_in_plane, split, with_length
-from .machinery.parameters import ParameterSpec
-from .machinery.triples import Vector, cross, length, turned
+from .machinery.parameters import number
+from .machinery.triples import Motion, Vector, cross, length, turned
 
 NORMAL_SPEED_MPS = 9.144
 FRICTION_SPEED_MPS = 6.096
 SCALING_SPEED_MPS = 76.2
+GROUND = "Noël et al. 2018; ranges of ground types not verified"
+
+
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    rn: float = number(0.35, 0, 1, "normal coefficient; 0.28 soft soil to 0.42 hard surface", GROUND, symbol="R_n")
+    rt: float = number(0.85, 0, 1, "tangential coefficient; 0.80 soft soil to 0.92 hard surface", GROUND, symbol="R_t")
+    roughness: float = number(
+        0,
+        0,
+        5,
+        "height of the ground's roughness over one block radius; 0 for none",
+        "the two-dimensional form of PlatRock; in three dimensions ours",
+        unit="m",
+        symbol="S",
+        verified=False,
+    )
+
+
+class Draws(NamedTuple):
+    """The chance of one impact: how far the normal leans, how much of it against the motion, and to which side."""
+
+    angle: float
+    share: float
+    side: float
 
 
 def restituted_tangential(
@@ -57,18 +83,15 @@ def rough_normal(v1: Vector, n: Vector, angle: float, share: float, side: float)
     return turned(braked, t, side * (1.0 - share) * angle)
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: Draws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    rn, rt, roughness = p[0], p[1], p[2]
-    if roughness > 0.0 and not isnan(draws[0]):
-        angle = draws[0] * atan(roughness / radius)
-        n = rough_normal(v1, n, angle, uniform(draws[1], 0.0, 1.0), -1.0 if draws[2] < 0.5 else 1.0)
+    if p.roughness > 0.0 and not isnan(u.angle):
+        angle = u.angle * atan(p.roughness / radius)
+        n = rough_normal(v1, n, angle, uniform(u.share, 0.0, 1.0), -1.0 if u.side < 0.5 else 1.0)
     approach, tangential, speed = split(v1, n)
-    after = restituted_tangential(tangential, speed, n, omega1, radius, approach, rn, rt)
+    after = restituted_tangential(tangential, speed, n, omega1, radius, approach, p.rn, p.rt)
     ratio = approach / NORMAL_SPEED_MPS
-    return leaving(n, approach * rn / (1.0 + ratio * ratio), after), rolling(n, after, radius)
+    return leaving(n, approach * p.rn / (1.0 + ratio * ratio), after), rolling(n, after, radius)
 
 
 MODEL = ImpactModel(
@@ -76,38 +99,8 @@ MODEL = ImpactModel(
     title="CRSP (Pfeiffer & Bowen 1989)",
     reference="Pfeiffer, T., Bowen, T. (1989): Computer simulation of rockfalls. Bull. Assoc. Eng. Geol. 26(1).",
     function=rebound,
-    draws=3,
-    parameters=(
-        ParameterSpec(
-            "rn",
-            "R_n",
-            "",
-            0.35,
-            0.0,
-            1.0,
-            description="normal coefficient; 0.28 soft soil to 0.42 hard surface",
-            source="Noël et al. 2018; ranges of ground types not verified",
-        ),
-        ParameterSpec(
-            "rt",
-            "R_t",
-            "",
-            0.85,
-            0.0,
-            1.0,
-            description="tangential coefficient; 0.80 soft soil to 0.92 hard surface",
-            source="Noël et al. 2018; ranges of ground types not verified",
-        ),
-        ParameterSpec(
-            "roughness",
-            "S",
-            "m",
-            0.0,
-            0.0,
-            5.0,
-            description="height of the ground's roughness over one block radius; 0 for none",
-            source="the two-dimensional form of PlatRock; in three dimensions ours",
-            verified=False,
-        ),
-    ),
+    parameter_type=Parameters,
+    draw_type=Draws,
+    colour=(0.94, 0.89, 0.26),
+    compared=True,
 )

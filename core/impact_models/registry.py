@@ -27,15 +27,8 @@ def _found() -> dict[str, ImpactModel]:
 MODELS: Mapping[str, ImpactModel] = MappingProxyType(_found())
 """Name → model, by name."""
 
-COMPARED = (
-    "azimi_desvarreux_1977",
-    "dorren_2015",
-    "noel_2017",
-    "pfeiffer_bowen_1989",
-    "stevens_1998",
-    "wyllie_2014",
-)
-"""The six models that Noël et al. 2018 compare, in their order."""
+COMPARED = tuple(model.name for model in MODELS.values() if model.compared)
+"""The models that are compared when none are chosen, by name: the six that Noël et al. 2018 compare, in their order."""
 
 
 def find_model(name: str) -> ImpactModel:

@@ -14,16 +14,43 @@ and writes RocFall's files (PyRockfall); RocFall's help calls the tangential law
 standard deviations: Noël et al. 2018. Not verified: the truncation, and how the mass scales R_n.
 """
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
 from .machinery.base import ImpactModel
 from .machinery.chance import truncated_normal
 from .machinery.contact import leaving, rolling, split
-from .machinery.parameters import SWITCH, ParameterSpec
-from .machinery.triples import Vector, scaled
+from .machinery.parameters import number, switch
+from .machinery.triples import Motion, Vector, scaled
 from .pfeiffer_bowen_1989 import restituted_tangential
 
 WIDEST_SD = 3.0
+PAPER, CUT = "Noël et al. 2018", "Noël et al. 2018; the cut is not verified"
+PROGRAM, UNSURE = "PyRockfall", "PyRockfall; not verified against RocFall"
+
+
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    rn: float = number(0.35, 0, 1, "mean normal coefficient", PAPER, symbol="R_n")
+    rt: float = number(0.85, 0, 1, "mean tangential coefficient", PAPER, symbol="R_t")
+    rn_sd: float = number(0.04, 0, 0.5, "standard deviation of R_n before it is cut at 3 sd", CUT)
+    rt_sd: float = number(0.04, 0, 0.5, "standard deviation of R_t before it is cut at 3 sd", CUT)
+    rotational: float = switch(
+        "on", "consider rotational velocity: the tangential law of CRSP", f"RocFall's help; {PROGRAM}"
+    )
+    scale_rn_by_velocity: float = switch("on", "R_n falls with the normal velocity", PROGRAM)
+    velocity_scale: float = number(
+        9.144, 0.1, 100, "normal velocity that halves R_n", f"{PROGRAM}; 30 ft/s", unit="m/s", symbol="K"
+    )
+    scale_rn_by_mass: float = switch("off", "R_n falls with the mass", UNSURE, verified=False)
+    mass_scale: float = number(1000, 1, 1e7, "mass that halves R_n", UNSURE, unit="kg", symbol="C", verified=False)
+
+
+class Draws(NamedTuple):
+    """The chance of one impact: of its two coefficients."""
+
+    rn: float
+    rt: float
 
 
 def drawn_coefficient(u: float, mean: float, sd: float) -> float:
@@ -31,19 +58,16 @@ def drawn_coefficient(u: float, mean: float, sd: float) -> float:
     return truncated_normal(u, mean, sd, max(0.0, mean - WIDEST_SD * sd), min(1.0, mean + WIDEST_SD * sd))
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: Draws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    rotational, by_velocity, by_mass = p[4], p[5], p[7]
-    rn, rt = drawn_coefficient(draws[0], p[0], p[2]), drawn_coefficient(draws[1], p[1], p[3])
+    rn, rt = drawn_coefficient(u.rn, p.rn, p.rn_sd), drawn_coefficient(u.rt, p.rt, p.rt_sd)
     approach, tangential, speed = split(v1, n)
     scaled_rn = rn
-    if by_velocity == 1.0:
-        scaled_rn /= 1.0 + (approach / p[6]) ** 2
-    if by_mass == 1.0:
-        scaled_rn /= 1.0 + (mass / p[8]) ** 2
-    if rotational == 1.0:
+    if p.scale_rn_by_velocity:
+        scaled_rn /= 1.0 + (approach / p.velocity_scale) ** 2
+    if p.scale_rn_by_mass:
+        scaled_rn /= 1.0 + (mass / p.mass_scale) ** 2
+    if p.rotational:
         after = restituted_tangential(tangential, speed, n, omega1, radius, approach, rn, rt)
         return leaving(n, approach * scaled_rn, after), rolling(n, after, radius)
     return leaving(n, approach * scaled_rn, scaled(tangential, rt)), omega1
@@ -54,82 +78,8 @@ MODEL = ImpactModel(
     title="RocFall 6 (Stevens 1998)",
     reference="Stevens, W. (1998): RocFall: a tool for probabilistic analysis. MSc thesis, University of Toronto.",
     function=rebound,
-    draws=2,
-    parameters=(
-        ParameterSpec(
-            "rn", "R_n", "", 0.35, 0.0, 1.0, description="mean normal coefficient", source="Noël et al. 2018"
-        ),
-        ParameterSpec(
-            "rt", "R_t", "", 0.85, 0.0, 1.0, description="mean tangential coefficient", source="Noël et al. 2018"
-        ),
-        ParameterSpec(
-            "rn_sd",
-            "",
-            "",
-            0.04,
-            0.0,
-            0.5,
-            description="standard deviation of R_n before it is cut at 3 sd",
-            source="Noël et al. 2018; the cut is not verified",
-        ),
-        ParameterSpec(
-            "rt_sd",
-            "",
-            "",
-            0.04,
-            0.0,
-            0.5,
-            description="standard deviation of R_t before it is cut at 3 sd",
-            source="Noël et al. 2018; the cut is not verified",
-        ),
-        ParameterSpec(
-            "rotational",
-            "",
-            "",
-            "on",
-            choices=SWITCH,
-            description="consider rotational velocity: the tangential law of CRSP",
-            source="RocFall's help; PyRockfall",
-        ),
-        ParameterSpec(
-            "scale_rn_by_velocity",
-            "",
-            "",
-            "on",
-            choices=SWITCH,
-            description="R_n falls with the normal velocity",
-            source="PyRockfall",
-        ),
-        ParameterSpec(
-            "velocity_scale",
-            "K",
-            "m/s",
-            9.144,
-            0.1,
-            100.0,
-            description="normal velocity that halves R_n",
-            source="PyRockfall; 30 ft/s",
-        ),
-        ParameterSpec(
-            "scale_rn_by_mass",
-            "",
-            "",
-            "off",
-            choices=SWITCH,
-            description="R_n falls with the mass",
-            source="PyRockfall; not verified against RocFall",
-            verified=False,
-        ),
-        ParameterSpec(
-            "mass_scale",
-            "C",
-            "kg",
-            1000.0,
-            1.0,
-            1e7,
-            description="mass that halves R_n",
-            source="PyRockfall; not verified against RocFall",
-            verified=False,
-        ),
-    ),
+    parameter_type=Parameters,
+    draw_type=Draws,
+    colour=(0.80, 0.47, 0.65),
+    compared=True,
 )

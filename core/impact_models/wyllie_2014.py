@@ -14,25 +14,35 @@ tangential law of Goldsmith (1960) as on the poster of Noël et al. 2017. Not ve
 not conserved: Noël et al. 2018.
 """
 
-from collections.abc import Sequence
+from typing import NamedTuple
 
-from .machinery.base import ImpactModel
+from .machinery.base import ImpactModel, NoDraws
 from .machinery.contact import CUBE_INERTIA, SPHERE_INERTIA, gripped, incident_angle_deg, leaving, split
-from .machinery.parameters import ParameterSpec
-from .machinery.triples import Vector
+from .machinery.parameters import choice, number
+from .machinery.triples import Motion, Vector
 
 SMALLEST_ANGLE_DEG = 0.1
-SPHERE = 1.0
+SHAPES = ("cube", "sphere")
+SPHERE = SHAPES.index("sphere")
 
 
-def rebound(
-    v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Sequence[float], draws: Sequence[float]
-) -> tuple[Vector, Vector]:
+class Parameters(NamedTuple):
+    """What can be set."""
+
+    rn_factor: float = number(
+        19.5, 0, 100, "factor of R_N = factor · θ1^exponent, θ1 in degrees", "RockGIS", verified=False
+    )
+    rn_exponent: float = number(-1.03, -2, 0, "exponent of R_N = factor · θ1^exponent", "RockGIS", verified=False)
+    inertia: float = choice(
+        "cube", SHAPES, "shape of the block for its moment of inertia", "cube: Noël et al. 2017", verified=False
+    )
+
+
+def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p: Parameters, u: NoDraws) -> Motion:
     """v2 [m/s] and ω2 [rad/s]; see the module."""
-    factor, exponent, inertia = p[0], p[1], p[2]
     approach, tangential, speed = split(v1, n)
-    rn = factor * max(incident_angle_deg(approach, speed), SMALLEST_ANGLE_DEG) ** exponent
-    after, omega2 = gripped(n, tangential, omega1, radius, SPHERE_INERTIA if inertia == SPHERE else CUBE_INERTIA)
+    rn = p.rn_factor * max(incident_angle_deg(approach, speed), SMALLEST_ANGLE_DEG) ** p.rn_exponent
+    after, omega2 = gripped(n, tangential, omega1, radius, SPHERE_INERTIA if p.inertia == SPHERE else CUBE_INERTIA)
     return leaving(n, rn * approach, after), omega2
 
 
@@ -41,39 +51,8 @@ MODEL = ImpactModel(
     title="Wyllie 2014",
     reference="Wyllie, D. (2014): Rock Fall Engineering. CRC Press.",
     function=rebound,
+    parameter_type=Parameters,
+    colour=(0.00, 0.45, 0.70),
+    compared=True,
     energy_never_grows=False,
-    parameters=(
-        ParameterSpec(
-            "rn_factor",
-            "",
-            "",
-            19.5,
-            0.0,
-            100.0,
-            description="factor of R_N = factor · θ1^exponent, θ1 in degrees",
-            source="RockGIS",
-            verified=False,
-        ),
-        ParameterSpec(
-            "rn_exponent",
-            "",
-            "",
-            -1.03,
-            -2.0,
-            0.0,
-            description="exponent of R_N = factor · θ1^exponent",
-            source="RockGIS",
-            verified=False,
-        ),
-        ParameterSpec(
-            "inertia",
-            "",
-            "",
-            "cube",
-            choices=("cube", "sphere"),
-            description="shape of the block for its moment of inertia",
-            source="cube: Noël et al. 2017",
-            verified=False,
-        ),
-    ),
 )

@@ -13,7 +13,6 @@ import numpy as np
 
 from ...core.analysis.comparison import compare
 from ...core.analysis.twins import Twins, fly_twins
-from ...core.colours import model_colour
 from ...core.errors import RockfallError
 from ...core.impact_models.machinery.parameters import Value
 from ...core.impact_models.registry import find_model
@@ -118,7 +117,7 @@ def _show_flights(scene: bpy.types.Scene, model: str, twins: Twins, which: np.nd
         pieces.append((begin_s[index] + clock, position, np.linalg.norm(velocity, axis=1)))
     thing = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, pieces)
     thing[store.MODEL] = model
-    trails.paint(thing.data, np.array(model_colour(model)))
+    trails.paint(thing.data, np.array(find_model(model).colour))
     _link(scene, thing, model)
 
 
@@ -135,7 +134,7 @@ def _show_block(
     name = real[store.TRAJECTORY]
     thing = bpy.data.objects.new(
         f"{name} {model}{f' {number + 1}' if number else ''}",
-        trajectories.block_mesh(f"Rockfall twin {model}", model_colour(model)),
+        trajectories.block_mesh(f"Rockfall twin {model}", find_model(model).colour),
     )
     thing[store.ROLE], thing[store.MODEL], thing[store.TRAJECTORY] = store.MODEL_BLOCK_ROLE, model, name
     thing.scale, thing.delta_location = real.scale, real.delta_location

@@ -28,7 +28,8 @@ def made_impacts(n: int) -> Incident:
 
 def plain_loop(model: ImpactModel, rows: list[tuple], numbers: list[float], draws: list[list[float]]) -> list:
     """The same function, not compiled, impact by impact on Python's own floats."""
-    return [model.function(*row, numbers, here) for row, here in zip(rows, draws, strict=True)]
+    named = model.parameter_type(*numbers)
+    return [model.function(*row, named, model.draw_type(*here)) for row, here in zip(rows, draws, strict=True)]
 
 
 def timed(work: Callable[[], object], repeats: int) -> float:

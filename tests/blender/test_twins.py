@@ -115,7 +115,8 @@ def test_curves_land_on_the_terrain_in_the_models_colour(shown: bpy.types.Scene,
         assert min(heights) > -1e-3
         ends = [v.index for v in thing.data.vertices if abs(v.co.z + SLOPE * v.co.x) < 1e-3]
         assert len(ends) >= 4
-        colour = colours.srgb_to_linear(np.array(colours.model_colour(thing["rockfall_model"])))
+        own = part("core.impact_models.registry").find_model(thing["rockfall_model"]).colour
+        colour = colours.srgb_to_linear(np.array(own))
         np.testing.assert_allclose(thing.data.attributes["speed_colour"].data[0].color[:3], colour, atol=1e-6)
     red = colours.srgb_to_linear(np.array(colours.OBSERVED_COLOUR))
     for thing in of_role(shown, "flights"):
@@ -218,6 +219,6 @@ def test_the_models_colours_are_in_a_rendered_film(shown: bpy.types.Scene, part,
     render.render_picture(shown, tmp_path / "still.png")
     image = bpy.data.images.load(str(tmp_path / "still.png"))
     pixels = np.array(image.pixels[:]).reshape(108, 192, 4)[:, 24:, :3]  # right of the legend's swatches
-    colours = part("core.colours")
-    for colour in (colours.OBSERVED_COLOUR, *(colours.model_colour(name) for name in MODELS)):
+    find_model = part("core.impact_models.registry").find_model
+    for colour in (part("core.colours").OBSERVED_COLOUR, *(find_model(name).colour for name in MODELS)):
         assert (np.abs(pixels - colour).max(axis=2) < 0.15).sum() >= 2, colour

@@ -4,11 +4,13 @@
 import os
 import subprocess
 import sys
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.impact_models.machinery.base import Incident
+from rockfall.core.impact_models.machinery.parameters import ParameterSpec, choice, declared, number, switch
 from rockfall.core.impact_models.registry import COMPARED, MODELS, find_model, parse_settings
 from rockfall.core.impact_models.rockyfor3d_tables import SHAPES
 
@@ -65,8 +67,8 @@ def test_rn_is_that_of_the_soil_unless_given():
 
 def test_choices_by_name_and_by_number():
     rocky, rocfall = MODELS["dorren_2015"], MODELS["stevens_1998"]
-    for number, (name, _) in enumerate(SHAPES, 1):
-        for given in (name, number, str(number), name.upper()):
+    for code, (name, _) in enumerate(SHAPES, 1):
+        for given in (name, code, str(code), name.upper()):
             assert rocky.settings({"block_shape": given})["block_shape"] == name
     for given in (True, "true", "on", "yes", 1, "1"):
         assert rocfall.settings({"rotational": given})["rotational"] == "on"
@@ -123,33 +125,73 @@ def test_the_registry_does_not_import_numba():
 
 
 NEW_MODEL = """
-from .base import ImpactModel
-from .contact import leaving, split
-from .parameters import ParameterSpec
+from typing import NamedTuple
+
+from .machinery.base import ImpactModel, NoDraws
+from .machinery.contact import leaving, split
+from .machinery.parameters import number
+from .machinery.triples import scaled
 
 
-def rebound(v1, n, omega1, radius, mass, p, draws):
+class Parameters(NamedTuple):
+    rn: float = number(1.0, 0, 1, "normal", "none")
+    rt: float = number(0.5, 0, 1, "tangential", "none")
+
+
+def rebound(v1, n, omega1, radius, mass, p, u):
     approach, tangential, _ = split(v1, n)
-    return leaving(n, p[0] * approach, tangential), omega1
+    return leaving(n, p.rn * approach, scaled(tangential, p.rt)), omega1
 
 
-MODEL = ImpactModel("mirror_2026", "Mirror", "none", (ParameterSpec("rn", "", "", 1.0, 0.0, 1.0),), rebound)
+MODEL = ImpactModel("mirror_2026", "Mirror", "none", rebound, Parameters, compared=True)
+"""
+RUN_IT = """
+import rockfall.core.impact_models as package
+package.__path__.append({folder!r})
+import numpy as np
+from rockfall.core.impact_models.registry import COMPARED, MODELS
+from rockfall.core.impact_models.machinery.base import Incident
+velocity, up, still = np.array([[3.0, 0, -2]]), np.array([[0, 0, 1.0]]), np.zeros((1, 3))
+state = Incident(velocity, up, still, np.ones(1), np.ones(1))
+print("mirror_2026" in COMPARED, MODELS["mirror_2026"].rebound(state).velocity.tolist())
 """
 
 
+def run_new_model(folder):
+    """What a process prints that finds a model in a folder beside the others."""
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / "kernels")}
+    argv = [sys.executable, "-c", RUN_IT.format(folder=str(folder))]
+    return subprocess.run(argv, capture_output=True, text=True, check=True, env=environment).stdout.strip()
+
+
 def test_a_new_model_is_one_file(tmp_path):
-    """A module that is found beside the others is a model, compiled like them."""
-    (tmp_path / "mirror_2026.py").write_text(NEW_MODEL, encoding="utf-8")
-    code = (
-        "import rockfall.core.impact_models as package\n"
-        f"package.__path__.append({str(tmp_path)!r})\n"
-        "import numpy as np\n"
-        "from rockfall.core.impact_models.registry import MODELS\n"
-        "from rockfall.core.impact_models.machinery.base import Incident\n"
-        "velocity, up, still = np.array([[3.0, 0, -2]]), np.array([[0, 0, 1.0]]), np.zeros((1, 3))\n"
-        "state = Incident(velocity, up, still, np.ones(1), np.ones(1))\n"
-        "print(MODELS['mirror_2026'].rebound(state).velocity.tolist())\n"
-    )
-    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment)
-    assert result.stdout.strip() == "[[3.0, 0.0, 2.0]]"
+    """A module that is found beside the others is a model, compiled like them, and compared when it says so."""
+    file = tmp_path / "mirror_2026.py"
+    file.write_text(NEW_MODEL, encoding="utf-8")
+    assert run_new_model(tmp_path) == "True [[1.5, 0.0, 2.0]]"
+    other = NEW_MODEL.replace("p.rn", "p.other").replace("p.rt", "p.rn").replace("p.other", "p.rt")
+    file.write_text(other, encoding="utf-8")
+    assert run_new_model(tmp_path) == "True [[3.0, 0.0, 1.0]]"
+    first, second = (line for line in other.splitlines() if ": float" in line)
+    turned = other.replace(first, "-").replace(second, first).replace("-\n", f"{second}\n", 1)
+    file.write_text(turned, encoding="utf-8")
+    assert run_new_model(tmp_path) == "True [[3.0, 0.0, 1.0]]"
+
+
+def test_the_compared_models_are_those_of_the_paper_in_its_order():
+    """Noël et al. 2018: Azimi, Rockyfor3D, Noël, CRSP, RocFall, Wyllie."""
+    names = ["azimi_desvarreux_1977", "dorren_2015", "noel_2017", "pfeiffer_bowen_1989", "stevens_1998", "wyllie_2014"]
+    assert list(COMPARED) == names
+
+
+def test_a_parameter_is_declared_in_a_line():
+    class Parameters(NamedTuple):
+        speed: float = number(2, 1, 9, "of something", "a book", unit="m/s", symbol="v")
+        kind: float = choice("b", ("a", "b"), "which", "a book", first_code=1, verified=False)
+        on: float = switch("off", "whether", "a book")
+
+    speed, kind, on = declared(Parameters)
+    assert speed == ParameterSpec("speed", 2.0, 1.0, 9.0, (), "of something", "a book", "m/s", "v")
+    assert [kind.code(name) for name in ("a", "b")] == [1.0, 2.0]
+    assert (kind.name, kind.default, kind.verified) == ("kind", "b", False)
+    assert (on.choices, on.code("on"), on.is_switch) == (("off", "on"), 1.0, True)

@@ -138,6 +138,7 @@ def test_the_plain_function_is_the_compiled_one(name):
         for draws in (np.full((1, model.draws), np.nan), rng.random((1, model.draws))):
             out = model.rebound(incident(which), draws=draws)
             n, v, w = INCIDENT[which]
-            plain = model.function(v, n, w, 0.175, 60.0, numbers.tolist(), draws[0].tolist())
+            named = model.parameter_type(*numbers.tolist()), model.draw_type(*draws[0].tolist())
+            plain = model.function(v, n, w, 0.175, 60.0, *named)
             np.testing.assert_allclose(out.velocity[0], plain[0], rtol=1e-12, atol=1e-12)
             np.testing.assert_allclose(out.angular_velocity[0], plain[1], rtol=1e-12, atol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.twins import fly_twins, score_twins
 from rockfall.core.cli import main
-from rockfall.core.colours import OBSERVED_COLOUR, model_colour
+from rockfall.core.colours import OBSERVED_COLOUR
 from rockfall.core.commands.demo import SITE
 from rockfall.core.constants import GRAVITY_MPS2 as G
 from rockfall.core.errors import InputError, RockfallError
@@ -236,7 +236,7 @@ def test_a_film_of_models(tmp_path, capsys):
 
 
 def test_model_colours_are_told_apart():
-    colours = np.array([OBSERVED_COLOUR, *(model_colour(name) for name in MODELS)])
+    colours = np.array([OBSERVED_COLOUR, *(model.colour for model in MODELS.values())])
     apart = np.linalg.norm(colours[:, None] - colours, axis=-1)[np.triu_indices(len(colours), 1)]
     assert apart.min() > 0.3
 

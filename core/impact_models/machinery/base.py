@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an impact model is: a pure function of the incident state, parameters and random numbers, and its table."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...errors import InputError
 from ...vectors import Array, Indices, dot
-from .compilation import compiled_driver, compiled_rebound
-from .parameters import ParameterSpec, Value, suggestion
-from .triples import Vector
+from .compilation import compiled_driver, compiled_model
+from .parameters import ParameterSpec, Value, declared, suggestion
+from .triples import Motion, Vector
 
-Rebound = Callable[[Vector, Vector, Vector, float, float, Sequence[float], Sequence[float]], tuple[Vector, Vector]]
-"""``rebound(v1, n, omega1, radius, mass, p, draws) -> (v2, omega2)``: floats, triples of floats, and two sequences:
-the parameters as numbers in the order of the model's table, and its uniform random numbers (NaN for the mean)."""
+Rebound = Callable[[Vector, Vector, Vector, float, float, Any, Any], Motion]
+"""``rebound(v1, n, omega1, radius, mass, p, u) -> (v2, omega2)``: triples of floats, floats, the model's parameters as
+numbers by name, and its uniform random numbers by name (NaN for the mean)."""
 
 UNIT_TOLERANCE = 1e-6
 
@@ -75,6 +76,10 @@ class Outgoing:
     angular_velocity: Array
 
 
+class NoDraws(NamedTuple):
+    """The random numbers of a model without chance."""
+
+
 @dataclass(frozen=True, eq=False)
 class ImpactModel:
     """A published impact model.
@@ -84,9 +89,11 @@ class ImpactModel:
     name : author_year, as in tables and on the command line.
     title : for people, with the program that uses it.
     reference : the publication.
-    parameters : its table, in the order in which `function` takes them.
     function : the model itself.
-    draws : how many uniform random numbers one impact takes; 0 for a model without chance.
+    parameter_type : a named tuple of its parameters, whose defaults are made by `number`, `choice` and `switch`.
+    draw_type : a named tuple of the uniform random numbers that one impact takes.
+    colour : sRGB, in films, legends and the viewport.
+    compared : whether it is compared when no models are chosen.
     energy_never_grows : whether ½m(v² + c·r²ω²) after the impact is never above that before, whatever the parameters.
     turns_with_the_frame : whether the result turns with the frame about any axis; else the vertical (z) is special.
     """
@@ -94,21 +101,33 @@ class ImpactModel:
     name: str
     title: str
     reference: str
-    parameters: tuple[ParameterSpec, ...]
     function: Rebound
-    draws: int = 0
+    parameter_type: type[Any]
+    draw_type: type[Any] = NoDraws
+    colour: tuple[float, float, float] = (0.95, 0.95, 0.95)
+    compared: bool = False
     energy_never_grows: bool = True
     turns_with_the_frame: bool = True
+
+    @cached_property
+    def parameters(self) -> tuple[ParameterSpec, ...]:
+        """Its table, in the order in which the compiled model takes the numbers."""
+        return declared(self.parameter_type)
+
+    @property
+    def draws(self) -> int:
+        """How many uniform random numbers one impact takes; 0 for a model without chance."""
+        return len(self.draw_type._fields)
 
     @property
     def is_random(self) -> bool:
         """Whether chance has a part in it."""
         return self.draws > 0
 
-    @property
+    @cached_property
     def compiled(self) -> Any:
-        """`function`, compiled by numba at the first call; for compiled callers."""
-        return compiled_rebound(self.function)
+        """`function` for compiled callers, which give it all numbers as two arrays; compiled by numba when needed."""
+        return compiled_model(self.function, self.parameter_type, self.draw_type)
 
     def parameter(self, name: str) -> ParameterSpec:
         """The specification of one parameter.
@@ -147,7 +166,7 @@ class ImpactModel:
         return result
 
     def numbers(self, given: Mapping[str, object] | None = None) -> Array:
-        """(k,) all parameters as the numbers that `function` takes; `given` as in `settings`."""
+        """(k,) all parameters as the numbers that the compiled model takes; `given` as in `settings`."""
         settings = self.settings(given)
         return np.array([spec.code(settings[spec.name]) for spec in self.parameters], dtype=np.float64)
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a model's plain Python function to machine code, when it is first needed.
 
-A model is written once, as a plain function of floats, triples of floats and two sequences. `compiled_rebound` compiles
-it and every plain function that it calls; all models have one signature, so that `compiled_driver` compiles one loop,
-which takes the model as a function pointer. A compiled simulation does the same with `rebound_type`.
+A model is written once, as a plain function of floats, triples of floats and two named tuples. `compiled_model`
+compiles it and every plain function that it calls, behind a signature that all models share (`ENTRY`): so
+`compiled_driver` compiles one loop, which takes the model as a function pointer. A compiled simulation does the same
+with `rebound_type`.
 """
 
 from collections.abc import Callable
@@ -13,10 +14,22 @@ from typing import Any
 
 from ...compiled import kernel
 
+ENTRY = """
+def enter(v1, n, omega1, radius, mass, numbers, uniform):
+    return rebound(v1, n, omega1, radius, mass, parameters({parameters}), draws({draws}))
+"""
+"""A model behind the signature that all models share: its numbers come in two arrays and are handed on by name."""
 
-def compiled_rebound(rebound: Callable[..., Any]) -> Any:
+
+def compiled_model(rebound: Callable[..., Any], parameter_type: type[Any], draw_type: type[Any]) -> Any:
     """The compiled function of a model; other compiled functions can call it or take it as an argument."""
-    return _compiled(rebound, _rebound_signature())
+    text = ENTRY.format(
+        parameters=", ".join(f"numbers[{i}]" for i in range(len(parameter_type._fields))),
+        draws=", ".join(f"uniform[{i}]" for i in range(len(draw_type._fields))),
+    )
+    own = {"__name__": rebound.__module__, "rebound": rebound, "parameters": parameter_type, "draws": draw_type}
+    exec(compile(text, __file__, "exec"), own)  # in the name of this file, beside which numba keeps the compiled code
+    return _compiled(own["enter"], _rebound_signature())
 
 
 def rebound_type() -> Any:
@@ -57,7 +70,8 @@ def _compiled(function: FunctionType, signature: Any = None) -> Any:
     called = {name: _compiled(value) for name, value in used.items() if isinstance(value, FunctionType)}
     copy = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
     copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
-    made = kernel(copy)
+    # one function in the end: handing the named numbers from one to the next would take longer than using them
+    made = kernel(copy, inline=signature is None)
     if signature is not None:
         made.compile(signature)
         made.disable_compile()

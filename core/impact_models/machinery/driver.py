@@ -8,7 +8,7 @@ from .triples import dot
 
 
 def drive(
-    rebound: Any,
+    model: Any,
     velocity: Any,
     normal: Any,
     start: Any,
@@ -25,7 +25,7 @@ def drive(
 
     Parameters
     ----------
-    rebound : a model's function.
+    model : compiled.
     velocity, normal, start : (n, 3) incident velocity, unit normal, and angular velocity where no impact is followed.
     follows : (n,) row, before this one, of the impact whose ω2 is the incident ω1 here; −1 for `start`.
     radius, mass : (n,).
@@ -47,7 +47,7 @@ def drive(
                 w = (omega2[replicate, before, 0], omega2[replicate, before, 1], omega2[replicate, before, 2])
             after, spin = (nan, nan, nan), (nan, nan, nan)
             if dot(v, n) < 0.0:
-                after, spin = rebound(v, n, w, radius[i], mass[i], parameters, draws[replicate, i])
+                after, spin = model(v, n, w, radius[i], mass[i], parameters, draws[replicate, i])
             for axis in range(3):
                 omega1[replicate, i, axis] = w[axis]
                 v2[replicate, i, axis] = after[axis]

@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parameters of a model: the one table from which validation, help, sliders and project files come."""
+"""Parameters of a model: the one table from which validation, help, sliders and project files come.
+
+A model declares them in a named tuple, and its function reads them from it by name::
+
+    class Parameters(NamedTuple):
+        rn: float = number(0.35, 0, 1, "normal coefficient of restitution", "Noël et al. 2018", symbol="R_N")
+        definition: float = choice("velocity", DEFINITIONS, "what the coefficients are ratios of", "the report")
+"""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from math import isfinite, nan
+from typing import Any
 
 from ...errors import InputError
 
@@ -22,26 +30,27 @@ class ParameterSpec:
 
     Attributes
     ----------
-    name, symbol : in tables and on the command line; in equations.
-    unit : "" for a pure number or a choice.
+    name : in tables and on the command line.
     default : a number, or one of `choices`.
     minimum, maximum : inclusive range of a number; NaN for a choice.
     choices : names; empty for a number. `SWITCH` for on and off.
     description, source : sentences without a final full stop.
+    unit : "" for a pure number or a choice.
+    symbol : in equations.
     verified : whether default and role were checked against a text that was read; else they rest on common knowledge.
     first_code : number of the first choice; a choice may also be given by its number.
     follows : (name of a choice parameter, value for each of its choices): the default when this one is not given.
     """
 
     name: str
-    symbol: str
-    unit: str
     default: Value
-    minimum: float = nan
-    maximum: float = nan
-    choices: tuple[str, ...] = ()
-    description: str = ""
-    source: str = ""
+    minimum: float
+    maximum: float
+    choices: tuple[str, ...]
+    description: str
+    source: str
+    unit: str = ""
+    symbol: str = ""
     verified: bool = True
     first_code: int = 0
     follows: tuple[str, tuple[float, ...]] | None = None
@@ -100,6 +109,48 @@ class ParameterSpec:
         raise InputError(
             f"{model}.{self.name} is {value!r}, which is none of its choices", advice=suggestion(text, self.choices)
         )
+
+
+def number(
+    default: float,
+    minimum: float,
+    maximum: float,
+    description: str,
+    source: str,
+    *,
+    unit: str = "",
+    symbol: str = "",
+    verified: bool = True,
+    follows: tuple[str, tuple[float, ...]] | None = None,
+) -> Any:
+    """A number in a range, as the default of a field; see `ParameterSpec`."""
+    limits = float(minimum), float(maximum)
+    return ParameterSpec("", float(default), *limits, (), description, source, unit, symbol, verified, follows=follows)
+
+
+def choice(
+    default: str,
+    choices: Iterable[str],
+    description: str,
+    source: str,
+    *,
+    symbol: str = "",
+    verified: bool = True,
+    first_code: int = 0,
+) -> Any:
+    """One of several names, as the default of a field: the function reads its place among them plus `first_code`."""
+    return ParameterSpec("", default, nan, nan, tuple(choices), description, source, "", symbol, verified, first_code)
+
+
+def switch(default: str, description: str, source: str, *, symbol: str = "", verified: bool = True) -> Any:
+    """On or off, as the default of a field: the function reads 1 or 0."""
+    return choice(default, SWITCH, description, source, symbol=symbol, verified=verified)
+
+
+def declared(parameters: type[Any]) -> tuple[ParameterSpec, ...]:
+    """The specifications that a named tuple has as the defaults of its fields, with the names of the fields."""
+    defaults: dict[str, ParameterSpec] = parameters._field_defaults
+    return tuple(replace(defaults[name], name=name) for name in parameters._fields)
 
 
 def suggestion(name: str, names: Iterable[str]) -> str:

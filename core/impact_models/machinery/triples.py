@@ -4,6 +4,8 @@
 from math import cos, sin, sqrt
 
 Vector = tuple[float, float, float]
+Motion = tuple[Vector, Vector]
+"""A velocity [m/s] and an angular velocity [rad/s]."""
 
 
 def dot(a: Vector, b: Vector) -> float:

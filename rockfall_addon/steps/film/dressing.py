@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ....core.colours import OBSERVED_COLOUR, model_colour
+from ....core.colours import OBSERVED_COLOUR
 from ....core.exchange.project import RenderPreset
 from ....core.film.engines import IDENTIFIERS
 from ....core.film.framing import View, rounded_scale
@@ -223,7 +223,7 @@ def _sources(names: tuple[str, ...]) -> tuple[layout.Source, ...]:
     """Whose blocks there are, when there are others than the real ones."""
     if not names:
         return ()
-    return ("observed", OBSERVED_COLOUR), *((find_model(name).title, model_colour(name)) for name in names)
+    return ("observed", OBSERVED_COLOUR), *((model.title, model.colour) for model in map(find_model, names))
 
 
 def _title(scene: bpy.types.Scene) -> str:

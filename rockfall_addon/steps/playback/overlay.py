@@ -6,7 +6,7 @@ import bpy
 import gpu
 from gpu_extras.batch import batch_for_shader
 
-from ....core.colours import OBSERVED_COLOUR, SPEED_SCALE, model_colour
+from ....core.colours import OBSERVED_COLOUR, SPEED_SCALE
 from ....core.impact_models.registry import MODELS
 from ...scene import models, problems, store, trails
 
@@ -50,7 +50,7 @@ def _draw() -> None:
 
 def _draw_models(shown: tuple[str, ...], left: float, scale: float) -> None:
     """A swatch and a name for the real blocks, and for each model."""
-    rows = [("observed", OBSERVED_COLOUR), *((MODELS[name].title, model_colour(name)) for name in shown)]
+    rows = [("observed", OBSERVED_COLOUR), *((MODELS[name].title, MODELS[name].colour) for name in shown)]
     size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for i, (name, colour) in enumerate(reversed(rows)):

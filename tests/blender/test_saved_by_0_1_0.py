@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A file that version 0.1.0 saved, with everything that a file can hold, against what 0.1.0 itself read from it.
+
+Picks, pairs, clocks and poses are compared as exact doubles; what is computed anew from them, to 1e-9 of itself.
+"""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+FILE = DATA / "saved_by_0.1.0.blend"
+COMPUTED = {"rockfall_result"}
+
+
+@pytest.fixture(scope="module")
+def old() -> dict:
+    return json.loads(FILE.with_suffix(".json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def opened(part) -> bpy.types.Scene:
+    assert bpy.ops.wm.open_mainfile(filepath=str(FILE)) == {"FINISHED"}
+    return bpy.context.scene
+
+
+def plain(value: object) -> object:
+    """ID properties, arrays and dataclasses as JSON would hold them."""
+    if hasattr(value, "to_dict"):
+        return {name: plain(each) for name, each in value.to_dict().items()}
+    if hasattr(value, "to_list"):
+        return value.to_list()
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: plain(getattr(value, name)) for name in value.__dataclass_fields__ if name != "shift"}
+    if isinstance(value, dict):
+        return {str(name): plain(each) for name, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def same(new: object, before: object, rtol: float = 0.0, where: str = "") -> None:
+    """Fail where two trees of numbers and texts differ; NaN is as NaN."""
+    if isinstance(before, dict):
+        assert isinstance(new, dict), where
+        assert set(new) == set(before), where
+        for name in before:
+            same(new[name], before[name], rtol, f"{where}.{name}")
+    elif isinstance(before, list):
+        assert len(new) == len(before), where
+        for i, (one, other) in enumerate(zip(new, before, strict=True)):
+            same(one, other, rtol, f"{where}[{i}]")
+    elif isinstance(before, float):
+        np.testing.assert_allclose(new, before, rtol=rtol, atol=rtol, err_msg=where)
+    else:
+        assert new == before, where
+
+
+def stored(thing: bpy.types.ID) -> dict:
+    return {name: plain(thing[name]) for name in thing.keys() if name.startswith("rockfall_")}  # noqa: SIM118
+
+
+def all_picks(part, scene: bpy.types.Scene) -> list[dict]:
+    picks = part("rockfall_addon.scene.picks")
+    return [stored(thing) for thing in picks.ordered(scene, picks.things_of(scene))]
+
+
+def test_every_pick_is_identical(opened, part, old) -> None:
+    picks, picking = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.picking")
+    found = all_picks(part, opened)
+    assert len(found) == 18
+    for new, before in zip(found, old["picks"], strict=True):
+        for name in set(before) - COMPUTED:
+            same(new[name], before[name], where=f"{before['rockfall_trajectory']} {before['rockfall_time_s']} {name}")
+        assert set(new) == set(before)
+        same(new.get("rockfall_result"), before.get("rockfall_result"), 1e-9, before["rockfall_trajectory"])
+    same(plain(picks.picks_of(opened)), old["table"])
+    seen = {thing["rockfall_id"]: plain(picking.sightings(thing)) for thing in picks.things_of(opened)}
+    same(seen, old["sightings"])
+    assert sum(map(len, seen.values())) == 5
+
+
+def test_every_result_is_equal(opened, part, old) -> None:
+    impacts = part("rockfall_addon.scene.reconstruction").reconstruct_scene(opened).impacts
+    for name, before in old["impacts"].items():
+        same(plain(getattr(impacts, name)), before, 1e-9, name)
+    proposal = plain(part("rockfall_addon.scene.refinement").proposal(opened))
+    for name in ("before_px", "after_px", "pixels", "outliers", "picks", "ids", "names", "stale"):
+        same(proposal[name], old["proposal"][name], where=name)
+
+
+def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
+    videos, alignment = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.alignment")
+    cameras = videos.cameras(opened)
+    assert [camera.name for camera in cameras] == sorted(old["cameras"])
+    for camera in cameras:
+        before = old["cameras"][camera.name]
+        path = videos.camera_path(camera)
+        for name in ("time_s", "position", "rotation", "sigma_position_m", "sigma_rotation"):
+            same(plain(getattr(path, name)), before[name], where=name)
+        same(plain(path.reference.intrinsics), before["intrinsics"])
+        same(plain(videos.pose_covariance(camera)), before["pose_covariance"])
+        same(plain(videos.clock_of(camera)), before["clock"])
+        same(plain(videos.times_of(camera)[:5]), before["video_s"])
+        assert len(videos.times_of(camera)) == before["frames"]
+        assert videos.row_time_of(camera) == before["row_time_s"]
+        same([plain(pair) for pair in alignment.pairs_of(camera)], before["pairs"])
+        solution = plain(alignment.solution_of(camera))
+        for name in ("rmse_px", "residual", "residual_m", "wrong", "sigma", "reference", "keys"):
+            same(solution[name], before["solution"][name], where=name)
+        same(plain(part("rockfall_addon.scene.video_times").events_of(camera)), before["events"])
+        observations = part("rockfall_addon.scene.observations")
+        seen = {name: plain(observations.seen_in(camera, name)) for name in observations.names_in(camera)}
+        same(seen, before["seen"])
+        for name, value in before["settings"].items():
+            same(plain(getattr(camera.rockfall_alignment, name)), value, where=name)
+        assert videos.file_of(camera).is_file(), "the footage is found beside the file"
+    assert len(old["cameras"]["Bridge"]["pairs"]) == 14
+
+
+def test_settings_models_and_film_are_as_they_were(opened, part, old) -> None:
+    for settings, before in ((opened.rockfall, old["settings"]), (opened.rockfall_picking, old["picking"])):
+        for name, value in before.items():
+            now = getattr(settings, name)
+            same(plain(sorted(now) if isinstance(now, set) else now), value, where=name)
+    shift = part("rockfall_addon.scene.georeference").read_shift(opened)
+    same([*shift.vector.tolist(), shift.crs], old["shift"])
+    project = part("rockfall_addon.scene.reconstruction").project_settings(opened, ["B02", "B07", "B10"])
+    same(plain(project.reconstruction) | {"block": plain(project.block)}, old["reconstruction"])
+    tiles = part("rockfall_addon.scene.terrain").tiles(opened)
+    assert [[len(tile.data.vertices), len(tile.data.polygons)] for tile in tiles] == old["terrain"]
+    assert list(part("rockfall_addon.scene.models").shown_models(opened)) == old["models"]
+    assert part("rockfall_addon.steps.film.remembered").is_set_up(opened) is old["film"] is True
+    named = [[o.name, str(o.get("rockfall_role", "")), str(o.get("rockfall_trajectory", ""))] for o in opened.objects]
+    assert sorted(named) == old["objects"]
+    for name in ("rockfall_problem", "rockfall_trajectory_problems", "rockfall_offsets_s", "rockfall_blocks"):
+        assert opened[name] == old["scene"][name], name
+
+
+def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path) -> None:
+    picks, store = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.store")
+    _, second, *_ = picks.ordered(opened, picks.things_of(opened, ["B07"]))
+    before = stored(second)
+    second[store.TIME] = before["rockfall_time_s"] + 0.02
+    part("rockfall_addon.scene.sync").sync(opened)
+    after = stored(second)
+    assert after["rockfall_key_frame"] == pytest.approx(before["rockfall_key_frame"] + 0.6, abs=1e-4)
+    assert after["rockfall_result"]["incident_mps"] != before["rockfall_result"]["incident_mps"]
+    assert bpy.ops.rockfall.remove_twins() == {"FINISHED"}
+    assert bpy.ops.rockfall.remove_film() == {"FINISHED"}
+    edited = all_picks(part, opened)
+    again = tmp_path / "again.blend"
+    assert bpy.ops.wm.save_as_mainfile(filepath=str(again)) == {"FINISHED"}
+    bpy.ops.wm.open_mainfile(filepath=str(again))
+    same(all_picks(part, bpy.context.scene), edited)
+    untouched = [pick for pick in old["picks"] if pick["rockfall_trajectory"] != "B07"]
+    kept = [pick for pick in edited if pick["rockfall_trajectory"] != "B07"]
+    for new, was in zip(kept, untouched, strict=True):
+        same({name: new[name] for name in set(new) - COMPUTED}, {name: was[name] for name in set(was) - COMPUTED})

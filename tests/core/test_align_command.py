@@ -62,8 +62,9 @@ def refused(capsys, table, *options):
     assert sorted(path.name for path in table.parent.iterdir()) == before
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    return captured.err
+    *progress, message = captured.err.splitlines()
+    assert all(line.endswith(" …") for line in progress)
+    return message
 
 
 def test_the_camera_is_found_within_its_deviations(pairs, capsys):

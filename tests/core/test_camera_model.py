@@ -281,6 +281,8 @@ def test_another_shift_is_the_same_place() -> None:
         ({"height": -1}, "× -1 px, which is no size"),
         ({"position": np.array([0, np.inf, 0])}, "position is not three finite numbers"),
         ({"position": np.zeros(2)}, "position is not three finite numbers"),
+        ({"rotation": np.full((3, 3), np.nan)}, "rotation is not three rows of three finite numbers"),
+        ({"rotation": np.eye(4)}, "rotation is not three rows of three finite numbers"),
         ({"rotation": np.diag([1.0, 1, -1])}, "or it mirrors"),
         ({"rotation": np.eye(3) * 1.1}, "not at right angles"),
     ],

@@ -65,8 +65,9 @@ def test_bad_videos_end_with_status_1(name, tmp_path, capsys):
     assert main(["inspect", str(FOLDER / name), "--out", str(tmp_path / "out")]) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert name in captured.err
-    assert captured.err.count("\n") == 1
+    *progress, message = captured.err.splitlines()
+    assert message.startswith(f"rockfall: {FOLDER / name}: ")
+    assert all(line.endswith(" …") for line in progress)
     assert not (tmp_path / "out").exists()
 
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a user should know about a result, as data: sentences that nobody has to take apart again."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
 type Severity = Literal["note", "advice", "warning", "problem"]
 """A fact; something to do; a result that may be wrong; no result."""
@@ -27,6 +28,16 @@ class Remark:
 
     def __str__(self) -> str:
         return self.text
+
+
+def to_plain(remarks: Iterable[Remark]) -> list[dict[str, str]]:
+    """Remarks for JSON."""
+    return [asdict(remark) for remark in remarks]
+
+
+def from_plain(values: Iterable[Mapping[str, Any] | str]) -> tuple[Remark, ...]:
+    """Remarks from JSON; version 0.1.0 kept sentences alone."""
+    return tuple(Remark(value, "advice") if isinstance(value, str) else Remark(**value) for value in values)
 
 
 def gravest_first(remarks: list[Remark]) -> list[Remark]:

@@ -2,7 +2,7 @@
 """How the path of a camera is found from features of the background."""
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..remarks import Remark
 from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project, rays, undistort
 from .path import CameraPath
@@ -45,13 +46,13 @@ class SolvedMotion:
     path : with standard deviations relative to the reference frame and the key frames.
     residual_px : (f,) median length of the residuals of the features that were believed [px]; NaN without any.
     features : (f,) how many were believed.
-    advice : sentences for the user.
+    remarks : what a user should know.
     """
 
     path: CameraPath
     residual_px: Array
     features: Indices
-    advice: tuple[str, ...]
+    remarks: tuple[Remark, ...]
 
 
 def solve_motion(
@@ -121,7 +122,7 @@ def solve_motion(
         sigma_position_m=spread[:, 1],
         sigma_rotation=spread[:, 0],
     )
-    return SolvedMotion(path, residual, features, _advice(known, features, residual, sigma_px))
+    return SolvedMotion(path, residual, features, tuple(_remarks(known, features, residual, sigma_px)))
 
 
 def _checked(
@@ -277,23 +278,24 @@ def _bridged(spread: Array, keys: list[int]) -> Array:
     return np.sqrt(result)
 
 
-def _advice(known: Mask, features: Indices, residual: Array, sigma_px: float) -> tuple[str, ...]:
-    sentences = []
+def _remarks(known: Mask, features: Indices, residual: Array, sigma_px: float) -> Iterator[Remark]:
     if not known.all():
-        sentences.append(
+        text = (
             f"{int((~known).sum())} frames have no features that lead there, the first is frame "
             f"{int(np.argmin(known))}: their poses are guessed between the neighbours. Solve a frame there."
         )
+        yield Remark(text, "warning", "frames")
     few = known & (features < 10)
     if few.any():
-        sentences.append(
+        text = (
             f"{int(few.sum())} frames rest on fewer than 10 features, the first is frame {int(np.argmax(few))}. "
             "Track more of the background."
         )
+        yield Remark(text, "advice", "features")
     typical = float(np.median(residual[np.isfinite(residual)])) if np.isfinite(residual).any() else 0.0
     if typical > 4 * sigma_px:
-        sentences.append(
+        text = (
             f"The features fit to {typical:.2g} px only, where {sigma_px:g} px were expected. If the camera moved from "
             "its place, solve its full motion."
         )
-    return tuple(sentences)
+        yield Remark(text, "warning", "fit")

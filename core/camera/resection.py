@@ -15,6 +15,7 @@ from scipy.special import fdtri
 
 from ..errors import InputError, RockfallError
 from ..georeference import GlobalShift
+from ..remarks import Remark
 from ..vectors import Array, Mask, distance_to_ray, norm
 from .model import (
     GUESSED_FOCAL,
@@ -26,7 +27,7 @@ from .model import (
     rotation_from_vector,
     with_intrinsics,
 )
-from .resection_advice import Geometry, advise
+from .resection_advice import Geometry, remarks_on
 from .starting import Starts, find_starts
 
 POSE = ("rx", "ry", "rz", "x", "y", "z")
@@ -73,7 +74,7 @@ class Resection:
     scatter : residuals in units of the stated errors, 1 when they agree; NaN without redundancy. Above 1 the
         covariance is enlarged by its square.
     redundancy : observations more than unknowns.
-    advice : sentences for the user, the gravest first.
+    remarks : what a user should know, the gravest first.
     wrong : names of the pairs left out, or their numbers from 1.
     """
 
@@ -86,7 +87,7 @@ class Resection:
     covariance: Array
     scatter: float
     redundancy: int
-    advice: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     wrong: tuple[str, ...]
 
     @property
@@ -192,7 +193,7 @@ def resect(
 
     Notes
     -----
-    With the fewest pairs there can be, nothing tells a wrong one: `advice` says so.
+    With the fewest pairs there can be, nothing tells a wrong one: `remarks` say so.
     """
     problem, named = _checked(pixels, points, sigma_px, sigma_m, width, height, names, rows, source)
     columns = _free_columns(free)
@@ -240,7 +241,7 @@ def resect(
         covariance=covariance,
         scatter=scatter,
         redundancy=redundancy,
-        advice=advise(geometry),
+        remarks=remarks_on(geometry),
         wrong=tuple(name for name, _ in geometry.wrong),
     )
 
@@ -337,9 +338,14 @@ def _starting_camera(
     return camera.in_shift(shift)
 
 
+def needed_pairs(free: Sequence[str]) -> int:
+    """The fewest pairs that `resect` accepts for what is free of the lens."""
+    k = len(_free_columns(free))
+    return max(POSE_PAIRS + 1, (6 + k + 1) // 2 + 1) if k else POSE_PAIRS
+
+
 def _check_number(problem: _Problem, columns: tuple[str, ...], source: str | None) -> None:
-    n, k = len(problem.points), len(columns)
-    needed = POSE_PAIRS if not k else max(5, (6 + k + 1) // 2 + 1)
+    n, k, needed = len(problem.points), len(columns), needed_pairs(columns)
     if n < needed:
         what = "the pose alone" if not k else f"the pose and {', '.join(columns)}"
         lock = f"Add pairs (10 or more are good), or lock parameters: {POSE_PAIRS} pairs give the pose"

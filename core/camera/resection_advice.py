@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a user should know about a camera that was found from pairs, in plain words."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from ..remarks import Remark
 from ..vectors import Array, norm
 from .model import Camera
 
@@ -50,9 +52,9 @@ class Geometry:
         return float(np.sqrt(self.covariance[i, i]))
 
 
-def advise(found: Geometry) -> tuple[str, ...]:
-    """Sentences, the gravest first; none when all is well."""
-    sentences = [
+def remarks_on(found: Geometry) -> tuple[Remark, ...]:
+    """The gravest first; none when all is well."""
+    return (
         *_on_wrong_pairs(found),
         *_on_a_rival(found),
         *_on_focal_length(found),
@@ -61,47 +63,52 @@ def advise(found: Geometry) -> tuple[str, ...]:
         *_on_fit(found),
         *_on_redundancy(found),
         *_on_cover(found),
-    ]
-    return tuple(sentences)
+    )
 
 
-def _on_wrong_pairs(found: Geometry) -> list[str]:
-    return [
-        f"Pair {name} does not fit the others ({_pixels(residual)} off) and was left out. "
-        "Check its pixel and its point."
-        for name, residual in found.wrong
-    ]
+def _on_wrong_pairs(found: Geometry) -> Iterator[Remark]:
+    for name, residual in found.wrong:
+        off = f"({_pixels(residual)} off) and was left out. Check its pixel and its point."
+        yield Remark(f"Pair {name} does not fit the others {off}", "warning", about_pair(name))
+
+
+def about_pair(name: str) -> str:
+    """What a remark about a pair is about."""
+    return f"pair {name}"
 
 
 def _pixels(residual: float) -> str:
     return f"{residual:.3g} px" if np.isfinite(residual) else "not in view"
 
 
-def _on_a_rival(found: Geometry) -> list[str]:
+def _on_a_rival(found: Geometry) -> Iterator[Remark]:
     if found.other is None:
-        return []
+        return
     away = norm(found.other.position - found.camera.position)
-    return [
+    text = (
         f"A second camera, {away:.3g} m from this one, fits the pairs nearly as well. "
         "Add pairs at other distances, or give a rough position to start from."
-    ]
+    )
+    yield Remark(text, "warning", "position")
 
 
-def _on_focal_length(found: Geometry) -> list[str]:
+def _on_focal_length(found: Geometry) -> Iterator[Remark]:
     free = [name for name in ("f", "fx", "fy") if name in found.parameters]
     if not free:
-        return []
+        return
     share = max(found.sigma(name) for name in free) / found.camera.fx
     if share <= POOR_FOCAL:
         tied = abs(_focal_and_distance(found, free[0]))
         if tied <= DEPENDENT or share <= POOR_FOCAL / 4:
-            return []
-        return [
+            return
+        text = (
             f"The focal length (± {_percent(share)}) and the distance depend on each other (correlation {tied:.3f}): "
             f"{_reason(found)}. Lock the focal length if you know it, or add pairs nearer or farther."
-        ]
-    known = f"to {_percent(share)} only" if share < 1 else "not at all"
-    return [f"The focal length is known {known}: {_reason(found)}. Lock it, or add pairs nearer or farther."]
+        )
+    else:
+        known = f"to {_percent(share)} only" if share < 1 else "not at all"
+        text = f"The focal length is known {known}: {_reason(found)}. Lock it, or add pairs nearer or farther."
+    yield Remark(text, "advice", "focal")
 
 
 def _focal_and_distance(found: Geometry, name: str) -> float:
@@ -133,28 +140,29 @@ def _field_deg(found: Geometry) -> float:
     return float(np.degrees(2 * np.arctan(np.hypot(*span) / 2)))
 
 
-def _on_position(found: Geometry) -> list[str]:
+def _on_position(found: Geometry) -> Iterator[Remark]:
     distance = float(norm(found.points - found.camera.position).mean())
     with np.errstate(invalid="ignore"):
         values = np.linalg.eigvalsh(np.nan_to_num(found.covariance[3:6, 3:6], posinf=1e12, neginf=-1e12))
     worst = float(np.sqrt(max(values[-1], 0.0)))
     if worst <= POOR_POSITION * distance:
-        return []
-    return [
+        return
+    text = (
         f"The camera's position is known to {worst:.2g} m only, at {distance:.3g} m from the pairs. "
         "Add pairs that are farther apart, in the image and in depth."
-    ]
+    )
+    yield Remark(text, "advice", "position")
 
 
-def _on_lens(found: Geometry) -> list[str]:
-    sentences = []
+def _on_lens(found: Geometry) -> Iterator[Remark]:
     camera = found.camera
     for name, size in (("cx", camera.width), ("cy", camera.height)):
         if name in found.parameters and found.sigma(name) > 0.03 * size:
-            sentences.append(
+            text = (
                 f"The image's centre {name} is known to {_px(found.sigma(name))} px only. "
                 "Lock it to the middle of the image, or add pairs towards all edges."
             )
+            yield Remark(text, "advice", name)
     corner = np.hypot(*camera.size) / 2
     reach = float(norm(found.pixels - [camera.cx, camera.cy]).max() / corner)
     radius = corner / camera.fx
@@ -163,39 +171,42 @@ def _on_lens(found: Geometry) -> list[str]:
             continue
         bend = found.sigma(name) * radius**power * camera.fx
         if bend > 0.005 * corner * 2:
-            sentences.append(
+            text = (
                 f"The distortion {name} is known to {_px(bend)} px at the image's corner only; the pairs reach "
                 f"{_percent(reach)} of the way there. Lock it, or add pairs near the corners."
             )
-    return sentences
+            yield Remark(text, "advice", name)
 
 
-def _on_fit(found: Geometry) -> list[str]:
+def _on_fit(found: Geometry) -> Iterator[Remark]:
     if not found.scatter > POOR_SCATTER:
-        return []
-    return [
+        return
+    text = (
         f"The pairs fit to {found.rmse_px:.2g} px, {found.scatter:.2g} times worse than their stated errors; the "
         "errors of the camera were enlarged accordingly. Check the pairs, or free the lens's distortion."
-    ]
+    )
+    yield Remark(text, "advice", "fit")
 
 
-def _on_redundancy(found: Geometry) -> list[str]:
+def _on_redundancy(found: Geometry) -> Iterator[Remark]:
     n = len(found.pixels)
     if found.redundancy > 4:
-        return []
+        return
     if found.redundancy > 2:
-        return [f"With {n} pairs a wrong one can hardly be told. Add two or more."]
-    return [f"With {n} pairs nothing tells a wrong one. Add three or more."]
+        yield Remark(f"With {n} pairs a wrong one can hardly be told. Add two or more.", "advice", "pairs")
+    else:
+        yield Remark(f"With {n} pairs nothing tells a wrong one. Add three or more.", "advice", "pairs")
 
 
-def _on_cover(found: Geometry) -> list[str]:
+def _on_cover(found: Geometry) -> Iterator[Remark]:
     cover = ConvexHull(found.pixels).volume / (found.camera.width * found.camera.height)
     if cover >= SMALL_COVER:
-        return []
-    return [
+        return
+    text = (
         f"The pairs cover only {_percent(cover)} of the image; away from them the camera is an extrapolation. "
         "Spread the pairs."
-    ]
+    )
+    yield Remark(text, "advice", "pairs")
 
 
 def _percent(share: float) -> str:

@@ -239,7 +239,7 @@ def _follow(
     if sigma.size:
         wide = path.reference.fx * float(sigma.max())
         sentences.append(f"Relative to the solved frame, a pose is known to {wide:.2f} px in the image or better.")
-    return path, [*sentences, *made.advice]
+    return path, [*sentences, *map(str, made.remarks)]
 
 
 def _points_of(surface: "Surface") -> "Callable[[Array, Array], Array]":
@@ -364,7 +364,7 @@ def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
     if (checked := ~pairs.used).any():
         off = [f"{pairs.name[i]} {_in_view(size[i])}" for i in np.flatnonzero(checked)]
         sentences.append(f"Not used, to check: {', '.join(off)}.")
-    return [*sentences, *solved.notes, *found.advice]
+    return [*sentences, *solved.notes, *map(str, found.remarks)]
 
 
 def _same(one: float, other: float) -> bool:

@@ -26,8 +26,9 @@ from ...core.camera.model import (
     with_intrinsics,
 )
 from ...core.camera.path import CameraPath, fixed
-from ...core.camera.resection import POSE_PAIRS, Resection, resect
+from ...core.camera.resection import POSE_PAIRS, Resection, needed_pairs, resect
 from ...core.errors import RockfallError
+from ...core.remarks import Remark, from_plain, to_plain
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array, distance_to_ray
 from . import georeference, migration, store, terrain, videos
@@ -94,7 +95,7 @@ class Solution:
     residual_m : pair's id → distance from the point to the pixel's ray [m].
     wrong : ids of the pairs that were left out.
     sigma : standard deviations by name [rad, m, px, 1].
-    advice : sentences, the gravest first.
+    remarks : the gravest first.
     reference : the frame whose pairs gave the lens.
     keys : other frames that were solved.
     """
@@ -105,7 +106,7 @@ class Solution:
     residual_m: dict[str, float] | None = None
     wrong: tuple[str, ...] = ()
     sigma: dict[str, float] | None = None
-    advice: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     reference: int = 0
     keys: tuple[int, ...] = ()
 
@@ -344,12 +345,6 @@ def free_of(camera: bpy.types.Object) -> tuple[str, ...]:
     return tuple(name for name, box in LENS_BOXES.items() if getattr(settings, box))
 
 
-def needed(free: Sequence[str]) -> int:
-    """How many pairs the core asks for."""
-    unknown = sum(2 if name == "c" else 1 for name in free)
-    return max(5, (6 + unknown + 1) // 2 + 1) if unknown else 4
-
-
 def known_lens(camera: bpy.types.Object) -> Array:
     """(9,) what is taken of the lens where it is not free: as imported or typed, else as it is, without distortion."""
     if store.KNOWN_LENS in camera:
@@ -431,7 +426,7 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
     try:
         found, keys, reference = _solve(scene, camera, pairs)
     except RockfallError as error:
-        enough = len(_used_at(pairs, camera, reference_frame(pairs))) >= needed(free_of(camera))
+        enough = len(_used_at(pairs, camera, reference_frame(pairs))) >= needed_pairs(free_of(camera))
         keep_check(camera, Solution(problem=str(error) if enough else ""))  # too few is no problem, but the beginning
         return False
     path = _path(camera, found.camera, {frame: key.camera for frame, key in keys.items()}, reference)
@@ -446,7 +441,7 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
         rmse_px=found.rmse_px,
         wrong=tuple(wrong),
         sigma=found.sigma,
-        advice=found.advice,
+        remarks=found.remarks,
         reference=reference,
         keys=tuple(sorted(keys)),
     )
@@ -553,15 +548,17 @@ def keep_check(camera: bpy.types.Object, solution: Solution) -> None:
 
 
 def _keep_solution(camera: bpy.types.Object, solution: Solution) -> None:
-    camera[store.SOLUTION] = json.dumps({f.name: getattr(solution, f.name) for f in fields(solution)})
+    values = {f.name: getattr(solution, f.name) for f in fields(solution)}
+    camera[store.SOLUTION] = json.dumps(values | {"remarks": to_plain(solution.remarks)})
 
 
 def solution_of(camera: bpy.types.Object) -> Solution:
     """What the last solution said."""
     values = json.loads(camera.get(store.SOLUTION, "{}"))
-    for name in ("wrong", "advice", "keys"):
+    for name in ("wrong", "keys"):
         values[name] = tuple(values.get(name, ()))
-    return Solution(**values)
+    remarks = from_plain(values.pop("remarks", values.pop("advice", ())))  # "advice" in files of version 0.1.0
+    return Solution(**values, remarks=remarks)
 
 
 def fill_rows(camera: bpy.types.Object) -> None:
@@ -645,7 +642,7 @@ def hint(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> str:
     if waiting:
         return f"Drag {waiting} dashed marks to where they are seen in this frame; Enter takes one that fits."
     ready = _used_at(pairs, camera, reference_frame(pairs))
-    more = needed(free_of(camera)) - len(ready)
+    more = needed_pairs(free_of(camera)) - len(ready)
     if not pairs:
         return (
             "Click a place in the picture that you will find again on the terrain: a boulder's edge, a ledge, a crack."

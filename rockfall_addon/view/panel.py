@@ -2,9 +2,12 @@
 """What all panels share."""
 
 import textwrap
+from collections.abc import Iterable
 from typing import Literal
 
 import bpy
+
+from ...core.remarks import Remark
 
 type State = Literal["TO_DO", "READY", "ATTENTION"]
 """How a step stands."""
@@ -45,6 +48,12 @@ def paragraph(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: 
     column = layout.column(align=True)
     for number, line in enumerate(textwrap.wrap(sentence, characters)):
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
+
+
+def show_remarks(context: bpy.types.Context, layout: bpy.types.UILayout, remarks: Iterable[Remark]) -> None:
+    """What the core has to say about a result."""
+    for remark in remarks:
+        paragraph(context, layout, remark.text, "ERROR" if remark.severity in ("warning", "problem") else "INFO")
 
 
 def facts(layout: bpy.types.UILayout, rows: list[tuple[str, str]]) -> None:

@@ -216,7 +216,7 @@ def test_enabled_box_and_wrong_pair(part, scene, aligned, camera, table) -> None
     aligned.move(scene, camera, wrong.id, "pixel", (wrong.pixel[0] + 40, wrong.pixel[1]))
     assert aligned.solution_of(camera).wrong == (wrong.id,)
     assert [row.is_wrong for row in rows].index(True) == 5
-    assert any("T06" in sentence for sentence in aligned.solution_of(camera).advice)
+    assert [remark.about for remark in aligned.solution_of(camera).remarks][:1] == ["pair T06"]
     rows[5].name = "ledge"
     assert aligned.pairs_of(camera)[5].name == "ledge"
 

@@ -98,7 +98,7 @@ def test_a_person_who_pans() -> None:
     scaled = np.radians(np.delete(wrong, REFERENCE)) / np.delete(found.path.sigma_rotation, REFERENCE) / np.sqrt(3)
     assert 0.5 < np.sqrt(np.mean(scaled**2)) < 1.6
     assert np.nanmax(found.residual_px) < 1
-    assert found.advice == ()
+    assert found.remarks == ()
 
 
 def test_a_pan_that_leaves_the_first_view() -> None:
@@ -164,8 +164,8 @@ def test_frames_without_features_lie_between_their_neighbours() -> None:
         @ found.path.rotation[59]
     )
     np.testing.assert_allclose(found.path.rotation[61], middle, atol=1e-12)
-    assert "3 frames have no features" in found.advice[0]
-    assert "frame 60" in found.advice[0]
+    assert "3 frames have no features" in found.remarks[0].text
+    assert "frame 60" in found.remarks[0].text
 
 
 def test_bad_tracks_are_refused() -> None:

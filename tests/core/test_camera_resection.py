@@ -144,7 +144,8 @@ def test_wrong_pairs_are_named(swap: bool) -> None:
         named += found.wrong == (("P3", "P7") if swap else ("P3",))
         assert not found.used[3]
         assert error_squared(found, camera) < 30
-        assert "P3 does not fit" in found.advice[0]
+        assert "P3 does not fit" in found.remarks[0].text
+        assert (found.remarks[0].about, found.remarks[0].severity) == ("pair P3", "warning")
     assert named >= 11
 
 
@@ -153,7 +154,7 @@ def test_with_the_fewest_pairs_nothing_is_called_wrong() -> None:
     pixels[0] += [40, 0]
     found = resect(pixels, points, WIDTH, HEIGHT, free=(), camera=camera)
     assert found.used.all()
-    assert any("nothing tells a wrong one" in sentence for sentence in found.advice)
+    assert any("nothing tells a wrong one" in remark.text for remark in found.remarks)
 
 
 @pytest.mark.parametrize("view", [1, 2, 3, 4, 5, 6])
@@ -243,11 +244,11 @@ def test_flat_pairs_that_face_the_camera_cannot_tell_the_focal_length() -> None:
     pixels = project(camera, points) + rng.normal(size=(10, 2))
     found = resect(pixels, points, WIDTH, HEIGHT)
     assert any(
-        "focal length is known" in sentence and "plane facing the camera. Lock it" in sentence
-        for sentence in found.advice
+        "focal length is known" in remark.text and "plane facing the camera. Lock it" in remark.text
+        for remark in found.remarks
     )
     locked = resect(pixels, points, WIDTH, HEIGHT, free=(), camera=camera)
-    assert not any("focal" in sentence for sentence in locked.advice)
+    assert not any("focal" in remark.text for remark in locked.remarks)
 
 
 def test_pairs_in_a_corner_cannot_tell_the_lens() -> None:
@@ -258,7 +259,7 @@ def test_pairs_in_a_corner_cannot_tell_the_lens() -> None:
     origins, directions = rays(camera, truth)
     points = origins + directions * rng.uniform(40, 150, (12, 1))
     found = resect(truth + rng.normal(size=(12, 2)), points, WIDTH, HEIGHT, free=("f", "cx", "cy", "k1"))
-    text = " ".join(found.advice)
+    text = " ".join(map(str, found.remarks))
     assert "centre cx is known to" in text
     assert "distortion k1" in text
     assert "cover only" in text

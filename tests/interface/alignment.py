@@ -135,7 +135,9 @@ def case_align_with_clicks(window):
     assert aligned.open_pair(camera) is None
     assert sum(pair.is_complete for pair in aligned.pairs_of(camera)) == 6
     focal, rmse = aligned.focal_px(camera), aligned.solution_of(camera).rmse_px
-    print(f"focal {focal:.0f} px, rmse {rmse:.2f} px, {aligned.solution_of(camera).advice}")
+    print(
+        f"focal {focal:.0f} px, rmse {rmse:.2f} px, {[remark.text for remark in aligned.solution_of(camera).remarks]}"
+    )
     yield from sidebar(window, True)
     camera = the_camera(window)
     camera.rockfall_alignment.blend = 0.5

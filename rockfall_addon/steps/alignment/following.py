@@ -20,6 +20,7 @@ from ....core.errors import RockfallError
 from ....core.footage.background import BackgroundMotion, TrackedFeatures, background_motion
 from ....core.footage.video import Video
 from ....core.progress import CancelledError, Progress
+from ....core.remarks import from_plain, to_plain
 from ....core.terrain.raycast import cast_rays
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
@@ -160,7 +161,7 @@ def apply(scene: bpy.types.Scene, camera: bpy.types.Object, task: Task, found: S
             "features": 0.0 if found is None else float(np.median(found.features)),
             "residual_px": None if found is None else float(np.nanmedian(found.residual_px)),
             "sigma_px": None if found is None else _sigma_px(path),
-            "advice": [] if found is None else list(found.advice),
+            "remarks": [] if found is None else to_plain(found.remarks),
         }
     )
     alignment.solve(scene, camera)  # the pairs may have changed meanwhile
@@ -170,8 +171,11 @@ def apply(scene: bpy.types.Scene, camera: bpy.types.Object, task: Task, found: S
 
 
 def followed(camera: bpy.types.Object) -> dict | None:
-    """What the last following said: reference, frames, focal, turn_deg, features, residual_px, sigma_px, advice."""
-    return json.loads(camera[store.FOLLOWED]) if store.FOLLOWED in camera else None
+    """What the last following said: reference, frames, focal, turn_deg, features, residual_px, sigma_px, remarks."""
+    if store.FOLLOWED not in camera:
+        return None
+    known = json.loads(camera[store.FOLLOWED])
+    return known | {"remarks": from_plain(known.get("remarks", known.get("advice", ())))}  # "advice" of version 0.1.0
 
 
 def is_stale(camera: bpy.types.Object) -> bool:

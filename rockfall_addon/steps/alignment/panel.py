@@ -6,7 +6,7 @@ import math
 import bpy
 
 from ...scene import alignment, georeference, videos
-from ...view.panel import RockfallPanel, State, advise, facts, paragraph
+from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 from . import following
 
 COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, alignment.COLOURS + 1))
@@ -98,8 +98,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
             advise(context, layout, True, f"{camera.name} is solved. {fit}")
         if solution.problem and not next_step:
             paragraph(context, layout, solution.problem, "ERROR")
-        for sentence in solution.advice:
-            paragraph(context, layout, sentence, "ERROR" if sentence.startswith("Pair ") else "INFO")
+        show_remarks(context, layout, solution.remarks)
         if next_step:
             advise(context, layout, False, next_step)
 
@@ -220,8 +219,7 @@ class ROCKFALL_PT_alignment_motion(RockfallPanel, bpy.types.Panel):
         if known["sigma_px"] is not None:
             rows.append(("Poses known to", f"{known['sigma_px']:.2f} px"))
         facts(layout, rows)
-        for sentence in known["advice"]:
-            paragraph(context, layout, sentence, "INFO")
+        show_remarks(context, layout, known["remarks"])
         if following.is_stale(camera):
             paragraph(context, layout, "The focal length has changed since. Follow again.", "ERROR")
 

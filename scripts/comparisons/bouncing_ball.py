@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from rockfall.core.camera.model import look_at, rays
-from rockfall.core.camera.motion import fixed
+from rockfall.core.camera.path import fixed
 from rockfall.core.footage.background import no_motion
 from rockfall.core.footage.kinks import Kinks, find_kinks
 from rockfall.core.footage.tracking import track_block

@@ -291,7 +291,7 @@ def test_placed_by_eye(part, scene, aligned, camera, table) -> None:
 def test_camera_that_is_gone(part, scene, aligned, camera) -> None:
     aligned.mark(scene, camera, "pixel", (10.0, 10.0))
     bpy.data.objects.remove(camera)
-    assert aligned.hint(scene, None)
+    assert aligned.hint(scene, None) == "Add a video first (step 2)."
     with pytest.raises(RuntimeError, match="Add a video first"):
         bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
 

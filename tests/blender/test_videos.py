@@ -409,9 +409,16 @@ def test_file_moved(part: Part, tmp_path: Path) -> None:
     assert len(bpy.data.movieclips) == 1
 
 
-@pytest.mark.parametrize("name", ["interlaced.mp4", "sound.mp4", "nothing.mp4"])
-def test_bad_videos(part: Part, name: str) -> None:
-    with pytest.raises(RuntimeError):
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("interlaced.mp4", "as interlaced video does here"),
+        ("sound.mp4", "The file holds sound and no video"),
+        ("nothing.mp4", "There is no such file"),
+    ],
+)
+def test_bad_videos(part: Part, name: str, said: str) -> None:
+    with pytest.raises(RuntimeError, match=rf"{name}: .*{said}"):
         bpy.ops.rockfall.add_video(filepath=str(DATA / name))
     assert len(bpy.data.cameras) == len(bpy.data.movieclips) == 0
 

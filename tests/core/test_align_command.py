@@ -171,7 +171,11 @@ def test_the_video_gives_the_size_and_the_check_picture(tmp_path, capsys):
         b, g, r = picture[int(v) - 1 : int(v) + 2, int(u) - 1 : int(u) + 2].reshape(-1, 3).astype(int).max(axis=0)
         assert g > 150
         assert g > max(b, r) - 1
-    assert "no frame 7" in refused_again(capsys, table, "--video", video, "--frame", 7)
+    said = refused_again(capsys, table, "--video", video, "--frame", 7)
+    assert "film.avi: There is no frame 7. It has the frames 0 to 2." in said
+    write(table, *scene(camera), {"frame": ["", "2", "3", *["0"] * 13]})
+    said = refused_again(capsys, table, "--video", video)
+    assert "pairs.csv, row 4: There is no frame 3 in film.avi. It has the frames 0 to 2." in said
 
 
 def refused_again(capsys, table, *options):

@@ -171,7 +171,8 @@ def test_compare_leaves_figures_and_the_page(impacts, tmp_path, capsys) -> None:
     [
         (["--model", "noel_2071"], "Did you mean noel_2017"),
         (["--port", "70000"], "65535"),
-        (["--parameters", "missing.toml"], "missing.toml"),
+        (["--parameters", "missing.toml"], "missing.toml: The parameters cannot be read"),
+        (["--spin", "table"], "impacts.csv: No impact can be compared: "),
     ],
 )
 def test_explore_refuses_bad_input(impacts, tmp_path, capsys, options, words) -> None:
@@ -185,6 +186,8 @@ def test_parameters_come_back_from_their_file(tmp_path) -> None:
     settings = {name: model.settings() for name, model in MODELS.items()}
     write_parameters(settings, tmp_path / "parameters.toml")
     assert read_parameters(tmp_path / "parameters.toml") == settings
+    with pytest.raises(InputError, match=r": The parameters cannot be written \(.+\)\. Choose another file"):
+        write_parameters(settings, tmp_path)
 
 
 @pytest.mark.parametrize(

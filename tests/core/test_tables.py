@@ -291,7 +291,10 @@ def test_only_an_error_of_the_output_itself_is_called_one(tmp_path):
 
 def test_output_does_not_replace_a_file_or_folder_of_another_kind(tmp_path):
     (tmp_path / "out").write_text("a file")
-    with pytest.raises(InputError, match="not a folder"), output_folder(tmp_path / "out"):
+    with pytest.raises(InputError, match="This is a file, not a folder"), output_folder(tmp_path / "out"):
+        pass
+    below = tmp_path / "out" / "deep"
+    with pytest.raises(InputError, match=r"deep: The output folder cannot be made \("), output_folder(below):
         pass
     (tmp_path / "dir" / "a.csv").mkdir(parents=True)
     with pytest.raises(InputError, match="folder is where a file"), output_folder(tmp_path / "dir") as folder:

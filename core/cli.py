@@ -6,13 +6,17 @@ when it is asked for, so that help is quick.
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
+from errno import EINVAL
 from importlib import import_module
 
 from .errors import RockfallError
 
 DONE, BAD_INPUT, USAGE, INTERRUPTED = 0, 1, 2, 130
+CLOSED_PIPE = 141
+"""What a shell says of a tool that a closed pipe has ended, as in ``rockfall models | head -1``."""
 
 COMMANDS = {
     "demo": "the whole job on the bundled site: reconstruct, figures, animation",
@@ -34,8 +38,20 @@ COMMANDS = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted."""
-    argv = list(sys.argv[1:] if argv is None else argv)
+    """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted, 141 output closed."""
+    try:
+        status = _run(list(sys.argv[1:] if argv is None else argv))
+        sys.stdout.flush()
+    except OSError as error:
+        if not _is_closed_pipe(error):
+            raise
+        for stream in (sys.stdout, sys.stderr):  # what is still to be written would fail again when Python ends
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return CLOSED_PIPE
+    return status
+
+
+def _run(argv: Sequence[str]) -> int:
     try:
         arguments = _parser(argv).parse_args(argv)
     except SystemExit as leaving:  # argparse has printed its help or its complaint
@@ -49,6 +65,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("rockfall: interrupted, nothing was written.", file=sys.stderr)
         return INTERRUPTED
     return status
+
+
+def _is_closed_pipe(error: OSError) -> bool:
+    """Whether what reads the output has ended; Windows calls that an invalid argument."""
+    return isinstance(error, BrokenPipeError) or (os.name == "nt" and (error.errno, error.filename) == (EINVAL, None))
 
 
 def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The command line: what it writes, what it says, and how it refuses."""
 
+import os
 import subprocess
 import sys
 
@@ -208,3 +209,32 @@ def test_help_imports_no_numerical_library():
         "assert not {'numpy', 'scipy', 'numba', 'trimesh'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell there has no such status")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize(
+    "argv",
+    [["models"], ["models", "noel_2017"], ["--help"], ["compare", "--help"], ["reconstruct"]],
+)
+def test_a_pipe_that_is_closed_ends_a_command_quietly(argv, unbuffered, picks, tmp_path):
+    """As of other tools in ``command | head -1``: status 141 in a shell, no complaint, and the output is whole."""
+    files = [str(picks), "--out", str(tmp_path / "out")] if argv == ["reconstruct"] else []
+    read, write = os.pipe()
+    os.close(read)  # before anything is written
+    with os.fdopen(write, "wb") as closed:
+        command = [sys.executable, "-m", "rockfall.core.cli", *argv, *files]
+        environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        ended = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False, env=environment)
+    swallowed = unbuffered and "--help" in argv  # by argparse
+    assert (ended.returncode, ended.stderr) == (0 if swallowed else 141, b"")
+    assert (tmp_path / "out" / "impacts.csv").exists() == bool(files)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no shell with pipefail")
+def test_the_first_line_of_a_long_output():
+    command = f"set -o pipefail; '{sys.executable}' -m rockfall.core.cli models | head -1"
+    ended = subprocess.run(["bash", "-c", command], capture_output=True, check=False)
+    assert ended.stdout.split() == [b"parameter", b"default", b"range"]
+    assert ended.returncode in (0, 141)  # 0 when all was in the pipe before it was closed
+    assert ended.stderr == b""

@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .scene import footage, impact_rows, migration, problems, store, sync, terrain, timing, videos
+from .scene import footage, impact_rows, migration, problems, store, sync, terrain_mesh, timing, videos
 
 _owner = object()
 
@@ -27,7 +27,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @persistent
 @problems.guarded
 def _loaded(_path: str, _unused: object = None) -> None:
-    terrain.forget_surfaces()
+    terrain_mesh.mistrust()
     videos.forget_files()
     problems.forget()
     _listen()  # subscriptions do not survive loading
@@ -38,7 +38,7 @@ def _loaded(_path: str, _unused: object = None) -> None:
 @problems.guarded
 def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     """At once: Blender stores a step before the edit is absorbed, and its animation would take the edit back."""
-    terrain.forget_surfaces()
+    terrain_mesh.mistrust()
     _keep_rate(scene)
     footage.follow(scene)
     sync.sync(scene)

@@ -8,7 +8,6 @@ from mathutils import Matrix
 
 from ...core.vectors import Array
 
-"""What the keys were written with, see `videos`."""
 LINEAR = 1
 """As the interpolation of keys is numbered."""
 

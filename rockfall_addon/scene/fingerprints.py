@@ -10,9 +10,8 @@ from collections.abc import Iterable, Sequence
 
 import bpy
 
-from . import picks, store, timing
+from . import picks, store, terrain, terrain_mesh, timing
 
-"""The terrain that the trajectories were computed on; empty or missing without."""
 COMPLETE = "+"
 """Behind the fingerprint of a trajectory that has flights and a block."""
 _KEPT = (
@@ -71,14 +70,19 @@ def remember_all(scene: bpy.types.Scene) -> None:
     groups = by_trajectory(picks.things_of(scene))
     flying = {o[store.TRAJECTORY] for o in scene.objects if o.get(store.ROLE) == store.FLIGHTS_ROLE}
     remember(scene, {n: fingerprint(things, rate) + (COMPLETE if n in flying else "") for n, things in groups.items()})
-    scene[store.GROUND], scene[store.TICK_RATE] = ground(scene), timing.frame_rate(scene)
+    scene[store.GROUND], scene[store.GROUND_CONTENTS] = ground(scene), ground_contents(scene)
+    scene[store.TICK_RATE] = timing.frame_rate(scene)
 
 
 def ground(scene: bpy.types.Scene) -> str:
     """What the terrain is: its tiles, their sizes and places; empty without."""
     rows = []
-    for thing in scene.objects:
-        if thing.get(store.ROLE) == store.TERRAIN_ROLE and thing.type == "MESH" and len(thing.data.polygons):
-            place = [round(value, 5) for row in thing.matrix_world for value in row]
-            rows.append(f"{len(thing.data.vertices)} {len(thing.data.polygons)} {place}")
+    for tile in terrain.tiles(scene):
+        place = [round(value, 5) for row in tile.matrix_world for value in row]
+        rows.append(f"{len(tile.data.vertices)} {len(tile.data.polygons)} {place}")
     return "\n".join(sorted(rows))
+
+
+def ground_contents(scene: bpy.types.Scene) -> str:
+    """Checksums of the tiles' meshes."""
+    return "\n".join(sorted(str(terrain_mesh.contents_of(tile.data)) for tile in terrain.tiles(scene)))

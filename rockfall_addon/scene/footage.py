@@ -19,8 +19,6 @@ from ...core.footage.video import Image
 from ...core.vectors import Array
 from . import migration, store, videos
 
-"""On an image: the number of the picture that it holds."""
-
 
 def follow(scene: bpy.types.Scene) -> None:
     """Bring cameras and footage in line with the scene: what handlers call. Changes only what has to change."""

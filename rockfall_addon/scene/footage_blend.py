@@ -5,8 +5,6 @@ import bpy
 
 from . import store
 
-"""The blend that comes back when the wipe ends."""
-
 
 def background_of(camera: bpy.types.Object) -> bpy.types.CameraBackgroundImage | None:
     """The footage of a camera; None when somebody took it away."""

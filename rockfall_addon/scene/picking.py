@@ -27,7 +27,6 @@ from ...core.terrain.surface import Surface
 from ...core.vectors import Array
 from . import picks, reconstruction, store, sync, timing, videos
 
-"""Of a pick: id of a video → the sighting."""
 SAME_PICTURE = 0.6
 """A pick that is nearer in time than this belongs to the picture [frames]."""
 FIRST_NAME = "B01"

@@ -33,7 +33,8 @@ TIME_ORIGIN, OFFSETS = "rockfall_time_origin_s", "rockfall_offsets_s"
 KEYED_RATE, TICK_RATE = "rockfall_keyed_rate_hz", "rockfall_tick_rate_hz"
 
 # of the scene: what is shown
-SHOWN, GROUND = "rockfall_shown", "rockfall_ground"  # fingerprints
+SHOWN = "rockfall_shown"  # fingerprint of each trajectory
+GROUND, GROUND_CONTENTS = "rockfall_ground", "rockfall_ground_contents"  # fingerprints; 0.1.0 had the first only
 PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems"
 SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
 MODEL = "rockfall_model"  # of what a model predicts
@@ -46,13 +47,13 @@ KIND, STATUS = "rockfall_kind", "rockfall_status"
 SIGMA_TIME, SIGMA_POSITION = "rockfall_sigma_time_s", "rockfall_sigma_position_m"
 ROW, EXTRA = "rockfall_row", "rockfall_extra"  # where it stood in a table, and the table's other columns
 KEY_FRAME, PICK_SHIFT = "rockfall_key_frame", "rockfall_pick_shift_m"
-SEEN = "rockfall_seen"  # in which video, frame and pixel
+SEEN = "rockfall_seen"  # id of a video → frame and pixel in it
 RESULT = "rockfall_result"
 
 # of a tile of the terrain
 TERRAIN_FILE, TERRAIN_SUMMARY = "rockfall_file", "rockfall_summary"
 THIN_SHARE, REACH = "rockfall_thin_share", "rockfall_reach_m"
-COARSE_VIEW_OF = "rockfall_view_of"  # vertices and triangles of the full mesh, and triangles that were wanted
+COARSE_VIEW_OF = "rockfall_view_of"  # of the full mesh: vertices, triangles, triangles that were wanted, checksums
 
 # of the scene: its videos
 KNOWN_VIDEOS, ACTIVE_CAMERA = (
@@ -66,14 +67,15 @@ SYNCHRONISED, REFERENCE_CAMERA = "rockfall_synchronised", "rockfall_reference_ca
 VIDEO_FILE, VIDEO_FACTS = "rockfall_video_file", "rockfall_video_facts"
 VIDEO_TIMES, VIDEO_SIZE = "rockfall_video_times_s", "rockfall_video_size"
 CLOCK, CAPTURE_RATE, ROW_TIME = "rockfall_clock", "rockfall_capture_rate_hz", "rockfall_row_time_s"
-STILL, IMAGE_BLEND = "rockfall_still", "rockfall_blend"
+IMAGE_BLEND = "rockfall_blend"  # that comes back when the wipe ends
+STILL = "rockfall_still"  # of an image: the number of the picture that it holds
 
 # of a camera: where it stood and how it looked
 CAMERA, SOLVED, RMSE = "rockfall_camera", "rockfall_solved", "rockfall_rmse_px"
 POSE_TIMES, POSES = "rockfall_pose_times_s", "rockfall_poses"
 POSE_SIGMA, POSE_COVARIANCE = "rockfall_pose_sigma", "rockfall_pose_covariance"
 CAMERA_SHIFT, ASPECT, REFERENCE_POSE = "rockfall_camera_shift_m", "rockfall_aspect", "rockfall_reference_pose"
-CAMERA_KEYED = "rockfall_camera_keyed"
+CAMERA_KEYED = "rockfall_camera_keyed"  # clock, origin and rate that its keys were written with
 PAIRS, OPEN_PAIR, SOLUTION = "rockfall_pairs", "rockfall_open_pair", "rockfall_solution"
 KNOWN_LENS, PLACED, FOLLOWED = "rockfall_known_lens", "rockfall_placed", "rockfall_followed"
 

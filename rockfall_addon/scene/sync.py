@@ -24,6 +24,8 @@ from . import (
     problems,
     reconstruction,
     store,
+    terrain_mesh,
+    terrain_view,
     timing,
     trails,
     trajectories,
@@ -59,7 +61,8 @@ def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
 
 def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """From Blender's list of updates, find what to look at."""
-    names: set[str] | None = set()
+    names: set[str] = set()
+    anywhere = False
     for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
         thing = update.id
         if isinstance(thing, bpy.types.Object):
@@ -67,15 +70,15 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             if role == store.PICK_ROLE and store.TRAJECTORY in thing:
                 names.add(thing[store.TRAJECTORY])
             elif role == store.TERRAIN_ROLE:
-                names = None
+                anywhere = True
+                if update.is_updated_geometry:
+                    terrain_mesh.mistrust(thing.original.data)
         elif isinstance(thing, bpy.types.Collection) or (
             isinstance(thing, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
         ):
-            names = None
-        if names is None:
-            break
-    if names or (names is None and migration.version(scene) is not None):
-        touch(scene, names)
+            anywhere = True
+    if names or (anywhere and migration.version(scene) is not None):
+        touch(scene, None if anywhere else names)
 
 
 @problems.guarded
@@ -119,6 +122,8 @@ def sync(
     done = Done([], [])
     if migration.is_newer(scene):
         return done
+    if not dragging:
+        terrain_view.follow_edits(scene)
     wanted = None if names is None else set(names)
     things = picks.things_of(scene, wanted)
     if not things and store.SHOWN not in scene:
@@ -284,11 +289,13 @@ def _finish(scene: bpy.types.Scene) -> None:
 
 def _ground_changed(scene: bpy.types.Scene) -> bool:
     """Whether there is another terrain than the trajectories were computed with; one that is gone changes nothing."""
-    now = fingerprints.ground(scene)
-    if not now or now == scene.get(store.GROUND, ""):
+    now = fingerprints.ground(scene), fingerprints.ground_contents(scene)
+    before = scene.get(store.GROUND, ""), scene.get(store.GROUND_CONTENTS, now[1])
+    if not now[0]:
         return False
-    scene[store.GROUND] = now
-    return True
+    if now != before or store.GROUND_CONTENTS not in scene:
+        scene[store.GROUND], scene[store.GROUND_CONTENTS] = now
+    return now != before
 
 
 def _rate_changed(scene: bpy.types.Scene) -> bool:

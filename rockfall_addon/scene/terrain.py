@@ -2,8 +2,6 @@
 """Terrain: core surfaces ↔ Blender mesh objects, one for each tile."""
 
 import uuid
-import zlib
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -19,16 +17,8 @@ from . import georeference, store, terrain_look, terrain_mesh, terrain_view
 LEAST_THIN = 0.005
 
 
-@dataclass
-class _Known:
-    """A surface that was made for a mesh, the mesh's contents then, and whether they may have changed since."""
-
-    surface: Surface
-    contents: tuple[int, int]
-    doubtful: bool = False
-
-
-_surfaces: dict[tuple, _Known] = {}  # the index of a million triangles takes a while: built once per mesh
+_surfaces: dict[int, tuple[tuple, Surface]] = {}
+"""By the tile's session_uid, what it was made of and the surface: the index of a million triangles takes a while."""
 _joined: list[tuple[tuple[Surface, ...], Surface]] = []
 
 
@@ -49,7 +39,7 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     thing[store.THIN_SHARE] = float(np.mean(shading.thin))
     thing[store.REACH] = float(np.abs(surface.bounds).max())
     store.collection(scene, "Terrain").objects.link(thing)
-    _surfaces[_key(thing)] = _Known(surface, _contents(mesh))
+    _surfaces[thing.session_uid] = _key(thing), surface
     terrain_view.follow(scene)
     terrain_look.apply(scene)
     return thing
@@ -100,15 +90,12 @@ def surface_of(thing: bpy.types.Object) -> Surface:
     if not has_faces(thing):
         raise RockfallError(f"{thing.name} has no faces, so it cannot be the terrain. Choose a mesh with faces.")
     key = _key(thing)
-    known = _surfaces.get(key)
-    if known is not None and known.doubtful:
-        known.doubtful = False
-        if known.contents != _contents(thing.data):
-            known = None
-    if known is None:
-        _forget_gone()
-        known = _surfaces[key] = _Known(_read(thing), _contents(thing.data))
-    return known.surface
+    known = _surfaces.get(thing.session_uid)
+    if known is None or known[0] != key:
+        for identifier in _surfaces.keys() - {each.session_uid for each in bpy.data.objects}:
+            del _surfaces[identifier]
+        known = _surfaces[thing.session_uid] = key, _read(thing)
+    return known[1]
 
 
 def active_terrain(scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -124,15 +111,6 @@ def downhill(scene: bpy.types.Scene) -> Vector:
     mean = Vector(np.nansum(surface.face_normals * surface.face_areas[:, None], axis=0).tolist())
     fall = Vector((mean.x, mean.y, 0.0))
     return fall.normalized() if fall.length > 1e-3 * mean.length else Vector((0.0, -1.0, 0.0))
-
-
-def forget_surfaces() -> None:
-    """Mistrust the cached surfaces: after undo or loading, the same keys may mean other meshes.
-
-    A surface whose mesh turns out to be as it was is kept with its index.
-    """
-    for known in _surfaces.values():
-        known.doubtful = True
 
 
 def warnings(scene: bpy.types.Scene) -> list[str]:
@@ -189,28 +167,15 @@ def _read(thing: bpy.types.Object) -> Surface:
     return Surface(local, faces, georeference.read_shift(_scene_of(thing)), thing.name, ())
 
 
-def _forget_gone() -> None:
-    """Drop the surfaces whose meshes are no more."""
-    alive = {mesh.session_uid for mesh in bpy.data.meshes}
-    for key in [key for key in _surfaces if key[0] not in alive]:
-        del _surfaces[key]
-
-
 def _key(thing: bpy.types.Object) -> tuple:
     mesh = thing.data
     place = tuple(round(value, 9) for row in thing.matrix_world for value in row)
     shift = georeference.read_shift(_scene_of(thing))
-    return mesh.session_uid, len(mesh.vertices), len(mesh.polygons), place, shift
+    return mesh.session_uid, terrain_mesh.contents_of(mesh), place, shift
 
 
 def _scene_of(thing: bpy.types.Object) -> bpy.types.Scene:
     return next(iter(thing.users_scene), bpy.context.scene)
-
-
-def _contents(mesh: bpy.types.Mesh) -> tuple[int, int]:
-    """Checksums of the coordinates and the corners, some milliseconds for each million triangles."""
-    vertices, faces = terrain_mesh.mesh_arrays(mesh)
-    return zlib.crc32(vertices), zlib.crc32(faces)
 
 
 def _differ(one: Surface, other: Surface) -> bool:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The meshes of the terrain: arrays ↔ Blender meshes, and the mesh that stands in for a large one in the 3-D view."""
 
+import zlib
 from collections.abc import Mapping
 
 import bpy
@@ -12,6 +13,10 @@ SHADING = ("hillshade", "eye_dome", "thin")
 """Attributes of a terrain's vertices, 0 … 1."""
 MODIFIER = "Coarse view"
 STAND_IN = "Coarse mesh"
+
+Contents = tuple[int, int, int, int]
+
+_contents: dict[int, Contents] = {}  # by the mesh's session_uid
 
 
 def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping[str, np.ndarray]) -> bpy.types.Mesh:
@@ -46,6 +51,26 @@ def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
         faces = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
         mesh.loop_triangles.foreach_get("vertices", faces)
     return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def contents_of(mesh: bpy.types.Mesh) -> Contents:
+    """Numbers of vertices and triangles, checksums of both: they differ when a person has edited the mesh.
+
+    Computed anew, some milliseconds for each million triangles, where the numbers differ or the mesh is mistrusted.
+    """
+    known, counts = _contents.get(mesh.session_uid), (len(mesh.vertices), len(mesh.polygons))
+    if known is None or known[:2] != counts:
+        vertices, faces = mesh_arrays(mesh)
+        known = _contents[mesh.session_uid] = (*counts, zlib.crc32(vertices), zlib.crc32(faces))
+    return known
+
+
+def mistrust(mesh: bpy.types.Mesh | None = None) -> None:
+    """A mesh may have been edited; any mesh, after undo or loading."""
+    if mesh is None:
+        _contents.clear()
+    else:
+        _contents.pop(mesh.session_uid, None)
 
 
 def stand_in(tile: bpy.types.Object) -> bpy.types.Object | None:

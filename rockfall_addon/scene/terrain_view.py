@@ -40,6 +40,13 @@ def follow(scene: bpy.types.Scene) -> None:
             modifier.show_viewport = not settings.full_resolution
 
 
+def follow_edits(scene: bpy.types.Scene) -> None:
+    """Make the coarse views anew of tiles that a person has edited."""
+    tiles = [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if terrain_mesh.stand_in(thing) is not None]
+    if not all(map(_is_current, tiles)):
+        follow(scene)
+
+
 def is_coarse(scene: bpy.types.Scene) -> bool:
     """Whether a tile of the scene has a coarse view, be it switched on or off."""
     return any(terrain_mesh.MODIFIER in tile.modifiers for tile in store.with_role(scene, store.TERRAIN_ROLE))
@@ -56,9 +63,14 @@ def _fits(tile: bpy.types.Object, wanted: int) -> bool:
     other = terrain_mesh.stand_in(tile)
     if other is None:
         return False
-    vertices, faces, before = other.get(store.COARSE_VIEW_OF, (0, 0, 0))
-    same = (vertices, faces) == (len(tile.data.vertices), len(tile.data.polygons))
-    return same and 1 / TOO_FINE < before / wanted < TOO_FINE
+    return _is_current(tile) and 1 / TOO_FINE < other[store.COARSE_VIEW_OF][2] / wanted < TOO_FINE
+
+
+def _is_current(tile: bpy.types.Object) -> bool:
+    """Whether the coarse mesh of a tile was made from the mesh that the tile has."""
+    vertices, faces, _, *checksums = terrain_mesh.stand_in(tile).get(store.COARSE_VIEW_OF, (0, 0, 0))
+    now = terrain_mesh.contents_of(tile.data)
+    return now == (vertices, faces, *(checksums or now[2:]))  # 0.1.0 kept no checksums
 
 
 def _make(tile: bpy.types.Object, wanted: int) -> None:
@@ -76,7 +88,8 @@ def _make(tile: bpy.types.Object, wanted: int) -> None:
     _remove(tile)
     other = bpy.data.objects.new(mesh.name, mesh)
     other[store.ROLE] = store.COARSE_VIEW_ROLE
-    other[store.COARSE_VIEW_OF] = [len(full.vertices), len(full.polygons), wanted]
+    contents = terrain_mesh.contents_of(full)
+    other[store.COARSE_VIEW_OF] = [float(value) for value in (*contents[:2], wanted, *contents[2:])]
     modifier = tile.modifiers.new(terrain_mesh.MODIFIER, "NODES")
     modifier.node_group = _group()
     modifier.show_render = modifier.show_expanded = False

@@ -4,6 +4,7 @@
 import json
 from pathlib import Path
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -317,6 +318,55 @@ def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part) -> None:
     update()
     check_shown(slope, part)
     assert picks_of(slope, "B")[1]["rockfall_result"]["bounce_height_m"][0] > 0.3
+
+
+def raised(x: np.ndarray) -> np.ndarray:
+    """What an edit adds to the heights of the plane, which it also turns."""
+    return 5.0 + 0.2 * x
+
+
+def edit_by_script(tile: bpy.types.Object) -> None:
+    for vertex in tile.data.vertices:
+        vertex.co.z += raised(vertex.co.x)
+    tile.data.update()
+
+
+def edit_in_edit_mode(tile: bpy.types.Object) -> None:
+    bpy.context.view_layer.objects.active = tile
+    bpy.ops.object.mode_set(mode="EDIT")
+    mesh = bmesh.from_edit_mesh(tile.data)
+    for vertex in mesh.verts:
+        vertex.co.z += raised(vertex.co.x)
+    bmesh.update_edit_mesh(tile.data)
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("edit", [edit_by_script, edit_in_edit_mode])
+def test_an_edited_terrain_is_seen(slope: bpy.types.Scene, part, edit) -> None:
+    """Vertices that move, as many as before: rays, normals, results and fingerprints are of the new surface."""
+    terrain, reconstruction = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.reconstruction")
+    (tile,) = terrain.tiles(slope)
+    cast = part("core.terrain.raycast").cast_rays
+    above, down = np.array([[10.0, 0.0, 500.0]]), np.array([[0.0, 0.0, -1.0]])
+    assert cast(terrain.surface_of_scene(slope), above, down).point[0, 2] == pytest.approx(ground(10.0), abs=1e-4)
+    assert not any(each.value for each in trail(slope, "A").data.attributes["below_terrain"].data)
+    edit(tile)
+    update()
+    hit = cast(terrain.surface_of_scene(slope), above, down)
+    assert hit.point[0, 2] == pytest.approx(ground(10.0) + raised(10.0), abs=1e-4)
+    normal = np.array([SLOPE - 0.2, 0.0, 1.0]) / np.hypot(SLOPE - 0.2, 1.0)
+    impact = picks_of(slope, "A")[2]
+    fresh = reconstruction.reconstruct_scene(slope).impacts
+    (row,) = np.flatnonzero((fresh.trajectory == "A") & (fresh.time_s == impact["rockfall_time_s"]))
+    np.testing.assert_allclose(fresh.normal[row], normal, atol=1e-6)
+    assert impact["rockfall_result"]["rn"][0] == pytest.approx(fresh.rn[row], rel=1e-12)
+    assert all(each.value for each in trail(slope, "A").data.attributes["below_terrain"].data)
+    # the same terrain again changes nothing, and neither does a file that is opened again
+    shown = slope["rockfall_shown"]
+    tile.data.update()
+    update()
+    assert part("rockfall_addon.scene.sync").sync(slope).rebuilt == []
+    assert slope["rockfall_shown"] == shown
 
 
 def test_unit_scale_backside_and_early_picks_are_told(slope: bpy.types.Scene, part) -> None:

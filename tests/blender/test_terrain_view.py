@@ -131,6 +131,21 @@ def test_coarse_view_follows_the_sliders(part, slope) -> None:
     assert colours(ground.data)[:, :3].mean() == pytest.approx(after[:, :3].mean(), rel=0.1)
 
 
+def test_coarse_view_follows_an_edit(part, slope) -> None:
+    ground, _, _ = slope
+    bpy.context.scene.rockfall_terrain.view_limit = 12_000
+    before = drawn(ground)
+    for vertex in ground.data.vertices:
+        vertex.co.z += 5.0
+    ground.data.update()
+    bpy.context.view_layer.update()
+    assert drawn(ground) == before
+    seen = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    heights = [vertex.co.z - 0.7 * vertex.co.x for vertex in seen.vertices]
+    assert min(heights) > 4.0
+    assert max(heights) < 6.0
+
+
 def test_a_render_takes_the_full_mesh(part, slope) -> None:
     ground, _, _ = slope
     bpy.context.scene.rockfall_terrain.view_limit = 12_000

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading comma-separated text into columns, with every mistake located."""
 
-import codecs
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,10 +12,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, Names
-from .cells import Cells, split_cells
 
-LARGE_BYTES = 2_000_000
-"""Tables above this are split by compiled code, which takes a moment to load."""
+BLOCK_ROWS, BETWEEN = 20_000, "\0"
+"""So many rows of a column are kept as one text, cells between zero bytes: a fifth of the memory of single cells."""
 EXPORT_ADVICE = "Export it as comma-separated text in UTF-8, with . decimals"
 
 
@@ -27,7 +25,7 @@ class TextTable:
     Attributes
     ----------
     source : the file.
-    columns : name → (n,) cells, without surrounding blanks.
+    columns : name → texts of some rows each, see `BLOCK_ROWS`.
     row : (n,) row in a text editor, the header being row 1.
     """
 
@@ -38,12 +36,15 @@ class TextTable:
     def __len__(self) -> int:
         return len(self.row)
 
+    def cells(self, name: str) -> list[str]:
+        """(n,) of a column that is there, without surrounding blanks."""
+        return [cell for block in self.columns[name] for cell in block.split(BETWEEN)]
+
     def text(self, name: str, default: str = "") -> list[str]:
         """(n,) cells; `default` where the column is missing or the cell is empty."""
-        cells = self.columns.get(name)
-        if cells is None:
+        if name not in self.columns:
             return [default] * len(self)
-        return [cell or default for cell in (cells.texts() if isinstance(cells, Cells) else cells)]
+        return [cell or default for cell in self.cells(name)]
 
     def numbers(self, name: str, *, required: bool = False) -> Array:
         """(n,) a column of numbers; NaN where it is missing or empty.
@@ -52,36 +53,30 @@ class TextTable:
         ------
         InputError : a cell is no finite number, or is empty although required.
         """
-        cells = self.columns.get(name)
-        if cells is None:
+        if name not in self.columns:
             return np.full(len(self), np.nan)
-        values = np.empty(len(cells))
-        rows: Iterable[int] = range(len(cells))
-        if isinstance(cells, Cells):
-            values, found = cells.numbers(empty=required)
-            rows = found.tolist()
-        for i in rows:
-            if cells[i]:
-                values[i] = self._number(name, i, required)
-            elif required:
-                raise self.error(i, f"The cell of {name} is empty", "Give a number")
-            else:
-                values[i] = np.nan
-        return values
+        blocks = [_numbers(block.split(BETWEEN), required) for block in self.columns[name]]
+        good = [block for block in blocks if block is not None]
+        if len(good) < len(blocks):
+            cells = self.cells(name)
+            raise next(error for i in range(len(self)) if (error := self._mistake(name, i, cells[i], required)))
+        return np.concatenate(good)
 
-    def _number(self, name: str, i: int, required: bool) -> float:
+    def _mistake(self, name: str, i: int, cell: str, required: bool) -> InputError | None:
+        """What is wrong with a cell that must be a number."""
         or_empty = "" if required else ", or leave it empty if it is not defined"
-        cell = self.columns[name][i]
+        if not cell:
+            return self.error(i, f"The cell of {name} is empty", "Give a number") if required else None
         try:
             value = float(cell)
         except ValueError:
             value = None
         if value is None or "_" in cell:
             advice = "Write decimals with a point" if "," in cell else f"Correct the cell{or_empty}"
-            raise self.error(i, f"'{cell}' in column {name} is not a number", advice)
+            return self.error(i, f"'{cell}' in column {name} is not a number", advice)
         if not np.isfinite(value):
-            raise self.error(i, f"'{cell}' in column {name} is not finite", f"Correct the cell{or_empty}")
-        return value
+            return self.error(i, f"'{cell}' in column {name} is not finite", f"Correct the cell{or_empty}")
+        return None
 
     def vectors(self, names: Sequence[str], *, required: bool = False) -> Array:
         """(n, 3) from three columns."""
@@ -94,8 +89,8 @@ class TextTable:
 
     def error(self, i: int, problem: str, advice: str) -> InputError:
         """An `InputError` that points at one row."""
-        name = self.columns.get("trajectory", [""] * len(self))[i]
-        return InputError(problem, file=self.source, row=self.row[i], trajectory=name or None, advice=advice)
+        name = self.text("trajectory")[i] or None
+        return InputError(problem, file=self.source, row=self.row[i], trajectory=name, advice=advice)
 
 
 def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
@@ -112,32 +107,27 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         row with too many or too few cells, no rows.
     """
     path = Path(path)
-    data = _read_bytes(path)
-    text = _decoded(path, data)
-    if len(data) >= LARGE_BYTES and (large := _large_table(path, data, required, known)) is not None:
-        return large
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    header: list[str] | None = None
+    data = _checked(path, _read_bytes(path))
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True)
+    header: list[str] = []
+    blocks: list[list[str]] = []
     rows: list[list[str]] = []
     numbers: list[int] = []
     start = 1
     try:
         for cells in reader:
             stripped = [cell.strip() for cell in cells]
-            if any(stripped):
-                if header is None:
-                    header = stripped
-                    _check_header(path, header, required, known, start)
-                elif len(stripped) != len(header):
-                    raise InputError(
-                        f"The row has {len(stripped)} cells, the header has {len(header)}",
-                        file=path,
-                        row=start,
-                        advice="Give every row as many cells as the header; put text that contains a comma in quotes",
-                    )
-                else:
-                    rows.append(stripped)
-                    numbers.append(start)
+            if not any(stripped):
+                pass
+            elif not header:
+                header, blocks = stripped, [[] for _ in stripped]
+                _check_header(path, header, required, known, start)
+            else:
+                _check_row(path, header, stripped, start)
+                rows.append(stripped)
+                numbers.append(start)
+                if len(rows) == BLOCK_ROWS:
+                    _add_block(blocks, rows)
             start = reader.line_num + 1
     except csv.Error as error:
         raise InputError(
@@ -146,30 +136,45 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
             row=max(start, 1),
             advice="Look for a quote that is not closed",
         ) from error
-    if header is None:
+    if not header:
         raise InputError("The file is empty", file=path, advice=f"Its first row must name {', '.join(required)}")
-    if not rows:
+    if not numbers:
         raise InputError("The table has a header but no rows", file=path, advice="Add a row for each pick")
-    columns = {name: [row[i] for row in rows] for i, name in enumerate(header) if name}
-    unnamed = [i for i, name in enumerate(header) if not name]
-    for i in unnamed:
-        filled = [number for number, row in zip(numbers, rows, strict=True) if row[i]]
-        if filled:
-            raise InputError(
-                f"Column {i + 1} has no name, but a cell in it", file=path, row=filled[0], advice="Name it in row 1"
-            )
-    return TextTable(path, columns, numbers)
+    _add_block(blocks, rows)
+    return TextTable(path, {name: texts for name, texts in zip(header, blocks, strict=True) if name}, numbers)
 
 
-def _large_table(path: Path, data: bytes, required: Sequence[str], known: Sequence[str]) -> TextTable | None:
-    """The same table, quickly; None when there is anything unusual about it."""
-    begin = len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0
-    end = data.find(b"\n")
-    header = [cell.strip() for cell in data[begin:end].decode().split(",")]
-    if end < 0 or not all(header) or (columns := split_cells(data, end + 1, len(header))) is None:
+def _check_row(path: Path, header: list[str], cells: list[str], row: int) -> None:
+    if len(cells) != len(header):
+        raise InputError(
+            f"The row has {len(cells)} cells, the header has {len(header)}",
+            file=path,
+            row=row,
+            advice="Give every row as many cells as the header; put text that contains a comma in quotes",
+        )
+    if "" in header:
+        for i, cell in enumerate(cells):
+            if cell and not header[i]:
+                raise InputError(
+                    f"Column {i + 1} has no name, but a cell in it", file=path, row=row, advice="Name it in row 1"
+                )
+
+
+def _add_block(blocks: list[list[str]], rows: list[list[str]]) -> None:
+    """Move rows to the columns."""
+    for texts, cells in zip(blocks, zip(*rows, strict=True), strict=False):
+        texts.append(BETWEEN.join(cells))
+    rows.clear()
+
+
+def _numbers(cells: list[str], required: bool) -> Array | None:
+    """(n,) numbers, NaN where a cell is empty; None when one is no finite number, or empty although required."""
+    try:
+        values = np.array([float(cell) if cell else np.nan for cell in cells])
+    except ValueError:
         return None
-    _check_header(path, header, required, known, 1)
-    return TextTable(path, dict(zip(header, columns, strict=True)), range(2, len(columns[0]) + 2))
+    allowed = 0 if required else cells.count("")
+    return values if np.isfinite(values).sum() == len(cells) - allowed and "_" not in "".join(cells) else None
 
 
 def _read_bytes(path: Path) -> bytes:
@@ -181,16 +186,18 @@ def _read_bytes(path: Path) -> bytes:
         raise InputError(f"The file cannot be read ({error.strerror})", file=path, advice="Check the path") from error
 
 
-def _decoded(path: Path, data: bytes) -> str:
+def _checked(path: Path, data: bytes) -> bytes:
+    """The data, which are text in UTF-8."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError("The file is in UTF-16, not UTF-8", file=path, advice=EXPORT_ADVICE)
     if b"\0" in data:
         raise InputError("This is a binary file, not a table", file=path, advice=EXPORT_ADVICE)
     try:
-        return data.decode("utf-8-sig")
+        data.decode()
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, error.start) + 1
         raise InputError("The text is not in UTF-8", file=path, row=row, advice=EXPORT_ADVICE) from error
+    return data
 
 
 def _check_header(path: Path, header: list[str], required: Sequence[str], known: Sequence[str], row: int) -> None:

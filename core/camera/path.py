@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..vectors import Array
+from ..vectors import Array, Mask
 from .model import Camera, rotation_from_vector, vector_from_rotation
 
 
@@ -60,6 +60,14 @@ class CameraPath:
         position = (1 - share) * self.position[before] + share * self.position[before + 1]
         step = vector_from_rotation(self.rotation[1:] @ np.swapaxes(self.rotation[:-1], 1, 2))
         return position, rotation_from_vector(share * step[before]) @ self.rotation[before]
+
+    def known_at(self, time_s: ArrayLike) -> Mask:
+        """(n,) whether the pose was found in the frames nearest to video times (n,) [s]: its deviations are numbers."""
+        times = np.asarray(time_s, dtype=np.float64).reshape(-1)
+        after = np.clip(np.searchsorted(self.time_s, times), 0, self.time_s.size - 1)
+        before = np.maximum(after - 1, 0)
+        near = np.where(np.abs(self.time_s[before] - times) < np.abs(self.time_s[after] - times), before, after)
+        return np.isfinite(self.sigma_position_m[near]) & np.isfinite(self.sigma_rotation[near])
 
 
 def fixed(camera: Camera) -> CameraPath:

@@ -2,14 +2,12 @@
 """``rockfall refine``: picks and times fitted to the pixels of the footage → picks and impacts with deviations."""
 
 import argparse
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from ..errors import InputError, RockfallError
 from ..reconstruction.choices import FREE, LOSSES, Loss
 from ..reconstruction.sampling import STEP_S
 from ..vectors import Array, norm
@@ -21,14 +19,11 @@ if TYPE_CHECKING:
     from ..exchange.project import Project, RefinementSettings
     from ..reconstruction.impact import Impacts
     from ..reconstruction.picks import Picks
-    from ..reconstruction.refinement.refine import Refinement
-    from ..reconstruction.refinement.views import View
     from ..terrain.surface import Surface
+    from ..workflow.refinement import Refined
 
 MOST_ROWS = 20
 POSE = ("rx", "ry", "rz", "x", "y", "z")
-TINY = 1e-9
-"""A fitted drag of zero is none: the project's must be above zero."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,11 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Refine, write the tables and the refined project, print the summary."""
-    from ..exchange.footage import open_footage, take_trajectories
+    from ..exchange.footage import name_trajectory, open_footage
     from ..exchange.opening import blocks_of, drag_of, open_terrain
     from ..exchange.output import output_folder
     from ..exchange.project import read_project
-    from ..reconstruction.refinement.refine import refine
+    from ..workflow.refinement import refine_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.project}")
@@ -78,29 +73,26 @@ def run(arguments: argparse.Namespace) -> int:
         surface = open_terrain(project)
         footage = open_footage(project, None if surface is None else surface.shift)
         picks, notes = _picks(project, surface, footage)
-        footage = _named(footage, picks)
-        if arguments.trajectory:
-            picks = _chosen(picks, arguments.trajectory)
-            footage = take_trajectories(footage, arguments.trajectory)
-        progress(f"Fitting {len(picks)} picks to {len(footage.observations)} pixels")
-        refined = refine(
+        footage = name_trajectory(footage, picks)
+        refined = refine_picks(
             picks,
-            footage.views,
-            footage.observations,
+            footage.seen,
             surface=surface,
             block=blocks_of(project, picks),
             gravity_mps2=project.reconstruction.gravity_mps2,
             drag=drag_of(project),
             normal_radius_m=project.reconstruction.normal_radius_m,
+            names=arguments.trajectory,
             free=how.free,
             sigma_terrain_m=how.sigma_terrain_m,
             sigma_aim=how.sigma_aim,
             loss=cast(Loss, how.loss),
             site=project.site.name,
+            progress=progress,
         )
         progress("Writing the tables")
         written = _write(folder, project, how, footage, refined, surface, arguments.step)
-    for sentence in (*notes, *footage.notes, *_summary(picks, footage, refined)):
+    for sentence in (*notes, *footage.notes, *_summary(refined)):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
@@ -108,65 +100,26 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> "RefinementSettings":
     """As the project says, but for what was typed."""
-
     free = settings.free if arguments.free is None else known_names(arguments.free, FREE, "--free")
     aim = settings.sigma_aim if arguments.sigma_aim is None else arguments.sigma_aim
     return replace(settings, free=free, loss=arguments.loss or settings.loss, sigma_aim=aim)
 
 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
-    """The project's picks, or first ones from the events that were seen; with a sentence about these."""
-    from ..exchange.footage import picks_from_events
+    """The project's picks, or first ones from what was seen; with a sentence about these."""
+    from ..exchange.footage import picks_from_footage
     from ..exchange.tables import read_picks
 
     if project.picks is not None:
-        return read_picks(
-            project.picks, footage.views[0].path.reference.shift if surface is None else surface.shift
-        ), ()
-    names = sorted(set(footage.observations.trajectory.tolist()) - {""})
+        return read_picks(project.picks, footage.shift if surface is None else surface.shift), ()
+    names = sorted({name for video in footage.seen for name in video.sightings.trajectory.tolist()} - {""})
     alone = names[0] if len(names) == 1 else project.blocks[0].name if len(project.blocks) == 1 else "block"
-    picks = picks_from_events(project, surface, name=alone)
+    picks = picks_from_footage(project, surface, name=alone)
     count = picks.group_starts.size
     runs = "trajectory" if count == 1 else "trajectories"
-    return picks, (f"{len(picks)} first picks of {count} {runs} were made from the events seen in the videos.",)
-
-
-def _named(footage: "Footage", picks: "Picks") -> "Footage":
-    """Pixels without a trajectory belong to the only one that there is.
-
-    Raises
-    ------
-    InputError : there are several.
-    """
-    seen = footage.observations
-    if not (nameless := seen.trajectory == "").any():
-        return footage
-    names = list(dict.fromkeys(picks.trajectory.tolist()))
-    if len(names) != 1:
-        i = int(np.argmax(nameless))
-        raise InputError(
-            f"The track does not name the trajectory, but there are picks of {len(names)}",
-            file=footage.entries[int(seen.view[i])].track,
-            row=int(footage.row[i]),
-            advice=f"Add a column trajectory, with {', '.join(names[:5])}",
-        )
-    return replace(footage, observations=replace(seen, trajectory=np.where(nameless, names[0], seen.trajectory)))
-
-
-def _chosen(picks: "Picks", names: Sequence[str]) -> "Picks":
-    """The picks of some trajectories.
-
-    Raises
-    ------
-    RockfallError : one of them has no picks.
-    """
-    from ..reconstruction.picks import take
-
-    known = list(dict.fromkeys(picks.trajectory.tolist()))
-    for name in names:
-        if name not in known:
-            raise RockfallError(f"There is no trajectory {name!r}. The picks have: {', '.join(known)}.")
-    return take(picks, np.isin(picks.trajectory, names))
+    marked = any(video.events is not None for video in project.videos)
+    source = "the events seen in the videos" if marked else "the tracks, where a block changes its velocity at once"
+    return picks, (f"{len(picks)} first picks of {count} {runs} were made from {source}.",)
 
 
 def _write(
@@ -174,7 +127,7 @@ def _write(
     project: "Project",
     how: "RefinementSettings",
     footage: "Footage",
-    refined: "Refinement",
+    refined: "Refined",
     surface: "Surface | None",
     step_s: float,
 ) -> list[str]:
@@ -185,41 +138,43 @@ def _write(
     from ..exchange.tables import write_impacts, write_picks, write_trajectories
     from ..reconstruction.sampling import sample_trajectories
 
-    made, seen = refined.reconstruction, footage.observations
-    write_picks(refined.picks, folder / "picks.csv")
+    fit, seen = refined.fit, refined.seen
+    made = fit.reconstruction
+    write_picks(fit.picks, folder / "picks.csv")
     write_impacts(made.impacts, folder / "impacts.csv")
     write_trajectories(sample_trajectories(made, step_s, surface), folder / "trajectories.csv")
     write_refinement_residuals(
         folder / "residuals.csv",
         trajectory=seen.trajectory,
-        video=np.array([entry.name for entry in footage.entries])[seen.view],
-        frame=footage.frame,
+        video=np.array([view.name for view in fit.views])[seen.view],
+        frame=refined.frame,
         time_s=seen.time_s,
         pixel=seen.pixel,
-        residual_px=refined.residual_px,
-        outlier=refined.outlier,
+        residual_px=fit.residual_px,
+        outlier=fit.outlier,
     )
     written = ["picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv"]
     entries = {}
-    for i, (entry, view, camera) in enumerate(zip(footage.entries, refined.views, footage.cameras, strict=True)):
+    for i, (video, view) in enumerate(zip(footage.videos, fit.views, strict=True)):
+        entry, camera, covariance = video.entry, video.camera, refined.pose_covariance[i]
         entries[entry.name] = replace(entry, offset_s=view.clock.offset_s, drift=view.clock.drift)
-        if "camera" in how.free and footage.views[i].pose_covariance is not None:
+        if covariance is not None:
             file = folder / f"camera_{_as_file(entry.name)}.toml"
-            sigma = {name: value for name, value in camera.sigma.items() if name not in POSE} | _pose_sigma(view)
+            held = {name: value for name, value in camera.sigma.items() if name not in POSE}
             write_camera(
                 file,
                 view.path,
-                rmse_px=float(refined.rmse_px_by_view[i]),
-                sigma=sigma,
+                rmse_px=float(fit.rmse_px_by_view[i]),
+                sigma=held | dict(zip(POSE, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
                 crs=camera.crs,
-                pose_covariance=view.pose_covariance,
+                pose_covariance=covariance,
                 extra=camera.extra,
             )
             entries[entry.name] = replace(entries[entry.name], camera=file)
             written.append(file.name)
     reconstruction = replace(project.reconstruction, flights=made.ends, gravity_mps2=made.gravity_mps2)
-    if made.drag is not None:
-        reconstruction = replace(reconstruction, drag=True, drag_coefficient=max(made.drag.coefficient, TINY))
+    if refined.drag_coefficient is not None:
+        reconstruction = replace(reconstruction, drag=True, drag_coefficient=refined.drag_coefficient)
     result = replace(
         project,
         picks=folder / "picks.csv",
@@ -231,48 +186,39 @@ def _write(
     return [*written, "project.toml"]
 
 
-def _pose_sigma(view: "View") -> dict[str, float]:
-    if view.pose_covariance is None:
-        return {}
-    return dict(zip(POSE, np.sqrt(np.diag(view.pose_covariance)).tolist(), strict=True))
-
-
 def _as_file(name: str) -> str:
     """A video's name as a part of a file name."""
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
 
 
-def _summary(before: "Picks", footage: "Footage", refined: "Refinement") -> list[str]:
-    seen = footage.observations
-    used = np.isfinite(refined.residual_px[:, 0])
+def _summary(refined: "Refined") -> list[str]:
+    fit = refined.fit
+    views, used = fit.views, np.isfinite(fit.residual_px[:, 0])
     sentences = [
-        f"{int(used.sum())} pixels in {len(footage.views)} {'video' if len(footage.views) == 1 else 'videos'}: "
-        f"{refined.rmse_px_before:.2f} px off the marked motion, {refined.rmse_px:.2f} px off the fitted one "
-        f"(root mean square), {int(refined.outlier.sum())} outliers; {refined.iterations} steps."
+        f"{int(used.sum())} pixels in {len(views)} {'video' if len(views) == 1 else 'videos'}: "
+        f"{fit.rmse_px_before:.2f} px off the marked motion, {fit.rmse_px:.2f} px off the fitted one "
+        f"(root mean square), {int(fit.outlier.sum())} outliers; {fit.iterations} steps."
     ]
-    if len(footage.views) > 1:
-        each = [f"{view.name} {rmse:.2f} px" for view, rmse in zip(refined.views, refined.rmse_px_by_view, strict=True)]
+    if len(views) > 1:
+        each = [f"{view.name} {rmse:.2f} px" for view, rmse in zip(views, fit.rmse_px_by_view, strict=True)]
         sentences.append(f"By video: {', '.join(each)}.")
-    moved = np.isin(refined.picks.trajectory, np.unique(seen.trajectory)) & (refined.picks.kind != "pass")
-    shift = norm(refined.picks.position - before.in_shift(refined.picks.shift).position)[moved]
-    late = np.abs(refined.picks.time_s - before.time_s)[moved]
+    fitted = np.isin(fit.picks.trajectory, np.unique(refined.seen.trajectory)) & (fit.picks.kind != "pass")
+    shift, late = refined.moved_m[fitted], np.abs(refined.later_s[fitted])
     if shift.size:
         sentences.append(
             f"The picks moved by {100 * np.median(shift):.1f} cm and {1e3 * np.median(late):.1f} ms (medians), by "
             f"{100 * shift.max():.1f} cm and {1e3 * late.max():.1f} ms at most."
         )
-    if refined.noise_scale > 1:
-        sentences.append(
-            f"The residuals are {refined.noise_scale:.2f} times what was stated; the deviations allow for it."
-        )
-    if refined.aim:
-        off = [100 * float(norm(aim)) for aim, _ in refined.aim.values()]
+    if fit.noise_scale > 1:
+        sentences.append(f"The residuals are {fit.noise_scale:.2f} times what was stated; the deviations allow for it.")
+    if fit.aim:
+        off = [100 * float(norm(aim)) for aim, _ in fit.aim.values()]
         sentences.append(
             f"The tracked spot lies {np.median(off):.0f} % of the block's diameter off its centre"
             + (f" (median; at most {max(off):.0f} %)." if len(off) > 1 else ".")
         )
-    sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in refined.unknowns.items()]
-    return [*sentences, *_impact_lines(refined.reconstruction.impacts), *map(str, refined.remarks)]
+    sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in fit.unknowns.items()]
+    return [*sentences, *_impact_lines(fit.reconstruction.impacts), *map(str, refined.remarks)]
 
 
 def _impact_lines(impacts: "Impacts") -> list[str]:

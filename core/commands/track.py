@@ -11,7 +11,7 @@ from .options import add_out, positive, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
-    from ..exchange.footage_tables import Events, Track
+    from ..exchange.footage_tables import EventTable, Track
     from ..footage.background import BackgroundMotion
     from ..footage.kinks import Kinks
     from ..footage.tracking import BlockTrack
@@ -178,9 +178,9 @@ def _table(track: "BlockTrack", name: str) -> "Track":
 
 def _events(
     video: "Video", motion: "BackgroundMotion", kinks: "Kinks", name: str, capture_rate_hz: float | None
-) -> "Events":
+) -> "EventTable":
     """Proposed impacts at video times, their pixels in the nearest frame."""
-    from ..exchange.footage_tables import Events
+    from ..exchange.footage_tables import EventTable
     from ..footage.background import destabilise
 
     number = np.arange(video.frames, dtype=np.float64)
@@ -191,7 +191,7 @@ def _events(
         time = np.interp(place, number, video.time_s)
         sigma = kinks.sigma_time_s * capture_rate_hz * video.usual_step_s
     frame = np.clip(np.round(place).astype(np.intp), motion.frames[0], motion.frames[-1])
-    return Events(
+    return EventTable(
         trajectory=np.full(len(kinks), name),
         frame=frame,
         time_s=time.round(6),
@@ -208,7 +208,7 @@ def _tell(
     track: "BlockTrack",
     motion: "BackgroundMotion",
     kinks: "Kinks",
-    events: "Events",
+    events: "EventTable",
 ) -> None:
     first, last = int(track.frame[0]), int(track.frame[-1])
     gaps = last - first + 1 - track.frame.size

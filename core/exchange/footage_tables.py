@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, Indices, Mask, Names
+from ..workflow.sightings import Events, Sightings
 from .csv_text import TextTable, read_table
 from .tables import Columns, vector_columns, write_columns
 
@@ -47,34 +48,21 @@ class Clicks:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """The block's centre in m frames; times ascend within a trajectory.
+class Track(Sightings):
+    """A table of sightings, with the rows of its file.
 
     Attributes
     ----------
-    trajectory : (m,) empty where not given.
-    frame : (m,) −1 where not given.
-    time_s : (m,) video time [s].
-    pixel : (m, 2) [px].
-    sigma_px : (m,) standard deviation of a coordinate; NaN where not given.
     score : (m,) how well the block was recognised, 0…1; NaN where not given.
     row : (m,) in a text editor.
     extra : further columns as text.
     source : the file, may be empty.
     """
 
-    trajectory: Names
-    frame: Indices
-    time_s: Array
-    pixel: Array
-    sigma_px: Array
     score: Array
     row: Indices
     extra: Extra = field(default_factory=dict)
     source: str = ""
-
-    def __len__(self) -> int:
-        return len(self.pixel)
 
     def error(self, index: int, problem: str, advice: str) -> InputError:
         """An `InputError` that points at one row."""
@@ -82,32 +70,12 @@ class Track:
 
 
 @dataclass(frozen=True, eq=False)
-class Events:
-    """What happened to the block, as seen in one video: n impacts and other events.
+class EventTable(Events):
+    """A table of events, with the rows of its file; row, extra, source : as in `Track`."""
 
-    Attributes
-    ----------
-    trajectory : (n,) empty where not given.
-    frame : (n,) −1 where not given.
-    time_s : (n,) video time [s].
-    pixel : (n, 2) of the block's centre [px].
-    sigma_time_s : (n,) NaN where not given.
-    kind : (n,) one of `EVENT_KINDS`.
-    row, extra, source : as in `Track`.
-    """
-
-    trajectory: Names
-    frame: Indices
-    time_s: Array
-    pixel: Array
-    sigma_time_s: Array
-    kind: Names
     row: Indices
     extra: Extra = field(default_factory=dict)
     source: str = ""
-
-    def __len__(self) -> int:
-        return len(self.pixel)
 
     def error(self, index: int, problem: str, advice: str) -> InputError:
         """An `InputError` that points at one row."""
@@ -169,7 +137,7 @@ def write_track(track: Track, path: str | Path) -> None:
     write_columns(path, columns | dict(track.extra))
 
 
-def read_events(path: str | Path) -> Events:
+def read_events(path: str | Path) -> EventTable:
     """Read events.csv: impacts and other events as seen in one video.
 
     Raises
@@ -181,7 +149,7 @@ def read_events(path: str | Path) -> Events:
     for i, kind in enumerate(kinds):
         if kind not in EVENT_KINDS:
             raise table.error(i, f"Unknown kind '{kind}'", f"Use one of {', '.join(EVENT_KINDS)}")
-    return Events(
+    return EventTable(
         trajectory=_names(table, "trajectory"),
         frame=_frames(table),
         time_s=table.numbers("time_s", required=True),
@@ -194,7 +162,7 @@ def read_events(path: str | Path) -> Events:
     )
 
 
-def write_events(events: Events, path: str | Path) -> None:
+def write_events(events: EventTable, path: str | Path) -> None:
     """Write events.csv, unknown columns at the end."""
     columns: Columns = {"trajectory": events.trajectory, "frame": _whole(events.frame), "time_s": events.time_s}
     columns |= vector_columns(PIXEL, events.pixel) | {"sigma_time_s": events.sigma_time_s, "kind": events.kind}

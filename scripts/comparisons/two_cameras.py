@@ -23,6 +23,7 @@ from rockfall.core.reconstruction.sampling import sample_trajectories
 from rockfall.core.reconstruction.triangulation import triangulate
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.vectors import Array
+from rockfall.core.workflow.refinement import pixels_of
 
 EXAMPLE = Path(__file__).parents[2] / "assets" / "examples" / "two_cameras"
 CAMERAS = ("camera", "clock", "clock_drift")
@@ -39,6 +40,8 @@ class Table:
 
     surface: Surface
     footage: Footage
+    views: tuple[View, ...]
+    seen: PixelObservations
     picks: Picks
     block: dict[str, Block]
     drag: Drag | None
@@ -52,12 +55,11 @@ def load(names: Sequence[str] | None = None) -> Table:
     assert known.picks is not None
     footage = open_footage(known, surface.shift)
     picks = read_picks(known.picks, surface.shift)
+    seen, _ = pixels_of(footage.seen)
     if names is not None:
-        picks = take(picks, np.isin(picks.trajectory, names))
-        footage = replace(
-            footage, observations=footage.observations.take(np.isin(footage.observations.trajectory, names))
-        )
-    return Table(surface, footage, picks, dict(blocks_of(known, picks)), drag_of(known))
+        picks, seen = take(picks, np.isin(picks.trajectory, names)), seen.take(np.isin(seen.trajectory, names))
+    views = tuple(video.view for video in footage.seen)
+    return Table(surface, footage, views, seen, picks, dict(blocks_of(known, picks)), drag_of(known))
 
 
 def fit(
@@ -73,8 +75,8 @@ def fit(
     """Refine with what is given instead of the example's own."""
     return refine(
         table.picks if picks is None else picks,
-        table.footage.views if views is None else views,
-        table.footage.observations if seen is None else seen,
+        table.views if views is None else views,
+        table.seen if seen is None else seen,
         surface=table.surface if on_table else None,
         block=table.block,
         drag=table.drag if drag else None,
@@ -91,14 +93,14 @@ def of_view(seen: PixelObservations, view: int) -> PixelObservations:
 
 def of_run(table: Table, name: str) -> tuple[Picks, PixelObservations]:
     """Picks and pixels of one run."""
-    seen = table.footage.observations
+    seen = table.seen
     return take(table.picks, table.picks.trajectory == name), seen.take(seen.trajectory == name)
 
 
 def predicted(table: Table, alone: Refinement, views: Sequence[View]) -> Array:
     """(m, 2) pixels of camera 2 less those that the motion seen by camera 1 alone predicts there [px]."""
     samples = sample_trajectories(alone.reconstruction, STEP_S)
-    seen, view = of_view(table.footage.observations, 1), views[1]
+    seen, view = of_view(table.seen, 1), views[1]
     error = np.full((len(seen), 2), np.nan)
     when = view.clock.to_common(seen.time_s)
     for name in np.unique(seen.trajectory):
@@ -117,7 +119,7 @@ def bounces(found: Refinement) -> Array:
 
 def miss_distances(table: Table, views: Sequence[View]) -> Array:
     """(n,) of the rays [m], camera 2's pixels taken between two frames to the time of camera 1's."""
-    seen = table.footage.observations
+    seen = table.seen
     first, second = of_view(seen, 0), of_view(seen, 1)
     when, other = (view.clock.to_common(part.time_s) for view, part in zip(views, (first, second), strict=True))
     place = np.searchsorted(other, when)
@@ -141,7 +143,7 @@ def jackknife(table: Table, views: Sequence[View]) -> float:
     values = []
     for group in range(GROUPS):
         kept = [name for i, name in enumerate(names) if i % GROUPS != group]
-        seen, picks = table.footage.observations, table.picks
+        seen, picks = table.seen, table.picks
         part = fit(
             table,
             ("gravity",),
@@ -162,9 +164,9 @@ def spread(values: Array, digits: int = 4) -> str:
 def main() -> None:
     """Print the numbers of the README."""
     table = load()
-    seen, names = table.footage.observations, list(dict.fromkeys(table.picks.trajectory.tolist()))
+    seen, names = table.seen, list(dict.fromkeys(table.picks.trajectory.tolist()))
     print(f"{len(names)} runs, {(table.picks.kind == 'impact').sum()} bounces, {len(seen)} pixels")
-    for entry, solved in zip(table.footage.entries, table.footage.cameras, strict=True):
+    for entry, solved in ((video.entry, video.camera) for video in table.footage.videos):
         camera = solved.path.reference
         print(f"{entry.name}: f {camera.fx:.0f} px, at {camera.position.round(2)}, rmse {solved.rmse_px:.2f} px")
 
@@ -176,7 +178,7 @@ def main() -> None:
     )
     for name, (value, sigma) in both.unknowns.items():
         print(f"  {name} {value:.5f} ± {sigma:.5f}")
-    for label, views in (("as aligned", table.footage.views), ("refined with both", held)):
+    for label, views in (("as aligned", table.views), ("refined with both", held)):
         now = [replace(view, clock=better.clock) for view, better in zip(views, held, strict=True)]
         alone = fit(table, views=now, seen=of_view(seen, 0))
         error = np.hypot(*predicted(table, alone, now).T)
@@ -196,11 +198,11 @@ def main() -> None:
         )
     print(f"rays miss by {spread(1e3 * miss_distances(table, held), 1)} mm")
     print("  as aligned " + spread(1e3 * miss_distances(table, [
-        replace(view, clock=better.clock) for view, better in zip(table.footage.views, held, strict=True)
+        replace(view, clock=better.clock) for view, better in zip(table.views, held, strict=True)
     ]), 1))  # fmt: skip
     free_z = fit(table, views=held, on_table=False)
     print(f"centre at the bounces {spread(1e3 * bounces(free_z)[:, 2], 1)} mm above the table")
-    own = [replace(view, clock=better.clock) for view, better in zip(table.footage.views, held, strict=True)]
+    own = [replace(view, clock=better.clock) for view, better in zip(table.views, held, strict=True)]
     print(f"  cameras as aligned {spread(1e3 * bounces(fit(table, views=own, on_table=False))[:, 2], 1)} mm")
 
     for label, free, drag in (

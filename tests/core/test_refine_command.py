@@ -8,9 +8,10 @@ import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
 from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.cli import main
+from rockfall.core.errors import RockfallError
 from rockfall.core.exchange.cameras import read_camera, write_camera
 from rockfall.core.exchange.csv_text import read_table
-from rockfall.core.exchange.footage import open_footage, picks_from_events
+from rockfall.core.exchange.footage import open_footage, picks_from_footage
 from rockfall.core.exchange.opening import open_project, open_terrain
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_impacts, read_picks
@@ -217,7 +218,7 @@ def test_the_refined_project_reads_back_as_what_was_refined(site, tmp_path):
 
 def test_without_picks_the_events_give_the_first_ones(site, tmp_path, capsys):
     change(site, '[picks]\nfile = "picks.csv"\n', "")
-    first = picks_from_events(read_project(site / "project.toml"), open_terrain(read_project(site / "project.toml")))
+    first = picks_from_footage(read_project(site / "project.toml"), open_terrain(read_project(site / "project.toml")))
     truth = np.concatenate([contacts(name) for name in TIMES])
     assert norm(first.shift.to_survey(first.position) - SHIFT.to_survey(truth)).max() < 1e-6
     assert first.extra["video"].tolist() == ["left"] * 7
@@ -284,9 +285,9 @@ def test_a_slow_motion_file_runs_at_its_capture_rate(site, tmp_path):
     (site / "right.csv").write_text("\n".join([lines[0], *table]) + "\n")
     change(site, "offset_s = 7.25", f"offset_s = {7.25 + late}\ncapture_rate_hz = 50.0")
     footage = open_footage(read_project(site / "project.toml"))
-    assert footage.views[1].clock.rate == pytest.approx(1.0, abs=1e-12)
+    assert footage.videos[1].clock.rate == pytest.approx(1.0, abs=1e-12)
     change(site, "capture_rate_hz = 50.0", "capture_rate_hz = 400")
-    assert open_footage(read_project(site / "project.toml")).views[1].clock.rate == pytest.approx(1 / 8)
+    assert open_footage(read_project(site / "project.toml")).videos[1].clock.rate == pytest.approx(1 / 8)
 
 
 def test_a_camera_that_is_a_little_off_is_put_right(site, tmp_path):
@@ -372,7 +373,41 @@ def test_bad_tables_and_options_are_refused_with_their_place(site, capsys):
     assert "covariance" in refused(capsys, site, "--free", "camera")
     change(site, '[picks]\nfile = "picks.csv"\n', "")
     change(site, 'events = "left_events.csv"\n', "")
-    assert "no video with events" in refused(capsys, site)
+    for name in ("left.csv", "right.csv"):
+        lines = (site / name).read_text().splitlines()
+        (site / name).write_text("\n".join(lines[:8]) + "\n")
+    assert "no video with events to make them from, and the tracked blocks change" in refused(capsys, site)
+    project = read_project(site / "project.toml")
+    blind = replace(project, videos=tuple(replace(video, track=None) for video in project.videos))
+    with pytest.raises(RockfallError, match="no video with events to make them from: add"):
+        picks_from_footage(blind, open_terrain(project))
+
+
+def test_without_a_terrain_events_have_no_places(site, capsys):
+    change(site, '[picks]\nfile = "picks.csv"\n', "")
+    change(site, '[terrain]\nfile = "plane.ply"\n', "")
+    assert "Picks can be made from events on a terrain only: add [terrain]" in refused(capsys, site)
+
+
+def test_without_events_the_tracks_give_the_first_picks(site, tmp_path, capsys):
+    """Impacts where the tracked pixels turn at once; the flights before the first and after the last end in passes."""
+    change(site, '[picks]\nfile = "picks.csv"\n', "")
+    change(site, 'events = "left_events.csv"\n', "")
+    project = read_project(site / "project.toml")
+    first = picks_from_footage(project, open_terrain(project))
+    assert first.kind.tolist() == ["pass", "impact", "impact", "pass", "pass", "impact", "pass"]
+    impacts = first.kind == "impact"
+    assert np.abs(first.time_s[impacts] - [10.9, 11.7, 20.8]).max() < 0.005
+    contact = SHIFT.to_survey(np.concatenate([contacts("B1")[1:3], contacts("B2")[1:2]]))
+    assert norm(first.shift.to_survey(first.position[impacts]) - contact).max() < 0.05
+    for i in np.flatnonzero(~impacts):
+        place = centre_at(str(first.trajectory[i]), first.time_s[i : i + 1])
+        assert norm(first.shift.to_survey(first.position[i : i + 1]) - SHIFT.to_survey(place)).max() < 0.3
+    assert main(["refine", str(site / "project.toml"), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "7 first picks of 2 trajectories were made from the tracks, where a block changes its velocity" in said
+    refined = read_picks(tmp_path / "out" / "picks.csv", SHIFT)
+    assert norm(refined.position[refined.kind == "impact"] - SHIFT.to_local(contact)).max() < 0.015
 
 
 def test_an_event_whose_ray_misses_is_located(site, capsys):

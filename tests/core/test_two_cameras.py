@@ -44,7 +44,8 @@ def both(table: Table) -> Refinement:
 
 def test_the_cameras_come_from_the_pairs() -> None:
     measured = ((1242.0, (1.7, -2.6, 1.5), 2.5), (1255.0, (1.6, 4.4, 1.6), 2.8))  # by another program
-    for entry, (focal, position, rmse) in zip(load().footage.cameras, measured, strict=True):
+    files = [video.camera for video in load().footage.videos]
+    for entry, (focal, position, rmse) in zip(files, measured, strict=True):
         number = 1 if focal == 1242.0 else 2
         pairs = read_pairs(EXAMPLE / f"pairs_{number}.csv")
         found = resect(pairs.pixel, pairs.point, 1280, 720, sigma_px=pairs.sigma_px, shift=pairs.shift)
@@ -65,7 +66,7 @@ def test_both_cameras_agree_on_one_motion(both: Refinement) -> None:
 
 
 def test_without_the_doubled_frame_the_clocks_do_not_agree(table: Table, both: Refinement) -> None:
-    seen = table.footage.observations
+    seen = table.seen
     late = (seen.view == 1) & (seen.time_s > SLIP_S)
     assert late.any()
     counted = replace(seen, time_s=seen.time_s + late / 30)
@@ -76,9 +77,7 @@ def test_without_the_doubled_frame_the_clocks_do_not_agree(table: Table, both: R
 def test_the_ball_bounces_a_radius_above_the_table(both: Refinement) -> None:
     """Without the table: where two flights meet, seen by the cameras as they came from six points each."""
     everything = load()
-    views = [
-        replace(view, clock=better.clock) for view, better in zip(everything.footage.views, both.views, strict=True)
-    ]
+    views = [replace(view, clock=better.clock) for view, better in zip(everything.views, both.views, strict=True)]
     height = bounces(fit(everything, views=views, on_table=False))[:, 2]
     assert height.size == 50
     assert np.median(height) == pytest.approx(RADIUS_M, abs=0.003)
@@ -92,8 +91,8 @@ def test_rays_meet(table: Table, both: Refinement) -> None:
 
 
 def test_camera_1_alone_tells_what_camera_2_sees(table: Table, both: Refinement) -> None:
-    views = [replace(view, clock=better.clock) for view, better in zip(table.footage.views, both.views, strict=True)]
-    alone = fit(table, views=views, seen=of_view(table.footage.observations, 0))
+    views = [replace(view, clock=better.clock) for view, better in zip(table.views, both.views, strict=True)]
+    alone = fit(table, views=views, seen=of_view(table.seen, 0))
     assert np.nanmedian(np.hypot(*alone.residual_px.T)) < 1.5
     error = np.hypot(*predicted(table, alone, views).T)
     assert np.median(error) < 10

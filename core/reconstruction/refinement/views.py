@@ -43,6 +43,10 @@ class View:
                 advice="Give rotation [rad] and position [m], or leave it out",
             )
 
+    def exposed_at(self, time_s: Array, pixel: Array) -> Array:
+        """(m,) when the rows of pixels (m, 2) of pictures at video times (m,) were exposed, on the common clock [s]."""
+        return self.clock.to_common(time_s) + self.row_time_s * (pixel[:, 1] - self.path.reference.height / 2)
+
     def in_shift(self, shift: GlobalShift) -> "View":
         """The same view in the local frame of another shift."""
         old = self.path.reference.shift

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..remarks import Remark
 from ..vectors import Array, Mask
 from .picks import Picks
 
@@ -23,8 +24,8 @@ NOTICEABLE_DIAMETERS = 3.0
 NEAR_BOX_M = 1000.0
 
 
-def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tuple[str, ...]:
-    """Sentences about picks that lie off the terrain.
+def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tuple[Remark, ...]:
+    """Remarks on picks that lie off the terrain, about their trajectories.
 
     Parameters
     ----------
@@ -53,12 +54,12 @@ def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tupl
             "Correct its coordinates, or discard it (status discarded); a point in the air is of kind pass",
         )
     off = grounded & (distance > np.maximum(NOTICEABLE_M, NOTICEABLE_DIAMETERS * diameter_m))
-    return tuple(
-        f"The {picks.kind[i]} pick of trajectory {picks.trajectory[i]} at {picks.time_s[i]:.3f} s"
-        + (f" (row {picks.row[i]})" if picks.row[i] else "")
-        + f" lies {distance[i]:.1f} m off the terrain."
-        for i in np.flatnonzero(off)
-    )
+    remarks = []
+    for i in np.flatnonzero(off):
+        row = f" (row {picks.row[i]})" if picks.row[i] else ""
+        text = f"The {picks.kind[i]} pick of trajectory {picks.trajectory[i]} at {picks.time_s[i]:.3f} s{row} lies "
+        remarks.append(Remark(f"{text}{distance[i]:.1f} m off the terrain.", "warning", str(picks.trajectory[i])))
+    return tuple(remarks)
 
 
 def _check_overlap(picks: Picks, surface: "Surface") -> None:

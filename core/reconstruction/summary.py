@@ -43,8 +43,8 @@ def summarise(reconstruction: Reconstruction) -> tuple[str, ...]:
             f"{_count(bare, 'impact')} without a terrain normal: velocities, R and deviation only. "
             "Give a terrain, or nx, ny, nz."
         )
-    notes = reconstruction.notes
-    sentences += notes[:MOST_NOTES]
+    notes = reconstruction.remarks
+    sentences += [remark.text for remark in notes[:MOST_NOTES]]
     if notes[MOST_NOTES:]:
         sentences.append(f"… and {len(notes) - MOST_NOTES} more.")
     return tuple(sentences)

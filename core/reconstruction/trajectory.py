@@ -9,6 +9,7 @@ import numpy as np
 
 from ..constants import GRAVITY_MPS2
 from ..errors import RockfallError
+from ..remarks import Remark
 from ..vectors import Indices
 from .block import Block, per_pick
 from .choices import FlightEnds
@@ -40,7 +41,7 @@ class Reconstruction:
     gravity_mps2 : [m/s²].
     drag : None without.
     ends : what the flights join.
-    notes : sentences for the summary about what deserves a look.
+    remarks : on what deserves a look, about its trajectory.
     """
 
     picks: Picks
@@ -53,7 +54,7 @@ class Reconstruction:
     gravity_mps2: float
     drag: Drag | None
     ends: FlightEnds
-    notes: tuple[str, ...]
+    remarks: tuple[Remark, ...]
 
 
 def reconstruct(
@@ -100,10 +101,10 @@ def reconstruct(
     if normal_radius_m is not None and not (np.isfinite(normal_radius_m) and normal_radius_m > 0):
         raise RockfallError(f"The normal's radius must be a positive number [m], not {normal_radius_m}.")
     block = block if block is not None else Block()
-    notes: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     if surface is not None:
         picks = picks.in_shift(surface.shift)
-        notes = check_placement(picks, surface, per_pick(picks, block, lambda one: one.diameter_m))
+        remarks = check_placement(picks, surface, per_pick(picks, block, lambda one: one.diameter_m))
 
     motion = solve_motion(picks, block, gravity_mps2, drag, surface, normal_radius_m, flights)
     return Reconstruction(
@@ -117,15 +118,15 @@ def reconstruct(
         gravity_mps2=gravity_mps2,
         drag=drag,
         ends=flights,
-        notes=notes + _lonely(picks),
+        remarks=remarks + _lonely(picks),
     )
 
 
-def _lonely(picks: Picks) -> tuple[str, ...]:
+def _lonely(picks: Picks) -> tuple[Remark, ...]:
     starts = picks.group_starts
-    alone = starts[np.diff(np.r_[starts, len(picks)]) == 1]
-    return tuple(
-        f"Trajectory {picks.trajectory[i]} has a single pick{f' (row {picks.row[i]})' if picks.row[i] else ''}: "
-        "no flight can be computed."
-        for i in alone
-    )
+    remarks = []
+    for i in starts[np.diff(np.r_[starts, len(picks)]) == 1]:
+        row = f" (row {picks.row[i]})" if picks.row[i] else ""
+        text = f"Trajectory {picks.trajectory[i]} has a single pick{row}: no flight can be computed."
+        remarks.append(Remark(text, "advice", str(picks.trajectory[i])))
+    return tuple(remarks)

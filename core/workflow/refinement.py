@@ -85,7 +85,7 @@ def refine_picks(
     ----------
     names : of the trajectories; None takes all.
     free : what else is fitted, see `refine`; the clock of a single video is not.
-    block, gravity_mps2, surface, drag, normal_radius_m, sigma_terrain_m, sigma_aim, loss, site : see `refine`.
+    Others : see `refine`.
 
     Raises
     ------

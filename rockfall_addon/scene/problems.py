@@ -34,9 +34,8 @@ def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[
     """Trajectory → what deserves a look in its reconstruction."""
     names = list(dict.fromkeys(result.picks.trajectory.tolist()))
     said: dict[str, list[str]] = {name: [] for name in names}
-    for note in result.notes:
-        about = [name for name in names if f"rajectory {name} " in note]
-        said[max(about, key=len) if about else names[0]].append(note)
+    for remark in result.remarks:
+        said[remark.about].append(remark.text)
     impacts = result.impacts
     for i in np.flatnonzero(impacts.normal[:, 2] < BACKSIDE):
         said[str(impacts.trajectory[i])].append(

@@ -95,7 +95,8 @@ def test_trajectories_are_grouped_and_a_single_pick_is_mentioned():
     assert picks.row.tolist() == [2, 4, 6, 3, 5]
     result = reconstruct(picks)
     assert len(result.flights) == 2
-    assert [note.split(" has")[0] for note in result.notes] == ["Trajectory a", "Trajectory c"]
+    assert [remark.text.split(" has")[0] for remark in result.remarks] == ["Trajectory a", "Trajectory c"]
+    assert [(remark.severity, remark.about) for remark in result.remarks] == [("advice", "a"), ("advice", "c")]
     assert result.impacts.flag_text() == ["first", "", "last", "first;last", "first;last"]
 
 

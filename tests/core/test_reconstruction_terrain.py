@@ -115,10 +115,10 @@ def test_picks_of_another_shift_come_into_the_terrains_frame():
 def test_a_pick_a_little_off_is_mentioned():
     position = bounces()
     position[2] += 2.0 * OUT
-    notes = reconstruct(picks_at(position), surface=SURFACE).notes
-    assert len(notes) == 1
-    assert "row 4" in notes[0]
-    assert "2.0 m off the terrain" in notes[0]
+    (remark,) = reconstruct(picks_at(position), surface=SURFACE).remarks
+    assert remark.severity == "warning"
+    assert "row 4" in remark.text
+    assert "2.0 m off the terrain" in remark.text
 
 
 @pytest.mark.parametrize("offset", [(0, 0, 50.0), (0, 0, -50.0), (0, 120.0, 0)])

@@ -10,6 +10,7 @@ from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.footage.clock import Clock
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.progress import CancelledError
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.node_motion import join_nodes, places_at
@@ -536,3 +537,30 @@ def test_picks_too_close_in_time_are_refused():
     time[2] = time[1] + 5e-5
     with pytest.raises(RockfallError, match="The picks are too close in time to be fitted"):
         run(views, observe(views), make_picks(["a"] * 5, time, PLACE, **EXACT))
+
+
+def test_a_refinement_can_be_stopped():
+    """The progress goes through all trajectories; raising in it ends the search."""
+    views = [view()]
+    pixels = observe(views, noise=1.0)
+    both = PixelObservations(
+        np.tile(pixels.view, 2),
+        np.repeat(["a", "b"], len(pixels)),
+        np.tile(pixels.time_s, 2),
+        np.tile(pixels.pixel, (2, 1)),
+        np.tile(pixels.sigma_px, 2),
+    )
+    one = marked(1)
+    picks = make_picks(np.repeat(["a", "b"], 5), np.tile(one.time_s, 2), np.tile(one.position, (2, 1)))
+    said = []
+    result = run(views, both, picks, progress=lambda *step: said.append(step))
+    assert {text for text, _, _ in said} == {"Fitting"}
+    assert sorted({(done, total) for _, done, total in said}) == [(0, 2), (1, 2)]
+    assert len(said) >= result.iterations > 1
+
+    def stop(text, done, total):
+        if done == 1:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        run(views, both, picks, progress=stop)

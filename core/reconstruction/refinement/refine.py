@@ -53,7 +53,7 @@ def refine(
     views : the cameras, their clocks roughly right.
     observations : pixels of the block's centre.
     surface : terrain, which every block on the ground touches as a sphere; without it, places come from the rays alone.
-    block, gravity_mps2, drag, normal_radius_m, site : see `reconstruct`.
+    block, gravity_mps2, drag, normal_radius_m, site : see `reconstruct`; progress : called at every step.
     free : what else to fit, of `FREE`: the poses of the views that have a covariance, the clocks of all but the first
         view, the drag coefficient, gravity. All trajectories share these.
     sigma_terrain_m : standard deviation of the centre's distance from the terrain at a contact, about its radius. None

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Each test gets an empty scene and a freshly registered Rockfall, and fails when unregistering leaves something."""
+"""Each test gets an empty scene and the registered Rockfall, and must leave Blender as it found it.
+
+Rockfall is registered once, and again after a test that has failed or that enables and disables it. Disabling it must
+leave nothing behind: that is looked at whenever it is disabled, at the latest after the last test.
+"""
 
 import importlib
-import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import ModuleType
 
 import addon_utils
@@ -15,9 +19,39 @@ NAME = "bl_ext.user_default.rockfall" if bpy.app.binary_path else "rockfall"
 
 
 class Installation:
-    """Rockfall in this Blender, to be switched on and off."""
+    """Rockfall in this Blender, to be switched on and off.
+
+    Attributes
+    ----------
+    draw_handlers : those that were added and not yet removed; Blender itself does not list them.
+    failed : a test has failed since Rockfall was enabled.
+    """
 
     name = NAME
+
+    def __init__(self, draw_handlers: set[object]) -> None:
+        self.draw_handlers = draw_handlers
+        self.failed = False
+        self.registered: dict[str, list] | None = None
+
+    def shared(self) -> ModuleType:
+        """The registered package, enabled now if it is not, or if what a failed test has left may be in its way."""
+        if self.failed or self.registered is None:
+            self.end()
+            self.enable()
+            self.registered = self.traces()
+        return importlib.import_module(NAME)
+
+    def end(self) -> None:
+        """Disable it if it is enabled; nothing may remain."""
+        self.registered, self.failed = None, False
+        if self.is_enabled():
+            self.disable()
+        left = {kind: names for kind, names in self.traces().items() if names}
+        assert not left, f"disabling leaves {left}"
+
+    def is_enabled(self) -> bool:
+        return hasattr(bpy.types, "ROCKFALL_PT_installation")
 
     def enable(self) -> ModuleType:
         """Register as ticking the box in the preferences does; the libraries stay unpacked between tests."""
@@ -41,8 +75,8 @@ class Installation:
         """A module of the package: ``part("core.terrain.readers")``."""
         return importlib.import_module(f"{NAME}.{name}")
 
-    def traces(self) -> dict[str, list[str]]:
-        """What registering leaves in Blender: handlers, types, properties, menu entries, key map items."""
+    def traces(self) -> dict[str, list]:
+        """What registering leaves in Blender: handlers, types, properties, menu entries, key map items, drawing."""
         handlers = [
             f"{name}: {function.__module__}.{function.__qualname__}"
             for name in dir(bpy.app.handlers)
@@ -69,7 +103,8 @@ class Installation:
             if getattr(each, "is_registered", False)
         ]
         found = {"handlers": handlers, "types": types, "properties": properties, "menus": entries, "keys": keys}
-        return {kind: sorted(name for name in names if "rockfall" in name.lower()) for kind, names in found.items()}
+        ours = {kind: sorted(name for name in names if "rockfall" in name.lower()) for kind, names in found.items()}
+        return ours | {"drawing": sorted(self.draw_handlers, key=id)}
 
 
 def _subclasses(base: type) -> Iterator[type]:
@@ -78,17 +113,20 @@ def _subclasses(base: type) -> Iterator[type]:
         yield from _subclasses(each)
 
 
-@pytest.fixture
-def installation() -> Installation:
-    return Installation()
+@pytest.fixture(scope="session")
+def installation() -> Iterator[Installation]:
+    with watched_drawing() as draw_handlers:
+        found = Installation(draw_handlers)
+        yield found
+        found.end()
 
 
-@pytest.fixture
-def draw_handlers(monkeypatch: pytest.MonkeyPatch) -> set[object]:
-    """The draw handlers that were added and not yet removed; Blender itself does not list them."""
+@contextmanager
+def watched_drawing() -> Iterator[set[object]]:
+    """The draw handlers that are added and not yet removed."""
     alive: set[object] = set()
 
-    def watch(space: type) -> None:
+    def watch(patch: pytest.MonkeyPatch, space: type) -> None:
         add, remove = space.draw_handler_add, space.draw_handler_remove
 
         def adding(*arguments: object) -> object:
@@ -100,12 +138,13 @@ def draw_handlers(monkeypatch: pytest.MonkeyPatch) -> set[object]:
             remove(handle, region)
             alive.discard(handle)
 
-        monkeypatch.setattr(space, "draw_handler_add", adding)
-        monkeypatch.setattr(space, "draw_handler_remove", removing)
+        patch.setattr(space, "draw_handler_add", adding)
+        patch.setattr(space, "draw_handler_remove", removing)
 
-    for space in (bpy.types.SpaceView3D, bpy.types.SpaceClipEditor, bpy.types.SpaceNodeEditor):
-        watch(space)
-    return alive
+    with pytest.MonkeyPatch.context() as patch:
+        for space in (bpy.types.SpaceView3D, bpy.types.SpaceClipEditor, bpy.types.SpaceNodeEditor):
+            watch(patch, space)
+        yield alive
 
 
 @pytest.fixture
@@ -115,23 +154,30 @@ def empty_scene() -> None:
 
 
 @pytest.fixture
-def clean_blender(empty_scene: None, installation: Installation, draw_handlers: set[object]) -> Iterator[None]:
+def clean_blender(empty_scene: None, installation: Installation) -> Iterator[None]:
     """Rockfall is disabled before the test, and must have left no trace after it."""
-    if getattr(sys.modules.get(NAME), "__addon_enabled__", False):
-        installation.disable()
-    left_before = {kind: names for kind, names in installation.traces().items() if names}
-    assert not left_before, f"something of Rockfall is there before the test: {left_before}"
+    installation.end()
     yield
     left = {kind: names for kind, names in installation.traces().items() if names}
     assert not left, f"disabling leaves {left}"
-    assert not draw_handlers, "disabling leaves draw handlers"
 
 
 @pytest.fixture
-def rockfall(clean_blender: None, installation: Installation) -> Iterator[ModuleType]:
+def rockfall(installation: Installation, empty_scene: None) -> Iterator[ModuleType]:
     """The registered package, under whichever name Blender knows it."""
-    yield installation.enable()
-    installation.disable()
+    yield installation.shared()
+    registered, left = installation.registered, installation.traces()
+    changed = {kind: (registered[kind], names) for kind, names in left.items() if names != registered[kind]}
+    installation.failed |= bool(changed)
+    assert not changed, f"the test leaves Rockfall registered otherwise than it was: {changed}"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    report = yield
+    if report.failed and (found := getattr(item, "funcargs", {}).get("installation")):
+        found.failed = True
+    return report
 
 
 @pytest.fixture

@@ -485,9 +485,15 @@ def set_scene_rate(scene: bpy.types.Scene, rate_hz: float) -> None:
 
 
 def scene_rate(rate_hz: float) -> tuple[int, float]:
-    """`fps` and `fps_base` of a measured rate; near a whole number or a rate of television, it is that."""
-    usual = (float(round(rate_hz)), 1000 * round(1.001 * rate_hz) / 1001)
-    return blender_rate(next((rate for rate in usual if abs(rate / rate_hz - 1) < SAME_RATE), rate_hz))
+    """`fps` and `fps_base` of a measured rate; near a whole number or a rate of television, it is that.
+
+    The base of any other rate is near 1, so that another `fps`, typed by a person, is about what it says.
+    """
+    for usual in (float(round(rate_hz)), 1000 * round(1.001 * rate_hz) / 1001):
+        if abs(usual / rate_hz - 1) < SAME_RATE:
+            return blender_rate(usual)
+    fps = max(1, round(rate_hz))
+    return fps, fps / rate_hz
 
 
 def remember(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:

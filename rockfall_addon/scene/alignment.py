@@ -31,7 +31,7 @@ from ...core.errors import RockfallError
 from ...core.remarks import Remark, from_plain, to_plain
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array, distance_to_ray
-from . import georeference, migration, store, terrain, videos
+from . import georeference, store, terrain, videos
 
 COLOURS = 7
 GOOD_PAIRS = 8
@@ -177,7 +177,6 @@ def mark(
     ------
     RockfallError : the pixel is outside of the picture.
     """
-    migration.refuse_newer(scene)
     pairs, place = pairs_of(camera), tuple(float(value) for value in place)
     if side == PIXEL:
         _check_inside(camera, place)
@@ -581,7 +580,6 @@ def fill_rows(camera: bpy.types.Object) -> None:
 
 def place_by_eye(scene: bpy.types.Scene, camera: bpy.types.Object, placed: Camera) -> None:
     """Put the camera where a person says that it stood."""
-    migration.refuse_newer(scene)
     videos.set_camera_path(scene, camera, fixed(placed))
     camera[store.PLACED] = BY_EYE
     camera.pop(store.FOLLOWED, None)

@@ -32,12 +32,6 @@ def warning(scene: bpy.types.Scene) -> str:
     )
 
 
-def refuse_newer(scene: bpy.types.Scene) -> None:
-    """Raise a RockfallError when the scene is of a newer version."""
-    if is_newer(scene):
-        raise RockfallError(warning(scene))
-
-
 def migrate(scene: bpy.types.Scene) -> bool:
     """Bring a scene to the present schema; True when something had to be done."""
     found = version(scene)

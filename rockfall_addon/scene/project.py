@@ -24,7 +24,7 @@ from ...core.exchange.tables import write_picks
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.shading import shade
 from ...core.terrain.writers import write_ply
-from . import georeference, migration, models, picks, project_videos, reconstruction, store, terrain
+from . import georeference, models, picks, project_videos, reconstruction, store, terrain
 
 
 def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True) -> Reconstruction | None:
@@ -76,7 +76,6 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
     ------
     RockfallError : there are no picks, two are at one time, or the folder cannot be written.
     """
-    migration.refuse_newer(scene)
     if not picks.things_of(scene):
         raise RockfallError("There are no picks to export: import some first, or load the demo.")
     table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), georeference.read_shift(scene)

@@ -22,9 +22,8 @@ def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Rec
 
     Raises
     ------
-    RockfallError : the file is of a newer Rockfall; whatever the core refuses.
+    RockfallError : whatever the core refuses.
     """
-    migration.refuse_newer(scene)
     settings = scene.rockfall
     picks = pick_objects.trusted(pick_objects.picks_of(scene) if picks is None else picks)
     return reconstruct(

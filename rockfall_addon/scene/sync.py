@@ -161,6 +161,8 @@ def recompute(scene: bpy.types.Scene) -> None:
 
     When one trajectory has a problem, the others still follow.
     """
+    if migration.is_newer(scene):
+        return
     try:
         reconstruction.refresh(scene)
     except RockfallError:

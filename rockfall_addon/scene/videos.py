@@ -72,7 +72,6 @@ def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None
     ------
     RockfallError : the file is no video that can be used. The scene is as it was.
     """
-    migration.refuse_newer(scene)
     video = opened(path)
     others = cameras(scene)
     camera = add_camera(scene, video)

@@ -8,6 +8,7 @@ import bpy
 
 from .. import view
 from ..scene import settings
+from ..view.reporting import leave_newer_alone
 
 STEPS = (
     "start",
@@ -51,6 +52,7 @@ def register() -> None:
     for part in parts():
         _registered.append(part)
         for cls in getattr(part, "CLASSES", ()):
+            leave_newer_alone(cls)
             bpy.utils.register_class(cls)
         for tool in getattr(part, "TOOLS", ()):
             bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=tool is first)

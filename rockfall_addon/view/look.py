@@ -74,6 +74,7 @@ class ROCKFALL_OT_show_relief(bpy.types.Operator):
     bl_idname = "rockfall.show_relief"
     bl_label = "Relief View"
     bl_options = {"REGISTER", "UNDO"}
+    looks_only = True
 
     frame_all: BoolProperty(name="Frame all", default=True)
 
@@ -88,6 +89,7 @@ class ROCKFALL_OT_show_impact(bpy.types.Operator):
     bl_idname = "rockfall.show_impact"
     bl_label = "Go to This Moment"
     bl_options = {"REGISTER", "UNDO"}
+    looks_only = True
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How an operator ends: an error in words, and nothing is changed; or done, and every view shows it."""
+"""How an operator begins and ends: a scene of a newer version is refused; an error is reported in words."""
 
 import functools
 from collections.abc import Callable
@@ -7,6 +7,7 @@ from collections.abc import Callable
 import bpy
 
 from ...core.errors import RockfallError
+from ..scene import migration
 
 
 def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
@@ -23,6 +24,45 @@ def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
         return ended
 
     return wrapper
+
+
+def leave_newer_alone(cls: type) -> None:
+    """Make a class that is to be registered leave a scene of a newer version as it is.
+
+    An operator refuses it before anything else, unless its ``looks_only`` is true; a panel is drawn in grey.
+    """
+    if issubclass(cls, bpy.types.Operator) and not getattr(cls, "looks_only", False):
+        cls.poll = classmethod(_refusing(cls.poll.__func__ if hasattr(cls, "poll") else None))
+    elif issubclass(cls, bpy.types.Panel):
+        cls.draw = _grey(cls.draw)
+
+
+def _refusing(poll: Callable[..., bool] | None) -> Callable[..., bool]:
+    if hasattr(poll, "refuses"):
+        return poll
+
+    def refusing(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+        if migration.is_newer(context.scene):
+            cls.poll_message_set(migration.warning(context.scene))
+            return False
+        return poll is None or poll(cls, context)
+
+    refusing.refuses = True
+    return refusing
+
+
+def _grey(draw: Callable[..., None]) -> Callable[..., None]:
+    if hasattr(draw, "greys"):
+        return draw
+
+    @functools.wraps(draw)
+    def greying(self: bpy.types.Panel, context: bpy.types.Context) -> None:
+        if migration.is_newer(context.scene):
+            self.layout.enabled = False
+        draw(self, context)
+
+    greying.greys = True
+    return greying
 
 
 def _redraw(context: bpy.types.Context) -> None:

@@ -2,6 +2,7 @@
 """All that counts is in the .blend, to the last double, and survives what people do to files."""
 
 import json
+import re
 from pathlib import Path
 
 import bpy
@@ -309,6 +310,26 @@ def test_a_newer_file_is_left_alone(scene: bpy.types.Scene, part) -> None:
     assert "newer Rockfall" in problems.sentences(scene)[0]
     with pytest.raises(RuntimeError, match="newer Rockfall"):
         bpy.ops.rockfall.reconstruct()
+
+
+LOOK_ONLY = {"fit_footage", "go_to_pair", "impact_table", "open_workspace", "show_impact", "show_relief",
+             "sort_impacts", "step_frame", "stop_following"}  # fmt: skip
+
+
+def test_every_operator_refuses_a_newer_file_in_the_same_words(scene: bpy.types.Scene, part) -> None:
+    operators = {name.removeprefix("ROCKFALL_OT_") for name in dir(bpy.types) if name.startswith("ROCKFALL_OT_")}
+    assert len(operators) > 50
+    assert operators == {name for name in dir(bpy.ops.rockfall) if not name.startswith("_")}
+    assert operators >= LOOK_ONLY
+    scene["rockfall_schema"] = 99
+    said = part("rockfall_addon.scene.migration").warning(scene)
+    before = {o.name: repr(sorted(o.items())) for o in scene.objects}
+    for name in sorted(operators - LOOK_ONLY):
+        with pytest.raises(RuntimeError, match=re.escape(said)):
+            getattr(bpy.ops.rockfall, name)()
+    assert {o.name: repr(sorted(o.items())) for o in scene.objects} == before
+    scene["rockfall_schema"] = 1
+    assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
 
 
 def test_a_scene_without_anything_of_ours_stays_so(part) -> None:

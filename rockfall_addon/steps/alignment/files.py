@@ -12,7 +12,7 @@ from ....core.errors import InputError
 from ....core.exchange.cameras import Pairs, read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
 from ....core.vectors import distance_to_ray
-from ...scene import alignment, georeference, migration, store, videos
+from ...scene import alignment, georeference, store, videos
 
 
 def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:
@@ -22,7 +22,6 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
     ------
     RockfallError : the table is bad, or a pixel is outside of the video's picture. Nothing has changed.
     """
-    migration.refuse_newer(scene)
     table = read_pairs(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
     (width, height), shown = videos.size_of(camera), videos.true_frame(scene, camera)
     frames = len(camera[store.VIDEO_TIMES])
@@ -77,7 +76,6 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
     ------
     RockfallError : the file is bad, or of another size of picture.
     """
-    migration.refuse_newer(scene)
     file = read_camera(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
     one, settings = file.path.reference, camera.rockfall_alignment
     if one.size != videos.size_of(camera):

@@ -24,7 +24,7 @@ from ....core.remarks import from_plain, to_plain
 from ....core.terrain.raycast import cast_rays
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
-from ...scene import alignment, migration, store, terrain, videos
+from ...scene import alignment, store, terrain, videos
 
 KEPT = 2
 
@@ -97,7 +97,6 @@ def prepare(scene: bpy.types.Scene, camera: bpy.types.Object) -> Task:
     ------
     RockfallError : the camera is not solved, does not move, or what is needed is missing.
     """
-    migration.refuse_newer(scene)
     settings = camera.rockfall_alignment
     if not videos.is_solved(camera):
         raise RockfallError("First solve the camera in one frame, from pairs.")

@@ -310,6 +310,7 @@ class ROCKFALL_OT_go_to_pair(bpy.types.Operator):
     bl_idname = "rockfall.go_to_pair"
     bl_label = "Go to Pair"
     bl_options = {"REGISTER", "UNDO"}
+    looks_only = True
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -429,6 +430,7 @@ class ROCKFALL_OT_stop_following(bpy.types.Operator):
     bl_idname = "rockfall.stop_following"
     bl_label = "Stop"
     bl_options = {"INTERNAL"}
+    looks_only = True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         for job in following.running:

@@ -16,6 +16,7 @@ class ROCKFALL_OT_sort_impacts(bpy.types.Operator):
     bl_idname = "rockfall.sort_impacts"
     bl_label = "Sort"
     bl_options = {"INTERNAL"}
+    looks_only = True
 
     column: StringProperty()
 
@@ -32,6 +33,7 @@ class ROCKFALL_OT_impact_table(bpy.types.Operator):
     bl_idname = "rockfall.impact_table"
     bl_label = "Impact Table"
     bl_options = {"INTERNAL"}
+    looks_only = True
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import alignment, observations, picking, refinement, store, videos
+from ...scene import alignment, migration, observations, picking, refinement, store, videos
 from ...view import workspace
 from ...view.panel import RockfallPanel, paragraph
 
@@ -34,6 +34,8 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
 
 def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
     """One sentence about what to do next, and the buttons for it."""
+    if migration.is_newer(scene):
+        return migration.warning(scene), []
     camera = videos.active_camera(scene)
     picks = store.with_role(scene, store.PICK_ROLE)
     if not store.with_role(scene, store.TERRAIN_ROLE) and not picks:

@@ -16,6 +16,7 @@ class ROCKFALL_OT_open_workspace(bpy.types.Operator):
     bl_idname = "rockfall.open_workspace"
     bl_label = "Open Rockfall Workspace"
     bl_options = {"REGISTER"}
+    looks_only = True
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -36,6 +37,7 @@ class ROCKFALL_OT_fit_footage(bpy.types.Operator):
     bl_idname = "rockfall.fit_footage"
     bl_label = "Fit Footage"
     bl_options = {"REGISTER"}
+    looks_only = True
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

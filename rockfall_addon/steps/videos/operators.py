@@ -127,6 +127,7 @@ class ROCKFALL_OT_step_frame(bpy.types.Operator):
     bl_idname = "rockfall.step_frame"
     bl_label = "Step Through the Video"
     bl_options = {"INTERNAL"}
+    looks_only = True
 
     step: IntProperty(name="Pictures", default=1)
     in_camera_view: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})

@@ -150,7 +150,7 @@ def look_at(
     """
     if (focal_px is None) == (fov_deg is None):
         raise InputError("A camera needs either its focal length or its angle of view")
-    focal = focal_px if focal_px is not None else width / 2 / np.tan(np.radians(fov_deg or 0.0) / 2)
+    focal = focal_px if focal_px is not None else focal_of_view(width, fov_deg or 0.0)
     place, upright = np.asarray(position, dtype=np.float64), np.asarray(up, dtype=np.float64)
     forward = unit(np.asarray(target, dtype=np.float64) - place)
     if not np.isfinite(forward).all():
@@ -163,6 +163,16 @@ def look_at(
     right = unit(right)
     rotation = np.stack([right, cross(forward, right), forward])
     return Camera(width, height, focal, focal, width / 2, height / 2, position=place, rotation=rotation)
+
+
+def pinhole(width: int, height: int, focal_px: float, shift: GlobalShift | None = None) -> Camera:
+    """A camera without distortion whose axis meets the middle of the image."""
+    return Camera(width, height, focal_px, focal_px, width / 2, height / 2, shift=shift or GlobalShift())
+
+
+def focal_of_view(width: int, fov_deg: float) -> float:
+    """Focal length [px] of a horizontal angle of view."""
+    return float(width / 2 / np.tan(np.radians(fov_deg) / 2))
 
 
 def full_frame_mm(focal_px: float, size: tuple[int, int]) -> float:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project, rays, undistort
-from .path import CameraPath
+from .path import CameraPath, bent_through
 from .turning import LEAST_FEATURES, Turns, solve_turns
 from .walking import LEAST_POINTS, solve_poses
 
@@ -112,7 +112,6 @@ def solve_motion(
     spread = np.where(
         known[:, None], np.stack([_mean_sigma(covariance, 0), _mean_sigma(covariance, 3)], axis=1), np.inf
     )
-    position, rotation = _without_drift(times, position, rotation, keys)
     spread = _bridged(spread, sorted(keys)) if len(keys) > 1 else spread
     path = CameraPath(
         reference=camera,
@@ -122,6 +121,7 @@ def solve_motion(
         sigma_position_m=spread[:, 1],
         sigma_rotation=spread[:, 0],
     )
+    path = bent_through(path, {float(times[number]): key for number, key in keys.items()})
     return SolvedMotion(path, residual, features, tuple(_remarks(known, features, residual, sigma_px)))
 
 
@@ -236,23 +236,6 @@ def _filled(times: Array, known: Mask, position: Array, rotation: Array) -> tupl
     any_camera = Camera(1, 1, 1.0, 1.0, 0.5, 0.5)
     path = CameraPath(any_camera, times[known], position[known], rotation[known], zeros, zeros)
     return path.poses_at(times)
-
-
-def _without_drift(times: Array, position: Array, rotation: Array, keys: Mapping[int, Camera]) -> tuple[Array, Array]:
-    """The path bent so that it passes through the solved frames; between them the bend is linear in time."""
-    numbers = np.array(sorted(keys))
-    cameras = [keys[number] for number in numbers.tolist()]
-    zeros = np.zeros(numbers.size)
-    bend = CameraPath(
-        cameras[0],
-        times[numbers],
-        np.array([camera.position for camera in cameras]) - position[numbers],
-        np.array([camera.rotation for camera in cameras]) @ np.swapaxes(rotation[numbers], 1, 2),
-        zeros,
-        zeros,
-    )
-    shift, turn = bend.poses_at(times)
-    return position + shift, turn @ rotation
 
 
 def _bridged(spread: Array, keys: list[int]) -> Array:

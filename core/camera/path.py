@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The path of a camera: one pose for each frame of a video."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..vectors import Array, Mask
-from .model import Camera, rotation_from_vector, vector_from_rotation
+from .model import Camera, project, rays, rotation_from_vector, vector_from_rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,3 +81,39 @@ def fixed(camera: Camera) -> CameraPath:
         sigma_position_m=np.zeros(1),
         sigma_rotation=np.zeros(1),
     )
+
+
+def camera_at(path: CameraPath, time_s: float) -> Camera:
+    """The camera with its pose at a video time [s]."""
+    position, rotation = path.poses_at(time_s)
+    return replace(path.reference, position=position[0], rotation=rotation[0])
+
+
+def project_at(path: CameraPath, points: ArrayLike, time_s: ArrayLike) -> Array:
+    """Pixels (n, 2) of points (n, 3) at video times (n,) [s]; NaN where they are not seen."""
+    position, rotation = path.poses_at(time_s)
+    return project(path.reference, points, position=position, rotation=rotation)
+
+
+def rays_at(path: CameraPath, pixels: ArrayLike, time_s: ArrayLike) -> tuple[Array, Array]:
+    """Origins and unit directions (n, 3) of the rays through pixels (n, 2) at video times (n,) [s]."""
+    position, rotation = path.poses_at(time_s)
+    return rays(path.reference, pixels, position=position, rotation=rotation)
+
+
+def bent_through(path: CameraPath, cameras: Mapping[float, Camera]) -> CameraPath:
+    """The path bent so that it has the poses of cameras at video times [s]; between them the bend is linear in time."""
+    times = np.array(sorted(cameras))
+    there = [cameras[time] for time in times.tolist()]
+    position, rotation = path.poses_at(times)
+    bend = CameraPath(
+        reference=there[0],
+        time_s=times,
+        position=np.array([camera.position for camera in there]) - position,
+        rotation=np.array([camera.rotation for camera in there]) @ np.swapaxes(rotation, 1, 2),
+        sigma_position_m=np.zeros(times.size),
+        sigma_rotation=np.zeros(times.size),
+    )
+    shift, turn = bend.poses_at(path.time_s)
+    turned = rotation_from_vector(vector_from_rotation(turn @ path.rotation))  # so that rounding does not add up
+    return replace(path, position=path.position + shift, rotation=turned)

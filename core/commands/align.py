@@ -3,26 +3,23 @@
 
 import argparse
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError
-from ..vectors import Array, Indices, Mask, distance_to_ray, norm
+from ..vectors import Array, Mask, norm
 from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_told, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..camera.model import Camera
-    from ..camera.path import CameraPath
-    from ..camera.resection import Resection
-    from ..exchange.cameras import Pairs
+    from ..camera.pairs import Pairs
     from ..footage.video import Video
-    from ..georeference import GlobalShift
     from ..terrain.surface import Surface
+    from ..workflow.alignment import Alignment, AlignmentOptions
+    from ..workflow.following import FollowedCamera
 
 FREE = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 WORST = 3
@@ -79,9 +76,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Solve, write the camera, the residuals and the picture, print the summary."""
+    from ..camera.pairs import pair_residuals
     from ..camera.path import fixed
     from ..exchange.cameras import read_pairs, write_camera, write_pair_residuals
     from ..exchange.output import output_folder
+    from ..footage.video import open_video
+    from ..workflow.alignment import align
+    from ..workflow.following import follow_background
 
     if arguments.moving and not arguments.video:
         raise InputError("--moving follows the background through a video", advice="Give it with --video FILE")
@@ -91,34 +92,75 @@ def run(arguments: argparse.Namespace) -> int:
         surface = terrain_as_told(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
         pairs = read_pairs(arguments.pairs, None if surface is None else surface.shift)
-        video = _video(arguments.video, progress) if arguments.video else None
-        size = (video.width, video.height) if video is not None else _size(arguments.size)
-        frame = _frame(arguments, pairs, video)
+        video = open_video(arguments.video, progress) if arguments.video else None
+        _check_frames(arguments, pairs, video)
         progress("Solving the camera")
-        solved = _solve(pairs, size, frame, arguments)
-        path, motion = fixed(solved.found.camera), list[str]()
+        aligned = align(pairs, _options(arguments, pairs, video))
+        path, motion = fixed(aligned.found.camera), list[str]()
         if arguments.moving and video is not None:
-            path, motion = _follow(solved, video, frame, surface, arguments, progress)
-        residual_px, residual_m = _residuals(path, pairs, video, frame)
+            first, last = arguments.frames or (0, 0)
+            followed = follow_background(
+                video,
+                aligned.solved,
+                mode=arguments.moving,
+                surface=surface,
+                frames=(first, last) if arguments.frames else None,
+                progress=progress,
+            )
+            path, motion = followed.path, _motion(followed, arguments.moving)
+        frames = np.where(pairs.frame < 0, aligned.frame, pairs.frame)
+        residual_px, residual_m = pair_residuals(
+            path, pairs, np.zeros(len(pairs)) if video is None else video.time_s[frames]
+        )
         progress("Writing the camera")
         write_camera(
             folder / "camera.toml",
             path,
-            rmse_px=solved.found.rmse_px,
-            sigma=solved.found.sigma,
-            pose_covariance=solved.found.pose_covariance_given_lens,
+            rmse_px=aligned.found.rmse_px,
+            sigma=aligned.found.sigma,
+            pose_covariance=aligned.pose_covariance,
         )
-        write_pair_residuals(folder / "pairs_residuals.csv", pairs, residual_px, residual_m, solved.used)
+        write_pair_residuals(folder / "pairs_residuals.csv", pairs, residual_px, residual_m, aligned.used)
         written = ["camera.toml", "pairs_residuals.csv"]
         if video is not None:
-            shown = (pairs.frame < 0) | (pairs.frame == frame) | (not arguments.moving)
-            _draw(folder / "align.png", video, frame, pairs, residual_px, solved.used, shown)
+            shown = (frames == aligned.frame) | (not arguments.moving)
+            _draw(folder / "align.png", video, aligned.frame, pairs, residual_px, aligned.used, shown)
             written.append("align.png")
     placed = _on_terrain(pairs, surface) if surface is not None else []
-    for sentence in (*_summary(solved, pairs, residual_px), *placed, *motion):
+    for sentence in (*_summary(aligned, pairs, residual_px), *placed, *motion):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> "AlignmentOptions":
+    """What is asked for and what is known of the camera."""
+    from ..camera.model import focal_of_view, pinhole
+    from ..exchange.cameras import read_camera
+    from ..workflow.alignment import AlignmentOptions
+
+    size = (video.width, video.height) if video is not None else _size(arguments.size)
+    free: tuple[str, ...] = ("f",)
+    focal, start = arguments.focal, None
+    if arguments.fov is not None:
+        if arguments.fov >= 180:
+            advice = "Give the horizontal angle, below 180°"
+            raise InputError(f"--fov {arguments.fov:g} is no angle of view", advice=advice)
+        focal = focal_of_view(size[0], arguments.fov)
+    if focal is not None:
+        free, start = (), pinhole(*size, focal, pairs.shift)
+    if arguments.camera:
+        start = read_camera(arguments.camera, pairs.shift).path.reference
+    return AlignmentOptions(
+        size=size,
+        free=free if arguments.free is None else known_names(arguments.free, FREE, "--free"),
+        start=start,
+        moves=bool(arguments.moving),
+        frame=arguments.frame,
+        robust=not arguments.no_robust,
+        sigma_px=arguments.sigma_px,
+        sigma_m=arguments.sigma_m,
+    )
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -128,176 +170,29 @@ def _size(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _video(file: str, progress: PrintedProgress) -> "Video":
-    from ..footage.video import open_video
-
-    return open_video(file, progress)
-
-
-@dataclass(frozen=True, eq=False)
-class _Solved:
-    """The reference frame's camera, those of other frames, and (n,) which pairs counted."""
-
-    found: "Resection"
-    keys: "Mapping[int, Resection]"
-    used: "Mask"
-    notes: tuple[str, ...]
-
-
-def _solve(pairs: "Pairs", size: tuple[int, int], frame: int, arguments: argparse.Namespace) -> _Solved:
-    """Solve the camera; of a moving one, each frame that has enough pairs."""
-    from ..camera.resection import POSE_PAIRS, resect
-
-    told = arguments.focal is not None or arguments.fov is not None
-    free = known_names(arguments.free, FREE, "--free") if arguments.free is not None else () if told else ("f",)
-    here = pairs.used & ((pairs.frame < 0) | (pairs.frame == frame)) if arguments.moving else pairs.used
-    if not here.any():
-        where = f" in frame {frame}" if arguments.moving else ""
-        raise InputError(f"No pair is to be used{where}", file=pairs.source, advice="Write 1 in the column used")
-    used = np.zeros(len(pairs), dtype=np.bool_)
-
-    def solve(rows: "Indices", free: tuple[str, ...], start: "Camera | None") -> "Resection":
-        found = resect(
-            pairs.pixel[rows],
-            pairs.point[rows],
-            *size,
-            free=free,
-            camera=start,
-            sigma_px=np.where(np.isnan(pairs.sigma_px), arguments.sigma_px, pairs.sigma_px)[rows],
-            sigma_m=np.where(np.isnan(pairs.sigma_m), arguments.sigma_m, pairs.sigma_m)[rows],
-            names=pairs.name[rows].tolist(),
-            robust=not arguments.no_robust,
-            shift=pairs.shift,
-            rows=pairs.row[rows].tolist(),
-            source=str(pairs.source),
-        )
-        used[rows[found.used]] = True
-        return found
-
-    found = solve(np.flatnonzero(here), free, _start(arguments, size, pairs.shift))
-    keys: dict[int, Resection] = {}
-    notes: list[str] = []
-    for other in np.unique(pairs.frame[pairs.used & ~here]).tolist():
-        rows = np.flatnonzero(pairs.used & (pairs.frame == other))
-        if rows.size < POSE_PAIRS:
-            notes.append(f"Frame {other} has {rows.size} pairs, too few to be solved: they only check the path.")
-            continue
-        keys[other] = solve(rows, (), found.camera)
-        notes.append(f"Frame {other}: {len(rows)} pairs fit to {keys[other].rmse_px:.2f} px.")
-    return _Solved(found, keys, used, tuple(notes))
-
-
-def _follow(
-    solved: _Solved,
-    video: "Video",
-    frame: int,
-    surface: "Surface | None",
-    arguments: argparse.Namespace,
-    progress: PrintedProgress,
-) -> "tuple[CameraPath, list[str]]":
-    """A pose for each frame from the background; and sentences about it."""
-    from ..camera.model import vector_from_rotation
-    from ..camera.motion import FeatureTracks, solve_motion
-    from ..camera.path import fixed
-    from ..footage.background import background_motion
-
-    first, last = arguments.frames or (0, video.frames - 1)
-    if not 0 <= first <= last < video.frames:
-        raise InputError(
-            f"--frames {first} {last} is no part of the video",
-            file=video.path,
-            advice=f"It has the frames 0 to {video.frames - 1}",
-        )
-    for number in (frame, *solved.keys):
-        if not first <= number <= last:
-            raise InputError(
-                f"Pairs were picked on frame {number}, outside of --frames {first} {last}",
-                advice="Widen the range, or leave these pairs out",
-            )
-    background, seen = background_motion(video, first=first, last=last, progress=progress)
-    if background.still and not solved.keys:
-        return fixed(solved.found.camera), ["The camera stands still: one pose serves all frames."]
-    progress("Solving the camera of each frame")
-    made = solve_motion(
-        solved.found.camera,
-        FeatureTracks(seen.frame - first, seen.feature, seen.pixel),
-        video.time_s[first : last + 1],
-        frame - first,
-        mode=arguments.moving,
-        points_of=None if surface is None else _points_of(surface),
-        key_frames={number - first: found.camera for number, found in solved.keys.items()},
-    )
-    path = made.path
-    turned = np.degrees(norm(vector_from_rotation(path.rotation @ path.reference.rotation.T)))
-    moved = norm(path.position - path.reference.position)
-    sentences = [
-        f"Motion: a pose for each of {path.time_s.size} frames; it turns by up to {turned.max():.2f}°"
-        + (f" and moves by up to {moved.max():.2f} m" if arguments.moving == "full" else "")
-        + f". {np.median(made.features):.0f} features in a frame, {np.nanmedian(made.residual_px):.2f} px off (median)."
-    ]
-    sigma = path.sigma_rotation[np.isfinite(path.sigma_rotation)]
-    if sigma.size:
-        wide = path.reference.fx * float(sigma.max())
-        sentences.append(f"Relative to the solved frame, a pose is known to {wide:.2f} px in the image or better.")
-    return path, [*sentences, *map(str, made.remarks)]
-
-
-def _points_of(surface: "Surface") -> "Callable[[Array, Array], Array]":
-    """Where rays meet the terrain; NaN where they do not, or are none."""
-    from ..terrain.raycast import cast_rays
-
-    def meet(origins: Array, directions: Array) -> Array:
-        points = np.full_like(origins, np.nan)
-        good = np.isfinite(directions).all(axis=1)
-        points[good] = cast_rays(surface, origins[good], directions[good]).point
-        return points
-
-    return meet
-
-
-def _start(arguments: argparse.Namespace, size: tuple[int, int], shift: "GlobalShift") -> "Camera | None":
-    """What is known of the camera; None when nothing is."""
-    from ..camera.model import Camera
-    from ..exchange.cameras import read_camera
-
-    if arguments.camera:
-        return read_camera(arguments.camera, shift).path.reference
-    width, height = size
-    if arguments.fov is not None and arguments.fov >= 180:
-        raise InputError(f"--fov {arguments.fov:g} is no angle of view", advice="Give the horizontal angle, below 180°")
-    focal = arguments.focal
-    if arguments.fov is not None:
-        focal = width / 2 / np.tan(np.radians(arguments.fov) / 2)
-    if focal is None:
-        return None
-    return Camera(width, height, focal, focal, width / 2, height / 2, shift=shift)
-
-
-def _residuals(path: "CameraPath", pairs: "Pairs", video: "Video | None", frame: int) -> tuple[Array, Array]:
-    """Of all pairs, used or not: (n, 2) marked minus projected [px], and (n,) from the point to the ray [m]."""
-    from ..camera.model import project, rays
-
-    time_s = np.zeros(len(pairs)) if video is None else video.time_s[np.where(pairs.frame < 0, frame, pairs.frame)]
-    position, rotation = path.poses_at(time_s)
-    seen = project(path.reference, pairs.point, position=position, rotation=rotation)
-    beam = rays(path.reference, pairs.pixel, position=position, rotation=rotation)
-    return pairs.pixel - seen, distance_to_ray(pairs.point, *beam)
-
-
-def _frame(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> int:
-    """The reference frame: as told, else the one on which most pairs were picked."""
-    given = pairs.frame[pairs.frame >= 0]
-    frame = arguments.frame
-    if frame is None:
-        frame = int(np.bincount(given).argmax()) if given.size else 0
+def _check_frames(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> None:
+    """Refuse frames that the video does not have."""
     if video is None:
-        return int(frame)
+        return
     advice = f"It has the frames 0 to {video.frames - 1}"
     for i in np.flatnonzero(pairs.frame >= video.frames):
         raise pairs.error(int(i), f"There is no frame {pairs.frame[i]} in {video.path.name}", advice)
-    if frame >= video.frames:
-        raise InputError(f"There is no frame {frame}", file=video.path, advice=advice)
-    return int(frame)
+    if arguments.frame is not None and arguments.frame >= video.frames:
+        raise InputError(f"There is no frame {arguments.frame}", file=video.path, advice=advice)
+
+
+def _motion(followed: "FollowedCamera", mode: str) -> list[str]:
+    """What there is to say about a camera that moves."""
+    if followed.is_still:
+        return ["The camera stands still: one pose serves all frames."]
+    sentences = [
+        f"Motion: a pose for each of {followed.path.time_s.size} frames; it turns by up to {followed.turn_deg:.2f}°"
+        + (f" and moves by up to {followed.move_m:.2f} m" if mode == "full" else "")
+        + f". {followed.features:.0f} features in a frame, {followed.residual_px:.2f} px off (median)."
+    ]
+    if (sigma := followed.sigma_px) is not None:
+        sentences.append(f"Relative to the solved frame, a pose is known to {sigma:.2f} px in the image or better.")
+    return [*sentences, *map(str, followed.remarks)]
 
 
 def _on_terrain(pairs: "Pairs", surface: "Surface") -> list[str]:
@@ -325,13 +220,13 @@ def _draw(
     write_picture(path, picture)
 
 
-def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
+def _summary(aligned: "Alignment", pairs: "Pairs", residual_px: Array) -> list[str]:
     from ..camera.model import full_frame_mm
 
-    found, used = solved.found, solved.used
+    found, used = aligned.found, aligned.used
     camera, sigma = found.camera, found.sigma
     left_out = len(found.wrong)
-    total, where = (found.used.size, " of the reference frame") if solved.notes else (len(pairs), "")
+    total, where = (found.used.size, " of the reference frame") if aligned.remarks else (len(pairs), "")
     spare = f", {found.redundancy} observations more than unknowns" if found.redundancy else ""
     sentences = [
         f"{int(found.used.sum())} of {total} pairs{where} fit to {found.rmse_px:.2f} px (root mean square){spare}."
@@ -358,13 +253,13 @@ def _summary(solved: _Solved, pairs: "Pairs", residual_px: Array) -> list[str]:
     size = norm(residual_px)
     order = [i for i in np.argsort(-np.nan_to_num(size, nan=np.inf)) if used[i]][:WORST]
     if order:
-        of = [f" (frame {frame})" if solved.keys and frame >= 0 else "" for frame in pairs.frame.tolist()]
+        of = [f" (frame {frame})" if aligned.keys and frame >= 0 else "" for frame in pairs.frame.tolist()]
         worst = [f"{pairs.name[i]}{of[i]} {size[i]:.2f} px" for i in order]
         sentences.append(f"Largest residuals: {', '.join(worst)}.")
     if (checked := ~pairs.used).any():
         off = [f"{pairs.name[i]} {_in_view(size[i])}" for i in np.flatnonzero(checked)]
         sentences.append(f"Not used, to check: {', '.join(off)}.")
-    return [*sentences, *solved.notes, *map(str, found.remarks)]
+    return [*sentences, *map(str, aligned.remarks), *map(str, found.remarks)]
 
 
 def _same(one: float, other: float) -> bool:

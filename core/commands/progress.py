@@ -19,7 +19,7 @@ def progress_line(text: str, done: int, total: int, elapsed_s: float) -> str:
     if not total or not done:
         return f"{text} …"
     left = round(elapsed_s / done * (total - done))
-    return f"{text}: {done} of {total}, {left // 60}:{left % 60:02d} left"
+    return f"{text}: {done} of {total}, {left // 60}:{left % 60:02d} left …"
 
 
 class PrintedProgress:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..camera.model import Camera
+from ..camera.pairs import Pairs
 from ..camera.path import CameraPath
-from ..errors import InputError
 from ..georeference import GlobalShift
-from ..vectors import Array, Indices, Mask, Names
+from ..vectors import Array, Mask
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
 from .toml_text import TomlTable, read_toml
@@ -51,42 +51,6 @@ class CameraFile:
     crs: str = ""
     pose_covariance: Array | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False)
-class Pairs:
-    """n pixels and the points of the terrain that are seen there.
-
-    Attributes
-    ----------
-    pixel : (n, 2) [px].
-    point : (n, 3) local [m].
-    name : (n,) for people; the number of the row where none is given.
-    frame : (n,) of the video, −1 where not given.
-    sigma_px, sigma_m : (n,) standard deviations of a coordinate; NaN where not given.
-    used : (n,) False for pairs that are only to be checked.
-    row : (n,) in a text editor.
-    source : the file.
-    shift : of the local frame.
-    """
-
-    pixel: Array
-    point: Array
-    name: Names
-    frame: Indices
-    sigma_px: Array
-    sigma_m: Array
-    used: Mask
-    row: Indices
-    source: Path
-    shift: GlobalShift
-
-    def __len__(self) -> int:
-        return len(self.pixel)
-
-    def error(self, index: int, problem: str, advice: str) -> InputError:
-        """An `InputError` that points at one pair."""
-        return InputError(problem, file=self.source, row=int(self.row[index]), advice=advice)
 
 
 def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFile:

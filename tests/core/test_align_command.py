@@ -289,7 +289,7 @@ def test_a_tripod_needs_one_pose(tmp_path, capsys):
     assert "--video" in refused_again(capsys, table, "--size", "640x480", "--moving", "rotation")
     moving = ["--video", tmp_path / "film.avi", "--moving", "rotation"]
     assert "It has the frames 0 to 5." in refused_again(capsys, table, *moving, "--frames", "0", "9")
-    assert "on frame 0, outside of --frames 2 5" in refused_again(capsys, table, *moving, "--frames", "2", "5")
+    assert "on frame 0, outside of the frames 2 to 5" in refused_again(capsys, table, *moving, "--frames", "2", "5")
 
 
 @pytest.mark.parametrize(

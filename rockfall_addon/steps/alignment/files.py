@@ -8,8 +8,9 @@ import bpy
 import numpy as np
 
 from ....core.camera.model import project, rays
+from ....core.camera.pairs import Pairs
 from ....core.errors import InputError
-from ....core.exchange.cameras import Pairs, read_camera, read_pairs, write_camera, write_pair_residuals
+from ....core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
 from ....core.vectors import distance_to_ray
 from ...scene import alignment, georeference, store, videos

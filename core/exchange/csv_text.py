@@ -4,7 +4,7 @@
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, Names
+from .units import OtherUnit, if_in_unit, other_units, unknown_unit, unknown_units
 
 BLOCK_ROWS, BETWEEN = 20_000, "\0"
 """So many rows of a column are kept as one text, cells between zero bytes: a fifth of the memory of single cells."""
@@ -27,11 +28,13 @@ class TextTable:
     source : the file.
     columns : name → texts of some rows each, see `BLOCK_ROWS`.
     row : (n,) row in a text editor, the header being row 1.
+    converted : the columns whose numbers are in another unit in the file.
     """
 
     source: Path
     columns: Mapping[str, Sequence[str]]
     row: Sequence[int]
+    converted: Mapping[str, OtherUnit] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.row)
@@ -47,7 +50,7 @@ class TextTable:
         return [cell or default for cell in self.cells(name)]
 
     def numbers(self, name: str, *, required: bool = False) -> Array:
-        """(n,) a column of numbers; NaN where it is missing or empty.
+        """(n,) a column of numbers in the unit of its name; NaN where it is missing or empty.
 
         Raises
         ------
@@ -59,8 +62,16 @@ class TextTable:
         good = [block for block in blocks if block is not None]
         if len(good) < len(blocks):
             cells = self.cells(name)
-            raise next(error for i in range(len(self)) if (error := self._mistake(name, i, cells[i], required)))
-        return np.concatenate(good)
+            there = self.converted[name].name if name in self.converted else name
+            raise next(error for i in range(len(self)) if (error := self._mistake(there, i, cells[i], required)))
+        values = np.concatenate(good)
+        return values * self.converted[name].factor if name in self.converted else values
+
+    def has_numbers(self, name: str) -> bool:
+        """Whether there are numbers in a column that is there, and nothing else."""
+        blocks = [_numbers(block.split(BETWEEN), False) for block in self.columns[name]]
+        good = [block for block in blocks if block is not None]
+        return len(good) == len(blocks) and bool(np.isfinite(np.concatenate(good)).any())
 
     def _mistake(self, name: str, i: int, cell: str, required: bool) -> InputError | None:
         """What is wrong with a cell that must be a number."""
@@ -94,17 +105,18 @@ class TextTable:
 
 
 def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
-    """Read a comma-separated table.
+    """Read a comma-separated table, its columns in the units of `known`.
 
     Parameters
     ----------
     required : columns that must be there.
-    known : all columns that mean something, to suggest a near one when a required one is missing.
+    known : all columns that mean something: what has the name of one but for its unit is converted (`units`), and a
+        near one is suggested when a required one is missing.
 
     Raises
     ------
     InputError : no such file, no text, an empty file, another separator, a required column missing, a column twice, a
-        row with too many or too few cells, no rows.
+        row with too many or too few cells, no rows, numbers in a unit that is not known.
     """
     path = Path(path)
     data = _checked(path, _read_bytes(path))
@@ -113,14 +125,16 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     blocks: list[list[str]] = []
     rows: list[list[str]] = []
     numbers: list[int] = []
-    start = 1
+    converted: dict[str, OtherUnit] = {}
+    start, top = 1, 1
     try:
         for cells in reader:
             stripped = [cell.strip() for cell in cells]
             if not any(stripped):
                 pass
             elif not header:
-                header, blocks = stripped, [[] for _ in stripped]
+                top, blocks = start, [[] for _ in stripped]
+                header, converted = _in_our_units(path, stripped, known, start)
                 _check_header(path, header, required, known, start)
             else:
                 _check_row(path, header, stripped, start)
@@ -141,7 +155,21 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     if not numbers:
         raise InputError("The table has a header but no rows", file=path, advice="Add a row for each pick")
     _add_block(blocks, rows)
-    return TextTable(path, {name: texts for name, texts in zip(header, blocks, strict=True) if name}, numbers)
+    columns = {name: texts for name, texts in zip(header, blocks, strict=True) if name}
+    table = TextTable(path, columns, numbers, converted)
+    for name, ours in unknown_units(header, known).items():
+        if table.has_numbers(name):
+            raise unknown_unit(path, name, ours, top)
+    return table
+
+
+def _in_our_units(
+    path: Path, header: list[str], known: Sequence[str], row: int
+) -> tuple[list[str], dict[str, OtherUnit]]:
+    """The header with our names, and what is in another unit."""
+    converted = other_units(path, header, known, row)
+    ours = {one.name: name for name, one in converted.items()}
+    return [ours.get(name, name) for name in header], converted
 
 
 def _check_row(path: Path, header: list[str], cells: list[str], row: int) -> None:
@@ -216,18 +244,21 @@ def _check_header(path: Path, header: list[str], required: Sequence[str], known:
     missing = [name for name in required if name not in named]
     if not missing:
         return
+    for name, ours in unknown_units(named, known).items():
+        if ours in missing:
+            raise unknown_unit(path, name, ours, row)
     spare = [name for name in named if name not in known]
     hints = []
     for name in missing:
         lower = {other.lower(): other for other in spare}
         near = get_close_matches(name, lower, n=1, cutoff=0.5) or [low for low in lower if low == name.split("_")[0]]
         if near:
-            hints.append(f"rename {lower[near[0]]} to {name}")
+            hints.append(f"rename {lower[near[0]]} to {name}{if_in_unit(name)}")
     found = ", ".join(named) if len(named) <= 30 else ", ".join([*named[:30], "…"])
     plural = "s" if len(missing) > 1 else ""
     raise InputError(
         f"The required column{plural} {', '.join(missing)} {'are' if plural else 'is'} missing; found: {found[:1000]}",
         file=path,
         row=row,
-        advice=(", ".join(hints).capitalize() if hints else f"Add {', '.join(missing)}"),
+        advice=f"R{', '.join(hints)[1:]}" if hints else f"Add {', '.join(missing)}",
     )

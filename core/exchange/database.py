@@ -15,7 +15,7 @@ from ..vectors import Array, Indices, Mask
 from .duplicates import Duplicates, find_duplicates
 from .selection import joined, rows_of
 from .tables import read_impacts
-from .unit_checks import check_names, check_units
+from .unit_checks import check_units
 
 SOURCE = "source"
 """Column of impacts.csv with the number of the source, from 1."""
@@ -104,7 +104,6 @@ def read_source(path: str | Path, site: str = "", licence: str = "") -> Database
     InputError : anything that is wrong with the table; units that are surely others; a row without a site.
     """
     path = Path(path)
-    check_names(path)
     impacts = read_impacts(path)
     doubts = check_units(impacts, path)
     sites = np.where(impacts.site == "", site, impacts.site)

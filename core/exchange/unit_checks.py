@@ -13,26 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..reconstruction.impact import Impacts, apparent
 from ..vectors import Array, Mask, norm
-from .tables import IMPACTS_COLUMNS
 
-OTHER_UNITS = {
-    "rad": ("deg", 57.29578),
-    "kmh": ("mps", 1 / 3.6),
-    "kmph": ("mps", 1 / 3.6),
-    "fps": ("mps", 0.3048),
-    "cmps": ("mps", 0.01),
-    "mmps": ("mps", 0.001),
-    "mm": ("m", 0.001),
-    "cm": ("m", 0.01),
-    "km": ("m", 1000.0),
-    "ft": ("m", 0.3048),
-    "ms": ("s", 0.001),
-    "min": ("s", 60.0),
-    "t": ("kg", 1000.0),
-    "g": ("kg", 0.001),
-    "lb": ("kg", 0.45359237),
-}
-"""Suffix of a column → suffix here, and the factor."""
 ANGLE_FACTORS = {np.pi / 180: ("in radians", "multiply it by 57.29578")}
 SPEED_FACTORS = {
     3.6: ("in km/h", "divide it by 3.6"),
@@ -51,33 +32,6 @@ DENSITY_KGPM3 = (300.0, 10_000.0)
 DIAMETER_M, SPEED_MPS, LENGTH_TOLERANCE = (0.005, 30.0), 150.0, 1e-3
 NEAR, FEWEST = 0.04, 5
 """A ratio is a factor when it is this near to it, over this many impacts or more."""
-
-
-def check_names(path: str | Path) -> None:
-    """Refuse a table one of whose columns has the name of one of ours, with another unit.
-
-    Raises
-    ------
-    InputError : with the factor. A file that cannot be read is left to who reads it.
-    """
-    try:
-        with Path(path).open(encoding="utf-8-sig", errors="replace") as stream:
-            header = [cell.strip().strip('"') for cell in stream.readline().split(",")]
-    except OSError:
-        return
-    for name in header:
-        stem, _, suffix = name.rpartition("_")
-        if suffix.lower() not in OTHER_UNITS:
-            continue
-        unit, factor = OTHER_UNITS[suffix.lower()]
-        ours = f"{stem}_{unit}"
-        if ours in IMPACTS_COLUMNS and ours not in header:
-            raise InputError(
-                f"The column {name} is {ours} in another unit",
-                file=path,
-                row=1,
-                advice=f"Multiply it by {factor:.7g} and rename it to {ours}",
-            )
 
 
 def check_units(impacts: Impacts, file: str | Path) -> list[str]:

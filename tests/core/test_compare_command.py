@@ -65,6 +65,28 @@ def test_chosen_models_spin_and_radius(impacts, tmp_path):
     np.testing.assert_allclose(predictions.v2[0, 0, 0], [3.312, 0, 1.860413], rtol=1e-6)
 
 
+def test_speeds_in_km_h_are_not_taken_for_metres_a_second(impacts, tmp_path, capsys):
+    """As recorded by many: the same results as from the same speeds in m/s, and no advice to rename a column."""
+    speeds = HEADER.replace("_mps", "_kmh")
+    rows = []
+    for row in ROWS:
+        cells = row.split(",")
+        cells[5:11] = [repr(3.6 * float(cell)) if cell else "" for cell in cells[5:11]]
+        rows.append(",".join(cells))
+    other, found = table(tmp_path / "other.csv", rows, speeds), []
+    for name, path in (("one", impacts), ("two", other)):
+        assert main(["compare", str(path), "--tables-only", "--out", str(tmp_path / name)]) == 0, (
+            capsys.readouterr().err
+        )
+        found.append(read_predictions(tmp_path / name / "predictions.csv", read_impacts(path)))
+    np.testing.assert_allclose(read_impacts(other).v1[0], [8, 0, -6], rtol=1e-15)
+    np.testing.assert_allclose(found[0].v2, found[1].v2, rtol=1e-12)
+    unknown = table(tmp_path / "other.csv", rows, HEADER.replace("v1x_mps", "v1x_knots"))
+    assert main(["compare", str(unknown), "--tables-only", "--out", str(tmp_path / "three")]) == 1
+    said = capsys.readouterr().err
+    assert f"{unknown}, row 1: The column v1x_knots is v1x_mps in a unit that is not known. Convert it to m/s" in said
+
+
 BAD = {
     "no v1": ([row.replace(",8,0,-6,", ",,,,").replace(",6,0,-5,", ",,,,") for row in ROWS], [], "3 with no incident"),
     "no normals": ([row.replace(",0,0,1,", ",,,,") for row in ROWS], [], "2 with no terrain normal"),

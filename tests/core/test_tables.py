@@ -220,6 +220,80 @@ def test_bad_tables_are_refused_with_their_row(tmp_path, case):
     assert caught.value.advice
 
 
+def test_picks_in_other_units_are_converted(tmp_path):
+    """Each factor by value: milliseconds, feet, centimetres, kilometres, millimetres, revolutions a minute, degrees."""
+    table = tmp_path / "picks.csv"
+    header = (
+        "trajectory,time_ms,x_ft,y_cm,z_km,sigma_time_min,sigma_position_mm,omega1x_rpm,omega1y_deg/s,omega1z_rad/s"
+    )
+    table.write_text(
+        f"{header},note_m\na,1500,100,250,1.5,0.5,35,60,180,2,7\na,2500,,,,,,,,,\n".replace(",,,,,,,,,", ",1,1,1,,,,,,")
+    )
+    read = read_picks(table)
+    survey = read.shift.to_survey(read.position)
+    np.testing.assert_allclose(read.time_s, [1.5, 2.5], rtol=1e-15)
+    np.testing.assert_allclose(survey, [[30.48, 2.5, 1500.0], [0.3048, 0.01, 1000.0]], rtol=1e-14)
+    np.testing.assert_allclose(read.sigma_time_s, [30.0, np.nan], rtol=1e-15)
+    np.testing.assert_allclose(read.sigma_position_m, [0.035, np.nan], rtol=1e-15)
+    np.testing.assert_allclose(read.angular_velocity[0], [2 * np.pi, np.pi, 2.0], rtol=1e-15)
+    assert read.extra.keys() == {"note_m"}
+    write_picks(read, table)
+    np.testing.assert_allclose(read_picks(table).sigma_position_m, read.sigma_position_m)
+
+
+IMPACT = "trajectory,nx,ny,nz,v2x_mps,v2y_mps,v2z_mps,"
+
+
+def test_impacts_in_other_units_are_converted(tmp_path):
+    """km/h divided by 3.6, 180/π degrees a radian, tonnes, kilojoules; a number that is wrong has the file's name."""
+    table = tmp_path / "impacts.csv"
+    header = f"{IMPACT}v1x_kmh,v1y_km/h,v1z_fps,theta1_rad,sigma_rn,sigma_vn1_cmps,mass_t,diameter_mm,kinetic1_kJ"
+    table.write_text(f"{header}\na,0,0,1,1,0,2,36,7.2,-10,0.5,0.1,20,0.06,350,12\n", encoding="utf-8")
+    read = read_impacts(table)
+    np.testing.assert_allclose(read.v1, [[10.0, 2.0, -3.048]], rtol=1e-15)
+    np.testing.assert_allclose(read.theta1, [0.5], rtol=1e-15)
+    assert (read.mass_kg[0], read.diameter_m[0], read.kinetic1_j[0]) == pytest.approx((60.0, 0.35, 12000.0), rel=1e-15)
+    assert (read.sigma["rn"][0], read.sigma["vn1"][0]) == pytest.approx((0.1, 0.2), rel=1e-15)
+    assert not read.extra
+    table.write_text(f"{header}\na,0,0,1,1,0,2,36,fast,-10,0.5,,,0.06,350,12\n", encoding="utf-8")
+    with pytest.raises(InputError, match="row 2, trajectory a: 'fast' in column v1y_km/h is not a number"):
+        read_impacts(table)
+
+
+def test_a_column_of_ours_is_taken_and_the_other_unit_kept(tmp_path):
+    table = tmp_path / "picks.csv"
+    table.write_text("trajectory,time_s,x_m,y_m,z_m,time_ms,time_zone,sigma_note\na,1,0,0,0,999,7,\n", encoding="utf-8")
+    read = read_picks(table)
+    assert read.time_s[0] == 1.0
+    assert read.extra["time_ms"].tolist() == ["999"]
+    assert read.extra["time_zone"].tolist() == ["7"]
+    table.write_text("trajectory,time_s,x_m,y_m,z_m,sigma_position_by\na,1,0,0,0,eye\n", encoding="utf-8")
+    assert read_picks(table).extra["sigma_position_by"].tolist() == ["eye"]
+
+
+BAD_UNITS = {
+    "required": (
+        "v1x_knots,v1y_mps,v1z_mps",
+        "The column v1x_knots is v1x_mps in a unit that is not known. Convert it to m/s",
+    ),
+    "metres and milliseconds": ("v1x_ms,v1y_mps,v1z_mps", "The column v1x_ms is v1x_mps in a unit that is not known"),
+    "optional": ("v1x_mps,v1y_mps,v1z_mps,diameter_inch", "rename it to diameter_m; known are mm, cm, km, ft"),
+    "two": ("v1x_kmh,v1x_fps,v1y_mps,v1z_mps", "The columns v1x_kmh and v1x_fps are both v1x_mps in another unit"),
+    "no unit": ("v1x,v1y_mps,v1z_mps", "Rename v1x to v1x_mps if it is in m/s"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_UNITS)
+def test_unknown_units_are_refused(tmp_path, case):
+    columns, message = BAD_UNITS[case]
+    table = tmp_path / "t.csv"
+    table.write_text(f"{IMPACT}{columns}\na,0,0,1,1,0,2{',1' * len(columns.split(','))}\n", encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_impacts(table)
+    assert message in str(caught.value).removeprefix(str(table))
+    assert (caught.value.file, caught.value.row) == (table, 1)
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [

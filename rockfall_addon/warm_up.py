@@ -6,7 +6,9 @@ import threading
 import bpy
 import numpy as np
 
+from ..core.constants import GRAVITY_MPS2
 from ..core.georeference import GlobalShift
+from ..core.reconstruction.free_flight import fly
 from ..core.terrain.orientation import block_scale_normals
 from ..core.terrain.raycast import cast_rays, closest_points
 from ..core.terrain.surface import Surface
@@ -28,3 +30,4 @@ def _compile() -> None:
     cast_rays(plane, above, np.array([[0.0, 0.0, -1.0]]))
     closest_points(plane, above)
     block_scale_normals(plane, above, 0.3)
+    fly(above, above, np.ones(1), GRAVITY_MPS2, np.ones(1))

@@ -252,7 +252,7 @@ def _check_positions(impacts: Impacts, row: Indices) -> None:
 
 def _drag_per_m(impacts: Impacts, row: Indices, drag: Drag) -> Array:
     """(n,) as `Drag.per_metre`, from diameter and mass."""
-    result: Array = 0.5 * drag.air_density * drag.coefficient * np.pi / 4 * impacts.diameter_m**2 / impacts.mass_kg
+    result = drag.of_size(impacts.diameter_m, impacts.mass_kg)
     unknown = row[np.isnan(result[row])]
     if unknown.size:
         raise InputError(

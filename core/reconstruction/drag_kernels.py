@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flight with drag and its derivatives, compiled: the equation of motion together with its variational equations."""
+"""Flight with drag, compiled: the equation of motion, and with it its variational equations where they are asked for.
+
+Dormand and Prince's method of order 8, each step as long as its error allows. A state begins with the displacement (3)
+and the velocity (3); one of length `STATE` goes on with the derivatives (3, 5) of either by the three start velocities,
+k and g.
+"""
 
 import numpy as np
+from scipy.integrate import DOP853
 
 from ..compiled import kernel
 
-STATE = 36
-"""Displacement (3), velocity (3), and the derivatives (3, 5) of either by the three start velocities, k and g."""
-STEP = 0.01
-"""Largest product of a step and the rate at which drag changes the velocity: 1e-10 of the way after Runge–Kutta."""
-LEAST_STEPS = 2
+MOTION, STATE = 6, 36
+STAGES, SHARES, ERRORS = np.array(DOP853.A, order="C"), np.array(DOP853.B, order="C"), np.stack([DOP853.E3, DOP853.E5])
+STEP_ERROR_M = 1e-11
+"""Of the displacement in one step, and of what the velocity's error makes of it during the whole flight."""
+FIRST_STEP = 0.1
+"""Largest product of the first step and the rate at which drag changes the velocity."""
+MOST_STEPS = 10_000
 NEWTON_STEPS = 30
 MET = 1e-11
 """The flight joins its ends to this part of their distance."""
@@ -23,6 +31,8 @@ def _slope(y, drag, gravity, dy):  # type: ignore[no-untyped-def]
     dy[3] = -drag * speed * vx
     dy[4] = -drag * speed * vy
     dy[5] = -drag * speed * vz - gravity
+    if len(y) == MOTION:
+        return
     inverse = drag / speed if speed > 0.0 else 0.0
     for j in range(5):
         sx, sy, sz = y[21 + j], y[26 + j], y[31 + j]
@@ -40,32 +50,56 @@ def _slope(y, drag, gravity, dy):  # type: ignore[no-untyped-def]
 @kernel
 def _start(velocity, y):  # type: ignore[no-untyped-def]
     y[:] = 0.0
-    for i in range(3):
-        y[3 + i] = velocity[i]
-        y[21 + 6 * i] = 1.0
+    y[3:MOTION] = velocity
+    if len(y) == STATE:
+        for i in range(3):
+            y[21 + 6 * i] = 1.0
+
+
+@kernel
+def _trial(y, step, drag, gravity, reach, slopes, trial):  # type: ignore[no-untyped-def]
+    """Fill `trial` with the state after one step; its error in parts of what is allowed."""
+    stages = len(SHARES)
+    for stage in range(stages + 1):
+        trial[:] = y
+        for other in range(stage):
+            share = step * (STAGES[stage, other] if stage < stages else SHARES[other])
+            if share != 0.0:
+                for i in range(len(y)):
+                    trial[i] += share * slopes[other, i]
+        if stage < stages:
+            _slope(trial, drag, gravity, slopes[stage])
+    third, fifth = 0.0, 0.0
+    for i in range(MOTION):
+        size = abs(step) * (1.0 if i < 3 else reach) / STEP_ERROR_M
+        low, high = 0.0, 0.0
+        for stage in range(stages):
+            low += ERRORS[0, stage] * slopes[stage, i]
+            high += ERRORS[1, stage] * slopes[stage, i]
+        third, fifth = third + (size * low) ** 2, fifth + (size * high) ** 2
+    return fifth / np.sqrt(fifth + 0.01 * third) if fifth > 0.0 else fifth
 
 
 @kernel
 def _advance(y, duration, drag, gravity, work):  # type: ignore[no-untyped-def]
-    """Classical Runge–Kutta of the fourth order, in place."""
-    speed = np.sqrt(y[3] * y[3] + y[4] * y[4] + y[5] * y[5])
-    rate = abs(drag) * (speed + gravity * abs(duration)) + np.sqrt(abs(drag) * gravity)
-    steps = int(max(LEAST_STEPS, np.ceil(abs(duration) * rate / STEP)))
-    h = duration / steps
-    a, b, c, d, z = work[0], work[1], work[2], work[3], work[4]
-    for _ in range(steps):
-        _slope(y, drag, gravity, a)
-        for i in range(STATE):
-            z[i] = y[i] + 0.5 * h * a[i]
-        _slope(z, drag, gravity, b)
-        for i in range(STATE):
-            z[i] = y[i] + 0.5 * h * b[i]
-        _slope(z, drag, gravity, c)
-        for i in range(STATE):
-            z[i] = y[i] + h * c[i]
-        _slope(z, drag, gravity, d)
-        for i in range(STATE):
-            y[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i])
+    """Move a state on by a time, which may be negative; NaN where it cannot be integrated."""
+    slopes, trial = work[:-1], work[-1]
+    left, reach = duration, abs(duration)
+    rate = abs(drag) * np.sqrt(y[3] * y[3] + y[4] * y[4] + y[5] * y[5]) + np.sqrt(abs(drag) * gravity)
+    step = left / np.ceil(max(abs(left) * rate / FIRST_STEP, 1.0))
+    for _ in range(MOST_STEPS):
+        if left == 0.0 or not np.isfinite(step):
+            break
+        error = _trial(y, step, drag, gravity, reach, slopes, trial)
+        if error <= 1.0:
+            y[:] = trial
+            left = 0.0 if step == left else left - step
+        factor = 0.9 * error**-0.125 if error > 0.0 else 5.0
+        step *= min(max(factor, 0.2), 5.0) if np.isfinite(error) else 0.2
+        if abs(step) > abs(left):
+            step = left
+    if left != 0.0:
+        y[:] = np.nan
 
 
 @kernel
@@ -74,7 +108,7 @@ def join_ends(displacement, duration, drag, gravity, velocity, ends):  # type: i
 
     `velocity` comes with the first guess; a flight that is not found leaves NaN in `ends`.
     """
-    work = np.empty((5, STATE))
+    work = np.empty((len(SHARES) + 1, STATE))
     matrix = np.empty((3, 3))
     for f in range(len(duration)):
         y = ends[f]
@@ -100,8 +134,8 @@ def join_ends(displacement, duration, drag, gravity, velocity, ends):  # type: i
 
 @kernel
 def states_along(which, elapsed, velocity, drag, gravity, states):  # type: ignore[no-untyped-def]
-    """States (q, 36) of the flights `which` (q,) after `elapsed` (q,); quickest when both ascend."""
-    work = np.empty((5, STATE))
+    """States (q, 6) or (q, 36) of the flights `which` (q,) after `elapsed` (q,); quickest when both ascend."""
+    work = np.empty((len(SHARES) + 1, states.shape[1]))
     for row in range(len(which)):
         f, y = which[row], states[row]
         begin = 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flights: the motion between two picks, from Noël et al. 2018, eq. 5 and 6, or fitted to more observations."""
+"""Flights: the motion between two picks, or fitted to more observations."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,8 @@ import numpy as np
 
 from ..vectors import Array, Indices, Mask, Names, norm
 from .chains import Segments
-from .drag import fit_with_drag, fly
+from .drag import fit_with_drag
+from .free_flight import fly, incident_velocity, parabola, restituted_velocity
 from .observations import fit_parabolas, observe
 from .picks import Picks
 
@@ -60,26 +61,6 @@ class Flights:
         return self.kind == "contact"
 
 
-def restituted_velocity(displacement: Array, duration_s: Array, gravity_mps2: float) -> Array:
-    """Velocity at the start of a free flight, (n, 3) [m/s]: Noël et al. 2018, eq. 5.
-
-    Parameters
-    ----------
-    displacement : (n, 3) from the start to the end [m].
-    duration_s : (n,) [s].
-    """
-    velocity = displacement / duration_s[:, None]
-    velocity[:, 2] += 0.5 * gravity_mps2 * duration_s
-    return velocity
-
-
-def incident_velocity(restituted: Array, duration_s: Array, gravity_mps2: float) -> Array:
-    """Velocity at the end of a free flight that starts with `restituted`, (n, 3) [m/s]: Noël et al. 2018, eq. 6."""
-    velocity = restituted.copy()
-    velocity[:, 2] -= gravity_mps2 * duration_s
-    return velocity
-
-
 def solve_flights(picks: Picks, segments: Segments, gravity_mps2: float, drag_per_m: Array | None) -> Flights:
     """The motion in every segment.
 
@@ -130,8 +111,9 @@ def solve_flights(picks: Picks, segments: Segments, gravity_mps2: float, drag_pe
             drag[flying],
             lambda i: _name(picks, first[flying[i]]),
         )
-        moved, end_velocity[flying] = fly(start_velocity[flying], duration[flying], gravity_mps2, drag[flying])
-        end[flying] = start[flying] + moved
+        end[flying], end_velocity[flying] = fly(
+            start[flying], start_velocity[flying], duration[flying], gravity_mps2, drag[flying]
+        )
 
     kind = np.full(first.size, "contact")
     kind[~contact] = "flight"
@@ -178,24 +160,10 @@ def flight_states(flights: Flights, which: Indices, time_s: Array) -> tuple[Arra
     """
     which = np.asarray(which, dtype=np.intp)
     elapsed = np.asarray(time_s, dtype=np.float64) - flights.start_time_s[which]
-    position, velocity = flights.start_position[which], flights.start_velocity[which]
     gravity = np.where(flights.is_contact[which], 0.0, flights.gravity_mps2)
-    at_position, at_velocity = parabola(position, velocity, elapsed, gravity)
-    dragged = np.flatnonzero(flights.drag_per_m[which] > 0)
-    if dragged.size:
-        drag = flights.drag_per_m[which[dragged]]
-        moved, at_velocity[dragged] = fly(velocity[dragged], elapsed[dragged], flights.gravity_mps2, drag)
-        at_position[dragged] = position[dragged] + moved
-    return at_position, at_velocity
-
-
-def parabola(position: Array, velocity: Array, elapsed_s: Array, gravity_mps2: float | Array) -> tuple[Array, Array]:
-    """Position and velocity (n, 3) after a free flight of `elapsed_s` (n,) [s]."""
-    later = position + velocity * elapsed_s[:, None]
-    later[:, 2] -= 0.5 * gravity_mps2 * elapsed_s**2
-    faster = velocity.copy()
-    faster[:, 2] -= gravity_mps2 * elapsed_s
-    return later, faster
+    return fly(
+        flights.start_position[which], flights.start_velocity[which], elapsed, gravity, flights.drag_per_m[which]
+    )
 
 
 def _name(picks: Picks, pick: int) -> str:

@@ -9,8 +9,7 @@ from ..errors import RockfallError
 from ..terrain.raycast import cast_rays, heights_above
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask, dot, norm
-from .drag import fly
-from .flight import parabola
+from .free_flight import fly
 
 FIRST_STEP_S, STEP_S = 0.001, 0.02
 """Chords of the curved path, short at its start, where it may be a hop. The longest leaves the path by g·t²/8 = 0.5 mm;
@@ -65,14 +64,7 @@ class Launches:
         """
         which = np.asarray(which, dtype=np.intp)
         elapsed = np.broadcast_to(np.asarray(elapsed_s, dtype=np.float64), which.shape)
-        start, launch = self.position[which], self.velocity[which]
-        position, velocity = parabola(start, launch, elapsed, self.gravity_mps2)
-        dragged = np.flatnonzero(self.drag_per_m[which] > 0)
-        if dragged.size:
-            drag = self.drag_per_m[which[dragged]]
-            moved, velocity[dragged] = fly(launch[dragged], elapsed[dragged], self.gravity_mps2, drag)
-            position[dragged] = start[dragged] + moved
-        return position, velocity
+        return fly(self.position[which], self.velocity[which], elapsed, self.gravity_mps2, self.drag_per_m[which])
 
 
 def find_landings(

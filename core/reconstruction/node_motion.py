@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..vectors import Array, Indices, Mask
+from .free_flight import fall, incident_velocity, parabola, restituted_velocity
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,17 +85,15 @@ def join_nodes(
     displacement, duration = end - start, end_time_s - start_time_s
     k = duration.size
     identity = np.broadcast_to(np.eye(3), (k, 3, 3))
-    velocity = displacement / duration[:, None]
-    velocity[:, 2] += 0.5 * gravity * duration
-    end_velocity = velocity.copy()
-    end_velocity[:, 2] -= gravity * duration
+    velocity = restituted_velocity(displacement, duration, gravity)
+    end_velocity = incident_velocity(velocity, duration, gravity)
     acceleration = np.zeros((k, 3))
     acceleration[:, 2] = -gravity
     inverse = identity / duration[:, None, None]
     end_by_displacement = inverse.copy()
     by_law, velocity_by_law = np.zeros((k, 3, 2)), np.zeros((k, 3, 2))
     flies = gravity != 0
-    by_law[:, 2, 1] = np.where(flies, -0.5 * duration**2, 0.0)
+    by_law[:, 2, 1] = np.where(flies, fall(duration, 1.0)[:, 2], 0.0)
     velocity_by_law[:, 2, 1] = np.where(flies, -duration, 0.0)
 
     dragged = drag != 0
@@ -146,14 +145,11 @@ def places_at(motion: NodeMotion, which: Indices, time_s: Array) -> Places:
 
 def _from_start(motion: NodeMotion, which: Indices, elapsed: Array) -> tuple[Array, Array, Array, Array]:
     """Displacement, velocity, and the derivatives of the displacement by start velocity (q, 3, 3) and law (q, 3, 2)."""
-    q = which.size
-    gravity, velocity = motion.gravity[which], motion.start_velocity[which].copy()
-    position = velocity * elapsed[:, None]
-    position[:, 2] -= 0.5 * gravity * elapsed**2
-    velocity[:, 2] -= gravity * elapsed
+    q, gravity = which.size, motion.gravity[which]
+    position, velocity = parabola(np.zeros((q, 3)), motion.start_velocity[which], elapsed, gravity)
     by_start = elapsed[:, None, None] * np.broadcast_to(np.eye(3), (q, 3, 3))
     direct = np.zeros((q, 3, 2))
-    direct[:, 2, 1] = np.where(gravity != 0, -0.5 * elapsed**2, 0.0)
+    direct[:, 2, 1] = np.where(gravity != 0, fall(elapsed, 1.0)[:, 2], 0.0)
     rows = np.flatnonzero(motion.dragged[which])
     if rows.size:
         from . import drag_kernels

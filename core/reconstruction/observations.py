@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..vectors import Array, Indices
+from .free_flight import fall
 from .picks import Picks
 
 
@@ -33,10 +34,14 @@ class Observations:
         """Number of flights."""
         return int(self.flight[-1]) + 1 if self.flight.size else 0
 
+    @property
+    def starts(self) -> Indices:
+        """(k,) the first observation of each flight."""
+        return np.flatnonzero(np.r_[True, np.diff(self.flight) > 0])
+
     def sums(self, values: Array) -> Array:
         """Sums over the observations of each flight, (m, …) → (k, …)."""
-        starts = np.flatnonzero(np.r_[True, np.diff(self.flight) > 0])
-        return np.add.reduceat(values, starts, axis=0)
+        return np.add.reduceat(values, self.starts, axis=0)
 
 
 def observe(picks: Picks, first: Indices, last: Indices) -> Observations:
@@ -62,17 +67,16 @@ def observe(picks: Picks, first: Indices, last: Indices) -> Observations:
 def fit_parabolas(observations: Observations, gravity_mps2: float) -> tuple[Array, Array]:
     """Start positions and velocities (k, 3) of the free flights with the least weighted squared distances.
 
-    A free flight is linear in both once ½gt² is added to z: a straight-line regression, in closed form.
+    A free flight is linear in both without its fall: a straight-line regression, in closed form.
     """
     t, w, group = observations.time_s, observations.weight, observations.flight
-    fallen = observations.position.copy()
-    fallen[:, 2] += 0.5 * gravity_mps2 * t**2
+    straight = observations.position - fall(t, gravity_mps2)
     total = observations.sums(w)
     mean_time = observations.sums(w * t) / total
-    mean = observations.sums(w[:, None] * fallen) / total[:, None]
+    mean = observations.sums(w[:, None] * straight) / total[:, None]
     centred = t - mean_time[group]
     spread = observations.sums(w * centred**2)
-    velocity = observations.sums((w * centred)[:, None] * (fallen - mean[group])) / spread[:, None]
+    velocity = observations.sums((w * centred)[:, None] * (straight - mean[group])) / spread[:, None]
     return mean - velocity * mean_time[:, None], velocity
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..vectors import Array, across, angle_between, norm
+from .free_flight import fall
 
 ROUNDS = 3
 """Of weighting by the distance, which the first round does not know."""
@@ -43,8 +44,7 @@ def flight_through_rays(
     Gravity, being known, tells the distance that a single view does not see.
     """
     elapsed = time_s - point_time_s
-    fallen = np.zeros((time_s.size, 3))
-    fallen[:, 2] = -0.5 * gravity_mps2 * elapsed**2
+    fallen = fall(elapsed, gravity_mps2)
     beside = across(directions)
     rest = (beside @ (origins - point - fallen)[:, :, None])[:, :, 0]
     rows = beside * elapsed[:, None, None]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from rockfall.core.exchange.tables import read_picks
-from rockfall.core.reconstruction.flight import incident_velocity, restituted_velocity
+from rockfall.core.reconstruction.free_flight import incident_velocity, restituted_velocity
 from rockfall.core.reconstruction.picks import Picks
 from rockfall.core.vectors import Array, norm, unit
 

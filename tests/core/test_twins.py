@@ -21,7 +21,8 @@ from rockfall.core.film.wording import compared_lines
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.registry import COMPARED, MODELS
 from rockfall.core.reconstruction.block import Block
-from rockfall.core.reconstruction.drag import Drag, fly
+from rockfall.core.reconstruction.drag import Drag
+from rockfall.core.reconstruction.free_flight import fly
 from rockfall.core.reconstruction.landing import Launches, find_landings, greatest_heights
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -84,7 +85,7 @@ def test_drag_is_the_equation_of_motion():
     surface, drag = plane(35.0), 0.02
     start = launches([0, 0, 0], VELOCITIES[:3], drag)
     found = find_landings(start, surface, 0.175)
-    moved, velocity = fly(VELOCITIES[:3], found.duration_s, G, np.full(3, drag))
+    moved, velocity = fly(np.zeros((3, 3)), VELOCITIES[:3], found.duration_s, G, np.full(3, drag))
     np.testing.assert_allclose(found.position, moved, atol=1e-8)
     np.testing.assert_allclose(found.velocity, velocity, atol=1e-8)
     np.testing.assert_allclose(moved[:, 2], -moved[:, 0] * np.tan(np.radians(35)), atol=1e-7)

@@ -338,6 +338,7 @@ def test_hand_held_camera_is_followed_and_corrected(part, scene, aligned, camera
     count = aligned.propose_here(scene, camera)
     assert count >= 4
     offered = [pair for pair in aligned.pairs_of(camera) if pair.proposed]
+    assert len(offered) == count
     for pair in offered:
         there = middle.pixel[middle.name.tolist().index(pair.name)]
         assert np.hypot(*(np.array(pair.pixel) - there)) < 6

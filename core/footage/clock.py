@@ -176,30 +176,6 @@ def synchronise(
     )
 
 
-def check_overlap(clock: Clock, video: Video, times_s: Any) -> None:
-    """Refuse common times at which the video was not running.
-
-    Raises
-    ------
-    InputError : a time outside, by more than one frame; it tells both spans in seconds and frames.
-    """
-    times = np.atleast_1d(np.asarray(times_s, np.float64))
-    step = video.usual_step_s if video.frames > 1 else 0.0
-    begin, end = float(video.time_s[0]), float(video.time_s[-1])
-    inside = clock.to_video(times)
-    outside = (inside < begin - step) | (inside > end + 2 * step) | ~np.isfinite(times)
-    if not outside.any():
-        return
-    frames = (np.array([inside.min(), inside.max()]) - begin) * (video.rate_hz if video.frames > 1 else 0.0)
-    raise InputError(
-        f"{outside.sum()} of {times.size} times lie outside the video: they run from {times.min():.3f} to "
-        f"{times.max():.3f} s (frames {frames[0]:.0f} to {frames[1]:.0f}), the video from {clock.to_common(begin):.3f} "
-        f"to {clock.to_common(end + step):.3f} s (frames 0 to {video.frames - 1})",
-        file=video.path,
-        advice="Check the offset and the capture rate of the video's clock, or synchronise it again",
-    )
-
-
 def _events(reference: Any, seen: Any, sigma: Any) -> tuple[Array, Array, Array]:
     common = np.asarray(reference, np.float64).reshape(-1)
     video = np.asarray(seen, np.float64).reshape(-1)

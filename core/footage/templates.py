@@ -105,22 +105,20 @@ def _shares(
     """Of each pixel: share covered by the colour that explains it best, its variance by noise, what is left over."""
     variance = sigma**2
     total = np.einsum("ijk,ijk->ij", change, change) / variance
-    best: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-    for colour in colours.astype(np.float32):
+
+    def explained(colour: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         contrast = colour - behind
         power = np.maximum(np.einsum("ijk,ijk->ij", contrast, contrast) / variance, 1e-3)
         along = np.einsum("ijk,ijk->ij", change, contrast) / variance
         share = np.clip(along / power, -0.5, 1.25)
-        left = np.maximum(total - 2 * share * along + share**2 * power - 2, 0)
-        now = share, 1 / power, left
-        if best is None:
-            best = now
-        else:
-            better = left < best[2]
-            best = tuple(np.where(better, a, b) for a, b in zip(now, best, strict=True))  # type: ignore[assignment]
-    if best is None:
-        raise ValueError("a block has a colour")
-    return best[0], best[1], best[2] * best[1]
+        return share, 1 / power, np.maximum(total - 2 * share * along + share**2 * power - 2, 0)
+
+    share, noise, left = explained(colours[0].astype(np.float32))
+    for colour in colours[1:].astype(np.float32):
+        other = explained(colour)
+        better = other[2] < left
+        share, noise, left = (np.where(better, a, b) for a, b in zip(other, (share, noise, left), strict=True))
+    return share, noise, left * noise
 
 
 def palette(picture: np.ndarray, strength: np.ndarray, centre: Array, radius: float) -> Array | None:
@@ -162,7 +160,7 @@ def disc(u: Array, v: Array, centre: Array, diameter: float, streak: Array) -> A
     return share / count
 
 
-def search(here: Cover, looks: Appearance, streak: Array, reach: float) -> tuple[Array, Array]:
+def search(here: Cover, looks: Appearance, streak: Array) -> tuple[Array, Array]:
     """Places that look like the block, best first: (n, 2) centres [px] and (n,) scores.
 
     Centres up to half a diameter outside the window are found as well.

@@ -17,7 +17,7 @@ from rockfall.core.footage.advice import (
     time_sigma_s,
     turn_advice,
 )
-from rockfall.core.footage.clock import Clock, check_overlap, clock_for, synchronise
+from rockfall.core.footage.clock import Clock, clock_for, synchronise
 from rockfall.core.footage.video import open_video
 
 FOLDER = Path(__file__).parent.parent / "data" / "videos"
@@ -141,16 +141,6 @@ def test_impossible_synchronisations():
         synchronise([1, np.nan], [1, 2])
     with pytest.raises(InputError, match="not above 0"):
         synchronise([1, 2], [1, 2], sigma_s=0.0)
-
-
-def test_clocks_that_do_not_overlap(constant):
-    clock = Clock(offset_s=10.0)
-    check_overlap(clock, constant, [10.0, 10.7, 10 + 40 / 30])
-    with pytest.raises(InputError) as refused:
-        check_overlap(clock, constant, [10.5, 12.0, 13.0])
-    assert "2 of 3 times lie outside" in str(refused.value)
-    assert "from 10.500 to 13.000 s (frames 15 to 90)" in str(refused.value)
-    assert "the video from 10.000 to 11.333 s (frames 0 to 39)" in str(refused.value)
 
 
 def test_five_frames_a_turn():

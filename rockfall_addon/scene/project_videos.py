@@ -16,7 +16,7 @@ from ...core.exchange.project import Project, VideoEntry
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import Video, open_video
 from ...core.georeference import GlobalShift
-from . import footage, georeference, observations, store, video_times, videos
+from . import footage, georeference, sightings, store, video_times, videos
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,12 +159,12 @@ def _keep_track(camera: bpy.types.Object, track: Track, name: str) -> None:
     for each in dict.fromkeys(names.tolist()):
         rows = names == each
         by_hand = np.zeros(int(rows.sum()))
-        seen = observations.Seen(frame[rows], track.time_s[rows], track.pixel[rows], sigma[rows], by_hand)
-        observations.keep_track(camera, each, seen)
+        seen = sightings.Seen(frame[rows], track.time_s[rows], track.pixel[rows], sigma[rows], by_hand)
+        sightings.keep_track(camera, each, seen)
 
 
 def _track_of(camera: bpy.types.Object) -> Track | None:
-    parts = [(name, observations.seen_in(camera, name)) for name in observations.names_in(camera)]
+    parts = [(name, sightings.seen_in(camera, name)) for name in sightings.names_in(camera)]
     if not parts:
         return None
     count = sum(len(seen) for _, seen in parts)

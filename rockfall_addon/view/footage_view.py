@@ -19,13 +19,16 @@ from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.terrain.raycast import cast_rays, heights_above
 from ...core.vectors import Array, cross, norm, perpendicular, unit
+from ...core.workflow.first_picks import FAR_M
 from ..scene import (
+    clicks,
     fingerprints,
-    observations,
-    picking,
     picks,
+    pictures,
+    places,
+    proposal,
     reconstruction,
-    refinement,
+    sightings,
     store,
     sync,
     trails,
@@ -102,10 +105,10 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
     active : the selected pick.
     """
     settings, found = scene.rockfall_picking, Drawing()
-    _, video_s = picking.picture_time(scene, camera)
-    lens, moment = picking.posed(camera, video_s), picking.common_time(camera, video_s)
+    _, video_s = pictures.picture_time(scene, camera)
+    lens, moment = pictures.posed(camera, video_s), pictures.common_time(camera, video_s)
     times = videos.clock_of(camera).to_common(videos.times_of(camera))
-    step = picking.frame_step_s(camera)
+    step = pictures.frame_step_s(camera)
     things = fingerprints.by_trajectory(picks.things_of(scene))
     filmed = {name: path for name in things if (path := path_of(scene, name, times)) is not None}
     filmed = {n: p for n, p in filmed.items() if p.time_s[-1] > times[0] - step and p.time_s[0] < times[-1] + step}
@@ -113,15 +116,15 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
         for path in filmed.values():
             _add_path(found, lens, path)
             _add_outline(found, lens, path, moment, step)
-        proposed = refinement.proposed_path(scene)
+        proposed = proposal.path(scene)
         if proposed is not None:
             _add_polyline(found, lens, *proposed)
     if settings.show_track:
-        for name in observations.names_in(camera):
+        for name in sightings.names_in(camera):
             _add_seen(found, scene, camera, lens, name, filmed.get(name), video_s)
     for members in things.values():
         for thing in members:
-            near = abs(thing[store.TIME] - moment) <= picking.SAME_PICTURE * step
+            near = abs(thing[store.TIME] - moment) <= pictures.SAME_PICTURE * step
             if near or thing == active or times[0] - step <= thing[store.TIME] <= times[-1] + step:
                 _add_pick(found, lens, thing, near, thing == active)
     if active is not None:
@@ -181,7 +184,7 @@ def sample(
 
 def _path(scene: bpy.types.Scene, name: str, frames_s: Array | None) -> Path | None:
     things = picks.ordered(scene, picks.things_of(scene, [name]))
-    surface, block = reconstruction.ground(scene), picking.block_of(scene, name)
+    surface, block = reconstruction.ground(scene), places.block_of(scene, name)
     how = reconstruction.project_settings(scene, []).reconstruction
     reach = max(sync.LEAST_REACH_M, sync.REACH_RADII * block.radius_m)
     drag = Drag(how.air_density_kgpm3, how.drag_coefficient) if how.drag else None
@@ -260,7 +263,7 @@ def _add_seen(
     video_s: float,
 ) -> None:
     """Sightings of all pictures, brought into this one, joined with where the path is at their times."""
-    seen = observations.seen_in(camera, name)
+    seen = sightings.seen_in(camera, name)
     place, where = _sightings(scene, camera, name, seen, path)
     pixels, expected = project(lens, place), project(lens, where)
     good = np.isfinite(pixels[:, 0])
@@ -276,7 +279,7 @@ def _add_seen(
 
 
 def _sightings(
-    scene: bpy.types.Scene, camera: bpy.types.Object, name: str, seen: observations.Seen, path: Path | None
+    scene: bpy.types.Scene, camera: bpy.types.Object, name: str, seen: sightings.Seen, path: Path | None
 ) -> tuple[Array, Array]:
     """Points in space of sightings (m, 3), as deep as the path is then, and of the path (m, 3), NaN where it is not."""
     rows = np.array(camera[store.TRACK_ROWS], dtype=np.float64)
@@ -299,10 +302,10 @@ def _sightings(
     lacking = np.isnan(depth) & np.isfinite(direction[:, 0])
     surface = reconstruction.ground(scene)
     if lacking.any():
-        depth[lacking] = observations.FAR_M
+        depth[lacking] = FAR_M
         if surface is not None:
             met = cast_rays(surface, origin[lacking], direction[lacking]).distance
-            depth[lacking] = np.where(np.isfinite(met), met, observations.FAR_M)
+            depth[lacking] = np.where(np.isfinite(met), met, FAR_M)
     _seen[place] = key, (origin + depth[:, None] * direction, where)
     return _seen[place][1]
 
@@ -323,18 +326,18 @@ def _add_active(
 ) -> None:
     """Disc, ellipse and second view of the selected pick."""
     place = np.array(thing.location if picks.moved(thing) else thing[store.POSITION], dtype=np.float64)
-    radius = picking.block_of(scene, thing[store.TRAJECTORY]).radius_m
+    radius = places.block_of(scene, thing[store.TRAJECTORY]).radius_m
     disc = around(place, np.array(thing.matrix_world.col[2].xyz), radius)
     found.lines.append(_closed(project(lens, disc), (1.0, 0.65, 0.1), 1.0, 0.9))
-    sightings = picking.sightings(thing)
-    for seen in sightings.values():
-        axes = seen.ellipse
+    clicked = clicks.of(thing)
+    for click in clicked.values():
+        axes = click.ellipse
         points = place + np.cos(CIRCLE)[:, None] * axes[0] + np.sin(CIRCLE)[:, None] * axes[1]
         found.lines.append(_closed(project(lens, points), (1.0, 0.3, 0.2), 1.5))
-    curve = picking.epipolar(scene, thing, camera)
+    curve = clicks.epipolar(scene, thing, camera)
     if curve is not None and len(curve) > 1:
         found.lines.append(_closed(curve, EPIPOLAR, 1.5))
-    met = picking.triangulated(scene, thing) if len(sightings) > 1 else None
+    met = clicks.triangulated(scene, thing) if len(clicked) > 1 else None
     if met is not None and np.isfinite(met.point).all():
         pixel = project(lens, met.point)[0]
         if np.isfinite(pixel[0]):

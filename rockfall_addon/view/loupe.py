@@ -7,7 +7,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ...core.errors import RockfallError
-from ..scene import picking, problems, videos
+from ..scene import pictures, problems, videos
 from . import drawing, image_view, loupe_picture, pointing
 
 SHOWN_BY = {"rockfall.pick_tool", "rockfall.align_tool"}
@@ -46,7 +46,7 @@ def _draw(mouse: tuple[int, int]) -> None:
         return
     scale = context.preferences.system.ui_scale
     zoom = settings.loupe_zoom * scale
-    frame, _ = picking.picture_time(scene, camera)
+    frame, _ = pictures.picture_time(scene, camera)
     try:
         crop = loupe_picture.crop(videos.picture(camera, frame), pixel)
     except RockfallError:

@@ -7,7 +7,7 @@ import numpy as np
 from ...core.camera.model import rays
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array
-from ..scene import picking, reconstruction, videos
+from ..scene import pictures, places, reconstruction, videos
 from . import footage_view
 
 SIDE = 25
@@ -32,15 +32,15 @@ def outline(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Array) -> A
     surface = reconstruction.ground(scene)
     if surface is None or not videos.is_solved(camera):
         return None
-    _, video_s = picking.picture_time(scene, camera)
-    lens = picking.posed(camera, video_s)
+    _, video_s = pictures.picture_time(scene, camera)
+    lens = pictures.posed(camera, video_s)
     origin, direction = rays(lens, pixel[None])
     if not np.isfinite(direction).all():
         return None
     hits = cast_rays(surface, origin, direction)
     if hits.face[0] < 0:
         return None
-    radius = picking.block_of(scene, picking.trajectory(scene)).radius_m
+    radius = places.block_of(scene, places.trajectory(scene)).radius_m
     if scene.rockfall_picking.aim == "CONTACT":
         normal = surface.face_normals[hits.face[0]]
         centre = hits.point[0] + radius * normal

@@ -11,8 +11,8 @@ from mathutils import Vector
 from ...core.camera.model import project
 from ...core.errors import RockfallError
 from ...core.vectors import Array
-from ..scene import picking, picks, store, videos
-from ..scene.picking import Place
+from ..scene import clicks, picks, pictures, places, store, videos
+from ..scene.places import Place
 from . import image_view
 
 REACH_PX = 10.0
@@ -58,10 +58,10 @@ def place_at(context: bpy.types.Context, xy: Sequence[float], name: str) -> Plac
     if camera is not None:
         if pixel is None:
             raise RockfallError(_no_pixel(context, camera))
-        return picking.in_picture(context.scene, camera, pixel, name)
+        return places.in_picture(context.scene, camera, pixel, name)
     origin = region_2d_to_origin_3d(context.region, context.region_data, Vector(xy))
     direction = region_2d_to_vector_3d(context.region, context.region_data, Vector(xy))
-    return picking.on_ray(context.scene, np.array(origin), np.array(direction), name)
+    return places.on_ray(context.scene, np.array(origin), np.array(direction), name)
 
 
 def on_screen(context: bpy.types.Context, points: Array) -> Array:
@@ -72,8 +72,8 @@ def on_screen(context: bpy.types.Context, points: Array) -> Array:
         scene = context.scene
         rectangle = image_view.image_rectangle(context.region, context.region_data, scene, camera)
         if rectangle is not None:
-            _, video_s = picking.picture_time(scene, camera)
-            pixels = project(picking.posed(camera, video_s), points)
+            _, video_s = pictures.picture_time(scene, camera)
+            pixels = project(pictures.posed(camera, video_s), points)
             return image_view.to_region(rectangle, videos.size_of(camera), pixels)
     matrix = np.array(context.region_data.perspective_matrix)
     clip = np.c_[points, np.ones(len(points))] @ matrix.T
@@ -88,7 +88,7 @@ def pick_at(context: bpy.types.Context, xy: Sequence[float], *, any_time: bool =
     scene, camera = context.scene, solved_camera_of(context)
     things = picks.things_of(scene)
     if camera is not None and not any_time:
-        things = picking.in_this_picture(scene, camera)
+        things = pictures.in_this_picture(scene, camera)
     things = [thing for thing in things if thing.visible_get()]
     if not things:
         return None
@@ -103,18 +103,18 @@ def handle_of(context: bpy.types.Context, thing: bpy.types.Object) -> tuple[floa
     """Where a pick is held by the mouse, in the region: by what is clicked in the footage, else by its place."""
     place, camera = np.array(thing[store.POSITION], dtype=np.float64), solved_camera_of(context)
     if camera is not None and context.scene.rockfall_picking.aim == "CENTRE":
-        seen = picking.sightings(thing).get(camera[store.ID])
+        seen = clicks.of(thing).get(camera[store.ID])
         rectangle = image_view.image_rectangle(context.region, context.region_data, context.scene, camera)
         if (
             seen is not None
             and seen.centre
             and rectangle is not None
-            and thing in picking.in_this_picture(context.scene, camera)
+            and thing in pictures.in_this_picture(context.scene, camera)
         ):
             x, y = image_view.to_region(rectangle, videos.size_of(camera), seen.pixel)
             return float(x), float(y)
         normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
-        radius = picking.block_of(context.scene, thing[store.TRAJECTORY]).radius_m
+        radius = places.block_of(context.scene, thing[store.TRAJECTORY]).radius_m
         place = place + radius * normal / max(float(np.linalg.norm(normal)), 1e-9)
     x, y = on_screen(context, place)[0]
     return float(x), float(y)

@@ -2,6 +2,7 @@
 """Refinement of picks that are a little wrong, with pixels made from the demo's truth."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -76,7 +77,7 @@ def tracked(site, part, truth) -> bpy.types.Scene:
     one = np.ones(len(block))
     track = part("core.footage.tracking").BlockTrack(frame, time, pixel, 0.3 * one, one, pixel, 9 * one, ("", ""))
     (camera,) = part("rockfall_addon.scene.videos").cameras(site)
-    part("rockfall_addon.scene.observations").keep_track(camera, "B10", track)
+    part("rockfall_addon.scene.sightings").keep_track(camera, "B10", track)
     return site
 
 
@@ -93,30 +94,30 @@ def times_off(scene: bpy.types.Scene, truth) -> np.ndarray:
 
 
 def test_what_is_missing_is_said(site, part) -> None:
-    refinement = part("rockfall_addon.scene.refinement")
-    assert "Track the block" in refinement.ready(site)[0]
+    proposal = part("rockfall_addon.scene.proposal")
+    assert "Track the block" in proposal.lacking(site)
     assert not bpy.ops.rockfall.refine.poll()
     for thing in picks_of(site):
         bpy.data.objects.remove(thing)
-    assert refinement.ready(site) == ["Pick the impacts first."]
+    assert proposal.lacking(site) == "Pick the impacts first."
 
 
 def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) -> None:
-    refinement = part("rockfall_addon.scene.refinement")
+    proposal = part("rockfall_addon.scene.proposal")
     before = [list(thing["rockfall_position_m"]) for thing in picks_of(tracked)]
     off = times_off(tracked, truth)
     assert bpy.ops.rockfall.refine() == {"FINISHED"}
-    found = refinement.proposal(tracked)
-    assert found["before_px"] > 3.0
-    assert found["after_px"] < 0.6, "0.3 px of noise on each axis are 0.42 px"
-    assert len(found["picks"]) == 5
-    assert not found["stale"]
+    found = proposal.read(tracked)
+    assert found.before_px > 3.0
+    assert found.after_px < 0.6, "0.3 px of noise on each axis are 0.42 px"
+    assert len(found.changes) == 5
+    assert not found.stale
     assert [list(thing["rockfall_position_m"]) for thing in picks_of(tracked)] == before
-    place, colour, joined = refinement.proposed_path(tracked)
+    place, colour, joined = proposal.path(tracked)
     assert len(place) == len(colour) == len(joined) > 50
 
     assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
-    assert refinement.proposal(tracked) is None
+    assert proposal.read(tracked) is None
     assert times_off(tracked, truth).max() < 0.004 < off.max()
     far = []
     for thing, row in zip(picks_of(tracked), truth, strict=True):
@@ -137,31 +138,50 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
 
 def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
     """Refined once more, nothing moves: the scene's picks are those of the core's result."""
-    refinement = part("rockfall_addon.scene.refinement")
+    proposal = part("rockfall_addon.scene.proposal")
     bpy.ops.rockfall.refine()
-    first = refinement.proposal(tracked)["picks"]
-    place, _, _ = refinement.proposed_path(tracked)
+    first = proposal.read(tracked).changes
+    place, _, _ = proposal.path(tracked)
     bpy.ops.rockfall.apply_refinement()
     path = part("rockfall_addon.view.footage_view").path_of(tracked, "B10")
     np.testing.assert_allclose(path.position, place, atol=1e-6)
     bpy.ops.rockfall.refine()
-    for before, again in zip(first, refinement.proposal(tracked)["picks"], strict=True):
-        assert again[1] < 0.15 * before[1], "cm"
+    for before, again in zip(first, proposal.read(tracked).changes, strict=True):
+        assert again.moved_cm < 0.15 * before.moved_cm
+
+
+def test_pixels_of_pictures_without_a_pose_are_not_used(tracked, part) -> None:
+    """Where nothing of the background was recognised, the pose is a guess."""
+    proposal, videos = part("rockfall_addon.scene.proposal"), part("rockfall_addon.scene.videos")
+    bpy.ops.rockfall.refine()
+    whole = proposal.read(tracked)
+    (camera,) = videos.cameras(tracked)
+    path, lost = videos.camera_path(camera), np.arange(70, 76)
+    sigma, place = path.sigma_rotation.copy(), path.position.copy()
+    sigma[lost], place[lost] = np.inf, place[lost] + 5.0
+    videos.set_camera_path(tracked, camera, replace(path, sigma_rotation=sigma, position=place))
+    bpy.ops.rockfall.refine()
+    found = proposal.read(tracked)
+    assert found.pixels == whole.pixels - lost.size
+    assert found.outliers == whole.outliers
+    assert found.after_px == pytest.approx(whole.after_px, abs=0.05)
+    assert found.remarks[0].text.startswith(f"{lost.size} pixels are not used: the pose of the camera is not known")
+    assert [remark.about for remark in found.remarks[1:]] == [remark.about for remark in whole.remarks]
 
 
 def test_discarding_and_changing(tracked, part) -> None:
-    refinement = part("rockfall_addon.scene.refinement")
+    proposal = part("rockfall_addon.scene.proposal")
     kept = [dict(thing.items()).keys() for thing in picks_of(tracked)]
     bpy.ops.rockfall.refine()
     bpy.ops.rockfall.discard_refinement()
-    assert refinement.proposal(tracked) is None
+    assert proposal.read(tracked) is None
     assert [dict(thing.items()).keys() for thing in picks_of(tracked)] == kept
     assert not [key for key in tracked.keys() if "proposal" in key]  # noqa: SIM118 - a scene is no dictionary
 
     bpy.ops.rockfall.refine()
     picks_of(tracked)[1].location.z += 0.3
     bpy.context.view_layer.update()
-    assert refinement.proposal(tracked)["stale"]
+    assert proposal.read(tracked).stale
     with pytest.raises(RuntimeError, match="were changed since"):
         bpy.ops.rockfall.apply_refinement()
 
@@ -169,7 +189,7 @@ def test_discarding_and_changing(tracked, part) -> None:
 def test_gravity_can_be_checked(tracked, part) -> None:
     tracked.rockfall_picking.free = {"gravity"}
     bpy.ops.rockfall.refine()
-    (name, value, sigma) = part("rockfall_addon.scene.refinement").proposal(tracked)["unknowns"][0]
+    (name, value, sigma) = part("rockfall_addon.scene.proposal").read(tracked).unknowns[0]
     assert name == "gravity_mps2"
     assert abs(value - 9.81) < max(4 * sigma, 0.05)
     bpy.ops.rockfall.apply_refinement()

@@ -71,7 +71,7 @@ def all_picks(part, scene: bpy.types.Scene) -> list[dict]:
 
 
 def test_every_pick_is_identical(opened, part, old) -> None:
-    picks, picking = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.picking")
+    picks, clicks = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.clicks")
     found = all_picks(part, opened)
     assert len(found) == 18
     for new, before in zip(found, old["picks"], strict=True):
@@ -80,7 +80,7 @@ def test_every_pick_is_identical(opened, part, old) -> None:
         assert set(new) == set(before)
         same(new.get("rockfall_result"), before.get("rockfall_result"), 1e-9, before["rockfall_trajectory"])
     same(plain(picks.picks_of(opened)), old["table"])
-    seen = {thing["rockfall_id"]: plain(picking.sightings(thing)) for thing in picks.things_of(opened)}
+    seen = {thing["rockfall_id"]: plain(clicks.of(thing)) for thing in picks.things_of(opened)}
     same(seen, old["sightings"])
     assert sum(map(len, seen.values())) == 5
 
@@ -89,9 +89,14 @@ def test_every_result_is_equal(opened, part, old) -> None:
     impacts = part("rockfall_addon.scene.reconstruction").reconstruct_scene(opened).impacts
     for name, before in old["impacts"].items():
         same(plain(getattr(impacts, name)), before, 1e-9, name)
-    proposal = plain(part("rockfall_addon.scene.refinement").proposal(opened))
-    for name in ("before_px", "after_px", "pixels", "outliers", "picks", "ids", "names", "stale"):
+    proposal = plain(part("rockfall_addon.scene.proposal").read(opened))
+    for name in ("before_px", "after_px", "pixels", "outliers", "by_video", "stale"):
         same(proposal[name], old["proposal"][name], where=name)
+    same([list(change.values()) for change in proposal["changes"]], old["proposal"]["picks"])
+    assert [remark["text"] for remark in proposal["remarks"]] == old["proposal"]["advice"] != []
+    kept = json.loads(opened["rockfall_proposal"])
+    for name in ("ids", "names"):
+        same(kept[name], old["proposal"][name], where=name)
 
 
 def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
@@ -114,8 +119,8 @@ def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
         for name in ("rmse_px", "residual", "residual_m", "wrong", "sigma", "reference", "keys"):
             same(solution[name], before["solution"][name], where=name)
         same(plain(part("rockfall_addon.scene.video_times").events_of(camera)), before["events"])
-        observations = part("rockfall_addon.scene.observations")
-        seen = {name: plain(observations.seen_in(camera, name)) for name in observations.names_in(camera)}
+        sightings = part("rockfall_addon.scene.sightings")
+        seen = {name: plain(sightings.seen_in(camera, name)) for name in sightings.names_in(camera)}
         same(seen, before["seen"])
         for name, value in before["settings"].items():
             same(plain(getattr(camera.rockfall_alignment, name)), value, where=name)

@@ -503,7 +503,7 @@ def test_footage_project(part: Part) -> None:
     )
     seen = view.project(scene(), camera, pairs.point, videos.common_time(scene(), 0))
     assert np.sqrt(np.mean((seen - pairs.pixel) ** 2)) < 2.0
-    assert part("rockfall_addon.scene.observations").names_in(camera) == ["B10"]
+    assert part("rockfall_addon.scene.sightings").names_in(camera) == ["B10"]
 
 
 def project_with_video(part: Part, folder: Path, file: Path) -> Path:

@@ -177,7 +177,7 @@ def test_footage_demo_is_ready_to_be_picked(rockfall, part) -> None:
     assert videos.is_solved(camera)
     assert scene.camera == camera
     assert videos.video_time(scene, camera) == pytest.approx(51 / 30, abs=1e-6)
-    observations = part("rockfall_addon.scene.observations")
-    assert observations.names_in(camera) == ["B10"]
-    assert part("rockfall_addon.scene.picking").trajectory(scene) == "B10"
+    sightings = part("rockfall_addon.scene.sightings")
+    assert sightings.names_in(camera) == ["B10"]
+    assert part("rockfall_addon.scene.places").trajectory(scene) == "B10"
     assert not bpy.ops.rockfall.load_footage_demo.poll()

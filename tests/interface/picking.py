@@ -179,7 +179,7 @@ def case_pick_refine(window):
     track = window.part("core.footage.tracking").BlockTrack(
         table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
     )
-    window.part("rockfall_addon.scene.observations").keep_track(camera_of(window), "B10", track)
+    window.part("rockfall_addon.scene.sightings").keep_track(camera_of(window), "B10", track)
     picks()[1]["rockfall_time_s"] += 0.03
     window.part("rockfall_addon.scene.sync").sync(scene)
     with window.override():
@@ -197,8 +197,8 @@ def case_pick_refine(window):
     window.redraw()
     yield 1.5
     window.screenshot("proposed")
-    found = window.part("rockfall_addon.scene.refinement").proposal(scene)
-    assert found["after_px"] < 1.5 < found["before_px"], found
+    found = window.part("rockfall_addon.scene.proposal").read(scene)
+    assert found.after_px < 1.5 < found.before_px, found
     with window.override():
         assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="applied")
@@ -306,9 +306,9 @@ def case_pick_track_the_block(window):
         x, y = on_screen(window, [float(block[frame]["u_px"]), float(block[frame]["v_px"])])
         yield from window.click(x, y)
         yield 0.3
-    observations, camera = window.part("rockfall_addon.scene.observations"), camera_of(window)
+    camera, sightings = camera_of(window), window.part("rockfall_addon.scene.sightings")
     assert not picks(), "in flight the pixel is kept, not a place"
-    assert observations.seen_in(camera, "B10").frame.tolist() == [70, 100]
+    assert sightings.seen_in(camera, "B10").frame.tolist() == [70, 100]
     scene.rockfall_picking.whole_video, scene.rockfall_picking.track_frames = False, 55
 
     def running():
@@ -321,11 +321,11 @@ def case_pick_track_the_block(window):
     window.screenshot("running")
     yield from window.press("ESC", x, y)
     yield from window.wait_for(lambda: not running(), 60.0, "tracking stops")
-    assert len(observations.seen_in(camera, "B10")) == 2, "nothing has changed"
+    assert len(sightings.seen_in(camera, "B10")) == 2, "nothing has changed"
     with window.override():
         assert bpy.ops.rockfall.track_block("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
     yield from window.wait_for(lambda: not running(), 150.0, "tracking ends")
-    seen = observations.seen_in(camera, "B10")
+    seen = sightings.seen_in(camera, "B10")
     assert len(seen) > 60, len(seen)
     with window.override():
         assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
@@ -369,8 +369,8 @@ def case_pick_in_two_views(window):
     window.screenshot("diamond")
     (thing,) = picks()
     assert list(thing["rockfall_position_m"]) == held, "the pick stays until it is told to move"
-    picking = window.part("rockfall_addon.scene.picking")
-    found = picking.triangulated(scene, thing)
+    clicks = window.part("rockfall_addon.scene.clicks")
+    found = clicks.triangulated(scene, thing)
     assert 0.001 < found.miss_distance[0] < 2.0, found.miss_distance
     with window.override():
         assert bpy.ops.rockfall.use_triangulated() == {"FINISHED"}

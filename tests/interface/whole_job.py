@@ -200,12 +200,12 @@ def refine(window):
     track = window.part("core.footage.tracking").BlockTrack(
         table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
     )
-    window.part("rockfall_addon.scene.observations").keep_track(aligning.the_camera(window), NAME, track)
+    window.part("rockfall_addon.scene.sightings").keep_track(aligning.the_camera(window), NAME, track)
     with in_left_view(window):
         bpy.ops.ed.undo_push(message="track")
         assert bpy.ops.rockfall.refine() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="refined")
-    found = window.part("rockfall_addon.scene.refinement").proposal(scene)
+    found = window.part("rockfall_addon.scene.proposal").read(scene)
     yield from window.move(*window.centre("DOPESHEET_EDITOR"))  # the loupe is not to hide the path
     yield 1.0
     window.screenshot("7-proposed")
@@ -215,10 +215,10 @@ def refine(window):
     yield 1.5
     window.screenshot("8-refined")
     off, wrong = misses(window), speed_errors(window)
-    print(f"{found['before_px']:.2f} px before, {found['after_px']:.2f} px after refinement")
+    print(f"{found.before_px:.2f} px before, {found.after_px:.2f} px after refinement")
     print(f"refined picks are {np.array2string(off, precision=2)} m off")
     print(f"refined speeds are {np.array2string(100 * wrong, precision=2)} % off")
-    assert found["after_px"] < found["before_px"]
+    assert found.after_px < found.before_px
     assert off.max() < 0.5, off
     assert np.abs(wrong).max() < 0.03, wrong
     picking.no_trouble(window)

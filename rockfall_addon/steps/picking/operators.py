@@ -5,9 +5,10 @@ import bpy
 from bpy.props import EnumProperty
 
 from ....core.errors import RockfallError
-from ...scene import observations, picking, picks, store
+from ...scene import clicks, picks, pictures, places, sightings, store
 from ...view import pointing
 from ...view.reporting import reported
+from . import editing
 from .properties import KINDS
 
 TOOL = "rockfall.pick_tool"
@@ -72,24 +73,24 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         scene = context.scene
         thing = pointing.pick_at(context, self._xy, any_time=any_time)
         if thing is None:
-            name, kind = picking.trajectory(scene), scene.rockfall_picking.kind
+            name, kind = places.trajectory(scene), scene.rockfall_picking.kind
             if kind == "pass" and pointing.camera_of(context) is not None:
                 self._observe(context, name)
                 return False
             place = pointing.place_at(context, self._xy, name)
             camera = pointing.solved_camera_of(context)
-            there = picking.of_this_picture(scene, camera, name, place.time_s)
-            self._kept = None if there is None else picking.snapshot(there)
-            second = there is not None and camera is not None and picking.elsewhere(there, camera)
-            thing, self._new = picking.put(scene, camera, place, name, kind)
+            there = pictures.of_this_picture(scene, camera, name, place.time_s)
+            self._kept = None if there is None else editing.snapshot(there)
+            second = there is not None and camera is not None and clicks.elsewhere(there, camera)
+            thing, self._new = editing.make_or_move(scene, camera, place, name, kind)
             scene.rockfall_picking.trajectory = name
             if second:
                 pointing.select(context, thing)
-                self.report({"INFO"}, picking.second_view(scene, thing))
+                self.report({"INFO"}, editing.second_view(scene, thing))
                 return False
             self._moved, self._place = True, place
         else:
-            self._kept, self._moved, self._place = picking.snapshot(thing), False, None
+            self._kept, self._moved, self._place = editing.snapshot(thing), False, None
             self._xy = pointing.handle_of(context, thing)  # held by its middle: it does not jump
             scene.rockfall_picking.trajectory = thing[store.TRAJECTORY]
         pointing.select(context, thing)
@@ -100,9 +101,9 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         camera, pixel = pointing.camera_of(context), pointing.pixel_at(context, self._xy)
         if pixel is None:
             raise RockfallError("This is outside of the picture. Click the block in it.")
-        frame, video_s = picking.picture_time(context.scene, camera)
+        frame, video_s = pictures.picture_time(context.scene, camera)
         sigma_px = context.scene.rockfall_picking.sigma_px
-        observations.click(camera, name, frame, video_s, pixel, sigma_px)
+        sightings.click(camera, name, frame, video_s, pixel, sigma_px)
         context.scene.rockfall_picking.trajectory = name
         self.report({"INFO"}, f"{name}: the block is at ({pixel[0]:.1f}, {pixel[1]:.1f}) in picture {frame}.")
         context.area.tag_redraw()
@@ -123,37 +124,37 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
             self._look_again(context, thing, camera)
             return {"FINISHED"}  # a click on a pick selects it
         if self._place is not None:
-            picking.move(scene, thing, camera, self._place)
-        picking.finish(scene, thing)
+            editing.move(scene, thing, camera, self._place)
+        editing.finish(scene, thing)
         warning = self._place.warning if self._place is not None else ""
         if warning:
             self.report({"WARNING"}, warning)
         else:
-            self.report({"INFO"}, picking.described(thing))
+            self.report({"INFO"}, editing.described(thing))
         return {"FINISHED"}
 
     def _look_again(self, context: bpy.types.Context, thing: bpy.types.Object, camera: bpy.types.Object | None) -> None:
         """A click on a pick that was made in another video tells where it is in this one."""
         scene = context.scene
-        if camera is None or not picking.elsewhere(thing, camera):
+        if camera is None or not clicks.elsewhere(thing, camera):
             return
-        if thing not in picking.in_this_picture(scene, camera):
+        if thing not in pictures.in_this_picture(scene, camera):
             return
         try:
             place = pointing.place_at(context, self._press, thing[store.TRAJECTORY])
         except RockfallError as error:
             self.report({"WARNING"}, str(error))
             return
-        picking.keep_sighting(scene, thing, camera, place)
-        self.report({"INFO"}, picking.second_view(scene, thing))
+        clicks.keep(scene, thing, camera, place)
+        self.report({"INFO"}, editing.second_view(scene, thing))
 
     def _cancel(self, context: bpy.types.Context, thing: bpy.types.Object | None) -> set[str]:
         context.workspace.status_text_set(None)
         if thing is not None:
             if self._new:
-                picking.remove(context.scene, thing)
+                editing.remove(context.scene, thing)
             elif self._kept is not None:
-                picking.restore(thing, self._kept)
+                editing.restore(thing, self._kept)
         return {"CANCELLED"}
 
 
@@ -175,7 +176,7 @@ class ROCKFALL_OT_pick_kind(bpy.types.Operator):
         thing = pointing.pick_at(context, (event.mouse_region_x, event.mouse_region_y))
         if thing is None:
             return self.execute(context)
-        picking.set_kind(scene, thing, self.kind)
+        editing.set_kind(scene, thing, self.kind)
         pointing.select(context, thing)
         return {"FINISHED"}
 
@@ -201,7 +202,7 @@ class ROCKFALL_OT_remove_pick(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        picking.remove(context.scene, pointing.active_pick(context))
+        editing.remove(context.scene, pointing.active_pick(context))
         return {"FINISHED"}
 
 
@@ -215,14 +216,14 @@ class ROCKFALL_OT_use_triangulated(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         thing = pointing.active_pick(context)
-        if thing is not None and len(picking.sightings(thing)) > 1:
+        if thing is not None and len(clicks.of(thing)) > 1:
             return True
         cls.poll_message_set("Select a pick, and click the same event in a second aligned video")
         return False
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        miss = picking.use_triangulated(context.scene, pointing.active_pick(context))
+        miss = editing.use_triangulated(context.scene, pointing.active_pick(context))
         self.report({"INFO"}, f"The rays miss each other by {100 * miss:.1f} cm.")
         return {"FINISHED"}
 

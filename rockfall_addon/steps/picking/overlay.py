@@ -6,7 +6,7 @@ import bpy
 import gpu
 import numpy as np
 
-from ...scene import picking, picks, problems, refinement, store, videos
+from ...scene import clicks, picks, places, problems, proposal, store, videos
 from ...view import drawing, footage_view, image_view, pointing
 from ...view.footage_view import Drawing, Mark
 
@@ -64,7 +64,7 @@ def _draw_view() -> None:
     scale = context.preferences.system.ui_scale
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("LESS_EQUAL")
-    proposed = refinement.proposed_path(scene)
+    proposed = proposal.path(scene)
     if proposed is not None:
         place, colour, joined = proposed
         first = np.flatnonzero(joined[:-1])
@@ -83,12 +83,12 @@ def _solid(scene: bpy.types.Scene, thing: bpy.types.Object) -> list[tuple[np.nda
     place = np.array(thing.location if picks.moved(thing) else thing[store.POSITION], dtype=np.float64)
     normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
     normal /= np.linalg.norm(normal)
-    radius = picking.block_of(scene, thing[store.TRAJECTORY]).radius_m
+    radius = places.block_of(scene, thing[store.TRAJECTORY]).radius_m
     found = []
     if thing[store.KIND] != "pass":
         for axis in np.eye(3):  # the block's ball, tangent to the terrain
             found.append((footage_view.around(place + radius * normal, axis, radius), footage_view.OUTLINE))
-    for seen in picking.sightings(thing).values():
+    for seen in clicks.of(thing).values():
         circle = footage_view.CIRCLE[:, None]
         ellipse = place + 0.02 * normal + np.cos(circle) * seen.ellipse[0] + np.sin(circle) * seen.ellipse[1]
         found.append((ellipse, (1.0, 0.3, 0.2)))

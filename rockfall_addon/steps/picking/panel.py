@@ -3,9 +3,10 @@
 
 import bpy
 
-from ...scene import observations, picking, store, videos
+from ...scene import places, sightings, store, videos
 from ...view import pointing
 from ...view.panel import RockfallPanel, advise, paragraph
+from . import editing
 
 
 class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
@@ -25,7 +26,7 @@ class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
             column.prop(settings, name)
         pick = pointing.active_pick(context)
         if pick is not None:
-            warning = picking.grazing_warning(pick)
+            warning = editing.grazing_warning(pick)
             if warning:
                 paragraph(context, layout, warning, "ERROR")
             if len(videos.cameras(scene)) > 1:
@@ -50,8 +51,8 @@ class ROCKFALL_PT_tracking(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         settings, camera = scene.rockfall_picking, videos.active_camera(scene)
-        name = picking.trajectory(scene)
-        seen = observations.seen_in(camera, name)
+        name = places.trajectory(scene)
+        seen = sightings.seen_in(camera, name)
         if len(seen):
             text = f"{name} was seen in {len(seen)} pictures of {camera.name}, {int(seen.by_hand.sum())} by hand."
         else:

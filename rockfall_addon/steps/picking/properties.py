@@ -14,9 +14,9 @@ KINDS = (
 
 
 def _names(self: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> list[str]:
-    from ...scene import picking
+    from ...scene import places
 
-    return picking.trajectories(self.id_data)
+    return places.trajectories(self.id_data)
 
 
 class PickingSettings(bpy.types.PropertyGroup):

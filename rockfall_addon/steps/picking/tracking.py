@@ -9,15 +9,16 @@ import bpy
 from ....core.errors import RockfallError
 from ....core.footage.tracking import BlockTrack, track_block
 from ....core.progress import CancelledError
-from ...scene import observations, picking, store, videos
+from ...scene import places, sightings, store, videos
 from ...view.of_video import OfVideo
 from ...view.reporting import reported
+from . import tracks
 
 POLL_S = 0.15
 
 
 def _solved_name(context: bpy.types.Context) -> tuple[bpy.types.Object | None, str]:
-    return videos.active_camera(context.scene), picking.trajectory(context.scene)
+    return videos.active_camera(context.scene), places.trajectory(context.scene)
 
 
 class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
@@ -68,7 +69,7 @@ class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
         camera, self._name = _solved_name(context)
         self._camera = camera[store.ID]
         video = videos.video_of(camera)
-        clicks, settings = observations.clicks_for(scene, camera, self._name), scene.rockfall_picking
+        clicks, settings = tracks.clicks_for(scene, camera, self._name), scene.rockfall_picking
         first, last = 0, video.frames - 1
         if not settings.whole_video:
             shown = videos.true_frame(scene, camera)
@@ -107,7 +108,7 @@ class ROCKFALL_OT_track_block(OfVideo, bpy.types.Operator):
         if camera is None:
             self.report({"ERROR"}, "The camera was deleted while its video was tracked.")
             return {"CANCELLED"}
-        observations.keep_track(camera, self._name, track)
+        sightings.keep_track(camera, self._name, track)
         frames = f"{track.frame.size} pictures, {track.frame[0]} to {track.frame[-1]}"
         self.report({"INFO"}, f"{self._name} is followed through {frames}. After: {track.stopped[1]}.")
         return {"FINISHED"}
@@ -121,7 +122,7 @@ class _OfTrack:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         camera, name = _solved_name(context)
-        if camera is not None and name in observations.names_in(camera):
+        if camera is not None and name in sightings.names_in(camera):
             return True
         cls.poll_message_set("Track the block first, or click it in flight")
         return False
@@ -136,9 +137,11 @@ class ROCKFALL_OT_propose_impacts(_OfTrack, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera, name = _solved_name(context)
-        made = observations.propose(context.scene, camera, name)
-        count = f"{len(made)} impacts are" if len(made) != 1 else "One impact is"
-        self.report({"INFO"}, f"{count} proposed for {name}. Look at each, and move or remove it.")
+        made = tracks.propose(context.scene, camera, name)
+        passes = sum(thing[store.KIND] == "pass" for thing in made)
+        count = f"{len(made) - passes} impacts are" if len(made) - passes != 1 else "One impact is"
+        ends = f", and {passes} points in flight where the track begins or ends" if passes else ""
+        self.report({"INFO"}, f"{count} proposed for {name}{ends}. Look at each, and move or remove it.")
         return {"FINISHED"} if made else {"CANCELLED"}
 
 
@@ -150,7 +153,7 @@ class ROCKFALL_OT_clear_track(_OfTrack, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera, name = _solved_name(context)
-        count = observations.clear(camera, name)
+        count = sightings.clear(camera, name)
         self.report({"INFO"}, f"{count} pixels of {name} are forgotten.")
         return {"FINISHED"}
 

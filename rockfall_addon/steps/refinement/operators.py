@@ -3,9 +3,10 @@
 
 import bpy
 
-from ...scene import picking, refinement, store
+from ...scene import places, proposal, store
 from ...view import pointing
 from ...view.reporting import reported
+from . import fitting
 
 
 class ROCKFALL_OT_refine(bpy.types.Operator):
@@ -17,9 +18,9 @@ class ROCKFALL_OT_refine(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        lacking = refinement.ready(context.scene)
+        lacking = proposal.lacking(context.scene)
         if lacking:
-            cls.poll_message_set(lacking[0])
+            cls.poll_message_set(lacking)
         return not lacking
 
     @reported
@@ -28,9 +29,10 @@ class ROCKFALL_OT_refine(bpy.types.Operator):
         names = None
         if settings.scope == "ACTIVE":
             thing = pointing.active_pick(context)
-            names = [picking.trajectory(scene) if thing is None else thing[store.TRAJECTORY]]
-        found = refinement.propose(scene, names, sorted(settings.free))
-        self.report({"INFO"}, f"{found['before_px']:.2f} px before, {found['after_px']:.2f} px after.")
+            names = [places.trajectory(scene) if thing is None else thing[store.TRAJECTORY]]
+        fitting.propose(scene, names, sorted(settings.free))
+        found = proposal.read(scene)
+        self.report({"INFO"}, f"{found.before_px:.2f} px before, {found.after_px:.2f} px after.")
         return {"FINISHED"}
 
 
@@ -41,7 +43,7 @@ class _OfProposal:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if store.PROPOSAL in context.scene:
+        if proposal.is_there(context.scene):
             return True
         cls.poll_message_set("Refine first")
         return False
@@ -55,7 +57,7 @@ class ROCKFALL_OT_apply_refinement(_OfProposal, bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        count = refinement.apply(context.scene)
+        count = proposal.apply(context.scene)
         self.report({"INFO"}, f"{count} picks are refined.")
         return {"FINISHED"}
 
@@ -67,7 +69,7 @@ class ROCKFALL_OT_discard_refinement(_OfProposal, bpy.types.Operator):
     bl_label = "Discard Refinement"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        refinement.discard(context.scene)
+        proposal.discard(context.scene)
         return {"FINISHED"}
 
 

@@ -3,8 +3,9 @@
 
 import bpy
 
-from ...scene import refinement, store
-from ...view.panel import RockfallPanel, State, advise, facts, paragraph
+from ...scene import proposal
+from ...scene.proposal import Proposal
+from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 
 MOST_ROWS = 12
 
@@ -16,17 +17,17 @@ class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
-        if refinement.ready(context.scene):
+        if proposal.lacking(context.scene):
             return "TO_DO"
-        return "ATTENTION" if context.scene.get(store.PROPOSAL) else "READY"  # it waits for a decision
+        return "ATTENTION" if proposal.is_there(context.scene) else "READY"  # it waits for a decision
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         settings = scene.rockfall_picking
-        lacking = refinement.ready(scene)
-        found = refinement.proposal(scene)
+        lacking = proposal.lacking(scene)
+        found = proposal.read(scene)
         if lacking:
-            advise(context, layout, False, lacking[0])
+            advise(context, layout, False, lacking)
         elif found is None:
             advise(context, layout, True, "Fit the picks' places and times to where the block was seen.")
         column = layout.column()
@@ -40,36 +41,31 @@ class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
             _draw_proposal(context, layout, found)
 
 
-def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found: dict) -> None:
+def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found: Proposal) -> None:
     box = layout.box()
-    if found["stale"]:
+    if found.stale:
         paragraph(context, box, "The picks were changed since: refine again.", "ERROR")
-    row = box.row()
-    row.label(text="")
-    row.label(text="Before")
-    row.label(text="After")
-    row = box.row()
-    row.label(text="Residual")
-    row.label(text=f"{found['before_px']:.2f} px")
-    row.label(text=f"{found['after_px']:.2f} px")
-    facts(box, [("Pixels", f"{found['pixels']}, {found['outliers']} outliers")])
-    if len(found["by_video"]) > 1:
-        facts(box, [(name, f"{px:.2f} px") for name, px in found["by_video"].items()])
-    facts(box, [(name, f"{value:.5g} ± {sigma:.2g}") for name, value, sigma in found["unknowns"]])
+    for texts in (("", "Before", "After"), ("Residual", f"{found.before_px:.2f} px", f"{found.after_px:.2f} px")):
+        row = box.row()
+        for text in texts:
+            row.label(text=text)
+    facts(box, [("Pixels", f"{found.pixels}, {found.outliers} outliers")])
+    if len(found.by_video) > 1:
+        facts(box, [(name, f"{px:.2f} px") for name, px in found.by_video.items()])
+    facts(box, [(name, f"{value:.5g} ± {sigma:.2g}") for name, value, sigma in found.unknowns])
     column = box.column(align=True)
     head = column.split(factor=0.5)
     head.label(text="Pick moves by")
     for text in ("cm", "ms"):
         head.label(text=text)
-    for label, shift, later, sigma_m, sigma_s in found["picks"][:MOST_ROWS]:
+    for change in found.changes[:MOST_ROWS]:
         row = column.split(factor=0.5)
-        row.label(text=label)
-        row.label(text=f"{shift:.0f} ± {sigma_m:.0f}")
-        row.label(text=f"{later:+.0f} ± {sigma_s:.0f}")
-    if len(found["picks"]) > MOST_ROWS:
-        column.label(text=f"… and {len(found['picks']) - MOST_ROWS} more")
-    for sentence in found["advice"]:
-        paragraph(context, box, sentence, "INFO")
+        row.label(text=change.label)
+        row.label(text=f"{change.moved_cm:.0f} ± {change.sigma_cm:.0f}")
+        row.label(text=f"{change.later_ms:+.0f} ± {change.sigma_ms:.0f}")
+    if len(found.changes) > MOST_ROWS:
+        column.label(text=f"… and {len(found.changes) - MOST_ROWS} more")
+    show_remarks(context, box, found.remarks)
     paragraph(context, box, "The proposed flights are drawn in light blue.")
     row = box.row(align=True)
     row.operator("rockfall.apply_refinement", text="Apply", icon="CHECKMARK")

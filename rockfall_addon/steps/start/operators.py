@@ -7,7 +7,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...scene import footage_blend, observations, store, videos
+from ...scene import footage_blend, sightings, store, videos
 from ...scene import project as scene_project
 from ...view import look
 from ...view.reporting import reported
@@ -65,7 +65,7 @@ class ROCKFALL_OT_load_footage_demo(_IntoEmptyScene, bpy.types.Operator):
             scene.camera = camera
             footage_blend.set_blend(camera, FOOTAGE_BLEND)
             common_s = videos.clock_of(camera).to_common(FIRST_IMPACT_S)
-            scene.rockfall_picking.trajectory = next(iter(observations.names_in(camera)), "")
+            scene.rockfall_picking.trajectory = next(iter(sightings.names_in(camera)), "")
             scene.frame_set(round(videos.frame_at(scene, float(common_s))))
         look.show_relief(context, frame_all=True)
         workspace.open_workspace(context, arrange=True)

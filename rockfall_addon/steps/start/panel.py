@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import alignment, migration, observations, picking, refinement, store, videos
+from ...scene import alignment, migration, places, proposal, sightings, store, videos
 from ...view import workspace
 from ...view.panel import RockfallPanel, paragraph
 
@@ -57,15 +57,15 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
         ]
     if not picks:
         return _begin_picking(scene, camera)
-    found = refinement.proposal(scene)
+    found = proposal.read(scene)
     if found is not None:
-        fit = f"Refined: {found['before_px']:.2f} px from the tracked pixels before, {found['after_px']:.2f} px after."
+        fit = f"Refined: {found.before_px:.2f} px from the tracked pixels before, {found.after_px:.2f} px after."
         return f"{fit} The new flights are light blue in the free view; step 5 has the numbers.", [
             ("rockfall.apply_refinement", "Apply", "CHECKMARK"),
             ("rockfall.discard_refinement", "Discard", "X"),
         ]
-    refined = all(store.NORMAL in pick for pick in picks)
-    if camera is not None and not refined and not refinement.ready(scene):
+    refined = all(store.NORMAL in pick for pick in picks if pick.get(store.KIND) != "pass")
+    if camera is not None and not refined and not proposal.lacking(scene):
         return "Look at each pick and correct it. Refine fits them all to the tracked pixels.", [
             PICK_TOOL,
             ("rockfall.refine", "", "SHADERFX"),
@@ -77,7 +77,7 @@ def next_step(scene: bpy.types.Scene) -> tuple[str, list[Button]]:
 
 
 def _begin_picking(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[str, list[Button]]:
-    if len(observations.seen_in(camera, picking.trajectory(scene))):
+    if len(sightings.seen_in(camera, places.trajectory(scene))):
         return "The block is tracked. Propose its impacts, or click the block at each (step with ← →).", [
             ("rockfall.propose_impacts", "", "OUTLINER_OB_LIGHTPROBE"),
             PICK_TOOL,

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What was clicked for a pick in the videos, and what follows from several of them.
+
+It is kept beside the pick, by the id of the video: frame, pixel, the ellipse of its error on the terrain. It holds as
+long as the pick stays where that click put it.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.reconstruction.triangulation import SpacePoints, epipolar_curve, triangulate
+from ...core.vectors import Array
+from . import pictures, reconstruction, store, videos
+from .places import Place
+
+NEAR_M, FAR_M = 1.0, 5000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Click:
+    """What was clicked for a pick in one video: see `Place`; `centre`: the block's centre, else its contact."""
+
+    frame: int
+    pixel: Array
+    sigma_px: float
+    ellipse: Array
+    grazing_deg: float
+    centre: bool
+
+
+def keep(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object, place: Place) -> None:
+    """Remember what was clicked in a video for a pick."""
+    seen = thing[store.SEEN].to_dict() if store.SEEN in thing and _holds(thing) else {}
+    seen["position"] = list(thing[store.POSITION])
+    seen[camera[store.ID]] = {
+        "frame": int(place.frame),
+        "pixel": place.pixel.tolist(),
+        "sigma_px": float(place.sigma_px),
+        "ellipse": place.ellipse.ravel().tolist(),
+        "grazing_deg": float(place.grazing_deg),
+        "centre": int(scene.rockfall_picking.aim == "CENTRE"),
+    }
+    thing[store.SEEN] = seen
+
+
+def of(thing: bpy.types.Object) -> dict[str, Click]:
+    """Id of a video → what was clicked in it for a pick that is still there."""
+    if store.SEEN not in thing or not _holds(thing):
+        return {}
+    return {
+        identifier: Click(
+            int(seen["frame"]),
+            np.array(seen["pixel"]),
+            float(seen["sigma_px"]),
+            np.array(seen["ellipse"]).reshape(2, 3),
+            float(seen["grazing_deg"]),
+            bool(seen["centre"]),
+        )
+        for identifier, seen in thing[store.SEEN].items()
+        if identifier != "position"
+    }
+
+
+def elsewhere(thing: bpy.types.Object, camera: bpy.types.Object) -> bool:
+    """Whether a pick was clicked in another video, and not in this one."""
+    seen = of(thing)
+    return bool(seen) and camera[store.ID] not in seen
+
+
+def epipolar(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object) -> Array | None:
+    """(k, 2) pixels in a video on which a pick must lie that was clicked in another one; None when it was not."""
+    for identifier, seen in of(thing).items():
+        other = videos.by_id(scene, identifier)
+        if other is None or other == camera or not videos.is_solved(other):
+            continue
+        video_s = _time_of(other, seen.frame)
+        here = float(videos.clock_of(camera).to_video(pictures.common_time(other, video_s, float(seen.pixel[1]))))
+        surface = reconstruction.ground(scene)
+        lenses = pictures.posed(other, video_s), pictures.posed(camera, here)
+        return epipolar_curve(lenses[0], seen.pixel, lenses[1], NEAR_M, FAR_M, surface)
+    return None
+
+
+def triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> SpacePoints | None:
+    """The point in space of a pick that was clicked in two videos or more; None otherwise."""
+    lenses, pixels, sigmas = [], [], []
+    for identifier, seen in of(thing).items():
+        camera = videos.by_id(scene, identifier)
+        if camera is not None and videos.is_solved(camera):
+            lenses.append(pictures.posed(camera, _time_of(camera, seen.frame)))
+            pixels.append(seen.pixel[None])
+            sigmas.append([seen.sigma_px])
+    return triangulate(lenses, np.array(pixels), np.array(sigmas)) if len(lenses) > 1 else None
+
+
+def _holds(thing: bpy.types.Object) -> bool:
+    return list(thing[store.SEEN].get("position", ())) == list(thing[store.POSITION])
+
+
+def _time_of(camera: bpy.types.Object, frame: int) -> float:
+    """Video time of a frame [s]."""
+    times = videos.times_of(camera)
+    return float(times[min(frame, times.size - 1)])

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From clicks to places on the terrain: a pixel of the footage, or a ray of a free view."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.camera.model import project, rays
+from ...core.errors import RockfallError
+from ...core.footage.advice import time_sigma_s
+from ...core.reconstruction.block import Block
+from ...core.reconstruction.triangulation import contact_points, pick_on_terrain
+from ...core.terrain.raycast import cast_rays
+from ...core.terrain.surface import Surface
+from ...core.vectors import Array
+from . import picks, pictures, reconstruction, store
+
+FIRST_NAME = "B01"
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a click lies on the terrain.
+
+    Attributes
+    ----------
+    position, normal : (3,) local [m], where the block touches the terrain; the normal of the face there.
+    time_s : on the common clock [s].
+    sigma_time_s, sigma_m : standard deviations of the time and of a coordinate; NaN in a free view.
+    frame, pixel, sigma_px : of the picture, and the (2,) click in it; −1 and NaN in a free view.
+    ellipse : (2, 3) half axes of one standard deviation on the terrain [m].
+    grazing_deg : angle between the ray and the terrain.
+    warning : a sentence, empty where all is well.
+    """
+
+    position: Array
+    normal: Array
+    time_s: float
+    sigma_time_s: float = np.nan
+    sigma_m: float = np.nan
+    frame: int = -1
+    pixel: Array | None = None
+    sigma_px: float = np.nan
+    ellipse: Array | None = None
+    grazing_deg: float = np.nan
+    warning: str = ""
+
+
+def surface_of(scene: bpy.types.Scene) -> Surface:
+    """The terrain that is picked on.
+
+    Raises
+    ------
+    RockfallError : there is none.
+    """
+    surface = reconstruction.ground(scene)
+    if surface is None:
+        raise RockfallError("There is no terrain to pick on. Import it first, in the panel Terrain.")
+    return surface
+
+
+def block_of(scene: bpy.types.Scene, name: str) -> Block:
+    """The block of a trajectory, also of one that has no picks yet."""
+    return reconstruction.blocks_of(scene, {name})[name]
+
+
+def normal_radius(scene: bpy.types.Scene) -> float | None:
+    """Radius in which terrain normals are fitted [m]; None: that of the block."""
+    return reconstruction.project_settings(scene, []).reconstruction.normal_radius_m
+
+
+def trajectory(scene: bpy.types.Scene) -> str:
+    """The trajectory that is picked: the one chosen in the tool, else that of the first pick, else a first name."""
+    chosen = scene.rockfall_picking.trajectory.strip()
+    if chosen:
+        return chosen
+    names = trajectories(scene)
+    return names[0] if names else FIRST_NAME
+
+
+def trajectories(scene: bpy.types.Scene) -> list[str]:
+    """Names of the trajectories that have picks, in the order of their names."""
+    return sorted({thing[store.TRAJECTORY] for thing in picks.things_of(scene)})
+
+
+def in_picture(
+    scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Array, name: str, *, centre: bool | None = None
+) -> Place:
+    """Where a click in the shown picture puts the block of a trajectory.
+
+    centre : whether the pixel is that of the block's centre, else that of its contact; None as the tool says.
+
+    Raises
+    ------
+    RockfallError : no terrain, a camera that is not aligned, a ray that misses the terrain.
+    """
+    settings = scene.rockfall_picking
+    surface = surface_of(scene)
+    frame, video_s = pictures.picture_time(scene, camera)
+    pixel = np.asarray(pixel, dtype=np.float64)
+    lens, sigma_px = pictures.posed(camera, video_s), store.double(settings.sigma_px)
+    of_centre = settings.aim == "CENTRE" if centre is None else centre
+    ground_pixel, touching = pixel, None
+    if of_centre:
+        origin, direction = rays(lens, pixel[None])
+        if np.isfinite(direction).all():
+            diameter = np.array([block_of(scene, name).diameter_m])
+            point, _ = contact_points(surface, origin, direction, diameter, normal_radius(scene))
+            if np.isfinite(point).all():
+                touching, ground_pixel = point[0], project(lens, point)[0]
+    found = pick_on_terrain(lens, ground_pixel[None], surface, sigma_px)
+    if np.isnan(found.point[0, 0]):
+        raise RockfallError("The ray through this pixel misses the terrain. Click on the surveyed slope.")
+    step = pictures.frame_step_s(camera)
+    return Place(
+        position=found.point[0] if touching is None else touching,
+        normal=found.normal[0],
+        time_s=pictures.common_time(camera, video_s, float(pixel[1])),
+        sigma_time_s=time_sigma_s(1 / step),
+        sigma_m=float(np.sqrt(np.trace(found.covariance[0]) / 3)),
+        frame=frame,
+        pixel=pixel,
+        sigma_px=sigma_px,
+        ellipse=found.ellipse[0],
+        grazing_deg=float(np.degrees(found.grazing[0])),
+        warning=found.warning[0],
+    )
+
+
+def on_ray(scene: bpy.types.Scene, origin: Array, direction: Array, name: str) -> Place:
+    """Where a ray of a free view meets the terrain, at the moment that the scene shows.
+
+    Raises
+    ------
+    RockfallError : no terrain, or the ray misses it.
+    """
+    surface = surface_of(scene)
+    hits = cast_rays(surface, np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64))
+    if hits.face[0] < 0:
+        raise RockfallError("There is no terrain under the mouse.")
+    return Place(hits.point[0], surface.face_normals[hits.face[0]], pictures.now(scene, name))

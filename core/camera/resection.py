@@ -15,6 +15,7 @@ from scipy.special import fdtri
 
 from ..errors import InputError, RockfallError
 from ..georeference import GlobalShift
+from ..least_squares import damped_step, inverse, scales
 from ..remarks import Remark
 from ..vectors import Array, Mask, distance_to_ray, norm
 from .model import (
@@ -111,7 +112,7 @@ class Resection:
         """
         pose, lens = self.covariance[:6, :6], self.covariance[6:, 6:]
         both = self.covariance[:6, 6:]
-        return pose - both @ np.linalg.pinv(lens, hermitian=True) @ both.T if lens.size else pose
+        return pose - both @ inverse(lens, partly=True) @ both.T if lens.size else pose
 
     def correlation(self, first: str, second: str) -> float:
         """Correlation of two parameters, −1…1; NaN when they are not determined."""
@@ -463,24 +464,21 @@ def _noise(camera: Camera, problem: _Problem) -> Array:
 
 
 def _minimised(camera: Camera, problem: _Problem, used: Mask, noise: Array) -> _Solution | None:
-    inverse = np.asarray(np.linalg.inv(noise[used]), dtype=np.float64)
-    now = _measured(camera, problem, used, noise, inverse)
+    trust = np.asarray(np.linalg.inv(noise[used]), dtype=np.float64)
+    now = _measured(camera, problem, used, noise, trust)
     damping = 1e-7
     for _ in range(STEPS):
         if now is None:
             break
-        size = np.sqrt(np.maximum(np.diagonal(now.normal), 1e-300))
-        scaled = now.normal / np.outer(size, size) + damping * np.eye(size.size)
-        step = np.linalg.solve(scaled, now.right / size)
-        moved = _moved(now.camera, problem.basis, step / size)
-        new = _measured(moved, problem, used, noise, inverse) if moved is not None else None
+        step = damped_step(now.normal, now.right, damping)
+        moved = _moved(now.camera, problem.basis, step)
+        new = _measured(moved, problem, used, noise, trust) if moved is not None else None
         if new is None or new.cost > now.cost * (1 + 1e-12):
             damping = max(10 * damping, 1e-4)
             if damping > 1e6:
                 break
             continue
-        # `step` is in standard deviations of each parameter with the others held.
-        finished = np.abs(step).max() < 1e-4 or now.cost - new.cost < 1e-9 * new.cost
+        finished = np.abs(step * scales(now.normal)).max() < 1e-4 or now.cost - new.cost < 1e-9 * new.cost
         now, damping = new, max(damping / 10, 1e-12)
         if finished:
             break
@@ -498,7 +496,7 @@ def _moved(camera: Camera, basis: Array, step: Array) -> Camera | None:
     return with_intrinsics(moved, values)
 
 
-def _measured(camera: Camera, problem: _Problem, used: Mask, noise: Array, inverse: Array) -> _Solution | None:
+def _measured(camera: Camera, problem: _Problem, used: Mask, noise: Array, trust: Array) -> _Solution | None:
     """Residuals and normal equations at a camera; None when a used point has no pixel."""
     seen = project_with_derivatives(camera, problem.points)
     if not np.isfinite(seen.pixel[used]).all():
@@ -506,12 +504,12 @@ def _measured(camera: Camera, problem: _Problem, used: Mask, noise: Array, inver
     slopes = np.concatenate([seen.d_rotation, seen.d_position, seen.d_intrinsics @ problem.basis], axis=2)
     residual = problem.pixels - seen.pixel
     gap, slope = residual[used], slopes[used]
-    weighted = (inverse @ gap[:, :, None])[..., 0]
+    weighted = (trust @ gap[:, :, None])[..., 0]
     squared = np.einsum("ni,ni->n", gap, weighted)
     length = np.sqrt(squared)
     weight = np.minimum(1, HUBER / np.maximum(length, 1e-300))
     flat = slope.reshape(-1, slope.shape[2])
-    tall = ((inverse * weight[:, None, None]) @ slope).reshape(flat.shape)
+    tall = ((trust * weight[:, None, None]) @ slope).reshape(flat.shape)
     cost = float(np.where(length <= HUBER, squared, 2 * HUBER * length - HUBER**2).sum())
     return _Solution(
         camera=camera,
@@ -521,7 +519,7 @@ def _measured(camera: Camera, problem: _Problem, used: Mask, noise: Array, inver
         normal=flat.T @ tall,
         right=tall.T @ gap.reshape(-1),
         cost=cost,
-        misfit=cost - float(np.log(np.linalg.det(inverse)).sum()),
+        misfit=cost - float(np.log(np.linalg.det(trust)).sum()),
     )
 
 
@@ -590,7 +588,7 @@ def _suspicion(problem: _Problem, solution: _Solution, used: Mask) -> Array:
     The variance is that of the others, together with the stated one as if `PRIOR_FREEDOM` observations had shown it,
     and no less than the stated one.
     """
-    spread = _inverse(solution.normal)
+    spread = inverse(solution.normal)
     around = solution.slopes @ spread @ np.swapaxes(solution.slopes, 1, 2)
     expected = solution.noise + np.where(used, -1.0, 1.0)[:, None, None] * around
     suspicion = np.where(used, 0.0, np.inf)
@@ -608,20 +606,11 @@ def _suspicion(problem: _Problem, solution: _Solution, used: Mask) -> Array:
     return suspicion
 
 
-def _inverse(normal: Array) -> Array:
-    """The inverse of normal equations; infinite throughout when they are singular."""
-    size = np.sqrt(np.maximum(np.diagonal(normal), 1e-300))
-    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
-    if not values[0] > 1e-14 * values[-1]:
-        return np.full(normal.shape, np.inf)
-    return (vectors / values) @ vectors.T / np.outer(size, size)
-
-
 def _spread(solution: _Solution, problem: _Problem, used: Mask) -> tuple[float, Array]:
     """The scatter, and the covariance of the parameters that goes with it."""
     scatter = _scatter(solution, problem, used)
     larger = max(1.0, scatter**2) if np.isfinite(scatter) else 1.0
-    return scatter, _inverse(solution.normal) * larger
+    return scatter, inverse(solution.normal) * larger
 
 
 def _distances(camera: Camera, problem: _Problem) -> Array:

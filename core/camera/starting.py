@@ -12,6 +12,7 @@ from math import comb
 
 import numpy as np
 
+from ..least_squares import damped_step
 from ..vectors import Array, cross, norm, unit
 from .model import Camera, project_with_derivatives, rotation_from_vector, undistort
 
@@ -322,9 +323,7 @@ def _improved(
         weighted = slopes * np.repeat(1 / (1 + squared / scale**2), 2, axis=1)[:, :, None]
         normal = np.swapaxes(weighted, 1, 2) @ slopes
         right = (np.swapaxes(weighted, 1, 2) @ gap[:, :, None])[..., 0]
-        size = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-30))
-        scaled = normal / (size[:, :, None] * size[:, None, :]) + damping[:, None, None] * np.eye(p)
-        step = np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
+        step = damped_step(normal, right, damping)
         new_focal = focal
         if free_focal:
             new_focal = np.clip(focal * np.exp(np.clip(step[:, 6] / focal, -0.5, 0.5)), *_focal_range(camera))

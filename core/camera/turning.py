@@ -10,14 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from ..least_squares import BELIEVED, believed_scatter, damped_step, sums_by
 from ..vectors import Array, Indices, Mask, across, cross, norm, perpendicular, unit
 from .model import rotation_from_vector
 
 LEAST_FEATURES = 3
 WAHBA_ROUNDS = 15
 ROUNDS = 6
-CUT = 3.0
-"""Width of the weights in standard deviations."""
+RIDGE = 1e-9
+"""What is added to the normal equations, for frames that too few features hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,24 +64,6 @@ def solve_turns(
         bearing[use], frame[use], feature[use], sigma[use], rotations, directions, reference, solved
     )
     return Turns(rotations, covariance, directions)
-
-
-def sums_by(index: Indices, values: Array, size: int) -> Array:
-    """Sums of rows with the same index, (m, ...) → (size, ...)."""
-    flat = values.reshape(len(index), -1)
-    sums = np.empty((size, flat.shape[1]))
-    for i in range(flat.shape[1]):
-        sums[:, i] = np.bincount(index, weights=flat[:, i], minlength=size)
-    return sums.reshape(size, *values.shape[1:])
-
-
-def believed_scatter(length: Array) -> float:
-    """The scatter of residuals in standard deviations, at least 1, of those that are no wrong tracks."""
-    scatter = max(1.0, float(np.median(length)) / 1.18) if length.size else 1.0
-    for _ in range(3):
-        inner = length[length < CUT * scatter]
-        scatter = max(1.0, float(np.median(inner)) / 1.16) if inner.size else scatter
-    return scatter
 
 
 def _outwards(
@@ -162,20 +145,18 @@ def _together(
     free[reference] = False
     unknown = np.flatnonzero(np.repeat(free, 3))
     base, gap, length = np.empty((0, 2, 3)), np.empty((0, 2)), np.empty(0)
-    scatter, ridge = 1.0, 0.0
+    scatter = 1.0
     for number in range(ROUNDS):
         base = np.stack(perpendicular(directions), axis=1)
         seen = np.einsum("mji,mj->mi", rotations[frame], bearing)
         gap = np.einsum("mki,mi->mk", base[feature], seen)
         length = norm(gap) / sigma
         scatter = believed_scatter(length)
-        width = CUT * scatter * max(1.0, 4.0 - number)
+        width = BELIEVED * scatter * max(1.0, 4.0 - number)
         weight = 1 / ((1 + (length / width) ** 2) * sigma) ** 2
         normal, right, offset, total = _reduced(weight, gap, frame, feature, directions, base, frames, features)
-        ridge = 1e-9 * max(float(np.median(np.diagonal(normal))), 1.0)
-        factor = cho_factor(normal[np.ix_(unknown, unknown)] + ridge * np.eye(unknown.size), check_finite=False)
         turn = np.zeros((frames, 3))
-        turn.reshape(-1)[unknown] = cho_solve(factor, right[unknown], check_finite=False)
+        turn.reshape(-1)[unknown] = damped_step(normal[np.ix_(unknown, unknown)], right[unknown], RIDGE)
         rotations = rotations @ rotation_from_vector(-turn)
         moved = cross(turn[frame], directions[feature])
         gained = sums_by(feature, weight[:, None] * np.einsum("mki,mi->mk", base[feature], moved), features)
@@ -183,10 +164,11 @@ def _together(
         directions = unit(directions + np.einsum("ikj,ik->ij", base, shift))
     covariance = np.zeros((frames, 3, 3))
     if unknown.size:
-        believed = np.where(length < CUT * scatter, 1 / sigma**2, 0.0)
+        believed = np.where(length < BELIEVED * scatter, 1 / sigma**2, 0.0)
         normal = _reduced(believed, gap, frame, feature, directions, base, frames, features)[0]
-        normal = normal[np.ix_(unknown, unknown)] + ridge * np.eye(unknown.size)
-        inverse = cho_solve(cho_factor(normal, check_finite=False), np.eye(unknown.size), check_finite=False)
+        normal = normal[np.ix_(unknown, unknown)]
+        ridge = RIDGE * max(float(np.median(np.diagonal(normal))), 1.0) * np.eye(unknown.size)
+        inverse = cho_solve(cho_factor(normal + ridge, check_finite=False), np.eye(unknown.size), check_finite=False)
         block = np.arange(unknown.size).reshape(-1, 3)
         covariance[free] = inverse[block[:, :, None], block[:, None, :]] * scatter**2
     return rotations, directions, covariance[solved]

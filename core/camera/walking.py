@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..least_squares import BELIEVED, believed_scatter, damped_step, inverse, sums_by
 from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project_with_derivatives, rotation_from_vector
-from .turning import CUT, believed_scatter, sums_by
 
 LEAST_POINTS = 4
 ROUNDS = 9
@@ -66,15 +66,13 @@ def solve_poses(
     for number in range(ROUNDS):
         length = norm(gap)
         scatter = believed_scatter(length)
-        width = CUT * scatter * max(1.0, LOOSE / CUT * 0.6**number)
+        width = BELIEVED * scatter * max(1.0, LOOSE / BELIEVED * 0.6**number)
         weight = 1 / (1 + (length / width) ** 2) ** 2
         cost = np.bincount(frame, weights=_cost(length, width), minlength=frames)
         weighted = slopes * weight[:, None, None]
         normal = sums_by(frame, np.swapaxes(weighted, 1, 2) @ slopes, frames)
         right = sums_by(frame, (np.swapaxes(weighted, 1, 2) @ gap[:, :, None])[..., 0], frames)
-        size = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-12))
-        scaled = normal / (size[:, :, None] * size[:, None, :]) + damping[:, None, None] * np.eye(6)
-        step = np.linalg.solve(scaled, (right / size)[:, :, None])[..., 0] / size
+        step = damped_step(normal, right, damping)
         new_position = position + step[:, 3:]
         new_rotation = rotation_from_vector(np.clip(step[:, :3], -0.3, 0.3)) @ rotation
         new_gap, new_slopes = measured(new_position, new_rotation)
@@ -85,14 +83,10 @@ def solve_poses(
         gap[rows], slopes[rows] = new_gap[rows], new_slopes[rows]
         damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e3)
     enough = asked & (np.bincount(frame, minlength=frames) >= LEAST_POINTS)
-    believed = norm(gap) < CUT * scatter
+    believed = norm(gap) < BELIEVED * scatter
     kept = slopes * believed[:, None, None]
     normal = sums_by(frame, np.swapaxes(kept, 1, 2) @ slopes, frames)
-    size = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), 1e-300))
-    scaled = normal / (size[:, :, None] * size[:, None, :])
-    sound = enough & (np.linalg.eigvalsh(scaled)[:, 0] > 1e-12)
-    inverse = np.linalg.inv(scaled[sound])
-    covariance[sound] = inverse / (size[sound, :, None] * size[sound, None, :]) * scatter**2
+    covariance[enough] = inverse(normal[enough]) * scatter**2
     return Poses(position, rotation, covariance)
 
 

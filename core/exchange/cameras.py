@@ -13,6 +13,7 @@ from ..camera.model import Camera
 from ..camera.pairs import Pairs
 from ..camera.path import CameraPath
 from ..georeference import GlobalShift
+from ..least_squares import scales
 from ..vectors import Array, Mask
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
@@ -244,9 +245,7 @@ def _rotation(table: TomlTable) -> Array:
 
 
 def _is_covariance(matrix: Array) -> bool:
-    size = np.abs(np.diag(matrix)).max()
-    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-12 * size):
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-12 * np.abs(np.diag(matrix)).max()):
         return False
-    scale = np.sqrt(np.abs(np.diag(matrix)))
-    scale[scale == 0] = 1.0
-    return bool(np.linalg.eigvalsh(matrix / np.outer(scale, scale)).min() > -1e-9)
+    size = scales(np.abs(matrix))
+    return bool(np.linalg.eigvalsh(matrix / np.outer(size, size)).min() > -1e-9)

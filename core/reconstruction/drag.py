@@ -9,6 +9,7 @@ import numpy as np
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT
 from ..errors import RockfallError
+from ..least_squares import damped_step
 from ..vectors import Array, norm
 from .block import Block
 from .observations import Observations
@@ -81,7 +82,7 @@ def fit_with_drag(
         weighted = jacobian * observations.weight[:, None, None]
         normal = observations.sums(np.einsum("mij,mik->mjk", weighted, jacobian))
         right = observations.sums(np.einsum("mij,mi->mj", weighted, misfit))
-        step = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+        step = damped_step(normal, right)
         moves = np.maximum(norm(step[:, :3]), norm(step[:, 3:]) * longest)
         lost = np.isnan(moves)
         wanting = lost if lost.any() else ~(moves < SOLVED_M)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..camera.model import SIGMA_PX, Camera, project, project_with_derivatives, rays
 from ..errors import InputError
+from ..least_squares import damped_step, inverse
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
 from ..vectors import Array, Mask, across, cross, distance_to_ray, dot, norm, perpendicular, unit
@@ -84,10 +85,10 @@ def pick_on_terrain(
         bare = ~np.isfinite(along[:, 0])  # looking straight down on the face: any axis does
         along = np.where(bare[:, None], perpendicular(normal[met])[0], along)
         plane = np.stack([along, cross(normal[met], along)], axis=2)
-        inverse = np.linalg.inv(by_point @ plane) * sigma[met, None, None]
-        spread = plane @ inverse
+        turned_back = np.linalg.inv(by_point @ plane) * sigma[met, None, None]
+        spread = plane @ turned_back
         covariance[met] = spread @ np.swapaxes(spread, 1, 2)
-        left, size, _ = np.linalg.svd(inverse)
+        left, size, _ = np.linalg.svd(turned_back)
         ellipse[met] = np.swapaxes((plane @ left) * size[:, None, :], 1, 2)
     warnings = tuple(
         "The ray misses the terrain."
@@ -198,12 +199,12 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
             information[use] += np.swapaxes(slope, 1, 2) @ slope
             gradient[use] += np.einsum("nij,ni->nj", slope, residual[i, use] / sigma[i, use, None])
         good = enough[np.isfinite(information[enough]).all(axis=(1, 2))]
-        step = np.linalg.solve(information[good], gradient[good, :, None])[:, :, 0]
+        step = damped_step(information[good], gradient[good])
         point[good] += step
         if not step.size or np.abs(step).max() < SETTLED_M:
             break
     covariance = np.full((n, 3, 3), np.nan)
-    covariance[good] = np.linalg.inv(information[good])
+    covariance[good] = inverse(information[good])
     count = np.maximum(seen.sum(axis=0), 1)
     miss = np.sqrt(np.where(seen, distance_to_ray(point, origin, direction) ** 2, 0.0).sum(axis=0) / count)
     return SpacePoints(point, covariance, np.where(np.isfinite(point[:, 0]), miss, np.nan), residual)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, dot, norm, unit
 from ..triangulation import GRAZING_DEG
@@ -145,11 +146,9 @@ def _late_views(fit: Fit) -> Iterator[Remark]:
         freed = replace(problem, columns=replace(problem.columns, size=size + 1))
         evaluation = replace(solution.evaluation, pixels=replace(rows, columns=columns))
         information, gradient = normal_equations(freed, evaluation, solution.weight)
-        scale = np.sqrt(np.diag(information))
-        scale[scale == 0] = 1.0
-        inverse = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
-        late = -float(inverse[-1] @ gradient)
-        if abs(late) > CLOCK_SIGNIFICANCE * fit.scale * float(np.sqrt(inverse[-1, -1])):
+        covariance = inverse(information, partly=True)
+        late = -float(covariance[-1] @ gradient)
+        if abs(late) > CLOCK_SIGNIFICANCE * fit.scale * float(np.sqrt(covariance[-1, -1])):
             name = problem.views[i].name
             text = f"the clock of view {name} seems to be off by about {1e3 * late:+.0f} ms: fit the clocks too."
             yield Remark(f"{_who(fit.setup)}: {text}", "advice", f"clock {name}")

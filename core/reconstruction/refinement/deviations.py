@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from ...least_squares import inverse
 from ...vectors import Array, Indices, dot, perpendicular
 from ..impact import Impacts, apparent
 from ..node_motion import NodeMotion
@@ -44,11 +45,7 @@ def with_covariance(setup: Setup, solution: Solution) -> Fit:
     scale = 1.0
     if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
         scale = float(np.sqrt(squares / spare))
-    information = solution.information
-    size = np.sqrt(np.diag(information))
-    size[size == 0] = 1.0
-    covariance = np.linalg.pinv(information / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    return Fit(setup, solution, scale**2 * covariance, scale)
+    return Fit(setup, solution, scale**2 * inverse(solution.information, partly=True), scale)
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

@@ -4,9 +4,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.stats import chi2
 
+from ...least_squares import damped_step
 from ...progress import Progress, silent
 from ...vectors import Array, Indices, Mask, norm
 from ..choices import Loss
@@ -88,7 +88,7 @@ def _search(
         progress("Fitting", iteration, MOST_ITERATIONS)
         improved = False
         while not improved and damping < HEAVIEST:
-            step = _step(information, gradient, damping)
+            step = -damped_step(information, gradient, damping)
             settled = float(step @ information @ step) < SETTLED**2
             trial_state = moved(problem, state, step)
             trial = evaluate(problem, trial_state, chain)
@@ -138,15 +138,6 @@ def _cost(evaluation: Evaluation, weight: Array) -> float:
     """Half the weighted squares; with the weights of the present state a smaller one is progress for any loss here."""
     cost = float(weight @ (evaluation.pixels.residual**2).sum(axis=1))
     return 0.5 * (cost + sum(float((rows.residual**2).sum()) for rows in evaluation.others))
-
-
-def _step(information: Array, gradient: Array, damping: float) -> Array:
-    diagonal = np.diag(information)
-    damped = information + np.diag(damping * np.maximum(diagonal, 1e-12 * diagonal.max()))
-    try:
-        return np.asarray(-cho_solve(cho_factor(damped, check_finite=False), gradient, check_finite=False))
-    except LinAlgError:
-        return np.asarray(-np.linalg.lstsq(damped, gradient, rcond=None)[0])
 
 
 def normal_equations(problem: Problem, evaluation: Evaluation, weight: Array) -> tuple[Array, Array]:

@@ -5,10 +5,13 @@ import os
 import subprocess
 import sys
 
+import laspy
 import numpy as np
 import pytest
 from rockfall.core.cli import main
 from rockfall.core.exchange.tables import read_impacts
+from rockfall.core.film.maker import FilmMaker, inside_blender
+from rockfall.core.terrain.readers import read_terrain
 
 DIP = np.radians(30)
 GOOD = "trajectory,time_s,x_m,y_m,z_m,kind\n" + "".join(
@@ -96,6 +99,61 @@ def test_terrain_becomes_a_ply_that_reads_the_same(terrain, tmp_path, capsys):
     assert main(["terrain", str(tmp_path / "one" / "terrain.ply"), "--no-picture", "--out", str(tmp_path / "two")]) == 0
     one, two = ((tmp_path / name / "terrain.ply").read_bytes() for name in ("one", "two"))
     assert one == two
+
+
+@pytest.mark.parametrize(
+    ("unit", "metres"), [("m", 1), ("mm", 1e-3), ("km", 1000), ("ft", 0.3048), ("us-ft", 1200 / 3937), ("0.5", 0.5)]
+)
+def test_a_terrain_in_another_unit_is_measured_in_metres(terrain, tmp_path, unit, metres):
+    assert main(["terrain", str(terrain), "--unit", unit, "--no-picture", "--out", str(tmp_path / "out")]) == 0
+    found, plain = read_terrain(tmp_path / "out" / "terrain.ply"), read_terrain(terrain)
+    survey = [one.shift.to_survey(one.vertices) for one in (found, plain)]
+    np.testing.assert_allclose(survey[0].min(axis=0), metres * survey[1].min(axis=0), rtol=1e-9)
+    np.testing.assert_allclose(survey[0].max(axis=0), metres * survey[1].max(axis=0), rtol=1e-9)
+
+
+def test_how_a_terrain_is_read_is_a_matter_of_options(tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    cloud.x, cloud.y = np.concatenate([rng.uniform(0, 20, (300, 2)), rng.uniform(30, 50, (300, 2))]).T
+    cloud.z = 0.5 * np.asarray(cloud.x)
+    cloud.classification = np.where(np.arange(600) % 3, 2, 5)
+    cloud.write(str(tmp_path / "cloud.las"))
+
+    def said(name, *options):
+        assert main(["terrain", str(tmp_path / name), *options, "--no-picture", "--out", str(tmp_path / "out")]) == 0
+        return capsys.readouterr().out
+
+    assert "the 400 points of the ground class" in said("cloud.las")
+    faces = len(read_terrain(tmp_path / "out" / "terrain.ply").faces)
+    assert "the 400 points of the ground class" in said("cloud.las", "--ground-only")
+    assert "all classes, as asked" in said("cloud.las", "--all-points")
+    said("cloud.las", "--max-edge", "4")
+    cut = read_terrain(tmp_path / "out" / "terrain.ply")
+    assert len(cut.faces) < faces
+    corners = cut.vertices[cut.faces]
+    assert np.linalg.norm((corners - np.roll(corners, 1, axis=1))[:, :, :2], axis=2).max() <= 4
+    (tmp_path / "upright.obj").write_text("v 0 0 0\nv 9 0 0\nv 0 9 0\nv 9 9 1\nf 1 2 3\nf 2 4 3\n")
+    assert "Turned from Y up to Z up, as asked" in said("upright.obj", "--up", "y")
+
+
+def test_a_picture_of_the_terrain_is_made_unless_it_is_not_wanted(terrain, tmp_path, capsys, monkeypatch):
+    def make(job, progress):
+        assert (job.kind, job.source.name, job.title) == ("terrain", "terrain.ply", "plane.asc")
+        job.out.write_bytes(b"a picture")
+
+    monkeypatch.setattr("rockfall.core.film.maker.require_blender_libraries", lambda: None)
+    token = inside_blender.set(FilmMaker(make, ("/no/such/program",)))
+    try:
+        assert main(["terrain", str(terrain), "--out", str(tmp_path / "with")]) == 0
+        assert main(["terrain", str(terrain), "--no-picture", "--out", str(tmp_path / "without")]) == 0
+    finally:
+        inside_blender.reset(token)
+    assert sorted(path.name for path in (tmp_path / "with").iterdir()) == ["terrain.ply", "terrain.png"]
+    assert [path.name for path in (tmp_path / "without").iterdir()] == ["terrain.ply"]
+    said = capsys.readouterr().out
+    assert "Written: terrain.ply, terrain.png in" in said
+    assert "Written: terrain.ply in" in said
 
 
 BAD = {

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ..workflow.alignment import Alignment, AlignmentOptions
     from ..workflow.following import FollowedCamera
 
-FREE = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 WORST = 3
 
 
@@ -136,6 +135,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> "AlignmentOptions":
     """What is asked for and what is known of the camera."""
     from ..camera.model import focal_of_view, pinhole
+    from ..camera.resection.problem import FREE_LENS
     from ..exchange.cameras import read_camera
     from ..workflow.alignment import AlignmentOptions
 
@@ -153,7 +153,7 @@ def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None
         start = read_camera(arguments.camera, pairs.shift).path.reference
     return AlignmentOptions(
         size=size,
-        free=free if arguments.free is None else known_names(arguments.free, FREE, "--free"),
+        free=free if arguments.free is None else known_names(arguments.free, FREE_LENS, "--free"),
         start=start,
         moves=bool(arguments.moving),
         frame=arguments.frame,

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..camera.model import SIGMA_PX, Camera
 from ..camera.pairs import Pairs
-from ..camera.resection import POSE_PAIRS, Resection, resect
+from ..camera.resection.problem import POSE_PAIRS
+from ..camera.resection.resect import Resection, resect
 from ..errors import InputError
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask

@@ -26,7 +26,8 @@ from ...core.camera.model import (
     with_intrinsics,
 )
 from ...core.camera.path import CameraPath, fixed
-from ...core.camera.resection import POSE_PAIRS, Resection, needed_pairs, resect
+from ...core.camera.resection.problem import POSE_PAIRS, needed_pairs
+from ...core.camera.resection.resect import Resection, resect
 from ...core.errors import RockfallError
 from ...core.remarks import Remark, from_plain, to_plain
 from ...core.terrain.raycast import cast_rays

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector, undistort
 from rockfall.core.camera.motion import FeatureTracks, solve_motion
-from rockfall.core.camera.resection import Resection, resect
+from rockfall.core.camera.resection.resect import Resection, resect
 from rockfall.core.errors import RockfallError
 from rockfall.core.vectors import Array, norm, unit
 from scipy.optimize import least_squares

@@ -28,7 +28,7 @@ from rockfall.core.camera.model import (
     rotation_from_vector,
 )
 from rockfall.core.camera.path import CameraPath
-from rockfall.core.camera.resection import resect
+from rockfall.core.camera.resection.resect import resect
 from rockfall.core.footage.clock import Clock
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block

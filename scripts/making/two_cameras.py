@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from rockfall.core.camera.model import Camera, rays
-from rockfall.core.camera.resection import resect
+from rockfall.core.camera.resection.resect import resect
 from rockfall.core.exchange.footage_tables import Track, write_track
 from rockfall.core.exchange.tables import write_columns, write_picks
 from rockfall.core.footage.kinks import find_kinks

@@ -8,7 +8,8 @@ import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rotation_from_vector
 from rockfall.core.camera.pairs import Pairs, pair_residuals
 from rockfall.core.camera.path import CameraPath, bent_through, camera_at, fixed, project_at, rays_at
-from rockfall.core.camera.resection import needed_pairs, resect
+from rockfall.core.camera.resection.problem import needed_pairs
+from rockfall.core.camera.resection.resect import resect
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import norm

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
-from rockfall.core.camera.resection import Resection, resect
-from rockfall.core.camera.starting import poses_from_three
+from rockfall.core.camera.resection.resect import Resection, resect
+from rockfall.core.camera.resection.starting import poses_from_three
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import norm, unit

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rockfall.core.camera.resection import resect
+from rockfall.core.camera.resection.resect import resect
 from rockfall.core.exchange.cameras import read_pairs
 from rockfall.core.reconstruction.refinement.refine import Refinement
 

@@ -7,7 +7,7 @@ from bpy.props import BoolProperty
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
-from ....core.camera.resection import POSE_PAIRS
+from ....core.camera.resection.problem import POSE_PAIRS
 from ....core.errors import RockfallError
 from ....core.progress import silent
 from ...scene import alignment, footage_blend, store, terrain, videos

@@ -12,9 +12,9 @@ from math import comb
 
 import numpy as np
 
-from ..least_squares import damped_step
-from ..vectors import Array, cross, norm, unit
-from .model import Camera, project_with_derivatives, rotation_from_vector, undistort
+from ...least_squares import damped_step
+from ...vectors import Array, cross, norm, unit
+from ..model import Camera, project_with_derivatives, rotation_from_vector, undistort
 
 TRIPLES = 32
 KEPT = 8

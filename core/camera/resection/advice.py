@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ..remarks import Remark
-from ..vectors import Array, norm
-from .model import Camera
+from ...remarks import Remark
+from ...vectors import Array, norm
+from ..model import Camera
 
 POOR_FOCAL = 0.02
 POOR_POSITION = 0.02

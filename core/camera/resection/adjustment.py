@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The camera that fits pairs best: least squares with the errors of both sides, from a start."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...least_squares import damped_step, inverse, scales
+from ...vectors import Array, Mask
+from ..model import Camera, project_with_derivatives, rotation_from_vector, with_intrinsics
+from .problem import Problem, basis_of
+from .starting import Starts
+
+STEPS = 50
+HUBER = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A camera, the residuals of all pairs, (n, 2) [px], their derivatives (n, 2, p) and covariances (n, 2, 2).
+
+    `normal` and `right` are the weighted normal equations of the pairs in use, `cost` is Huber's, `misfit` that plus
+    what makes solutions with different covariances comparable.
+    """
+
+    camera: Camera
+    residual: Array
+    slopes: Array
+    noise: Array
+    normal: Array
+    right: Array
+    cost: float
+    misfit: float
+
+
+def adjusted_from(start: Camera, problem: Problem, starts: Starts, index: int, used: Mask) -> Solution | None:
+    """Least squares from one start: the pose and the focal length first, then all; None when a point has no pixel."""
+    larger = starts.focal_px[index] / start.fx
+    camera = replace(
+        start,
+        fx=start.fx * larger,
+        fy=start.fy * larger,
+        position=starts.position[index],
+        rotation=starts.rotation[index],
+    )
+    focal_is_free = bool(problem.basis[:2].any())
+    if problem.basis.shape[1] > focal_is_free:
+        few = basis_of(camera, ("f",) if focal_is_free else ())
+        first = adjusted(camera, replace(problem, basis=few), used)
+        camera = first.camera if first is not None else camera
+    return adjusted(camera, problem, used)
+
+
+def adjusted(camera: Camera, problem: Problem, used: Mask) -> Solution | None:
+    """Levenberg–Marquardt; the points' errors, seen from the camera, are renewed between rounds."""
+    noise = _noise(camera, problem)
+    solution = _minimised(camera, problem, used, noise)
+    if problem.sigma_m.any():
+        for _ in range(3):
+            if solution is None:
+                break
+            noise = _noise(solution.camera, problem)
+            solution = _minimised(solution.camera, problem, used, noise)
+    return solution
+
+
+def _noise(camera: Camera, problem: Problem) -> Array:
+    """(n, 2, 2) covariances of the pixels, with the points' errors as the camera sees them [px²]."""
+    noise: Array = problem.sigma_px[:, None, None] ** 2 * np.eye(2)
+    if problem.sigma_m.any():
+        slope = np.nan_to_num(project_with_derivatives(camera, problem.points).d_point)
+        noise = noise + problem.sigma_m[:, None, None] ** 2 * (slope @ np.swapaxes(slope, 1, 2))
+    return noise
+
+
+def _minimised(camera: Camera, problem: Problem, used: Mask, noise: Array) -> Solution | None:
+    trust = np.asarray(np.linalg.inv(noise[used]), dtype=np.float64)
+    now = _measured(camera, problem, used, noise, trust)
+    damping = 1e-7
+    for _ in range(STEPS):
+        if now is None:
+            break
+        step = damped_step(now.normal, now.right, damping)
+        moved = _moved(now.camera, problem.basis, step)
+        new = _measured(moved, problem, used, noise, trust) if moved is not None else None
+        if new is None or new.cost > now.cost * (1 + 1e-12):
+            damping = max(10 * damping, 1e-4)
+            if damping > 1e6:
+                break
+            continue
+        finished = np.abs(step * scales(now.normal)).max() < 1e-4 or now.cost - new.cost < 1e-9 * new.cost
+        now, damping = new, max(damping / 10, 1e-12)
+        if finished:
+            break
+    return now
+
+
+def _moved(camera: Camera, basis: Array, step: Array) -> Camera | None:
+    """The camera after a step; None when its focal length collapses."""
+    values = camera.intrinsics + basis @ step[6:]
+    if not np.isfinite(step).all() or values[0] < 0.2 * camera.fx or values[1] < 0.2 * camera.fy:
+        return None
+    moved = replace(
+        camera, rotation=rotation_from_vector(step[:3]) @ camera.rotation, position=camera.position + step[3:6]
+    )
+    return with_intrinsics(moved, values)
+
+
+def _measured(camera: Camera, problem: Problem, used: Mask, noise: Array, trust: Array) -> Solution | None:
+    """Residuals and normal equations at a camera; None when a used point has no pixel."""
+    seen = project_with_derivatives(camera, problem.points)
+    if not np.isfinite(seen.pixel[used]).all():
+        return None
+    slopes = np.concatenate([seen.d_rotation, seen.d_position, seen.d_intrinsics @ problem.basis], axis=2)
+    residual = problem.pixels - seen.pixel
+    gap, slope = residual[used], slopes[used]
+    weighted = (trust @ gap[:, :, None])[..., 0]
+    squared = np.einsum("ni,ni->n", gap, weighted)
+    length = np.sqrt(squared)
+    weight = np.minimum(1, HUBER / np.maximum(length, 1e-300))
+    flat = slope.reshape(-1, slope.shape[2])
+    tall = ((trust * weight[:, None, None]) @ slope).reshape(flat.shape)
+    cost = float(np.where(length <= HUBER, squared, 2 * HUBER * length - HUBER**2).sum())
+    return Solution(
+        camera=camera,
+        residual=residual,
+        slopes=slopes,
+        noise=noise,
+        normal=flat.T @ tall,
+        right=tall.T @ gap.reshape(-1),
+        cost=cost,
+        misfit=cost - float(np.log(np.linalg.det(trust)).sum()),
+    )
+
+
+def squares(solution: Solution) -> Array:
+    """(n,) squared residuals in units of their covariance; NaN where a point has no pixel."""
+    return np.einsum("ni,nij,nj->n", solution.residual, np.linalg.inv(solution.noise), solution.residual)
+
+
+def scatter_of(solution: Solution, problem: Problem, used: Mask) -> float:
+    """Residuals of the used pairs in units of the stated errors; NaN without redundancy."""
+    redundancy = 2 * int(used.sum()) - problem.unknowns
+    return float(np.sqrt(squares(solution)[used].sum() / redundancy)) if redundancy > 0 else float("nan")
+
+
+def spread_of(solution: Solution, problem: Problem, used: Mask) -> tuple[float, Array]:
+    """The scatter, and the covariance of the parameters that goes with it."""
+    scatter = scatter_of(solution, problem, used)
+    larger = max(1.0, scatter**2) if np.isfinite(scatter) else 1.0
+    return scatter, inverse(solution.normal) * larger

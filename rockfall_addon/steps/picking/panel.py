@@ -1,12 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Picking in the footage: the tool, the track of the block, and what is drawn over the footage."""
+"""Step 4: picks and trajectories, picking in the footage, and the track of the block."""
 
 import bpy
 
-from ...scene import places, sightings, store, videos
+from ...scene import places, problems, sightings, store, videos
 from ...view import pointing
-from ...view.panel import RockfallPanel, advise, paragraph
+from ...view.panel import RockfallPanel, State, advise, paragraph
 from . import editing
+
+
+class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
+    bl_label = "4  Picks and Trajectories"
+    bl_idname = "ROCKFALL_PT_picks"
+
+    @staticmethod
+    def step_state(context: bpy.types.Context) -> State:
+        if not store.with_role(context.scene, store.PICK_ROLE):
+            return "TO_DO"
+        return "ATTENTION" if problems.sentences(context.scene) else "READY"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        picks = store.with_role(scene, store.PICK_ROLE)
+        flights = store.with_role(scene, store.FLIGHTS_ROLE)
+        if not picks:
+            with_video = bool(store.with_role(scene, store.CAMERA_ROLE))
+            way = "Click the block at its impacts in the footage, or import" if with_video else "Import"
+            advise(context, layout, False, f"{way} a table of timed picks (picks.csv).")
+            layout.operator("rockfall.import_picks", icon="IMPORT")
+            return
+        for sentence in problems.sentences(scene):
+            paragraph(context, layout, sentence, "ERROR")
+        runs = "trajectory" if len(flights) == 1 else "trajectories"
+        advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
+        layout.use_property_split = True
+        settings = scene.rockfall
+        column = layout.column(align=True)
+        for name in ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag", "flights_join"):
+            column.prop(settings, name)
+        layout.operator("rockfall.reconstruct", icon="FILE_REFRESH")
 
 
 class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
@@ -81,4 +113,4 @@ def _advice(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> tuple[bo
     return True, "Step to the picture of an impact (← →), look through the camera, and click the block."
 
 
-CLASSES = (ROCKFALL_PT_picking, ROCKFALL_PT_tracking)
+CLASSES = (ROCKFALL_PT_picks, ROCKFALL_PT_picking, ROCKFALL_PT_tracking)

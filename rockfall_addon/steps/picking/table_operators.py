@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Step 2: timed picks and the trajectories between them."""
+"""Step 4: timed picks from a table, and the trajectories between them."""
 
 import bpy
 from bpy.props import StringProperty

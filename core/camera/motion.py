@@ -253,7 +253,8 @@ def _bridged(spread: Array, keys: list[int]) -> Array:
         low, high = variance[first], variance[last]
         from_first, from_last = np.abs(variance[inner] - low), np.abs(high - variance[inner])
         total = from_first + from_last
-        bridge = np.divide(from_first * from_last, total, out=np.zeros_like(total), where=total > 0)
+        divides = np.isfinite(total) & (total > 0)
+        bridge = np.divide(from_first * from_last, total, out=np.zeros_like(total), where=divides)
         result[inner] = np.where(np.isfinite(variance[inner]), bridge + own, np.inf)
     for outer, key in ((slice(None, keys[0]), keys[0]), (slice(keys[-1] + 1, None), keys[-1])):
         result[outer] = np.abs(variance[outer] - variance[key]) + own

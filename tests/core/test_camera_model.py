@@ -12,6 +12,7 @@ from rockfall.core.camera.model import (
     INTRINSICS,
     Camera,
     distort,
+    full_frame_mm,
     look_at,
     project,
     project_with_derivatives,
@@ -271,22 +272,60 @@ def test_another_shift_is_the_same_place() -> None:
     np.testing.assert_allclose(moved.shift.to_survey(moved.position), camera.position, atol=1e-8)
 
 
+NOT_FINITE = "The camera's inner parameters are not finite, or its focal length is not positive."
+NO_PLACE = "The camera's position is not three finite numbers."
+NO_ROWS = "The camera's rotation is not three rows of three finite numbers."
+NO_ROTATION = "The camera's rotation is not a rotation: its rows are not at right angles, or it mirrors."
+
+
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
-        ({"fx": 0.0}, "focal length is not positive"),
-        ({"fy": -1.0}, "focal length is not positive"),
-        ({"k1": np.nan}, "inner parameters are not finite"),
-        ({"width": 0}, "image is 0 × .* px, which is no size"),
-        ({"height": -1}, "× -1 px, which is no size"),
-        ({"position": np.array([0, np.inf, 0])}, "position is not three finite numbers"),
-        ({"position": np.zeros(2)}, "position is not three finite numbers"),
-        ({"rotation": np.full((3, 3), np.nan)}, "rotation is not three rows of three finite numbers"),
-        ({"rotation": np.eye(4)}, "rotation is not three rows of three finite numbers"),
-        ({"rotation": np.diag([1.0, 1, -1])}, "or it mirrors"),
-        ({"rotation": np.eye(3) * 1.1}, "not at right angles"),
+        ({"fx": 0.0}, NOT_FINITE),
+        ({"fy": -1.0}, NOT_FINITE),
+        ({"k1": np.nan}, NOT_FINITE),
+        ({"width": 0}, "The camera's image is 0 × 1080 px, which is no size."),
+        ({"height": -1}, "The camera's image is 1920 × -1 px, which is no size."),
+        ({"position": np.array([0, np.inf, 0])}, NO_PLACE),
+        ({"position": np.zeros(2)}, NO_PLACE),
+        ({"rotation": np.full((3, 3), np.nan)}, NO_ROWS),
+        ({"rotation": np.eye(4)}, NO_ROWS),
+        ({"rotation": np.diag([1.0, 1, -1])}, NO_ROTATION),
+        ({"rotation": np.eye(3) * 1.1}, NO_ROTATION),
     ],
 )
-def test_impossible_cameras_are_refused(change: dict[str, object], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_impossible_cameras_are_refused(change: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError) as caught:
         replace(some_camera(), **change)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("target", "lens", "message"),
+    [
+        ((0, 1, 0), {}, "A camera needs either its focal length or its angle of view."),
+        (
+            (0, 1, 0),
+            {"focal_px": 1e3, "fov_deg": 60},
+            "A camera needs either its focal length or its angle of view.",
+        ),
+        ((5, 5, 5), {"fov_deg": 60}, "The camera cannot look at the place where it stands."),
+    ],
+)
+def test_what_a_camera_cannot_look_at(target: tuple[float, ...], lens: dict[str, float], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        look_at(1920, 1080, (5, 5, 5), target, **lens)
+    assert str(caught.value) == message
+
+
+def test_the_principal_point_of_a_distorted_camera_is_straight_ahead() -> None:
+    """Where the distorted radius is exactly 0, so is the undistorted one."""
+    camera = some_camera(k1=-0.2, k2=0.05)
+    np.testing.assert_array_equal(undistort(camera, [[camera.cx, camera.cy]]), [[0, 0]])
+    np.testing.assert_allclose(rays(camera, [[camera.cx, camera.cy]])[1], camera.rotation[2:], atol=1e-15)
+
+
+def test_a_focal_length_on_full_frame() -> None:
+    """An image of 3 : 2 that is as wide as its focal length is a 36 mm one, whatever its size."""
+    assert full_frame_mm(3600.0, (3600, 2400)) == pytest.approx(36.0, abs=1e-4)
+    assert full_frame_mm(50.0, (36, 24)) == pytest.approx(50.0, abs=1e-4)

@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rotation_from_vector, vector_from_rotation
-from rockfall.core.camera.motion import FeatureTracks, solve_motion
+from rockfall.core.camera.motion import FeatureTracks, _bridged, solve_motion
 from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.errors import InputError
+from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import Array, norm
 
 REFERENCE = 40
@@ -129,8 +130,9 @@ def test_a_person_who_walks() -> None:
 
 def test_walking_needs_the_terrain() -> None:
     camera, position, rotation = true_path(50, walking=True)
-    with pytest.raises(InputError, match="terrain"):
+    with pytest.raises(InputError) as caught:
         solve_motion(camera, tracked(camera, position, rotation), np.arange(50.0), REFERENCE, mode="full")
+    assert str(caught.value) == "A camera that moves needs the terrain, to tell moving from turning."
 
 
 def test_solved_frames_remove_a_drift() -> None:
@@ -168,18 +170,83 @@ def test_frames_without_features_lie_between_their_neighbours() -> None:
     assert "frame 60" in found.remarks[0].text
 
 
-def test_bad_tracks_are_refused() -> None:
-    camera = true_path(50, walking=False)[0]
-    times = np.arange(50.0)
-    some = FeatureTracks(np.full(5, REFERENCE), np.arange(5), np.random.default_rng(1).uniform(0, 1000, (5, 2)))
-    with pytest.raises(InputError, match="too few"):
-        solve_motion(camera, some, times, 3)
-    with pytest.raises(InputError, match="twice"):
-        solve_motion(camera, replace(some, feature=np.zeros(5, dtype=int)), times, REFERENCE)
-    with pytest.raises(InputError, match="frames 0 to 9"):
-        solve_motion(camera, replace(some, frame=np.full(5, 12)), times[:10], 3)
-    with pytest.raises(InputError, match="ascend"):
-        solve_motion(camera, some, times[::-1], REFERENCE)
+UNEVEN = "The tracks have columns of different lengths."
+CAMERA = true_path(50, walking=False)[0]
+TIMES = np.arange(50.0)
+SOME = FeatureTracks(np.full(5, REFERENCE), np.arange(5), np.random.default_rng(1).uniform(0, 1000, (5, 2)))
+
+
+@pytest.mark.parametrize(
+    ("tracks", "times", "reference", "keys", "message"),
+    [
+        (
+            SOME,
+            TIMES,
+            3,
+            {},
+            "The solved frame 3 has 0 features, too few to lead to other frames. Track more features, or solve another "
+            "frame.",
+        ),
+        (replace(SOME, feature=np.zeros(5, dtype=int)), TIMES, REFERENCE, {}, "A feature is seen twice in one frame."),
+        (
+            replace(SOME, frame=np.array([3, 3, 3, 12, 3])),
+            TIMES[:10],
+            3,
+            {},
+            "A feature is in frame 12, but the video has the frames 0 to 9.",
+        ),
+        (SOME, TIMES[::-1], REFERENCE, {}, "The times of the frames do not ascend, or there are none."),
+        (SOME, TIMES[:0], REFERENCE, {}, "The times of the frames do not ascend, or there are none."),
+        (SOME, TIMES, 50, {}, "Frame 50 was solved, but the video has the frames 0 to 49."),
+        (SOME, TIMES, REFERENCE, {-1: CAMERA}, "Frame -1 was solved, but the video has the frames 0 to 49."),
+        (
+            SOME,
+            TIMES,
+            REFERENCE,
+            {4: replace(CAMERA, width=100)},
+            "The camera of frame 4 has another shift or image size than the reference frame's.",
+        ),
+        (
+            SOME,
+            TIMES,
+            REFERENCE,
+            {4: replace(CAMERA, shift=GlobalShift(1.0, 0.0, 0.0))},
+            "The camera of frame 4 has another shift or image size than the reference frame's.",
+        ),
+        (replace(SOME, frame=SOME.frame[1:]), TIMES, REFERENCE, {}, UNEVEN),
+        (
+            replace(SOME, feature=SOME.feature[1:]),
+            TIMES,
+            REFERENCE,
+            {},
+            UNEVEN,
+        ),
+    ],
+)
+def test_bad_tracks_are_refused(
+    tracks: FeatureTracks, times: Array, reference: int, keys: dict[int, Camera], message: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        solve_motion(CAMERA, tracks, times, reference, key_frames=keys)
+    assert str(caught.value) == message
+
+
+def test_between_solved_frames_the_deviation_is_that_of_a_bridge() -> None:
+    """A random walk tied at both ends has the variance s·a·b/(a + b), with what every frame scatters; none at its ends.
+
+    Outside it grows from the nearer end; a frame of which nothing is known stays so.
+    """
+    step = 0.09
+    variance = step * np.abs(np.arange(12) - 3.0)
+    spread = np.sqrt(np.stack([variance, 4 * variance], axis=1))
+    spread[[5, 10]] = np.inf
+    found = _bridged(spread, [3, 8]) ** 2
+    own = step
+    for frame in range(12):
+        before, after = frame - 3, 8 - frame
+        expected = before * after / 5 * step if 3 <= frame <= 8 else step * -min(before, after)
+        expected = 0.0 if frame in (3, 8) else np.inf if frame in (5, 10) else expected + own
+        np.testing.assert_allclose(found[frame], [expected, 4 * expected], err_msg=str(frame))
 
 
 def test_poses_between_frames() -> None:
@@ -210,8 +277,22 @@ def test_a_fixed_camera_stays() -> None:
     np.testing.assert_array_equal(rotation[2], camera.rotation)
 
 
-def test_a_path_has_times_that_ascend() -> None:
-    camera = look_at(1920, 1080, (1, 2, 3), (0, 10, 0), fov_deg=60)
-    path = fixed(camera)
-    with pytest.raises(InputError, match="ascend"):
-        CameraPath(camera, np.zeros(2), np.zeros((2, 3)), np.repeat(path.rotation, 2, axis=0), np.zeros(2), np.zeros(2))
+def test_a_path_that_cannot_be_is_refused() -> None:
+    turn = np.repeat(CAMERA.rotation[None], 2, axis=0)
+    with pytest.raises(InputError) as caught:
+        CameraPath(CAMERA, np.zeros(2), np.zeros((2, 3)), turn, np.zeros(2), np.zeros(2))
+    assert str(caught.value) == "The times of a camera's path do not ascend."
+    columns = {
+        1: (np.zeros((3, 3)), turn, np.zeros(2), np.zeros(2)),
+        2: (np.zeros((2, 3)), turn[0], np.zeros(2), np.zeros(2)),
+        3: (np.zeros((2, 3)), turn, np.zeros(1), np.zeros(2)),
+        4: (np.zeros((2, 3)), turn, np.zeros(2), np.zeros(3)),
+    }
+    for wrong in columns.values():
+        with pytest.raises(InputError) as caught:
+            CameraPath(CAMERA, np.arange(2.0), *wrong)
+        shapes = tuple(column.shape for column in wrong)
+        assert str(caught.value) == f"The path of a camera has 2 times, but its other columns have the shapes {shapes}."
+    with pytest.raises(InputError) as caught:
+        CameraPath(CAMERA, np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0))
+    assert str(caught.value).startswith("The path of a camera has 0 times")

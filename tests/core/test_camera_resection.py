@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
+from rockfall.core.camera.resection.advice import Geometry, remarks_on
 from rockfall.core.camera.resection.resect import Resection, resect
 from rockfall.core.camera.resection.starting import poses_from_three
-from rockfall.core.errors import InputError
+from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import norm, unit
 
@@ -265,40 +266,179 @@ def test_pairs_in_a_corner_cannot_tell_the_lens() -> None:
     assert "cover only" in text
 
 
+LINE = "lie on a line, from which no camera can be found. Add pairs beside the line."
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda pixels, points: pixels.__setitem__((2, 0), np.nan), "row 4.*finite"),
-        (lambda pixels, points: pixels.__setitem__((2, 1), 2200.0), "row 4.*outside the image"),
-        (lambda pixels, points: pixels.__setitem__(5, pixels[1]), "row 7.*same pixel as pair 2"),
-        (lambda pixels, points: points.__setitem__(5, points[1]), "row 7.*same point as pair 2"),
-        (lambda pixels, points: points.__setitem__((slice(None), slice(1, 3)), 0), "on a line"),
-        (lambda pixels, points: pixels.__setitem__((slice(None), 1), 500.0), "on a line"),
+        (
+            lambda pixels, points: pixels.__setitem__((2, 0), np.nan),
+            ", row 4: pair 3: a coordinate is not a finite number. Pick it again.",
+        ),
+        (
+            lambda pixels, points: points.__setitem__((2, 2), np.inf),
+            ", row 4: pair 3: a coordinate is not a finite number. Pick it again.",
+        ),
+        (
+            lambda pixels, points: pixels.__setitem__(2, (1000.5, 2200.0)),
+            f", row 4: pair 3: the pixel (1000.5, 2200) lies outside the image of {WIDTH} × {HEIGHT} px. "
+            "Check the size of the image, and that v counts down from its top.",
+        ),
+        (
+            lambda pixels, points: pixels.__setitem__(2, (-0.5, 20.0)),
+            f", row 4: pair 3: the pixel (-0.5, 20) lies outside the image of {WIDTH} × {HEIGHT} px. "
+            "Check the size of the image, and that v counts down from its top.",
+        ),
+        (
+            lambda pixels, points: pixels.__setitem__(5, pixels[1]),
+            ", row 7: pair 6: the same pixel as pair 2. Leave one of the two out.",
+        ),
+        (
+            lambda pixels, points: points.__setitem__(5, points[1]),
+            ", row 7: pair 6: the same point as pair 2. Leave one of the two out.",
+        ),
+        (lambda pixels, points: points.__setitem__((slice(None), slice(1, 3)), 0), f": All points {LINE}"),
+        (lambda pixels, points: pixels.__setitem__((slice(None), 1), 500.0), f": All pixels {LINE}"),
     ],
 )
 def test_bad_pairs_are_refused(spoil: object, message: str) -> None:
     _, pixels, points = made(3, 8)
     spoil(pixels, points)
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(InputError) as caught:
         resect(pixels, points, WIDTH, HEIGHT, rows=range(2, 10), source="pairs.csv")
+    assert str(caught.value) == f"pairs.csv{message}"
 
 
-def test_too_little_is_refused() -> None:
-    camera, pixels, points = made(3, 4)
-    with pytest.raises(InputError, match="the pose and f needs 5"):
-        resect(pixels, points, WIDTH, HEIGHT)
-    with pytest.raises(InputError, match="the pose alone needs 4"):
-        resect(pixels[:3], points[:3], WIDTH, HEIGHT, free=(), camera=camera)
-    with pytest.raises(InputError, match="neither free nor known"):
-        resect(pixels, points, WIDTH, HEIGHT, free=())
-    with pytest.raises(InputError, match="no parameter"):
-        resect(pixels, points, WIDTH, HEIGHT, free=("focal",))
-    with pytest.raises(InputError, match="already frees"):
-        resect(pixels, points, WIDTH, HEIGHT, free=("f", "fx"))
-    with pytest.raises(InputError, match="1920 × 1080"):
-        resect(pixels, points, 1920, 1080, free=(), camera=camera)
-    with pytest.raises(InputError, match="4 pixels but 3 points"):
-        resect(pixels, points[:3], WIDTH, HEIGHT)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"sigma_px": 0.0}, "pair 1: its error is not a positive number"),
+        ({"sigma_px": [1, 1, np.inf, 1, 1, 1]}, "pair 3: its error is not a positive number"),
+        ({"sigma_m": [0, -1e-9, 0, 0, 0, 0]}, "pair 2: its error is not a positive number"),
+        ({"sigma_m": [0, 0, 0, 0, np.nan, 0]}, "pair 5: its error is not a positive number"),
+        ({"sigma_m": [0, 0, 0, np.inf, 0, 0]}, "pair 4: its error is not a positive number"),
+    ],
+)
+def test_errors_that_cannot_be(change: dict[str, object], message: str) -> None:
+    _, pixels, points = made(3, 6)
+    with pytest.raises(InputError) as caught:
+        resect(pixels, points, WIDTH, HEIGHT, **change)
+    assert str(caught.value) == f"{message}. Give pixels an error above zero, points zero or more."
+
+
+MORE = "Add pairs (10 or more are good), or lock parameters: 4 pairs give the pose."
+COLUMNS = "f, fx, fy, c, cx, cy, k1, k2, k3, p1, p2"
+
+
+@pytest.mark.parametrize(
+    ("n", "change", "message"),
+    [
+        (4, {}, f"4 pairs are too few: the pose and f needs 5. {MORE}"),
+        (6, {"free": ("k2 k1", "f", "c")}, f"6 pairs are too few: the pose and f, cx, cy, k1, k2 needs 7. {MORE}"),
+        (3, {"free": (), "camera": True}, "3 pairs are too few: the pose alone needs 4. Add pairs."),
+        (4, {"free": ()}, "The focal length is neither free nor known. Free it, or give a camera that has it."),
+        (
+            6,
+            {"free": ("fy",)},
+            "The focal length is neither free nor known. Free it, or give a camera that has it.",
+        ),
+        (4, {"free": ("focal",)}, f"“focal” is no parameter of a camera. Choose among {COLUMNS}."),
+        (4, {"free": ("f", "fx")}, "f already frees fx and fy. Free either f, or fx and fy."),
+        (6, {"names": list("abcde")}, "There are 6 pairs, but not as many names or rows."),
+        (6, {"rows": range(7)}, "There are 6 pairs, but not as many names or rows."),
+    ],
+)
+def test_too_little_is_refused(n: int, change: dict[str, object], message: str) -> None:
+    camera, pixels, points = made(3, n)
+    if "camera" in change:
+        change = {**change, "camera": camera}
+    with pytest.raises(InputError) as caught:
+        resect(pixels, points, WIDTH, HEIGHT, **change)
+    assert str(caught.value) == message
+
+
+def test_what_does_not_belong_together_is_refused() -> None:
+    camera, pixels, points = made(3, 6)
+    with pytest.raises(InputError) as caught:
+        resect(pixels, points[:3], WIDTH, HEIGHT, source="pairs.csv")
+    assert str(caught.value) == "pairs.csv: There are 6 pixels but 3 points."
+    for size in ((WIDTH + 1, HEIGHT), (WIDTH, HEIGHT + 1)):
+        with pytest.raises(InputError) as caught:
+            resect(pixels, points, *size, free=(), camera=camera)
+        assert str(caught.value) == (
+            f"The known camera has {WIDTH} × {HEIGHT} px, the image {size[0]} × {size[1]} px. "
+            "A lens is known for one image size; scale its parameters, or free them."
+        )
+
+
+@pytest.mark.parametrize("robust", [True, False])
+def test_pixels_that_the_lens_cannot_see_have_no_camera(robust: bool) -> None:
+    """The distortion ends within the image, and the known pose looks away."""
+    camera = replace(look_at(1920, 1080, (0, 0, 0), (0, -10, 0), focal_px=1000.0), k1=-1.0)
+    pixels = np.array([[50, 50], [1850, 60], [1860, 1000], [70, 1010], [960, 20], [900, 1070.0]])
+    points = np.array([[-5, 20, 3], [5, 20, 3], [5, 21, -3], [-5, 22, -3], [0, 25, 4], [1, 19, -5.0]])
+    with pytest.raises(RockfallError) as caught:
+        resect(pixels, points, 1920, 1080, free=(), camera=camera, robust=robust)
+    assert str(caught.value) == (
+        "No camera sees the points where they were picked. Check that each pixel belongs to its point, that v counts "
+        "down from the top of the image, and the points' coordinates."
+    )
+
+
+def test_an_undetermined_camera_has_no_pose_for_a_held_lens_either() -> None:
+    _, pixels, points = made(3, 8)
+    found = resect(pixels, points, WIDTH, HEIGHT)
+    lost = replace(found, covariance=np.full(found.covariance.shape, np.inf))
+    assert np.isposinf(lost.pose_covariance_given_lens).all()
+
+
+def looked_at(**change: object) -> Geometry:
+    """Eight sound pairs in a tenth of a wide image's width and height, in depth."""
+    camera = look_at(2000, 1000, (0, 0, 0), (0, 50, 0), focal_px=2000.0)
+    corners = np.array([[0, 0], [200, 0], [200, 200], [0, 200], [10, 90], [90, 10], [110, 190], [190, 110.0]])
+    pixels = corners + np.array([900.0, 400.0])
+    depth = np.linspace(30.0, 70.0, 8)
+    origins, directions = rays(camera, pixels)
+    given = {
+        "camera": camera,
+        "pixels": pixels,
+        "points": origins + directions * depth[:, None],
+        "depth": depth,
+        "parameters": ("rx", "ry", "rz", "x", "y", "z", "f"),
+        "covariance": np.diag([1e-8] * 3 + [1e-4] * 3 + [1.0]),
+        "scatter": 1.0,
+        "redundancy": 9,
+        "rmse_px": 1.0,
+        "other": None,
+        "wrong": (),
+    }
+    return Geometry(**(given | change))
+
+
+def test_how_much_of_the_image_pairs_cover() -> None:
+    """A square of 200 px is 2 % of 2000 × 1000 px; from 10 % on nothing is said."""
+    assert [str(each) for each in remarks_on(looked_at())] == [
+        "The pairs cover only 2 % of the image; away from them the camera is an extrapolation. Spread the pairs."
+    ]
+    wide = look_at(2000, 1000, (0, 0, 0), (0, 50, 0), focal_px=2000.0)
+    spread = (looked_at().pixels - [900, 400]) * [2.3, 2.3]
+    assert remarks_on(looked_at(camera=wide, pixels=spread)) == ()
+
+
+def test_how_wide_a_field_pairs_span() -> None:
+    """200 px at 2000 px focal length across and down are 0.1414 rad along the diagonal, 8.1°; twice as many are 16°."""
+    poor = np.diag([1e-8] * 3 + [1e-4] * 3 + [100.0**2])
+    first = str(remarks_on(looked_at(covariance=poor))[0])
+    assert first == (
+        "The focal length is known to 5 % only: the pairs span only 8.1° of view. Lock it, or add pairs nearer or "
+        "farther."
+    )
+    wide = str(remarks_on(looked_at(covariance=poor, pixels=2 * looked_at().pixels - [1000, 500]))[0])
+    assert wide == (
+        "The focal length is known to 5 % only: the pairs are few, or close together. Lock it, or add pairs nearer or "
+        "farther."
+    )
 
 
 def test_three_pairs_leave_the_true_pose_among_four() -> None:

@@ -335,6 +335,12 @@ def test_clicked_and_proposed_observations(site, part) -> None:
         tracks.clicks_for(site, camera, "B10")
     sightings.click(camera, "B10", int(frame[3]), float(time[3]), pixel[3] + 0.25, 0.5)
     assert tracks.clicks_for(site, camera, "B10") == [(int(frame[3]), *(pixel[3] + 0.25))]
+    site.frame_set(60)
+    places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
+    place = places.in_picture(site, camera, np.array([700.0, 300.0]), "B10", centre=True)
+    thing, _ = editing.make_or_move(site, camera, place, "B10", "impact")
+    assert (60, 700.0, 300.0) in tracks.clicks_for(site, camera, "B10"), "a pick's click begins a track, too"
+    editing.remove(site, thing)
     track = tracking.BlockTrack(frame, time, pixel, 0.1 * one, one, pixel, 9 * one, ("", ""))
     sightings.keep_track(camera, "B10", track)
     seen = sightings.seen_in(camera, "B10")

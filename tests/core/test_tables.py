@@ -223,12 +223,9 @@ def test_bad_tables_are_refused_with_their_row(tmp_path, case):
 def test_picks_in_other_units_are_converted(tmp_path):
     """Each factor by value: milliseconds, feet, centimetres, kilometres, millimetres, revolutions a minute, degrees."""
     table = tmp_path / "picks.csv"
-    header = (
-        "trajectory,time_ms,x_ft,y_cm,z_km,sigma_time_min,sigma_position_mm,omega1x_rpm,omega1y_deg/s,omega1z_rad/s"
-    )
-    table.write_text(
-        f"{header},note_m\na,1500,100,250,1.5,0.5,35,60,180,2,7\na,2500,,,,,,,,,\n".replace(",,,,,,,,,", ",1,1,1,,,,,,")
-    )
+    units = "time_ms,x_ft,y_cm,z_km,sigma_time_min,sigma_position_mm,omega1x_rpm,omega1y_deg/s,omega1z_rad/s"
+    rows = "a,1500,100,250,1.5,0.5,35,60,180,2,7", "a,2500,1,1,1,,,,,,"
+    table.write_text("\n".join((f"trajectory,{units},note_m", *rows)), encoding="utf-8")
     read = read_picks(table)
     survey = read.shift.to_survey(read.position)
     np.testing.assert_allclose(read.time_s, [1.5, 2.5], rtol=1e-15)

@@ -1,26 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fit chosen parameters of one impact model to measured impacts, and say how far the result can be trusted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, get_args
 
 import numpy as np
 
-from ..errors import InputError
-from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
+from ..remarks import Remark
 from ..vectors import Array, Indices
 from .clouds import OBJECTIVE, Contest, Target, make_contest, measured_target
-from .courses import Spin, find_courses
-from .estimation import Estimate, Estimation, Question, ask, check_effort, estimate, paired_gain
+from .courses import find_courses
+from .estimation import Estimation, FitOptions, FittedModel, Question, ask, estimate, paired_gain
 from .fitting import COARSE, descend_from_best, watched
-from .verdicts import holdout_verdict, use_verdict
+from .verdicts import about_holdout, about_use
 
-HoldOut = Literal["trajectory", "none"]
 FOLDS = 5
 
 
@@ -42,58 +39,32 @@ class Fold:
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
-    """Fitted parameters of one model.
+class Calibration(FittedModel):
+    """Parameters of a model, fitted to measured impacts.
 
     Attributes
     ----------
-    model : name.
-    estimates : the fitted parameters, in the order asked for.
-    settings : all parameters of the model, as `compare` takes them.
     objective : what was made least.
-    impacts, trajectories : how many count.
     default_score, fitted_score : mean scores over all impacts; no unit, 0 is perfect.
     held_out_score : mean score of impacts in trajectories that were not fitted to; NaN when none were held out.
-    blind_score : of a guess that ignores the incident state; see `Target.blind_score`.
     folds : of the hold-out.
-    names, correlation : fitted numbers and their (k, k) correlation over the resamples.
-    replicates, resamples, seed, spin : what it was computed with.
-    verdict : sentences.
     """
 
-    model: str
-    estimates: tuple[Estimate, ...]
-    settings: Mapping[str, Value]
     objective: str
-    impacts: int
-    trajectories: int
     default_score: float
     fitted_score: float
     held_out_score: float
-    blind_score: float
     folds: tuple[Fold, ...]
-    names: tuple[str, ...]
-    correlation: Array
-    replicates: int
-    resamples: int
-    seed: int
-    spin: str
-    verdict: tuple[str, ...]
 
 
 def calibrate(
     impacts: Impacts,
     model: str,
     fit: Sequence[str],
-    *,
     fixed: Mapping[str, object] | None = None,
-    starts: int = 4,
-    seed: int = 0,
-    replicates: int = 16,
-    resamples: int = 200,
-    holdout: HoldOut = "trajectory",
-    spin: Spin = "rolling",
-    radius_m: float | None = None,
+    options: FitOptions | None = None,
+    *,
+    holdout: bool = True,
     progress: Progress = silent,
 ) -> Calibration:
     """Fit chosen parameters of one model to measured impacts.
@@ -106,11 +77,7 @@ def calibrate(
     model : name.
     fit : names of the parameters to fit.
     fixed : other parameters that are not to have their default.
-    starts : descents, from the best places of a scan of the whole range.
-    replicates : draws of a random model for each impact, the same for all parameters tried.
-    resamples : of the trajectories, for the intervals.
-    holdout : "trajectory" also predicts each fifth of the trajectories from the others.
-    spin, radius_m : as for `compare`.
+    holdout : whether each fifth of the trajectories is also predicted from the others.
 
     Raises
     ------
@@ -120,50 +87,33 @@ def calibrate(
     -----
     Intervals are 95 % percentiles over resampled trajectories, expanded for their number (Hesterberg 2015): impacts of
     one trajectory are not independent. With fewer than five trajectories impacts are resampled, which is too sure of
-    itself; the verdict says so. The noise of `replicates` draws adds about 1/replicates to the variance of an estimate.
+    itself; a remark says so. The noise of `replicates` draws adds about 1/replicates to the variance of an estimate.
     """
+    options = options or FitOptions()
     chosen = find_model(model)
     question = ask(chosen, fit, fixed)
-    check_effort(starts, seed, replicates, resamples)
-    _check(holdout)
-    courses = find_courses(impacts, spin, radius_m)
+    courses = find_courses(impacts, options.spin, options.radius_m)
     target = measured_target(impacts, courses)
-    contest = make_contest(chosen, impacts, target, replicates, seed)
-    found = estimate(
-        question,
-        contest,
-        fit,
-        starts=starts,
-        seed=seed,
-        resamples=resamples,
-        progress=progress,
-    )
-    counts = target.counts
-    total = float(counts.sum())
+    contest = make_contest(chosen, impacts, target, options.replicates, options.seed)
+    found = estimate(question, contest, fit, options, progress)
     held: Array | None = None
     parts: tuple[Fold, ...] = ()
-    if holdout == "trajectory" and target.clusters > 1:
-        held, members = _hold_out(question, contest, found, seed, progress)
+    if holdout and target.clusters > 1:
+        held, members = _hold_out(question, contest, found, options.seed, progress)
         parts = _folds(impacts, target, members, held, found.default_sums)
+    total = float(target.counts.sum())
     return Calibration(
         model=chosen.name,
         estimates=found.estimates,
         settings=found.settings,
-        objective=OBJECTIVE,
         impacts=int(total),
         trajectories=target.trajectories,
+        remarks=tuple(_remarks(target, found, held, chosen.is_random)),
+        objective=OBJECTIVE,
         default_score=float(found.default_sums.sum()) / total,
         fitted_score=float(found.sums.sum()) / total,
         held_out_score=float(held.sum()) / total if held is not None else np.nan,
-        blind_score=target.blind_score(chance=chosen.is_random),
         folds=parts,
-        names=found.names,
-        correlation=found.correlation,
-        replicates=replicates if chosen.is_random else 0,
-        resamples=resamples,
-        seed=seed,
-        spin=spin,
-        verdict=_verdict(target, found, held, chosen.is_random),
     )
 
 
@@ -204,31 +154,21 @@ def _folds(impacts: Impacts, target: Target, members: list[Indices], held: Array
     return tuple(folds)
 
 
-def _verdict(target: Target, found: Estimation, held: Array | None, chance: bool) -> tuple[str, ...]:
-    counts = target.counts
-    total = float(counts.sum())
-    sentences, blind = [], target.blind_score(chance=chance)
-    unsure = [one.name for one in found.estimates if one.verdict.startswith("The data cannot tell")]
+def _remarks(target: Target, found: Estimation, held: Array | None, chance: bool) -> Iterator[Remark]:
+    unsure = [one.name for one in found.estimates if not one.is_determined]
     if unsure:
-        sentences.append(
-            f"These impacts cannot tell {', '.join(unsure)}: set a value, or fit fewer parameters together."
-        )
+        text = f"These impacts cannot tell {', '.join(unsure)}: set a value, or fit fewer parameters together."
+        yield Remark(text, "advice", "parameters")
+    total, blind = float(target.counts.sum()), target.blind_score(chance=chance)
+    score = float((found.sums if held is None else held).sum()) / total
     if held is not None:
-        gain, error = paired_gain(found.default_sums, held, counts)
-        default, score = float(found.default_sums.sum()) / total, float(held.sum()) / total
+        gain, error = paired_gain(found.default_sums, held, target.counts)
         better = int((held < found.default_sums).sum())
-        sentences.append(holdout_verdict(default, score, gain, error, better, target.clusters))
-        sentences.append(use_verdict(score, blind, chance=chance))
-    else:
-        sentences.append(use_verdict(float(found.sums.sum()) / total, blind, chance=chance))
+        yield about_holdout(float(found.default_sums.sum()) / total, score, gain, error, better, target.clusters)
+    yield about_use(score, blind, chance=chance)
     if not target.by_trajectory:
-        sentences.append(
+        text = (
             f"With {target.trajectories} trajector{'y' if target.trajectories == 1 else 'ies'} single impacts were "
             "resampled as if independent: the intervals are likely too narrow, the hold-out too kind."
         )
-    return tuple(sentences)
-
-
-def _check(holdout: str) -> None:
-    if holdout not in get_args(HoldOut):
-        raise InputError(f"There is no hold-out {holdout!r}", advice=f"Choose one of {', '.join(get_args(HoldOut))}")
+        yield Remark(text, "warning", "trajectories")

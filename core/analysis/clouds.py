@@ -33,7 +33,6 @@ UNUSABLE = ("departing", "into_ground", "below_terrain", "contact", "shattered",
 """Flags of impacts whose restituted velocity is not that of a block that left the ground."""
 MOST_POOLED = 2000
 WEISZFELD_STEPS = 50
-"""Interquartile range of a normal law in standard deviations."""
 HOPELESS = 1e9
 FEWEST_CLUSTERS = 5
 """With fewer trajectories their resampling says nothing, and single impacts are resampled."""

@@ -16,93 +16,67 @@ from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
-from ..vectors import Array
 from .clouds import Target, cloud_of, make_contest, make_target
-from .courses import Spin, find_courses
-from .estimation import Estimate, ask, check_effort, estimate
-from .verdicts import likeness_verdict
+from .courses import find_courses
+from .estimation import FitOptions, FittedModel, ask, estimate
+from .verdicts import about_likeness
 
 OTHER_CHANCE = 1
 """Added to the seed for the second model: shared draws would make equal models look more than equal."""
 
 
 @dataclass(frozen=True, eq=False)
-class Equivalence:
-    """Parameters of a second model that make it behave like a first.
+class Equivalence(FittedModel):
+    """Parameters of a model that make it behave like another; the intervals say how they vary with the trajectories.
 
     Attributes
     ----------
-    model, settings : the first model and all its parameters.
-    other : the second model.
-    estimates : its fitted parameters; the interval says how they vary with the trajectories they are found on.
-    other_settings : all its parameters, as `compare` takes them.
-    impacts, trajectories : on how many.
-    default_distance, distance : energy distance of the two, with the second model's defaults and as fitted; in robust
-        standard deviations of the first model's outcomes.
+    source, source_settings : the model that is imitated, and all its parameters.
+    default_distance, distance : energy distance of the two, with the defaults and as fitted; in robust standard
+        deviations of the outcomes that are imitated.
     rms : root mean square difference of the two models' means: v_N2 [m/s], v_T2 [m/s], deviation [°].
-    names, correlation : fitted numbers and their (k, k) correlation over the resamples.
-    replicates, resamples, seed, spin : what it was computed with.
-    verdict : sentences.
     """
 
-    model: str
-    settings: Mapping[str, Value]
-    other: str
-    estimates: tuple[Estimate, ...]
-    other_settings: Mapping[str, Value]
-    impacts: int
-    trajectories: int
+    source: str
+    source_settings: Mapping[str, Value]
     default_distance: float
     distance: float
     rms: tuple[float, float, float]
-    names: tuple[str, ...]
-    correlation: Array
-    replicates: int
-    resamples: int
-    seed: int
-    spin: str
-    verdict: tuple[str, ...]
 
 
 def equivalent(
     impacts: Impacts,
-    model_a: str,
-    parameters_a: Mapping[str, object] | None,
-    model_b: str,
+    source: str,
+    parameters: Mapping[str, object] | None,
+    model: str,
     fit: Sequence[str],
-    *,
     fixed: Mapping[str, object] | None = None,
-    starts: int = 4,
-    seed: int = 0,
-    replicates: int = 16,
-    resamples: int = 100,
-    spin: Spin = "rolling",
-    radius_m: float | None = None,
+    options: FitOptions | None = None,
+    *,
     progress: Progress = silent,
 ) -> Equivalence:
-    """Parameters of `model_b` that behave most like `model_a` with `parameters_a`.
+    """Parameters of `model` with which it behaves most like `source` with `parameters`.
 
     Only the incident states of the impacts are used, not what was measured after them.
 
     Parameters
     ----------
-    parameters_a : those of the first model that are not to have their default.
-    fit, fixed : parameters of the second model to find, and others that are not to have their default.
-    starts, seed, replicates, resamples, spin, radius_m, progress : as for `calibrate`.
+    parameters : those of `source` that are not to have their default.
+    fit, fixed : parameters of `model` to find, and others that are not to have their default.
 
     Raises
     ------
     InputError : unknown model or parameter, value out of range, too few impacts or none that can be used.
     """
-    a, b = find_model(model_a), find_model(model_b)
-    settings = a.settings(parameters_a)
+    options = options or FitOptions()
+    a, b = find_model(source), find_model(model)
+    settings = a.settings(parameters)
     question = ask(b, fit, fixed)
-    check_effort(starts, seed, replicates, resamples)
-    courses = find_courses(impacts, spin, radius_m)
-    cloud = cloud_of(a, impacts, courses, settings, replicates, seed)
+    courses = find_courses(impacts, options.spin, options.radius_m)
+    cloud = cloud_of(a, impacts, courses, settings, options.replicates, options.seed)
     target = make_target(courses, cloud, np.asarray(np.isfinite(cloud).all(axis=(0, 2))))
-    contest = make_contest(b, impacts, target, replicates, seed + OTHER_CHANCE)
-    found = estimate(question, contest, fit, starts=starts, seed=seed, resamples=resamples, progress=progress)
+    contest = make_contest(b, impacts, target, options.replicates, options.seed + OTHER_CHANCE)
+    found = estimate(question, contest, fit, options, progress)
     own, total = _own_scatter(target), float(target.counts.sum())
     distances = [
         float(np.sqrt(max(2 * (float(sums.sum()) - own) / total, 0.0))) for sums in (found.default_sums, found.sums)
@@ -113,23 +87,17 @@ def equivalent(
     # Like with like: a distance of two points is D²/2, that of two outcomes of the first model twice its scatter.
     nearness = (float(found.sums.sum()) - own) / total
     return Equivalence(
-        model=a.name,
-        settings=settings,
-        other=b.name,
+        model=b.name,
         estimates=found.estimates,
-        other_settings=found.settings,
+        settings=found.settings,
         impacts=int(total),
         trajectories=target.trajectories,
+        remarks=(about_likeness(max(nearness, 0.0), 2 * target.blind_score(chance=True), rms),),
+        source=a.name,
+        source_settings=settings,
         default_distance=distances[0],
         distance=distances[1],
         rms=rms,
-        names=found.names,
-        correlation=found.correlation,
-        replicates=replicates if a.is_random or b.is_random else 0,
-        resamples=resamples,
-        seed=seed,
-        spin=spin,
-        verdict=(likeness_verdict(max(nearness, 0.0), 2 * target.blind_score(chance=True), rms),),
     )
 
 

@@ -13,16 +13,49 @@ from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.parameters import ParameterSpec, Value
 from ..progress import Progress
+from ..remarks import Remark
 from ..vectors import Array
 from .clouds import Contest
+from .courses import Spin
 from .fitting import Axis, Fit, Sums, fit, interval, resample, watched
-from .verdicts import choice_verdict, number_verdict
+from .verdicts import about_choice, about_number
 
 MOST_COMBINATIONS = 64
 FEWEST_IMPACTS = 5
 """For each fitted number."""
 IDLE_SPAN = 1e-9
 """A parameter that moves the mean score by less than this, over its whole range, has no effect."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How parameters are fitted.
+
+    Attributes
+    ----------
+    starts : descents, from the best places of a scan of the whole range.
+    seed : of all that is left to chance.
+    replicates : draws of a random model for each impact, the same for all parameters that are tried.
+    resamples : of the trajectories, for the intervals.
+    spin, radius_m : of the blocks, as for `compare`.
+
+    Raises
+    ------
+    InputError : too few of anything; says what is needed.
+    """
+
+    starts: int = 4
+    seed: int = 0
+    replicates: int = 16
+    resamples: int = 200
+    spin: Spin = "rolling"
+    radius_m: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.starts < 1 or self.seed < 0 or self.replicates < 2 or self.resamples < 20:
+            raise InputError(
+                "A fit needs a start or more, 2 replicates or more, 20 resamples or more, and a seed from 0"
+            )
 
 
 @dataclass(frozen=True)
@@ -35,7 +68,7 @@ class Estimate:
     default : its value without a fit.
     value : fitted: a number, or the name of a choice.
     low, high : 95 % interval of a number; NaN for a choice.
-    verdict : how far the value can be trusted, in words.
+    remarks : how far the value can be trusted.
     """
 
     name: str
@@ -44,7 +77,38 @@ class Estimate:
     value: Value
     low: float
     high: float
-    verdict: str
+    remarks: tuple[Remark, ...]
+
+    @property
+    def verdict(self) -> str:
+        """The remarks as one text."""
+        return " ".join(map(str, self.remarks))
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether the data tell the value."""
+        return all(remark.severity != "problem" for remark in self.remarks)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModel:
+    """Parameters of a model, fitted to what impacts should come to.
+
+    Attributes
+    ----------
+    model : name.
+    estimates : the fitted parameters, in the order asked for.
+    settings : all parameters of the model, as `compare` takes them.
+    impacts, trajectories : how many count.
+    remarks : what the result is worth.
+    """
+
+    model: str
+    estimates: tuple[Estimate, ...]
+    settings: Mapping[str, Value]
+    impacts: int
+    trajectories: int
+    remarks: tuple[Remark, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +161,6 @@ class Estimation:
     ----------
     estimates : one for each parameter that was asked for, in that order.
     settings : all parameters of the model.
-    correlation : (k, k) of the fitted numbers over the resamples; NaN where one of them never moved.
-    names : (k,) of the fitted numbers.
     sums, default_sums : (clusters,) sums of the scores with the fitted and with the default settings.
     fits : of each combination of choices.
     best : the combination that won.
@@ -106,8 +168,6 @@ class Estimation:
 
     estimates: tuple[Estimate, ...]
     settings: Mapping[str, Value]
-    correlation: Array
-    names: tuple[str, ...]
     sums: Array
     default_sums: Array
     fits: tuple[Fit, ...]
@@ -148,25 +208,11 @@ def ask(model: ImpactModel, names: Sequence[str], fixed: Mapping[str, object] | 
     return Question(model, numbers, choices, tuple(Axis.of(spec) for spec in numbers), tuple(combinations))
 
 
-def check_effort(starts: int, seed: int, replicates: int, resamples: int) -> None:
-    """Refuse a fit with too few of anything.
-
-    Raises
-    ------
-    InputError : says what is needed.
-    """
-    if starts < 1 or seed < 0 or replicates < 2 or resamples < 20:
-        raise InputError("A fit needs a start or more, 2 replicates or more, 20 resamples or more, and a seed from 0")
-
-
 def estimate(
     question: Question,
     contest: Contest,
     names: Sequence[str],
-    *,
-    starts: int,
-    seed: int,
-    resamples: int,
+    options: FitOptions,
     progress: Progress,
 ) -> Estimation:
     """Fit all combinations, take the best, and resample the trajectories for its intervals.
@@ -180,10 +226,10 @@ def estimate(
     fits, total = [], len(question.combinations)
     for i in range(total):
         sums = watched(question.sums(contest, i), partial(progress, f"Fitting {question.model.name}", i, total))
-        fits.append(fit(sums, counts, question.default_place(i), starts, seed))
+        fits.append(fit(sums, counts, question.default_place(i), options.starts, options.seed))
     best = int(np.argmin([found.sums.sum() for found in fits]))
     found, sums = fits[best], question.sums(contest, best)
-    places = resample(sums, counts, found, resamples, seed, progress)
+    places = resample(sums, counts, found, options.resamples, options.seed, progress)
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = np.atleast_2d(np.corrcoef(places, rowvar=False)) if places.size else np.empty((0, 0))
     values = question.values(found.place)
@@ -196,8 +242,6 @@ def estimate(
     return Estimation(
         estimates=tuple(made[name] for name in dict.fromkeys(names)),
         settings={**question.combinations[best], **values},
-        correlation=correlation,
-        names=tuple(spec.name for spec in question.numbers),
         sums=found.sums,
         default_sums=fits[0].scanned_sums[0],
         fits=tuple(fits),
@@ -222,10 +266,9 @@ def _number(
     others = [(other.name, float(correlation[j, i])) for i, other in enumerate(question.numbers) if i != j]
     value = float(default) if idle else axis.value(place)
     ends = axis.value(min(low, place)), axis.value(max(high, place))
-    verdict = number_verdict(
-        spec, float(default), value, ends, (place, min(low, place), max(high, place)), idle, others
-    )
-    return Estimate(spec.name, spec.unit, default, value, *ends, verdict)
+    span = place, min(low, place), max(high, place)
+    remarks = tuple(about_number(spec, float(default), value, ends, span, idle, others))
+    return Estimate(spec.name, spec.unit, default, value, *ends, remarks)
 
 
 def _span(sums: Sums, place: Array, j: int, counts: Array) -> float:
@@ -244,8 +287,8 @@ def _choice(question: Question, spec: ParameterSpec, fits: Sequence[Fit], best: 
     others = [i for i, settings in enumerate(question.combinations) if settings[spec.name] != value]
     rival = min(others, key=lambda i: float(fits[i].sums.sum()))
     gain, error = paired_gain(fits[rival].sums, fits[best].sums, counts)
-    verdict = choice_verdict(str(value), str(question.combinations[rival][spec.name]), gain, error)
-    return Estimate(spec.name, spec.unit, question.combinations[0][spec.name], value, nan, nan, verdict)
+    remark = about_choice(spec.name, str(value), str(question.combinations[rival][spec.name]), gain, error)
+    return Estimate(spec.name, spec.unit, question.combinations[0][spec.name], value, nan, nan, (remark,))
 
 
 def paired_gain(before: Array, after: Array, counts: Array) -> tuple[float, float]:

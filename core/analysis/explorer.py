@@ -236,23 +236,17 @@ class _Page:
             self.job.cancel()
             return
         from .calibration import Calibration, calibrate
+        from .estimation import FitOptions
 
         name, fitted = self.model, tuple(self.fit.value)
         if not fitted:
             self._say("Choose the parameters to fit.")
             return
         fixed = {key: value for key, value in self.given[name].items() if key not in fitted}
+        options = FitOptions(seed=self.start.seed, spin=self.start.courses.spin)
 
         def work(progress: Progress) -> Calibration:
-            return calibrate(
-                self.start.impacts,
-                name,
-                fitted,
-                fixed=fixed,
-                seed=self.start.seed,
-                spin=self.start.courses.spin,
-                progress=progress,
-            )
+            return calibrate(self.start.impacts, name, fitted, fixed, options, progress=progress)
 
         def done(result: Calibration | None) -> None:
             self.calibrate.update(label="Calibrate", button_type="primary")
@@ -260,7 +254,7 @@ class _Page:
                 self.given[name].update({key: result.settings[key] for key in fitted})
                 self.inputs[name].show(result.settings)
                 self._show()
-                self._say("<br>".join(escape(sentence) for sentence in result.verdict))
+                self._say("".join(f'<div class="{one.severity}">{escape(one.text)}</div>' for one in result.remarks))
 
         self.calibrate.update(label="Cancel", button_type="default")
         self.job.begin(work, done)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reconstruction.impact import Impacts
+from ..remarks import Remark
 from ..vectors import Array, Mask, norm
 
 PUBLISHED_RT_SLOPE = 0.66
@@ -114,27 +115,29 @@ class ImpactStatistics:
                 rows.append((f"{name}_{part}", getattr(spread, part), unit, note))
         return rows
 
-    def sentences(self) -> list[str]:
+    def remarks(self) -> list[Remark]:
         """The same for people, with the published values beside."""
         if self.used < FEWEST:
-            return [f"{self.used} of {self.impacts} impacts have all coefficients: too few for statistics."]
+            text = f"{self.used} of {self.impacts} impacts have all coefficients: too few for statistics."
+            return [Remark(text, "problem", "impacts")]
         rt, trend, spreads = self.rt, self.r_deviation, self.spreads
         before, angle = spreads["v1", "m/s"], spreads["theta1", "deg"]
-        return [
-            f"{self.used} of {self.impacts} impacts have all coefficients "
+        texts = {
+            "impacts": f"{self.used} of {self.impacts} impacts have all coefficients "
             f"(incident speed {before.median:.1f} m/s in the median, {before.greatest:.1f} at most; "
             f"incident angle {angle.median:.0f}°, {angle.low:.0f}–{angle.high:.0f}° for the middle 80 %).",
-            f"R_T = {rt.slope:.2f} ({rt.low:.2f}–{rt.high:.2f}), R² {rt.r2:.2f}: slope of |v_T2| on |v_T1| through the "
-            f"origin. Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
-            f"R_N = {self.rn_factor:.1f}·θ1^{self.rn_angle.slope:.2f} (θ1 in degrees): hyperbolic, as published. "
+            "rt": f"R_T = {rt.slope:.2f} ({rt.low:.2f}–{rt.high:.2f}), R² {rt.r2:.2f}: slope of |v_T2| on |v_T1| "
+            f"through the origin. Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
+            "rn": f"R_N = {self.rn_factor:.1f}·θ1^{self.rn_angle.slope:.2f} (θ1 in degrees): hyperbolic, as published. "
             f"R_N > 1 at {self.rn_above_one} impacts, {self.rn_above_one_grazing} of them below "
             f"{PUBLISHED_RN_ANGLE_DEG:.0f}° (published: below about {PUBLISHED_RN_ANGLE_DEG:.0f}°)."
             if self.rn_angle.high < 0
             else f"R_N shows no clear fall with the incident angle (exponent {self.rn_angle.slope:.2f}, "
             f"{self.rn_angle.low:.2f} to {self.rn_angle.high:.2f}). R_N > 1 at {self.rn_above_one} impacts.",
-            f"R {'falls' if trend.slope < 0 else 'rises'} by {abs(trend.slope) * 10:.3f} per 10° of deviation, from "
-            f"{trend.intercept:.2f} at 0° (R² {trend.r2:.2f}). Published: falls about linearly from 1.",
-        ]
+            "r": f"R {'falls' if trend.slope < 0 else 'rises'} by {abs(trend.slope) * 10:.3f} per 10° of deviation, "
+            f"from {trend.intercept:.2f} at 0° (R² {trend.r2:.2f}). Published: falls about linearly from 1.",
+        }
+        return [Remark(text, "note", about) for about, text in texts.items()]
 
 
 def impact_statistics(impacts: Impacts, among: Mask | None = None) -> ImpactStatistics:

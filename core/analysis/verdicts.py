@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the numbers of a fit mean, in plain words; above all when the data cannot tell."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from ..impact_models.machinery.parameters import ParameterSpec
+from ..remarks import Remark
 
 AT_LIMIT = 2e-3
 """Of the range: a value so near to its end is at the end."""
@@ -19,7 +20,7 @@ CLEAR = 2.0
 """Standard errors from which a difference counts."""
 
 
-def number_verdict(
+def about_number(
     spec: ParameterSpec,
     default: float,
     value: float,
@@ -27,8 +28,8 @@ def number_verdict(
     places: tuple[float, float, float],
     idle: bool,
     correlations: Sequence[tuple[str, float]],
-) -> str:
-    """About one fitted number.
+) -> Iterator[Remark]:
+    """About one fitted number; a problem where the data cannot tell it.
 
     Parameters
     ----------
@@ -37,32 +38,38 @@ def number_verdict(
     idle : whether the parameter has no effect on any of these impacts.
     correlations : (other parameter, correlation).
     """
+    name = spec.name
     if idle:
-        return "The data cannot tell: it has no effect on these impacts with these settings; left at its default."
+        text = "The data cannot tell: it has no effect on these impacts with these settings; left at its default."
+        yield Remark(text, "problem", name)
+        return
     place, low, high = places
     wide, exact = high - low > TOO_WIDE, high - low <= EXACT
-    parts = []
-    if place < AT_LIMIT or place > 1 - AT_LIMIT:
+    at_end = place < AT_LIMIT or place > 1 - AT_LIMIT
+    if wide:
+        text = f"The data cannot tell: the interval covers {100 * (high - low):.0f} % of the range."
+        yield Remark(text, "problem", name)
+    elif not at_end:
+        yield Remark(_width(value, ends, exact), "note", name)
+    if at_end:
         which = "lower" if place < AT_LIMIT else "upper"
-        parts.append(f"It ended at the {which} limit of its range, {value:g}: the best value may lie beyond.")
-    if wide or not parts:
-        parts.insert(0, _width(value, ends, high - low))
-    for name, correlation in correlations if not exact else ():
+        text = f"It ended at the {which} limit of its range, {value:g}: the best value may lie beyond."
+        yield Remark(text, "warning", name)
+    for other, correlation in correlations if not exact else ():
         if abs(correlation) >= TOGETHER:
-            parts.append(f"It moves with {name} (correlation {correlation:+.2f}): only the pair is determined.")
+            text = f"It moves with {other} (correlation {correlation:+.2f}): only the pair is determined."
+            yield Remark(text, "warning", name)
     if not wide:
         slack = EXACT * (spec.maximum - spec.minimum)
         same = ends[0] - slack <= default <= ends[1] + slack
-        parts.append(
+        text = (
             f"Not clearly different from the default {default:g}." if same else f"The default {default:g} lies outside."
         )
-    return " ".join(parts)
+        yield Remark(text, "note", name)
 
 
-def _width(value: float, ends: tuple[float, float], covered: float) -> str:
-    if covered > TOO_WIDE:
-        return f"The data cannot tell: the interval covers {100 * covered:.0f} % of the range."
-    if covered <= EXACT:
+def _width(value: float, ends: tuple[float, float], exact: bool) -> str:
+    if exact:
         return "Determined exactly, as by outcomes without any scatter."
     half = (ends[1] - ends[0]) / 2
     relative = half / abs(value) if value else float("inf")
@@ -73,51 +80,53 @@ def _width(value: float, ends: tuple[float, float], covered: float) -> str:
     return f"Only roughly determined: anything from {ends[0]:.3g} to {ends[1]:.3g} fits about as well."
 
 
-def choice_verdict(value: str, rival: str, gain: float, error: float) -> str:
+def about_choice(name: str, value: str, rival: str, gain: float, error: float) -> Remark:
     """About the choice that won over the best of the others by a mean score, with its standard error."""
     if abs(gain) < 1e-12:
-        return f"The data cannot tell: {rival} fits exactly as well."
+        return Remark(f"The data cannot tell: {rival} fits exactly as well.", "problem", name)
     if gain < CLEAR * error:
-        return f"The data cannot tell: {rival} fits about as well (score {gain:.3f} ± {error:.3f} more)."
-    return f"{value} fits clearly better than {rival} (score {gain:.3f} ± {error:.3f} less)."
+        text = f"The data cannot tell: {rival} fits about as well (score {gain:.3f} ± {error:.3f} more)."
+        return Remark(text, "problem", name)
+    return Remark(f"{value} fits clearly better than {rival} (score {gain:.3f} ± {error:.3f} less).", "note", name)
 
 
-def holdout_verdict(default: float, held_out: float, gain: float, error: float, better: int, clusters: int) -> str:
+def about_holdout(default: float, held_out: float, gain: float, error: float, better: int, clusters: int) -> Remark:
     """Whether the fit helps on what it has not seen."""
-    where = f"better in {better} of {clusters}"
     if not default:
-        return "The defaults already agree exactly."
-    share = f"{100 * abs(gain) / default:.0f} %"
+        return Remark("The defaults already agree exactly.", "note", "hold-out")
+    where, share = f"better in {better} of {clusters}", f"{100 * abs(gain) / default:.0f} %"
+    seen = "On impacts it was not fitted to, the"
     if gain > CLEAR * error:
-        return f"On impacts it was not fitted to, the model is {share} nearer than with its defaults ({where})."
+        return Remark(f"{seen} model is {share} nearer than with its defaults ({where}).", "note", "hold-out")
     if gain < -CLEAR * error:
-        return (
-            f"On impacts it was not fitted to, the model is {share} farther than with its defaults: keep the defaults."
-        )
-    return (
-        f"On impacts it was not fitted to, the fit is not clearly better than the defaults "
-        f"(score {held_out:.3f} against {default:.3f}, {where})."
-    )
+        text = f"{seen} model is {share} farther than with its defaults: keep the defaults."
+        return Remark(text, "warning", "hold-out")
+    text = f"{seen} fit is not clearly better than the defaults (score {held_out:.3f} against {default:.3f}, {where})."
+    return Remark(text, "warning", "hold-out")
 
 
-def use_verdict(score: float, blind: float, *, chance: bool) -> str:
+def about_use(score: float, blind: float, *, chance: bool) -> Remark:
     """Whether the model knows anything at all about these impacts."""
     guess = "drawing one of the measured outcomes at random" if chance else "one and the same outcome for all impacts"
     if score >= blind:
-        return f"Beware: with a score of {score:.3f} the model is no better than {guess} ({blind:.3f})."
-    return (
+        text = f"Beware: with a score of {score:.3f} the model is no better than {guess} ({blind:.3f})."
+        return Remark(text, "warning", "score")
+    text = (
         f"The model is {100 * (1 - score / blind):.0f} % nearer than {guess} (score {score:.3f} against {blind:.3f})."
     )
+    return Remark(text, "note", "score")
 
 
-def likeness_verdict(distance: float, scatter: float, rms: tuple[float, float, float]) -> str:
+def about_likeness(distance: float, scatter: float, rms: tuple[float, float, float]) -> Remark:
     """How alike two models get: their distance beside the scatter of outcomes from impact to impact (both scaled)."""
     amounts = f"v_N2 to {rms[0]:.2g} m/s, v_T2 to {rms[1]:.2g} m/s, deviation to {rms[2]:.2g}° on average"
     share = distance / scatter if scatter else float(distance > 0)
     if share < 0.01:
-        return f"The two behave the same on these impacts ({amounts})."
+        return Remark(f"The two behave the same on these impacts ({amounts}).", "note", "likeness")
     if share < 0.1:
-        return f"The two behave nearly alike ({amounts})."
+        return Remark(f"The two behave nearly alike ({amounts}).", "note", "likeness")
     if share < 0.4:
-        return f"The two behave somewhat alike ({amounts}): similar trends, visible differences."
-    return f"The two stay different ({amounts}): no parameters among those fitted make one stand for the other."
+        text = f"The two behave somewhat alike ({amounts}): similar trends, visible differences."
+        return Remark(text, "note", "likeness")
+    text = f"The two stay different ({amounts}): no parameters among those fitted make one stand for the other."
+    return Remark(text, "warning", "likeness")

@@ -4,8 +4,16 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from .fitting_options import add_fit_arguments, naming, parameter_names, parameter_values, table_of, wrapped
-from .options import add_out
+from .fitting_options import (
+    add_fit_arguments,
+    fit_options,
+    parameter_names,
+    parameter_values,
+    remarks_of,
+    table_of,
+    wrapped,
+)
+from .options import add_out, naming
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -17,14 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
     add_out(parser)
     parser.add_argument("--model", required=True, metavar="NAME", help="of the model (`rockfall models` lists them)")
-    add_fit_arguments(parser, resamples=200)
-    parser.add_argument(
-        "--set",
-        action="extend",
-        nargs="+",
-        default=[],
+    add_fit_arguments(
+        parser,
+        resamples=200,
         metavar="PARAMETER=VALUE",
-        help="a parameter that is not fitted and is not to have its default",
+        setting="a parameter that is not fitted and is not to have its default",
     )
     parser.add_argument(
         "--no-holdout", action="store_true", help="do not predict each fifth of the trajectories from the others"
@@ -42,23 +47,12 @@ def run(arguments: argparse.Namespace) -> int:
 
     model = find_model(arguments.model)
     names, fixed = parameter_names(model, arguments.fit), parameter_values(model, arguments.set)
-    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
-        impacts = read_impacts(arguments.impacts)
-        with naming(arguments.impacts):
-            result = calibrate(
-                impacts,
-                model.name,
-                names,
-                fixed=fixed,
-                seed=arguments.seed,
-                replicates=arguments.replicates,
-                resamples=arguments.resamples,
-                holdout="none" if arguments.no_holdout else "trajectory",
-                spin=arguments.spin,
-                radius_m=arguments.radius,
-                progress=progress,
-            )
+        impacts, options = read_impacts(arguments.impacts), fit_options(arguments)
+        result = calibrate(
+            impacts, model.name, names, fixed, options, holdout=not arguments.no_holdout, progress=progress
+        )
         write_estimates(model.name, result.estimates, folder / "calibration.csv")
         write_parameters({model.name: result.settings}, folder / "parameters.toml")
         if result.folds:
@@ -77,5 +71,5 @@ def _summary(result: "Calibration") -> list[str]:
         *table_of(result.estimates),
         f"Score (0 is perfect): {result.default_score:.3f} before, {result.fitted_score:.3f} fitted{held}.",
         *wrapped(f"It is the {result.objective}."),
-        *(line for sentence in result.verdict for line in wrapped(sentence)),
+        *remarks_of(result),
     ]

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2
-from ..errors import InputError
 from .options import (
     add_incident_options,
     add_out,
     add_parameter_options,
     add_terrain_options,
     model_parameters,
+    naming,
     not_negative,
     terrain_as_told,
     whole,
@@ -68,24 +68,19 @@ def run(arguments: argparse.Namespace) -> int:
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
     parameters = model_parameters(arguments, models)
-    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
         progress("Comparing")
-        try:
-            predictions = compare(
-                impacts,
-                models,
-                parameters,
-                replicates=arguments.replicates,
-                seed=arguments.seed,
-                spin=arguments.spin,
-                radius_m=arguments.radius,
-            )
-        except InputError as error:
-            raise InputError(
-                error.problem, file=arguments.impacts, trajectory=error.trajectory, advice=error.advice
-            ) from error
+        predictions = compare(
+            impacts,
+            models,
+            parameters,
+            replicates=arguments.replicates,
+            seed=arguments.seed,
+            spin=arguments.spin,
+            radius_m=arguments.radius,
+        )
         marks = scores(impacts, predictions)
         twins = _twins(arguments, impacts, predictions, progress) if arguments.terrain else None
         progress("Writing the tables")

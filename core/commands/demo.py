@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         _say("From timed picks to impacts", summarise(result)[:2])
         statistics = impact_statistics(result.impacts)
         _write(folder / "statistics.csv", ("name", "value", "unit", "note"), statistics.as_rows())
-        _say("Statistics, as in Noël et al. 2018", statistics.sentences())
+        _say("Statistics, as in Noël et al. 2018", map(str, statistics.remarks()))
         deviations = compare_with_truth(result.impacts, read_truth(SITE / "truth.csv"))
         columns = ("name", "unit", "n", "median", "p90", "bias", "typical")
         rows = ([getattr(one, column) for column in columns] for one in deviations)

@@ -4,8 +4,8 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from .fitting_options import add_fit_arguments, naming, parameter_names, parameter_values, table_of, wrapped
-from .options import add_out
+from .fitting_options import add_fit_arguments, fit_options, parameter_names, parameter_values, remarks_of, table_of
+from .options import add_out, naming
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -18,14 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser)
     parser.add_argument("--from", dest="source", required=True, metavar="NAME", help="the model to be imitated")
     parser.add_argument("--to", dest="target", required=True, metavar="NAME", help="the model that is to imitate it")
-    add_fit_arguments(parser, resamples=100)
-    parser.add_argument(
-        "--set",
-        action="extend",
-        nargs="+",
-        default=[],
+    add_fit_arguments(
+        parser,
+        resamples=100,
         metavar="[NAME.]PARAMETER=VALUE",
-        help="a parameter that is not to have its default, of the model to be imitated unless NAME says otherwise",
+        setting="a parameter that is not to have its default, of the model to be imitated unless NAME says otherwise",
     )
 
 
@@ -42,26 +39,13 @@ def run(arguments: argparse.Namespace) -> int:
     names = parameter_names(b, arguments.fit)
     of_b = [text for text in arguments.set if text.startswith(f"{b.name}.") and a is not b]
     given = parameter_values(a, [text for text in arguments.set if text not in of_b])
-    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+    fixed = parameter_values(b, of_b)
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
-        impacts = read_impacts(arguments.impacts)
-        with naming(arguments.impacts):
-            result = equivalent(
-                impacts,
-                a.name,
-                given,
-                b.name,
-                names,
-                fixed=parameter_values(b, of_b),
-                seed=arguments.seed,
-                replicates=arguments.replicates,
-                resamples=arguments.resamples,
-                spin=arguments.spin,
-                radius_m=arguments.radius,
-                progress=progress,
-            )
+        impacts, options = read_impacts(arguments.impacts), fit_options(arguments)
+        result = equivalent(impacts, a.name, given, b.name, names, fixed, options, progress=progress)
         write_estimates(b.name, result.estimates, folder / "equivalent.csv")
-        write_parameters({a.name: result.settings, b.name: result.other_settings}, folder / "parameters.toml")
+        write_parameters({a.name: result.source_settings, b.name: result.settings}, folder / "parameters.toml")
     for line in _summary(result):
         print(line)
     print(f"Written: equivalent.csv, parameters.toml in {arguments.out}")
@@ -70,8 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _summary(result: "Equivalence") -> list[str]:
     return [
-        f"{result.other} made like {result.model}, on {result.impacts} impacts of {result.trajectories} trajectories.",
+        f"{result.model} made like {result.source}, on {result.impacts} impacts of {result.trajectories} trajectories.",
         *table_of(result.estimates),
         f"Energy distance (0 is the same): {result.default_distance:.3f} before, {result.distance:.3f} fitted.",
-        *(line for sentence in result.verdict for line in wrapped(sentence)),
+        *remarks_of(result),
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import add_incident_options, whole
+from .options import add_incident_options, naming, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -63,15 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.no_browser:
             webbrowser.open(address)
 
-    with PrintedProgress() as progress:
+    with PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
-        try:
-            courses = find_courses(impacts, arguments.spin, arguments.radius)
-        except InputError as error:
-            raise InputError(
-                error.problem, file=arguments.impacts, trajectory=error.trajectory, advice=error.advice
-            ) from error
+        courses = find_courses(impacts, arguments.spin, arguments.radius)
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         serve(

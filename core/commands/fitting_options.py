@@ -3,22 +3,20 @@
 
 import argparse
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import InputError
 from .options import add_incident_options, whole
 
 if TYPE_CHECKING:
-    from ..analysis.estimation import Estimate
+    from ..analysis.estimation import Estimate, FitOptions, FittedModel
     from ..impact_models.machinery.base import ImpactModel
 
 WIDTH = 100
 
 
-def add_fit_arguments(parser: argparse.ArgumentParser, resamples: int) -> None:
-    """What is fitted, and how."""
+def add_fit_arguments(parser: argparse.ArgumentParser, *, resamples: int, metavar: str, setting: str) -> None:
+    """What is fitted, and how: `resamples` by default; `metavar` and `setting` describe ``--set``."""
     parser.add_argument(
         "--fit",
         action="extend",
@@ -38,6 +36,25 @@ def add_fit_arguments(parser: argparse.ArgumentParser, resamples: int) -> None:
         help="of the trajectories, for the intervals (default %(default)s)",
     )
     add_incident_options(parser)
+    parser.add_argument("--set", action="extend", nargs="+", default=[], metavar=metavar, help=setting)
+
+
+def fit_options(arguments: argparse.Namespace) -> "FitOptions":
+    """From the arguments.
+
+    Raises
+    ------
+    InputError : too few of anything.
+    """
+    from ..analysis.estimation import FitOptions
+
+    return FitOptions(
+        seed=arguments.seed,
+        replicates=arguments.replicates,
+        resamples=arguments.resamples,
+        spin=arguments.spin,
+        radius_m=arguments.radius,
+    )
 
 
 def parameter_names(model: "ImpactModel", texts: Iterable[str]) -> list[str]:
@@ -63,17 +80,6 @@ def parameter_values(model: "ImpactModel", texts: Iterable[str]) -> dict[str, ob
     return parse_settings(full).get(model.name, {})
 
 
-@contextmanager
-def naming(file: str) -> Iterator[None]:
-    """Errors about the impacts name the file that they are from."""
-    try:
-        yield
-    except InputError as error:
-        if error.file is not None:
-            raise
-        raise InputError(error.problem, file=file, trajectory=error.trajectory, advice=error.advice) from error
-
-
 def table_of(estimates: "Sequence[Estimate]") -> list[str]:
     """Fitted parameters for people: a line of numbers and the verdict below."""
     lines = [f"{'parameter':<22}{'default':>12}{'fitted':>12}   95 % interval"]
@@ -83,6 +89,11 @@ def table_of(estimates: "Sequence[Estimate]") -> list[str]:
         lines.append(f"{one.name:<22}{_short(one.default):>12}{_short(one.value):>12}{interval}")
         lines += wrapped(one.verdict, "    ")
     return lines
+
+
+def remarks_of(result: "FittedModel") -> list[str]:
+    """What the result is worth, for people."""
+    return [line for remark in result.remarks for line in wrapped(remark.text)]
 
 
 def wrapped(text: str, indent: str = "") -> list[str]:

@@ -2,7 +2,8 @@
 """Arguments that several commands share."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -69,6 +70,19 @@ def known_names(text: str, known: Sequence[str], option: str) -> tuple[str, ...]
 def add_out(parser: argparse.ArgumentParser) -> None:
     """``--out DIR``."""
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the output; made when it is missing")
+
+
+@contextmanager
+def naming(file: str) -> Iterator[None]:
+    """Errors about what was read from a file name it."""
+    try:
+        yield
+    except InputError as error:
+        if error.file is not None:
+            raise
+        raise InputError(
+            error.problem, file=file, row=error.row, trajectory=error.trajectory, advice=error.advice
+        ) from error
 
 
 def add_terrain_options(parser: argparse.ArgumentParser) -> None:

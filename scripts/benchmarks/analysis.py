@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from rockfall.core.analysis.calibration import calibrate
+from rockfall.core.analysis.estimation import FitOptions
 from rockfall.core.exchange.database import Database, merge, read_source
 from rockfall.core.exchange.datapackage import write_package
 from rockfall.core.exchange.selection import group_medians, matching
@@ -73,8 +74,8 @@ def main() -> None:
     print(f"{'':<46}{'clock':>8}{'CPU':>12}   ({os.process_cpu_count()} cores, load {os.getloadavg()[0]:.1f})")
 
     impacts = made_impacts(15, 9)
-    calibrate(impacts, "noel_2017", ["rt"], resamples=20)  # compiles
-    used = calibrate(impacts, "noel_2017", ["rt"], resamples=20).impacts
+    calibrate(impacts, "noel_2017", ["rt"], options=FitOptions(resamples=20))  # compiles
+    used = calibrate(impacts, "noel_2017", ["rt"], options=FitOptions(resamples=20)).impacts
     print(f"Calibration on {used} impacts, two parameters, 200 resamples, hold-out:")
     timed("six models", lambda: [timed(name, lambda n=name: calibrate(impacts, n, FITTED[n])) for name in FITTED])
 

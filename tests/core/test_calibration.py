@@ -11,6 +11,7 @@ from rockfall.core.analysis.clouds import make_contest, measured_target
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.equivalence import equivalent
+from rockfall.core.analysis.estimation import FitOptions, paired_gain
 from rockfall.core.analysis.fitting import Axis, interval
 from rockfall.core.errors import InputError
 from rockfall.core.impact_models.registry import MODELS
@@ -18,6 +19,8 @@ from rockfall.core.progress import CancelledError
 from rockfall.core.reconstruction.impact import Impacts, apparent
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
+
+QUICK = FitOptions(resamples=20)
 
 
 def slope(trajectories=10, each=7, seed=3):
@@ -59,6 +62,12 @@ def by_name(result):
     return {one.name: one for one in result.estimates}
 
 
+def remark_about(remarks, about):
+    """(severity, text) of the only remark about something."""
+    ((severity, text),) = [(one.severity, one.text) for one in remarks if one.about == about]
+    return severity, text
+
+
 EXACT = {
     "azimi_desvarreux_1977": {"rn": 0.52, "rt": 0.71},
     "pfeiffer_bowen_1989": {"rn": 0.45, "rt": 0.66},
@@ -69,7 +78,7 @@ EXACT = {
 @pytest.mark.parametrize("model", EXACT)
 def test_a_model_without_chance_is_recovered_exactly(model):
     truth = EXACT[model]
-    result = calibrate(made_by(slope(), model, truth), model, list(truth), resamples=20, holdout="none")
+    result = calibrate(made_by(slope(), model, truth), model, list(truth), options=QUICK, holdout=False)
     for name, value in truth.items():
         assert result.settings[name] == pytest.approx(value, rel=1e-3)
         assert by_name(result)[name].low == pytest.approx(by_name(result)[name].high, rel=2e-2)
@@ -89,7 +98,9 @@ def test_a_random_model_is_recovered_within_its_intervals(model):
     """Means and standard deviations alike; other random numbers than those that made the impacts."""
     truth = RANDOM[model]
     impacts = made_by(slope(14, 9), model, truth)
-    result = calibrate(impacts, model, list(truth), resamples=30, replicates=12, holdout="none", seed=4)
+    result = calibrate(
+        impacts, model, list(truth), options=FitOptions(resamples=30, replicates=12, seed=4), holdout=False
+    )
     for name, value in truth.items():
         one = by_name(result)[name]
         assert one.low <= value <= one.high
@@ -104,7 +115,9 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say():
     wide = []
     for seed in range(20):
         impacts = made_by(base, "azimi_desvarreux_1977", truth, seed=seed, noise_mps=0.5)
-        result = calibrate(impacts, "azimi_desvarreux_1977", list(truth), resamples=40, holdout="none", starts=1)
+        result = calibrate(
+            impacts, "azimi_desvarreux_1977", list(truth), options=FitOptions(resamples=40, starts=1), holdout=False
+        )
         for name, value in truth.items():
             inside += by_name(result)[name].low <= value <= by_name(result)[name].high
             wide.append(by_name(result)[name].high - by_name(result)[name].low)
@@ -140,14 +153,29 @@ def test_the_energy_score_is_that_of_its_definition():
 
 def test_held_out_trajectories_know_a_real_gain_from_a_vain_one():
     impacts = made_by(slope(12, 8), "stevens_1998", {"rn": 0.6})
-    gain = calibrate(impacts, "stevens_1998", ["rn"], resamples=20)
+    gain = calibrate(impacts, "stevens_1998", ["rn"], options=QUICK)
     assert gain.fitted_score <= gain.held_out_score < gain.default_score
-    assert "nearer than with its defaults" in " ".join(gain.verdict)
+    nearer = 100 * (1 - gain.held_out_score / gain.default_score)
+    better = sum(fold.fitted < fold.default for fold in gain.folds)
+    severity, text = remark_about(gain.remarks, "hold-out")
+    assert better == len(gain.folds) == 5
+    assert severity == "note"
+    assert text.startswith(
+        f"On impacts it was not fitted to, the model is {nearer:.0f} % nearer than with its defaults ("
+    )
+    severity, text = remark_about(gain.remarks, "score")
+    assert severity == "note"
+    assert text.startswith("The model is ")
+    assert f"(score {gain.held_out_score:.3f} against " in text
+    assert {one.about for one in gain.remarks} == {"hold-out", "score"}
     assert sum(fold.impacts for fold in gain.folds) == gain.impacts
     assert sorted(name for fold in gain.folds for name in fold.trajectories) == sorted(set(impacts.trajectory.tolist()))
-    vain = calibrate(made_by(slope(12, 8), "stevens_1998"), "stevens_1998", ["rn"], resamples=20)
+    vain = calibrate(made_by(slope(12, 8), "stevens_1998"), "stevens_1998", ["rn"], options=QUICK)
     assert vain.held_out_score == pytest.approx(vain.default_score, rel=0.02)
-    assert "nearer than with its defaults" not in " ".join(vain.verdict)
+    severity, text = remark_about(vain.remarks, "hold-out")
+    scores = f"(score {vain.held_out_score:.3f} against {vain.default_score:.3f}, better in "
+    assert severity == "warning"
+    assert text.startswith(f"On impacts it was not fitted to, the fit is not clearly better than the defaults {scores}")
 
 
 def test_a_flat_valley_is_told():
@@ -158,43 +186,53 @@ def test_a_flat_valley_is_told():
     v1 = 10 * (along / np.linalg.norm(along, axis=1, keepdims=True) * np.cos(0.5) - n * np.sin(0.5))
     base = replace(base, v1=np.where(np.isfinite(base.v1), v1, np.nan), normal=n)
     impacts = made_by(base, "wyllie_2014", noise_mps=0.2)
-    result = calibrate(impacts, "wyllie_2014", ["rn_factor", "rn_exponent"], resamples=40)
-    text = " ".join(one.verdict for one in result.estimates)
-    assert "The data cannot tell" in text
-    assert "only the pair is determined" in text
-    assert any("cannot tell rn_" in sentence for sentence in result.verdict)
-    idle = calibrate(impacts, "stevens_1998", ["mass_scale"], resamples=20, holdout="none").estimates[0]
+    result = calibrate(impacts, "wyllie_2014", ["rn_factor", "rn_exponent"], options=FitOptions(resamples=40))
+    factor, exponent = result.estimates
+    assert not factor.is_determined
+    assert "The data cannot tell: the interval covers " in factor.verdict
+    for one, other in ((factor, exponent), (exponent, factor)):
+        assert f"It moves with {other.name} (correlation -" in one.verdict
+        assert ("warning", one.name) in {(remark.severity, remark.about) for remark in one.remarks}
+    unsure = ", ".join(one.name for one in result.estimates if not one.is_determined)
+    text = f"These impacts cannot tell {unsure}: set a value, or fit fewer parameters together."
+    assert remark_about(result.remarks, "parameters") == ("advice", text)
+    idle = calibrate(impacts, "stevens_1998", ["mass_scale"], options=QUICK, holdout=False).estimates[0]
     assert (idle.value, idle.low, idle.high) == (1000.0, 1.0, 1e7)
+    assert [(one.severity, one.about) for one in idle.remarks] == [("problem", "mass_scale")]
     assert "no effect" in idle.verdict
 
 
 def test_a_parameter_at_its_limit_is_told():
     impacts = made_by(slope(), "azimi_desvarreux_1977", {"rn": 0.9})
     grown = replace(impacts, vn2=impacts.vn2 * 1.5)
-    result = calibrate(grown, "azimi_desvarreux_1977", ["rn"], resamples=20, holdout="none")
+    result = calibrate(grown, "azimi_desvarreux_1977", ["rn"], options=QUICK, holdout=False)
     assert result.settings["rn"] == pytest.approx(1.0, abs=1e-3)
-    assert "upper limit" in result.estimates[0].verdict
+    severity, about = result.estimates[0].remarks[0].severity, result.estimates[0].remarks[0].about
+    assert (severity, about) == ("warning", "rn")
+    assert result.estimates[0].verdict.startswith("It ended at the upper limit of its range, 1: the best value may lie")
 
 
 def test_choices_are_tried():
     impacts = made_by(slope(), "wyllie_2014", {"inertia": "sphere"}, noise_mps=0.05)
-    one = calibrate(impacts, "wyllie_2014", ["inertia"], resamples=20).estimates[0]
+    one = calibrate(impacts, "wyllie_2014", ["inertia"], options=QUICK).estimates[0]
     assert (one.value, one.default) == ("sphere", "cube")
-    assert "clearly better than cube" in one.verdict
+    assert one.verdict.startswith("sphere fits clearly better than cube (score ")
+    assert one.is_determined
     impacts = made_by(slope(), "azimi_desvarreux_1977", {"rn": 0.36}, noise_mps=0.05)
-    both = by_name(calibrate(impacts, "azimi_desvarreux_1977", ["rn", "rt", "definition"], resamples=20))
-    assert "The data cannot tell" in both["definition"].verdict
+    both = by_name(calibrate(impacts, "azimi_desvarreux_1977", ["rn", "rt", "definition"], options=QUICK))
+    assert both["definition"].verdict.startswith("The data cannot tell: ")
+    assert not both["definition"].is_determined
 
 
 def test_the_same_seed_gives_the_same_result_whatever_the_order_of_rows():
     impacts = made_by(slope(6), "noel_2017")
     mixed = rows_of(impacts, np.random.default_rng(0).permutation(len(impacts)))
     one, again, other = (
-        calibrate(which, "noel_2017", ["rt"], resamples=20, seed=seed)
+        calibrate(which, "noel_2017", ["rt"], options=FitOptions(resamples=20, seed=seed))
         for which, seed in ((impacts, 1), (impacts, 1), (mixed, 1))
     )
     assert one.estimates == again.estimates
-    assert one.verdict == again.verdict
+    assert one.remarks == again.remarks
     assert other.estimates[0].value == pytest.approx(one.estimates[0].value, abs=1e-3)
 
 
@@ -204,15 +242,17 @@ def test_impacts_that_do_not_count_still_hand_on_their_spin():
     wild[3] = 1e6
     flags = {**impacts.flags, "below_terrain": np.arange(len(impacts)) == 3}
     result = calibrate(
-        replace(impacts, vn2=wild, flags=flags), "pfeiffer_bowen_1989", ["rn"], resamples=20, holdout="none"
+        replace(impacts, vn2=wild, flags=flags), "pfeiffer_bowen_1989", ["rn"], options=QUICK, holdout=False
     )
     assert result.settings["rn"] == pytest.approx(0.5, rel=1e-3)
-    assert result.impacts == calibrate(impacts, "pfeiffer_bowen_1989", ["rn"], resamples=20, holdout="none").impacts - 1
+    assert result.impacts == calibrate(impacts, "pfeiffer_bowen_1989", ["rn"], options=QUICK, holdout=False).impacts - 1
 
 
 def test_few_trajectories_are_told():
-    result = calibrate(made_by(slope(2, 12), "noel_2017"), "noel_2017", ["rt"], resamples=20)
-    assert "With 2 trajectories single impacts were resampled" in result.verdict[-1]
+    result = calibrate(made_by(slope(2, 12), "noel_2017"), "noel_2017", ["rt"], options=QUICK)
+    severity, text = remark_about(result.remarks, "trajectories")
+    assert severity == "warning"
+    assert text.startswith("With 2 trajectories single impacts were resampled as if independent: ")
 
 
 def test_cancelling_stops():
@@ -231,7 +271,7 @@ def test_cancelling_stops():
 
 def test_progress_is_told():
     said = []
-    calibrate(slope(5), "noel_2017", ["rt"], resamples=20, progress=lambda *one: said.append(one))
+    calibrate(slope(5), "noel_2017", ["rt"], options=QUICK, progress=lambda *one: said.append(one))
     assert said[0] == ("Fitting noel_2017", 0, 1)
     assert ("Resampling the trajectories", 16, 20) in said
     assert said[-1] == ("Predicting trajectories that were held out", 4, 5)
@@ -242,8 +282,6 @@ BAD = {
     "none": ([], {}, "No parameter of stevens_1998 is to be fitted. Name some of rn, rt"),
     "both": (["rn"], {"fixed": {"rn": 0.3}}, "stevens_1998.rn is both fitted and set"),
     "range": (["rn"], {"fixed": {"rt": 3}}, "outside its range"),
-    "resamples": (["rn"], {"resamples": 3}, "20 resamples or more"),
-    "holdout": (["rn"], {"holdout": "row"}, "no hold-out 'row'"),
 }
 
 
@@ -254,9 +292,14 @@ def test_bad_questions_are_refused(case):
         calibrate(slope(5), "stevens_1998", names, **options)
 
 
+@pytest.mark.parametrize("few", [{"starts": 0}, {"seed": -1}, {"replicates": 1}, {"resamples": 19}])
+def test_too_little_effort_is_refused(few):
+    with pytest.raises(InputError, match="2 replicates or more, 20 resamples or more, and a seed from 0"):
+        FitOptions(**few)
+    assert FitOptions(starts=1, seed=0, replicates=2, resamples=20)
+
+
 def test_bad_questions_about_equivalence_are_refused():
-    with pytest.raises(InputError, match="20 resamples or more"):
-        equivalent(slope(3), "noel_2017", None, "stevens_1998", ["rn"], resamples=0)
     with pytest.raises(InputError, match=r"noel_2017\.rt is 4, outside its range"):
         equivalent(slope(3), "noel_2017", {"rt": 4}, "stevens_1998", ["rn"])
 
@@ -276,39 +319,62 @@ def test_crsp_and_rocfall_have_equal_parameters():
     """Stevens 1998 with both switches on and without scatter is Pfeiffer & Bowen's law of a sphere."""
     truth, quiet = {"rn": 0.42, "rt": 0.78}, {"rn_sd": 0.0, "rt_sd": 0.0}
     there = equivalent(
-        slope(), "pfeiffer_bowen_1989", truth, "stevens_1998", ["rn", "rt"], fixed=quiet, replicates=2, resamples=20
+        slope(),
+        "pfeiffer_bowen_1989",
+        truth,
+        "stevens_1998",
+        ["rn", "rt"],
+        fixed=quiet,
+        options=FitOptions(replicates=2, resamples=20),
     )
     back = equivalent(
-        slope(), "stevens_1998", truth | quiet, "pfeiffer_bowen_1989", ["rn", "rt"], replicates=2, resamples=20
+        slope(),
+        "stevens_1998",
+        truth | quiet,
+        "pfeiffer_bowen_1989",
+        ["rn", "rt"],
+        options=FitOptions(replicates=2, resamples=20),
     )
     for result in (there, back):
         for name, value in truth.items():
-            assert result.other_settings[name] == pytest.approx(value, rel=1e-4)
+            assert result.settings[name] == pytest.approx(value, rel=1e-4)
         assert result.distance < 0.02 < result.default_distance
-        assert "behave the same" in result.verdict[0]
+        assert result.remarks[0].text.startswith("The two behave the same on these impacts (v_N2 to ")
         assert max(result.rms) < 1e-3
 
 
 def test_a_random_model_finds_itself():
     truth = {"rn": 0.5, "rt": 0.75}
-    result = equivalent(slope(), "stevens_1998", truth, "stevens_1998", ["rn", "rt"], resamples=20)
+    result = equivalent(slope(), "stevens_1998", truth, "stevens_1998", ["rn", "rt"], options=QUICK)
     for name, value in truth.items():
-        assert result.other_settings[name] == pytest.approx(value, rel=0.03)
+        assert result.settings[name] == pytest.approx(value, rel=0.03)
     assert result.distance < 0.15
-    assert "behave the same" in result.verdict[0]
+    assert remark_about(result.remarks, "likeness")[0] == "note"
+    assert result.remarks[0].text.startswith("The two behave the same on these impacts (v_N2 to ")
 
 
 def test_models_that_cannot_be_alike_are_told():
-    result = equivalent(slope(), "noel_2017", None, "wyllie_2014", ["rn_factor"], resamples=20)
+    result = equivalent(slope(), "noel_2017", None, "wyllie_2014", ["rn_factor"], options=QUICK)
     assert result.distance > 0.5
-    assert "different" in result.verdict[0]
+    assert result.remarks[0].text.startswith(f"The two stay different (v_N2 to {result.rms[0]:.2g} m/s, v_T2 to ")
+    assert remark_about(result.remarks, "likeness")[0] == "warning"
 
 
 def test_equivalence_needs_no_measured_outcomes():
     base = slope()
     blank = replace(base, **{name: np.full_like(getattr(base, name), np.nan) for name in ("vn2", "vt2", "theta_dev")})
-    result = equivalent(blank, "azimi_desvarreux_1977", {"rn": 0.5}, "azimi_desvarreux_1977", ["rn"], resamples=20)
-    assert result.other_settings["rn"] == pytest.approx(0.5, rel=1e-4)
+    result = equivalent(blank, "azimi_desvarreux_1977", {"rn": 0.5}, "azimi_desvarreux_1977", ["rn"], options=QUICK)
+    assert result.settings["rn"] == pytest.approx(0.5, rel=1e-4)
+
+
+def test_the_gain_of_two_fits_and_its_error():
+    """Four trajectories of three impacts: the mean of four gains of an impact, and the error of that mean by hand."""
+    before, after = np.array([6.0, 9.0, 3.0, 12.0]), np.array([3.0, 3.0, 3.0, 9.0])
+    gains = np.array([1.0, 2.0, 0.0, 1.0])
+    found = paired_gain(before, after, np.full(4, 3.0))
+    assert found == pytest.approx((gains.mean(), gains.std(ddof=1) / np.sqrt(4)), rel=1e-12)
+    assert paired_gain(after, before, np.full(4, 3.0))[0] == -found[0]
+    assert paired_gain(before[:1], after[:1], np.array([3.0])) == (1.0, np.inf)
 
 
 def test_axes_and_intervals():

@@ -14,6 +14,7 @@ from rockfall.core.analysis.statistics import (
 from rockfall.core.reconstruction.impact import Impacts
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.remarks import Remark
 
 RNG = np.random.default_rng(7)
 
@@ -116,17 +117,21 @@ def test_rows_and_sentences(exact: ImpactStatistics) -> None:
     assert values["rt_slope"] == pytest.approx(0.66)
     assert values["rn_angle_exponent"] == pytest.approx(-1.1)
     assert values["theta1_median"] == pytest.approx(33.0)
-    text = " ".join(exact.sentences())
-    assert "R_T = 0.66" in text
-    assert "Published: 0.66, R² 0.31" in text
-    assert "40 of 120" in text
+    texts = {remark.about: remark.text for remark in exact.remarks()}
+    assert texts["impacts"].startswith("40 of 120 impacts have all coefficients (incident speed ")
+    assert texts["rt"].startswith("R_T = 0.66 (0.66–0.66), R² 1.00: slope of |v_T2| on |v_T1| through the origin. ")
+    assert texts["rt"].endswith("Published: 0.66, R² 0.31.")
+    assert "·θ1^-1.10 (θ1 in degrees): hyperbolic, as published. R_N > 1 at " in texts["rn"]
+    assert texts["r"].startswith("R falls by ")
+    assert {remark.severity for remark in exact.remarks()} == {"note"}
 
 
 def test_too_few_impacts_give_no_numbers_and_no_warnings() -> None:
     few = impact_statistics(impacts_with(np.array([20.0]), np.array([0.8]), np.array([0.7]), np.array([9.0])))
     assert few.used == 1
     assert np.isnan(few.rt.slope)
-    assert few.sentences() == ["1 of 3 impacts have all coefficients: too few for statistics."]
+    text = "1 of 3 impacts have all coefficients: too few for statistics."
+    assert few.remarks() == [Remark(text, "problem", "impacts")]
     same = line(np.ones(5), np.arange(5.0))
     assert np.isnan(same.slope)
     assert np.isnan(power_law(np.full(4, 10.0), np.ones(4)).slope)

@@ -6,7 +6,7 @@ It listens on this machine only, and answers only pages that it served itself.
 
 import socket
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
 
@@ -18,6 +18,7 @@ from ..reconstruction.impact import Impacts
 from .background import Job
 from .comparison import predict
 from .courses import Courses
+from .estimation import FitOptions, FittedModel
 from .extras import PAGES, demand
 from .linked_graphs import SHEET, WEB, LinkedGraphs, curve_tables, link_graphs, model_columns
 from .parameter_inputs import ParameterInputs, parameter_inputs
@@ -113,6 +114,13 @@ def open_page(document: Any, exploration: Exploration) -> None:
         **looks(),
     )
     document.on_session_destroyed(lambda _context: page.job.cancel())
+
+
+def _said_of(result: FittedModel) -> str:
+    """What a fit is worth, as HTML: of single parameters only what is not in order."""
+    single = [remark for one in result.estimates for remark in one.remarks if remark.severity != "note"]
+    remarks = [replace(one, text=f"{one.about}: {one.text}") for one in single] + [*result.remarks]
+    return "".join(f'<div class="remark {one.severity}">{escape(one.text)}</div>' for one in remarks)
 
 
 class _Page:
@@ -236,7 +244,6 @@ class _Page:
             self.job.cancel()
             return
         from .calibration import Calibration, calibrate
-        from .estimation import FitOptions
 
         name, fitted = self.model, tuple(self.fit.value)
         if not fitted:
@@ -254,7 +261,7 @@ class _Page:
                 self.given[name].update({key: result.settings[key] for key in fitted})
                 self.inputs[name].show(result.settings)
                 self._show()
-                self._say("".join(f'<div class="{one.severity}">{escape(one.text)}</div>' for one in result.remarks))
+                self._say(_said_of(result))
 
         self.calibrate.update(label="Cancel", button_type="default")
         self.job.begin(work, done)

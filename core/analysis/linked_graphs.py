@@ -21,12 +21,14 @@ from .variables import VARIABLES, Variable, find_variable, measured_values, mode
 
 WEB = Path(__file__).parents[2] / "assets" / "report"
 FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-INK, MUTED, GRID = "#20262e", "#5b6470", "#eceef1"
+INK, MUTED, GRID, CAUTION = "#20262e", "#5b6470", "#eceef1", "#8f4a00"
 SHEET = f"""
 :host {{ font-family: {FONT}; font-size: 13px; color: {INK}; }}
 .bk-input, .bk-btn {{ font-family: inherit !important; font-size: 13px; border-radius: 6px; }}
 select.bk-input {{ padding-top: 3px; padding-bottom: 3px; height: 30px; }}
 .bk-input-group > label, .bk-slider-title {{ color: {MUTED}; font-size: 12px; }}
+.remark {{ margin-bottom: 6px; }}
+.warning, .problem {{ color: {CAUTION}; }}
 """
 TOOLTIP = """
 <div style="font: 12px/1.5 {font}; color: {ink}">

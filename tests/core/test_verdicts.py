@@ -24,7 +24,7 @@ def test_widths_of_an_interval():
     assert said(0.5, 0.449, 0.551)[0] == ("note", "Fairly determined, to ±10 %.")
     assert said(0.5, 0.351, 0.649)[0] == ("note", "Fairly determined, to ±30 %.")
     assert said(0.6, 0.4, 1.0)[0] == ("note", ROUGH)
-    assert said(0.6, 0.4, 1.41) == [("problem", "The data cannot tell: the interval covers 51 % of the range.")]
+    assert said(0.6, 0.4, 1.41) == [("problem", "The data cannot tell: the interval covers 50 % of the range.")]
     exact = [("note", "Determined exactly, as by outcomes without any scatter."), ("note", OUTSIDE)]
     assert said(0.5, 0.5, 0.5, correlations=[("rt", 1.0)]) == exact
 

@@ -41,8 +41,12 @@ def test_the_ellipse_is_the_spread_of_draws():
 def test_grazing_and_missing_rays_are_told():
     camera = look_at(2000, 1000, (0, -100, 5), (0, 0, 0), focal_px=1000.0)
     found = pick_on_terrain(camera, [[1000.0, 500.0], [1000.0, 100.0]], GROUND)
-    assert "2.9°" in found.warning[0]
-    assert "misses" in found.warning[1]
+    angle, reach = np.arctan(5 / 100), np.linalg.norm(found.ellipse[0, 0])
+    assert reach == pytest.approx(np.hypot(100, 5) / 1000 / np.sin(angle), rel=1e-9)
+    assert found.warning == (
+        f"The ray grazes the terrain at {np.degrees(angle):.1f}°: its place is known to {reach:.1f} m.",
+        "The ray misses the terrain.",
+    )
     assert np.isnan(found.point[1]).all()
 
 
@@ -79,8 +83,18 @@ def test_a_view_may_be_blind():
     found = triangulate(CAMERAS, pixels)
     np.testing.assert_allclose(found.point[0], points[0], atol=1e-9)
     assert np.isnan(found.point[1]).all()
-    with pytest.raises(InputError, match="cannot be triangulated"):
-        triangulate(CAMERAS[:1], pixels[:1])
+
+
+@pytest.mark.parametrize(
+    ("views", "shape"), [(1, (1, 2, 2)), (3, (2, 2, 2)), (3, (3, 2, 3)), (3, (3, 2)), (3, (3, 2, 2, 2))]
+)
+def test_too_few_views_or_pixels_of_another_shape(views: int, shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError) as caught:
+        triangulate(CAMERAS[:views], np.zeros(shape))
+    assert str(caught.value) == (
+        f"{views} views with pixels of the shape {shape} cannot be triangulated. "
+        "Give two views or more, and pixels (views, points, 2)."
+    )
 
 
 def test_the_point_lies_on_the_epipolar_curve():
@@ -91,5 +105,17 @@ def test_the_point_lies_on_the_epipolar_curve():
     low = epipolar_curve(CAMERAS[0], pixel, CAMERAS[1], 50.0, 1e4, GROUND)
     end = pick_on_terrain(CAMERAS[0], pixel[None], GROUND).point
     np.testing.assert_allclose(low[-1], project(CAMERAS[1], end)[0], atol=1e-6)
-    with pytest.raises(InputError, match="near"):
-        epipolar_curve(CAMERAS[0], pixel, CAMERAS[1], 5.0, 1.0)
+
+
+@pytest.mark.parametrize(("near", "far"), [(5.0, 1.0), (5.0, 5.0), (0.0, 5.0)])
+def test_a_ray_that_cannot_run(near: float, far: float) -> None:
+    with pytest.raises(InputError) as caught:
+        epipolar_curve(CAMERAS[0], np.array([960.0, 540.0]), CAMERAS[1], near, far)
+    assert str(caught.value) == f"The ray cannot run from {near} m to {far} m. Give 0 < near < far."
+
+
+def test_a_pixel_that_the_lens_cannot_see_has_no_ray() -> None:
+    narrow = replace(CAMERAS[0], k1=-3.0)
+    with pytest.raises(InputError) as caught:
+        epipolar_curve(narrow, np.array([5.0, 5.0]), CAMERAS[1], 1.0, 100.0)
+    assert str(caught.value) == "The pixel is outside of what the lens can see, so that it has no ray."

@@ -70,7 +70,7 @@ def solved_by_core(part, table, rows=slice(None), **options):
     lens = options.pop("camera", None) or part("core.camera.model").Camera(
         1280, 720, 1536.0, 1536.0, 640.0, 360.0, shift=table.shift
     )
-    return part("core.camera.resection").resect(
+    return part("core.camera.resection.resect").resect(
         table.pixel[rows], table.point[rows], 1280, 720, camera=lens, names=table.name[rows].tolist(), **options
     )
 

@@ -117,7 +117,7 @@ def picks_from_footage(project: Project, surface: Surface | None, *, name: str =
 
     Parameters
     ----------
-    surface : the terrain; without one nothing tells the distance.
+    surface : the terrain; without one the distance of the block is not known.
     name : of the trajectory, for events and tracks that name none.
 
     Raises
@@ -165,7 +165,7 @@ def clock_of(entry: VideoEntry, frame: Indices, time_s: Array) -> Clock:
 
     Raises
     ------
-    InputError : a capture rate is given, but neither tells the rate of the file.
+    InputError : a capture rate is given, but neither gives the rate of the file.
     """
     rate = 1.0
     if entry.capture_rate_hz is not None:

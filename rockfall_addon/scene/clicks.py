@@ -2,7 +2,7 @@
 """What was clicked for a pick in the videos, and what follows from several of them.
 
 It is kept beside the pick, by the id of the video: frame, pixel, the ellipse of its error on the terrain. It holds as
-long as the pick stays where that click put it.
+long as the pick stays at that place.
 """
 
 from dataclasses import dataclass

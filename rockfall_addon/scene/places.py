@@ -87,7 +87,7 @@ def trajectories(scene: bpy.types.Scene) -> list[str]:
 def in_picture(
     scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Array, name: str, *, centre: bool | None = None
 ) -> Place:
-    """Where a click in the shown picture puts the block of a trajectory.
+    """Where the block of a trajectory is by a click in the picture.
 
     centre : whether the pixel is that of the block's centre, else that of its contact; None as the tool says.
 

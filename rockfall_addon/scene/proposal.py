@@ -67,7 +67,7 @@ def lacking(scene: bpy.types.Scene) -> str:
     if not cameras:
         return "Add the video first: the picks are fitted to its pixels."
     if not any(videos.is_solved(camera) for camera in cameras):
-        return "Align the camera first: only then pixels tell places."
+        return "Align the camera first: only then do pixels have places."
     if not seen_names(scene):
         return "Track the block, or click it in flight (kind “Block here”), in an aligned video."
     return ""

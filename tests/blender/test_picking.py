@@ -331,7 +331,7 @@ def test_clicked_and_proposed_observations(site, part) -> None:
     pixel = np.array([[float(row["u_px"]), float(row["v_px"])] for row in block])
     frame, time = np.array([int(row["frame"]) for row in block]), np.array([float(row["time_s"]) for row in block])
     one = np.ones(len(block))
-    with pytest.raises(part("core.errors").RockfallError, match="Nothing tells where"):
+    with pytest.raises(part("core.errors").RockfallError, match="It is not known where"):
         tracks.clicks_for(site, camera, "B10")
     sightings.click(camera, "B10", int(frame[3]), float(time[3]), pixel[3] + 0.25, 0.5)
     assert tracks.clicks_for(site, camera, "B10") == [(int(frame[3]), *(pixel[3] + 0.25))]

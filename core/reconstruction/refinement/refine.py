@@ -48,8 +48,9 @@ def refine(
 
     Parameters
     ----------
-    picks : contact points on the terrain, as a person marked them: the first guess, and what holds what the pixels do
-        not tell. A time without sigma_time_s counts as known to a frame, a place without sigma_position_m to 10 m.
+    picks : contact points on the terrain, as a person marked them: the first guess, and what holds what the pixels
+        do not determine. A time without sigma_time_s counts as known to a frame, a place without sigma_position_m to
+        10 m.
     views : the cameras, their clocks roughly right.
     observations : pixels of the block's centre.
     surface : terrain, which every block on the ground touches as a sphere; without it, places come from the rays alone.

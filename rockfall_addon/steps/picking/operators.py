@@ -134,7 +134,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         return {"FINISHED"}
 
     def _look_again(self, context: bpy.types.Context, thing: bpy.types.Object, camera: bpy.types.Object | None) -> None:
-        """A click on a pick that was made in another video tells where it is in this one."""
+        """A click on a pick that was made in another video is its second view."""
         scene = context.scene
         if camera is None or not clicks.elsewhere(thing, camera):
             return

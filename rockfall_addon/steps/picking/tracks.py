@@ -27,8 +27,8 @@ def clicks_for(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> l
             found.setdefault(click.frame, (float(click.pixel[0]), float(click.pixel[1])))
     if not found:
         raise RockfallError(
-            f"Nothing tells where the block of {name} is in {camera.name}. Choose the tool Pick Impacts, and the kind "
-            "“Block here”, and click the block where it flies, best in two or three pictures."
+            f"It is not known where the block of {name} is in {camera.name}. Choose the tool Pick Impacts, and the "
+            "kind “Block here”, and click the block where it flies, best in two or three pictures."
         )
     return sorted((frame, u, v) for frame, (u, v) in found.items())
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run the cases of tests/interface, each in the window of a Blender of its own.
+"""Run the cases of tests/interface in the window of a real Blender.
+
+Each begins with a new file. They share a Blender until one fails or crashes; the next ones get a fresh one.
 
     python scripts/interface_tests.py                     # all
     python scripts/interface_tests.py sidebar demo        # those with one of these words in file or name
@@ -17,6 +19,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -24,6 +27,10 @@ ROOT = Path(__file__).resolve().parent.parent
 CASES = ROOT / "tests" / "interface"
 EXTENSION = "bl_ext.user_default.rockfall"
 WINDOW = ("0", "0", "1600", "1000")
+BEGINS = "harness: "
+"""With this and its name a case begins in Blender's output."""
+START_S, GRACE_S = 240.0, 30.0
+"""How long Blender may take to start, and to end by itself when a case has taken too long."""
 
 
 def find_cases(words: list[str]) -> list[tuple[Path, str]]:
@@ -57,32 +64,54 @@ def use_checkout(blender: list[str]) -> None:
     os.environ["BLENDER_USER_RESOURCES"] = str(directory)
 
 
-def run_case(blender: list[str], file: Path, name: str, seconds: float) -> bool:
-    command = [*blender, "--factory-startup", "--enable-event-simulate", "--window-geometry", *WINDOW]
-    command += ["--addons", EXTENSION, "--python-exit-code", "5"]
-    command += ["--python", str(CASES / "harness.py"), "--", str(file), name]
-    started = time.monotonic()
-    try:
-        done = subprocess.run(
-            command, cwd=ROOT, timeout=seconds, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
-        )
-        code, output = done.returncode, done.stdout
-    except subprocess.TimeoutExpired as error:
-        code, output = 124, error.stdout.decode(errors="replace") if error.stdout else ""
-    passed = code == 0
-    print(f"{'PASSED' if passed else 'FAILED'} {file.stem}::{name} in {time.monotonic() - started:.1f} s", flush=True)
-    if not passed:
-        print(f"{output.rstrip()}\nstatus {code}", flush=True)
-    return passed
+def command(blender: list[str], cases: list[tuple[Path, str]], seconds: float) -> list[str]:
+    """What runs these cases one after the other in one Blender, each for so many seconds at most."""
+    options = ["--factory-startup", "--enable-event-simulate", "--window-geometry", *WINDOW]
+    options += ["--addons", EXTENSION, "--python-exit-code", "5", "--python", str(CASES / "harness.py")]
+    return [*blender, *options, "--", str(seconds), *(str(part) for case in cases for part in case)]
+
+
+def run_together(blender: list[str], cases: list[tuple[Path, str]], seconds: float) -> tuple[int, bool]:
+    """Run cases in one Blender until one fails; how many have passed, and whether the one after those has failed."""
+    begun, output, started = 0, [], time.monotonic()
+
+    def report(word: str) -> None:
+        file, name = cases[max(begun, 1) - 1]
+        print(f"{word} {file.stem}::{name} in {time.monotonic() - started:.1f} s", flush=True)
+
+    process = subprocess.Popen(
+        command(blender, cases, seconds), cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        text=True, errors="replace",
+    )  # fmt: skip
+    watchdog = threading.Timer(START_S, process.kill)
+    watchdog.start()
+    with process:
+        for line in process.stdout:
+            output.append(line)
+            if line.startswith(BEGINS):
+                watchdog.cancel()
+                if begun:
+                    report("PASSED")
+                begun, output, started = begun + 1, [], time.monotonic()
+                watchdog = threading.Timer(seconds + GRACE_S, process.kill)
+                watchdog.start()
+    watchdog.cancel()
+    failed = process.returncode != 0
+    report("FAILED" if failed else "PASSED")
+    if failed:
+        print(f"{''.join(output).rstrip()}\nstatus {process.returncode}", flush=True)
+    return max(begun, 1) - failed, failed
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("words", nargs="*")
     parser.add_argument("--list", action="store_true")
+    parser.add_argument("--part", default="1/1", metavar="K/N", help="only one of N parts, which can run side by side")
     parser.add_argument("--timeout", type=float, default=480.0, help="seconds that one case may take")
     options = parser.parse_args()
-    cases = find_cases(options.words)
+    part, parts = map(int, options.part.split("/"))
+    cases = find_cases(options.words)[part - 1 :: parts]
     if options.list:
         print("\n".join(f"{file.stem}::{name}" for file, name in cases))
         return 0
@@ -92,7 +121,10 @@ def main() -> int:
     if "BLENDER_USER_RESOURCES" not in os.environ:
         use_checkout(blender)
     started = time.monotonic()
-    passed = sum([run_case(blender, file, name, options.timeout) for file, name in cases])
+    passed, done = 0, 0
+    while done < len(cases):
+        good, failed = run_together(blender, cases[done:], options.timeout)
+        passed, done = passed + good, done + good + failed
     print(f"{passed} passed, {len(cases) - passed} failed in {time.monotonic() - started:.1f}s")
     return int(passed < len(cases))
 

@@ -214,11 +214,9 @@ def main() -> int:
     if "BLENDER_USER_RESOURCES" not in os.environ:
         interface_tests.use_checkout(blender)
     for name in options.what:
-        command = [*blender, "--factory-startup", "--enable-event-simulate"]
-        command += ["--window-geometry", *interface_tests.WINDOW, "--addons", interface_tests.EXTENSION]
-        command += ["--python", str(interface_tests.CASES / "harness.py"), "--", str(Path(__file__)), f"case_{name}"]
+        command = interface_tests.command(blender, [(Path(__file__), f"case_{name}")], options.timeout)
         done = subprocess.run(
-            command, cwd=ROOT, timeout=options.timeout, text=True, check=False,
+            command, cwd=ROOT, timeout=options.timeout + interface_tests.START_S, text=True, check=False,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
         if done.returncode:

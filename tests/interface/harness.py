@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run one case in the window of a real Blender: simulated clicks, pictures of the screen, assertions.
+"""Run cases in the window of a real Blender: simulated clicks, pictures of the screen, assertions.
 
-Blender runs this file; scripts/interface_tests.py starts one Blender for each case:
+Blender runs this file, started by scripts/interface_tests.py:
 
     blender --factory-startup --enable-event-simulate --addons bl_ext.user_default.rockfall \\
-        --python tests/interface/harness.py -- tests/interface/sidebar.py case_name
+        --python tests/interface/harness.py -- SECONDS tests/interface/sidebar.py case_name [FILE CASE ...]
+
+The cases run one after the other, each from a new file and with the time limit SECONDS. The first that fails ends this
+Blender, since what it leaves could disturb the next.
 
 A case is a generator function ``case_…(window: Window)``. It yields the seconds that Blender may have for drawing and
 for its events, asserts, and takes screenshots, which end up in out/screenshots:
@@ -19,6 +22,7 @@ for its events, asserts, and takes screenshots, which end up in out/screenshots:
         assert "Terrain" in bpy.data.objects
 """
 
+import faulthandler
 import importlib.util
 import os
 import shutil
@@ -26,6 +30,7 @@ import subprocess
 import sys
 import time
 import traceback
+from collections import deque
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -34,6 +39,7 @@ import bpy
 
 ROOT = Path(__file__).resolve().parents[2]
 EXTENSION = "bl_ext.user_default.rockfall"
+BEGINS = "harness: "
 FIRST_DRAW_S = 1.0
 BETWEEN_EVENTS_S = 0.2
 
@@ -130,6 +136,12 @@ def load_case(file: str, name: str) -> Iterator[float]:
     return getattr(module, name)(Window(name))
 
 
+def new_file() -> None:
+    """What a person has who has just started Blender."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
+    bpy.context.preferences.view.ui_scale = 1.0
+
+
 def leave(code: int) -> None:
     sys.stdout.flush()
     sys.stderr.flush()
@@ -137,7 +149,8 @@ def leave(code: int) -> None:
 
 
 def main() -> None:
-    file, name = sys.argv[sys.argv.index("--") + 1 :]
+    seconds, *cases = sys.argv[sys.argv.index("--") + 1 :]
+    waiting = deque(zip(cases[::2], cases[1::2], strict=True))
     bpy.context.preferences.view.show_splash = False  # it would eat the first click
     if EXTENSION not in sys.modules:
         print(f"harness: {EXTENSION} is not enabled in this Blender", file=sys.stderr)
@@ -147,10 +160,17 @@ def main() -> None:
     def step() -> float | None:
         try:
             if not steps:
-                steps.append(load_case(file, name))
+                print(f"{BEGINS}{waiting[0][1]}", flush=True)
+                faulthandler.dump_traceback_later(float(seconds), exit=True)
+                steps.append(load_case(*waiting[0]))
             return next(steps[0])
         except StopIteration:
-            leave(0)
+            steps.clear()
+            waiting.popleft()
+            if not waiting:
+                leave(0)
+            new_file()
+            return FIRST_DRAW_S
         except BaseException:  # noqa: BLE001 - whatever it was, it goes to the log and ends this Blender
             traceback.print_exc()
             leave(1)

@@ -120,9 +120,20 @@ def test_a_changed_package_is_refused(tables, tmp_path):
         descriptor.write_text(bad, encoding="utf-8")
         with pytest.raises(InputError, match=message):
             read_package(tmp_path)
+    with pytest.raises(InputError, match=r"none\.json: The package cannot be read \("):
+        read_package(tmp_path / "none.json")
     outside = {"resources": [{"path": "../one.csv", "hash": ""}], "sources": []}
     descriptor.write_text(json.dumps(outside), encoding="utf-8")
     with pytest.raises(InputError, match="outside the package"):
+        read_package(tmp_path)
+
+
+def test_a_row_of_a_source_that_the_package_does_not_name_is_refused(tables, tmp_path):
+    write_package(merge([read_source(path) for path in tables]).database, tmp_path)
+    descriptor = tmp_path / "datapackage.json"
+    content = json.loads(descriptor.read_text(encoding="utf-8"))
+    descriptor.write_text(json.dumps({**content, "sources": content["sources"][:1]}), encoding="utf-8")
+    with pytest.raises(InputError, match=r"impacts\.csv: A row has the source '2', of 1\. Write the package again"):
         read_package(tmp_path)
 
 
@@ -153,6 +164,8 @@ def test_duplicates_are_dropped_kept_or_refused(tables):
     assert len(merge(parts, "keep").database) == 35
     with pytest.raises(InputError, match=r"14 impacts are there twice; the first is gully, a, impact 1 in one\.csv"):
         merge(parts, "refuse")
+    with pytest.raises(InputError, match=r"Duplicates cannot be 'sometimes'\. Choose drop, keep, refuse"):
+        merge(parts, "sometimes")
     with pytest.raises(InputError, match="no tables"):
         merge([])
 

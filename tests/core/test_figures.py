@@ -2,6 +2,7 @@
 """Figures in print and the page of a comparison: what the files hold, and what is said when a library is missing."""
 
 import re
+import socket
 import struct
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -180,6 +181,15 @@ def test_explore_refuses_bad_input(impacts, tmp_path, capsys, options, words) ->
     write_impacts(impacts, tmp_path / "impacts.csv")
     assert main(["explore", str(tmp_path / "impacts.csv"), "--no-browser", *options]) == 1
     assert words in capsys.readouterr().err
+
+
+def test_a_port_that_is_taken_is_named(impacts, tmp_path, capsys) -> None:
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    write_impacts(impacts, tmp_path / "impacts.csv")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["explore", str(tmp_path / "impacts.csv"), "--no-browser", "--port", str(port)]) == 1
+    assert f"Port {port} cannot be used (" in capsys.readouterr().err
 
 
 def test_parameters_come_back_from_their_file(tmp_path) -> None:

@@ -117,6 +117,12 @@ def test_wrong_states_are_refused():
         Incident(normal=np.array([[0, 0, 2.0]]), mass_kg=np.ones(1), **one)
     with pytest.raises(InputError, match=r"mass_kg has the shape \(2,\), not \(1,\)"):
         Incident(normal=np.array([[0, 0, 1.0]]), mass_kg=np.ones(2), **one)
+    with pytest.raises(InputError, match=r"normal has the shape \(2, 3\), not \(1, 3\)"):
+        Incident(normal=np.tile([0, 0, 1.0], (2, 1)), mass_kg=np.ones(1), **one)
+    right = Incident(normal=np.array([[0, 0, 1.0]]), mass_kg=np.ones(1), **one)
+    for name, count in (("azimi_desvarreux_1977", 1), ("stevens_1998", 3)):
+        with pytest.raises(InputError, match=rf"draws have the shape \(1, {count}\), not \(1, "):
+            MODELS[name].rebound(right, draws=np.zeros((1, count)))
 
 
 def test_the_registry_does_not_import_numba():

@@ -242,6 +242,16 @@ def test_model_colours_are_told_apart():
     assert apart.min() > 0.3
 
 
+def test_a_table_of_two_gravities_is_refused(tmp_path):
+    surface, impacts = bounces()
+    write_twins(fly_twins(impacts, compare(impacts, ["noel_2017"]), surface), tmp_path / "twins.csv")
+    header, first, second, *rest = [line.split(",") for line in (tmp_path / "twins.csv").read_text().splitlines()]
+    second[header.index("gravity_mps2")] = "3.71"
+    (tmp_path / "twins.csv").write_text("\n".join(",".join(row) for row in (header, first, second, *rest)) + "\n")
+    with pytest.raises(InputError, match=r"csv, row 3.*: Gravity is not that of the first row"):
+        read_twins(tmp_path / "twins.csv")
+
+
 def test_table_round_trip(tmp_path):
     surface, impacts = bounces()
     shift = GlobalShift(2600000.0, 1200000.0, 500.0)

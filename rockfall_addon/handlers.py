@@ -5,6 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .scene import footage, impact_rows, migration, problems, store, sync, terrain_mesh, timing, videos
+from .view import job
 
 _owner = object()
 
@@ -30,6 +31,7 @@ def _loaded(_path: str, _unused: object = None) -> None:
     terrain_mesh.mistrust()
     videos.forget_files()
     problems.forget()
+    job.forget()
     _listen()  # subscriptions do not survive loading
     _catch_up()
 

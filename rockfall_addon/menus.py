@@ -22,7 +22,7 @@ STEPS = (
         ("rockfall.use_view", "Place Camera from This View", {}), None,
         "rockfall.accept_pair", "rockfall.go_to_pair", "rockfall.delete_pair", "rockfall.import_pairs",
         "rockfall.export_pairs", None,
-        "rockfall.follow_background", ("rockfall.stop_following", "Stop Following", {}), "rockfall.propose_pairs", None,
+        "rockfall.follow_background", "rockfall.stop_job", "rockfall.propose_pairs", None,
         "rockfall.import_camera", "rockfall.export_camera",
     )),
     ("picks", "4  Picks and Trajectories", (

@@ -31,7 +31,7 @@ from . import (
     trajectories,
 )
 
-DRAGGING = ("TRANSFORM_OT_", "ROCKFALL_OT_drag")
+DRAGGING = ("TRANSFORM_OT_", "ROCKFALL_OT_drag", "ROCKFALL_OT_mark_pair")
 REACH_RADII = 1.0
 """A pick nearer to the terrain than this many radii of its block lies on it, and stays on it when it is moved."""
 LEAST_REACH_M = 0.1

@@ -20,7 +20,7 @@ def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
         except RockfallError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        _redraw(context)
+        redraw(context)
         return ended
 
     return wrapper
@@ -65,7 +65,7 @@ def _grey(draw: Callable[..., None]) -> Callable[..., None]:
     return greying
 
 
-def _redraw(context: bpy.types.Context) -> None:
+def redraw(context: bpy.types.Context) -> None:
     """Draw all views and panels again: Blender does not know who shows what the scene stores."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:

@@ -25,6 +25,26 @@ def aligned(part):
     return part("rockfall_addon.scene.alignment")
 
 
+@pytest.fixture
+def pairs(part):
+    return part("rockfall_addon.scene.pairs")
+
+
+@pytest.fixture
+def marking(part):
+    return part("rockfall_addon.steps.alignment.marking")
+
+
+@pytest.fixture
+def solving(part):
+    return part("rockfall_addon.steps.alignment.solving")
+
+
+@pytest.fixture
+def looking(part):
+    return part("rockfall_addon.steps.alignment.looking")
+
+
 _opened: dict = {}
 
 
@@ -75,10 +95,10 @@ def solved_by_core(part, table, rows=slice(None), **options):
     )
 
 
-def mark_all(aligned, scene, camera, table, count) -> None:
+def mark_all(marking, scene, camera, table, count) -> None:
     for i in range(count):
-        aligned.mark(scene, camera, "pixel", table.pixel[i])
-        aligned.mark(scene, camera, "point", table.point[i])
+        marking.mark(scene, camera, "pixel", table.pixel[i])
+        marking.mark(scene, camera, "point", table.point[i])
 
 
 def test_imported_pairs_give_the_cores_camera(part, scene, aligned, camera, table) -> None:
@@ -101,31 +121,41 @@ def test_imported_pairs_give_the_cores_camera(part, scene, aligned, camera, tabl
     assert aligned.placement(camera) == "pairs"
 
 
-def test_blenders_camera_sees_the_points_where_they_were_marked(part, scene, aligned, camera, table) -> None:
+def test_the_poses_covariance_is_that_for_the_lens_as_found(part, scene, camera, table) -> None:
+    """As the command line writes it; with the lens free the camera could back away while its focal length grows."""
+    bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
+    found = solved_by_core(part, table)
+    kept = part("rockfall_addon.scene.videos").pose_covariance(camera)
+    np.testing.assert_allclose(kept, found.pose_covariance_given_lens, rtol=1e-6)
+    along, free = (np.sqrt(np.trace(each[3:, 3:])) for each in (kept, found.pose_covariance))
+    assert along < 0.5 * free
+
+
+def test_blenders_camera_sees_the_points_where_they_were_marked(part, scene, looking, camera, table) -> None:
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector
 
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
-    aligned.look_through(scene, camera)
+    looking.look_through(scene, camera)
     bpy.context.view_layer.update()
     views = [world_to_camera_view(scene, camera, Vector(point)) for point in table.point.tolist()]
     seen = np.array([(view.x * 1280, (1 - view.y) * 720) for view in views])
     assert np.sqrt(((seen - table.pixel) ** 2).sum(axis=1).mean()) < 0.6
 
 
-def test_clicks_in_either_order(part, scene, aligned, camera, table) -> None:
-    one = aligned.mark(scene, camera, "pixel", table.pixel[0])
-    assert aligned.open_pair(camera).missing == "point"
+def test_clicks_in_either_order(part, scene, aligned, pairs, marking, camera, table) -> None:
+    one = marking.mark(scene, camera, "pixel", table.pixel[0])
+    assert pairs.open_pair(camera).missing == "point"
     assert "terrain" in aligned.hint(scene, camera)
-    assert aligned.mark(scene, camera, "pixel", table.pixel[1]) == one, (
+    assert marking.mark(scene, camera, "pixel", table.pixel[1]) == one, (
         "a second click in the picture corrects the first"
     )
-    aligned.mark(scene, camera, "point", table.point[1])
-    assert aligned.open_pair(camera) is None
-    other = aligned.mark(scene, camera, "point", table.point[0])
-    assert aligned.open_pair(camera).missing == "pixel"
-    aligned.mark(scene, camera, "pixel", table.pixel[0])
-    first, second = aligned.pairs_of(camera)
+    marking.mark(scene, camera, "point", table.point[1])
+    assert pairs.open_pair(camera) is None
+    other = marking.mark(scene, camera, "point", table.point[0])
+    assert pairs.open_pair(camera).missing == "pixel"
+    marking.mark(scene, camera, "pixel", table.pixel[0])
+    first, second = pairs.pairs_of(camera)
     assert (first.id, second.id) == (one, other)
     assert second.pixel == tuple(table.pixel[0]), "doubles, exactly"
     assert second.point == tuple(table.point[0])
@@ -133,22 +163,24 @@ def test_clicks_in_either_order(part, scene, aligned, camera, table) -> None:
     assert aligned.placement(camera) == ""
 
 
-def test_solved_from_the_fifth_pair_on_and_predicted_from_then(part, scene, aligned, camera, table, slope) -> None:
+def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
+    part, scene, aligned, pairs, marking, camera, table, slope
+) -> None:
     surface = slope(table)
-    mark_all(aligned, scene, camera, table, 4)
+    mark_all(marking, scene, camera, table, 4)
     assert not part("rockfall_addon.scene.videos").is_solved(camera)
     assert "1 more" in aligned.hint(scene, camera)
     order = [4, 5, 7]
     for i in order:
-        aligned.mark(scene, camera, "pixel", table.pixel[i])
-        if aligned.open_pair(camera).proposed:
-            aligned.move(scene, camera, aligned.open_pair(camera).id, "point", table.point[i])
+        marking.mark(scene, camera, "pixel", table.pixel[i])
+        if pairs.open_pair(camera).proposed:
+            marking.move(scene, camera, pairs.open_pair(camera).id, "point", table.point[i])
         else:
-            aligned.mark(scene, camera, "point", table.point[i])
+            marking.mark(scene, camera, "point", table.point[i])
     assert part("rockfall_addon.scene.videos").is_solved(camera)
-    assert len([pair for pair in aligned.pairs_of(camera) if pair.is_complete]) == 7
-    pair = aligned.mark(scene, camera, "pixel", table.pixel[8])
-    proposed = aligned.with_id(aligned.pairs_of(camera), pair)
+    assert len([pair for pair in pairs.pairs_of(camera) if pair.is_complete]) == 7
+    pair = marking.mark(scene, camera, "pixel", table.pixel[8])
+    proposed = pairs.with_id(pairs.pairs_of(camera), pair)
     assert proposed.proposed == "point"
     assert not proposed.is_complete
     moving = part("rockfall_addon.scene.videos").camera_path(camera)
@@ -158,25 +190,25 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(part, scene, alig
     near = part("core.terrain.raycast").closest_points(surface, [proposed.point])
     assert near.distance[0] < 1e-3, "on the terrain"
     before = aligned.solution_of(camera).rmse_px
-    aligned.delete(scene, camera, [pair])
-    pair = aligned.mark(scene, camera, "point", table.point[8])
-    proposed = aligned.with_id(aligned.pairs_of(camera), pair)
+    marking.delete(scene, camera, [pair])
+    pair = marking.mark(scene, camera, "point", table.point[8])
+    proposed = pairs.with_id(pairs.pairs_of(camera), pair)
     assert proposed.proposed == "pixel"
     assert np.hypot(*(np.array(proposed.pixel) - table.pixel[8])) < 5
     assert aligned.solution_of(camera).rmse_px == pytest.approx(before, rel=1e-9), "a prediction does not count"
-    aligned.settle(scene, camera, pair)
-    assert aligned.with_id(aligned.pairs_of(camera), pair).is_complete
-    assert aligned.open_pair(camera) is None
+    marking.accept(scene, camera, pair)
+    assert pairs.with_id(pairs.pairs_of(camera), pair).is_complete
+    assert pairs.open_pair(camera) is None
 
 
-def test_known_focal_length_needs_four_pairs(part, scene, aligned, camera, table) -> None:
+def test_known_focal_length_needs_four_pairs(part, scene, marking, camera, table) -> None:
     settings = camera.rockfall_alignment
     settings.focal_px = 2100.0
     settings.free_focal = False
     rows = [0, 4, 7, 11]
     for i in rows:
-        aligned.mark(scene, camera, "pixel", table.pixel[i])
-        aligned.mark(scene, camera, "point", table.point[i])
+        marking.mark(scene, camera, "pixel", table.pixel[i])
+        marking.mark(scene, camera, "point", table.point[i])
     moving = part("rockfall_addon.scene.videos").camera_path(camera)
     assert part("rockfall_addon.scene.videos").is_solved(camera)
     assert moving.reference.fx == 2100.0
@@ -204,7 +236,7 @@ def test_boxes_of_the_lens(part, scene, aligned, camera, table) -> None:
     assert "fx" not in aligned.solution_of(camera).sigma
 
 
-def test_enabled_box_and_wrong_pair(part, scene, aligned, camera, table) -> None:
+def test_enabled_box_and_wrong_pair(part, scene, aligned, pairs, marking, camera, table) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     rows = camera.rockfall_alignment.rows
     rows[3].enabled = False
@@ -212,48 +244,48 @@ def test_enabled_box_and_wrong_pair(part, scene, aligned, camera, table) -> None
     assert aligned.focal_px(camera) == pytest.approx(found.camera.fx, rel=1e-9)
     assert rows[3].residual_px > 0, "it is still checked"
     rows[3].enabled = True
-    wrong = aligned.pairs_of(camera)[5]
-    aligned.move(scene, camera, wrong.id, "pixel", (wrong.pixel[0] + 40, wrong.pixel[1]))
+    wrong = pairs.pairs_of(camera)[5]
+    marking.move(scene, camera, wrong.id, "pixel", (wrong.pixel[0] + 40, wrong.pixel[1]))
     assert aligned.solution_of(camera).wrong == (wrong.id,)
     assert [row.is_wrong for row in rows].index(True) == 5
     assert [remark.about for remark in aligned.solution_of(camera).remarks][:1] == ["pair T06"]
     rows[5].name = "ledge"
-    assert aligned.pairs_of(camera)[5].name == "ledge"
+    assert pairs.pairs_of(camera)[5].name == "ledge"
 
 
-def test_bad_pairs_in_words(part, scene, aligned, camera, table) -> None:
+def test_bad_pairs_in_words(part, scene, aligned, pairs, marking, camera, table) -> None:
     errors = part("core.errors")
     with pytest.raises(errors.RockfallError, match="outside of the picture"):
-        aligned.mark(scene, camera, "pixel", (1300.0, 10.0))
-    assert aligned.pairs_of(camera) == []
+        marking.mark(scene, camera, "pixel", (1300.0, 10.0))
+    assert pairs.pairs_of(camera) == []
     line = table.point[0] + np.linspace(0, 10, 6)[:, None] * [1, 2, 0.5]
     for i in range(6):
-        aligned.mark(scene, camera, "pixel", table.pixel[i])
-        aligned.mark(scene, camera, "point", line[i])
+        marking.mark(scene, camera, "pixel", table.pixel[i])
+        marking.mark(scene, camera, "point", line[i])
     assert "line" in aligned.solution_of(camera).problem
     assert not part("rockfall_addon.scene.videos").is_solved(camera)
-    aligned.delete(scene, camera, [pair.id for pair in aligned.pairs_of(camera)])
+    marking.delete(scene, camera, [pair.id for pair in pairs.pairs_of(camera)])
     assert "rockfall_pairs" not in camera
     assert len(camera.rockfall_alignment.rows) == 0
 
 
-def test_file_keeps_the_doubles(part, scene, aligned, camera, table, tmp_path) -> None:
+def test_file_keeps_the_doubles(part, scene, aligned, pairs, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
-    pairs, lens = aligned.pairs_of(camera), aligned.lens_of(camera).tolist()
+    kept, lens = repr(pairs.pairs_of(camera)), aligned.lens_of(camera).tolist()
     pose = part("rockfall_addon.scene.videos").camera_path(camera).reference.position.tolist()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "aligned.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "aligned.blend"), load_ui=False)
     videos = part("rockfall_addon.scene.videos")
     again = videos.active_camera(bpy.context.scene)
-    assert repr(aligned.pairs_of(again)) == repr(pairs)
+    assert repr(pairs.pairs_of(again)) == kept
     assert aligned.lens_of(again).tolist() == lens
     assert videos.camera_path(again).reference.position.tolist() == pose
     assert len(again.rockfall_alignment.rows) == 14
     assert aligned.solution_of(again).rmse_px < 0.5
 
 
-def test_pairs_and_camera_go_through_files(part, scene, aligned, camera, table, tmp_path) -> None:
+def test_pairs_and_camera_go_through_files(part, scene, aligned, pairs, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     assert bpy.ops.rockfall.export_pairs(filepath=str(tmp_path / "pairs.csv")) == {"FINISHED"}
     again = part("core.exchange.cameras").read_pairs(tmp_path / "pairs.csv", table.shift)
@@ -278,18 +310,55 @@ def test_pairs_and_camera_go_through_files(part, scene, aligned, camera, table, 
         bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "small.toml"))
 
 
-def test_placed_by_eye(part, scene, aligned, camera, table) -> None:
+def test_a_marked_pair_can_be_taken_back(part, scene, aligned, marking, pairs, solving, camera, table) -> None:
+    """Pairs, solution, lens and place of the camera are as before, whether it was solved or not."""
+    videos = part("rockfall_addon.scene.videos")
+
+    def state() -> tuple:
+        path, lens = videos.camera_path(camera), camera.data
+        return (
+            repr(pairs.pairs_of(camera)), repr(pairs.open_pair(camera)), repr(aligned.solution_of(camera)),
+            aligned.placement(camera), path.reference.intrinsics.tolist(), path.position.tolist(),
+            path.rotation.tolist(), repr(videos.pose_covariance(camera)), [list(row) for row in camera.matrix_world],
+            (lens.lens, lens.sensor_width, lens.sensor_fit, lens.shift_x), tuple(camera.lock_location),
+            repr([(row.name, row.residual_px) for row in camera.rockfall_alignment.rows]),
+        )  # fmt: skip
+
+    camera.location = (3.0, 4.0, 5.0)
+    bpy.context.view_layer.update()
+    mark_all(marking, scene, camera, table, 4)
+    marking.mark(scene, camera, "pixel", table.pixel[4])
+    known, before = state(), marking.remember(camera)
+    marking.mark(scene, camera, "point", table.point[4])
+    assert videos.is_solved(camera)
+    marking.restore(scene, camera, before)
+    bpy.context.view_layer.update()
+    assert state() == known
+    assert not videos.is_solved(camera)
+    marking.delete(scene, camera, [pair.id for pair in pairs.pairs_of(camera)])
+    mark_all(marking, scene, camera, table, 9)
+    bpy.context.view_layer.update()
+    known, before = state(), marking.remember(camera)
+    pair = pairs.pairs_of(camera)[7]
+    marking.move(scene, camera, pair.id, "pixel", (pair.pixel[0] + 30, pair.pixel[1]))
+    assert repr(aligned.solution_of(camera)) != known[2]
+    marking.restore(scene, camera, before)
+    bpy.context.view_layer.update()
+    assert state() == known
+
+
+def test_placed_by_eye(part, scene, aligned, solving, camera, table) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     one = part("core.camera.model").look_at(1280, 720, (10, -40, 1540), (20, 60, 1530), focal_px=1000.0)
-    aligned.place_by_eye(scene, camera, one)
+    solving.place_by_eye(scene, camera, one)
     assert aligned.placement(camera) == "eye"
     assert aligned.focal_px(camera) == 1000.0
     assert np.isnan(aligned.solution_of(camera).rmse_px)
     assert camera.rockfall_alignment.rows[0].residual_px > 5, "the pairs say how far off it is"
 
 
-def test_camera_that_is_gone(part, scene, aligned, camera) -> None:
-    aligned.mark(scene, camera, "pixel", (10.0, 10.0))
+def test_camera_that_is_gone(part, scene, aligned, marking, camera) -> None:
+    marking.mark(scene, camera, "pixel", (10.0, 10.0))
     bpy.data.objects.remove(camera)
     assert aligned.hint(scene, None) == "Add a video first (step 2)."
     with pytest.raises(RuntimeError, match="Add a video first"):
@@ -310,7 +379,9 @@ def test_video_that_has_moved(part, scene, aligned, table, tmp_path) -> None:
         bpy.ops.rockfall.follow_background()
 
 
-def test_hand_held_camera_is_followed_and_corrected(part, scene, aligned, camera, table, monkeypatch) -> None:
+def test_hand_held_camera_is_followed_and_corrected(
+    part, scene, aligned, pairs, marking, camera, table, monkeypatch
+) -> None:
     """Each frame's pose is close to the truth, and pairs of another frame bend the path through it.
 
     A third of the video is followed, to be quick.
@@ -335,14 +406,14 @@ def test_hand_held_camera_is_followed_and_corrected(part, scene, aligned, camera
     assert np.degrees(angle).max() < 0.1
     scene.frame_set(90)
     middle = part("core.exchange.cameras").read_pairs(FOOTAGE / "pairs_middle.csv", table.shift)
-    count = aligned.propose_here(scene, camera)
+    count = marking.propose_here(scene, camera)
     assert count >= 4
-    offered = [pair for pair in aligned.pairs_of(camera) if pair.proposed]
+    offered = [pair for pair in pairs.pairs_of(camera) if pair.proposed]
     assert len(offered) == count
     for pair in offered:
         there = middle.pixel[middle.name.tolist().index(pair.name)]
         assert np.hypot(*(np.array(pair.pixel) - there)) < 6
-        aligned.move(scene, camera, pair.id, "pixel", there)
+        marking.move(scene, camera, pair.id, "pixel", there)
     assert aligned.solution_of(camera).keys == (90,)
     corrected = videos.camera_path(camera)
     assert not np.allclose(corrected.rotation[90], moving.rotation[90], atol=1e-9)

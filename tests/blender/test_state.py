@@ -313,7 +313,7 @@ def test_a_newer_file_is_left_alone(scene: bpy.types.Scene, part) -> None:
 
 
 LOOK_ONLY = {"fit_footage", "go_to_pair", "impact_table", "open_workspace", "show_impact", "show_relief",
-             "sort_impacts", "step_frame", "stop_following"}  # fmt: skip
+             "sort_impacts", "step_frame", "stop_job"}  # fmt: skip
 
 
 def test_every_operator_refuses_a_newer_file_in_the_same_words(scene: bpy.types.Scene, part) -> None:

@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ....core.errors import RockfallError
-from ...scene import alignment, videos
+from ...scene import alignment, pairs, videos
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
 from . import files
@@ -49,7 +49,7 @@ class ROCKFALL_OT_export_pairs(bpy.types.Operator, ExportHelper):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not has_video(cls, context):
             return False
-        if any(pair.is_complete for pair in alignment.pairs_of(videos.active_camera(context.scene))):
+        if pairs.complete_of(videos.active_camera(context.scene)):
             return True
         cls.poll_message_set("There are no complete pairs")
         return False

@@ -7,13 +7,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ....core.camera.model import project, rays
-from ....core.camera.pairs import Pairs
+from ....core.camera.pairs import pair_residuals
 from ....core.errors import InputError
 from ....core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
-from ....core.vectors import distance_to_ray
-from ...scene import alignment, georeference, store, videos
+from ...scene import alignment, georeference, pairs, store, videos
+from . import solving
 
 
 def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:
@@ -26,7 +25,7 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
     table = read_pairs(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
     (width, height), shown = videos.size_of(camera), videos.true_frame(scene, camera)
     frames = len(camera[store.VIDEO_TIMES])
-    pairs, added = alignment.pairs_of(camera), []
+    marked, added = pairs.pairs_of(camera), []
     for i, pixel in enumerate(table.pixel):
         if not (0 <= pixel[0] <= width and 0 <= pixel[1] <= height):
             raise table.error(
@@ -37,28 +36,28 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
         if table.frame[i] >= frames:
             raise table.error(i, f"There is no frame {table.frame[i]}", f"The video has the frames 0 to {frames - 1}")
         added.append(
-            alignment.Pair(
+            pairs.Pair(
                 id=uuid.uuid4().hex,
                 name=str(table.name[i]),
                 pixel=tuple(pixel.tolist()),
                 point=tuple(table.point[i].tolist()),
                 frame=int(table.frame[i]) if table.frame[i] >= 0 else shown,
                 enabled=bool(table.used[i]),
-                colour=(len(pairs) + i) % alignment.COLOURS,
+                colour=(len(marked) + i) % pairs.COLOURS,
                 sigma_px=float(table.sigma_px[i]),
                 sigma_m=float(table.sigma_m[i]),
             )
         )
     if not georeference.has_shift(scene):
         georeference.write_shift(scene, table.shift)
-    alignment.keep_pairs(camera, [*pairs, *added])
-    alignment.solve(scene, camera)
+    pairs.keep_pairs(camera, [*marked, *added])
+    solving.solve(scene, camera)
     return len(added)
 
 
 def export_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:
     """Write the complete pairs as pairs.csv; returns how many."""
-    table = _table(scene, camera, Path(path))
+    table = pairs.table(pairs.complete_of(camera), georeference.read_shift(scene))
     write_columns(
         path,
         vector_columns(("u_px", "v_px"), table.pixel)
@@ -86,10 +85,10 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
             file=path,
             advice="Take the camera of this video, or solve it from pairs",
         )
-    alignment.lock_lens(camera)
+    solving.lock_lens(camera)
     alignment.keep_lens(camera, one.intrinsics)
     if lens_only:
-        alignment.set_lens(scene, camera, one.intrinsics)
+        solving.set_lens(scene, camera, one.intrinsics)
         return
     if not georeference.has_shift(scene):
         georeference.write_shift(scene, one.shift)
@@ -97,47 +96,23 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
         settings.motion = "ROTATION"
     videos.set_camera_path(scene, camera, file.path, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
     camera[store.PLACED] = alignment.FROM_FILE
-    alignment.keep_check(camera, alignment.Solution(rmse_px=_number(file.rmse_px), sigma=dict(file.sigma)))
+    solving.check(scene, camera, alignment.Solution(rmse_px=_number(file.rmse_px), sigma=dict(file.sigma)))
 
 
-def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> list[str]:
+def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, file: str | Path) -> list[str]:
     """Write camera.toml and, when there are pairs, pairs_residuals.csv beside it. Returns the names of the files."""
-    path, solution, moving = Path(path), alignment.solution_of(camera), videos.camera_path(camera)
-    write_camera(
-        path,
-        moving,
-        rmse_px=solution.rmse_px,
-        sigma=solution.sigma,
-        pose_covariance=videos.pose_covariance(camera),
-    )
-    table = _table(scene, camera, path)
-    if not len(table):
-        return [path.name]
-    position, rotation = moving.poses_at(videos.times_of(camera)[table.frame])
-    seen = project(moving.reference, table.point, position=position, rotation=rotation)
-    away = distance_to_ray(table.point, *rays(moving.reference, table.pixel, position=position, rotation=rotation))
-    complete = [pair for pair in alignment.pairs_of(camera) if pair.is_complete]
+    file, solution, path = Path(file), alignment.solution_of(camera), videos.camera_path(camera)
+    covariance = videos.pose_covariance(camera)
+    write_camera(file, path, rmse_px=solution.rmse_px, sigma=solution.sigma, pose_covariance=covariance)
+    complete = pairs.complete_of(camera)
+    if not complete:
+        return [file.name]
+    table = pairs.table(complete, georeference.read_shift(scene))
+    left, away = pair_residuals(path, table, pairs.times_of(camera, table.frame))
     used = np.array([pair.enabled and pair.id not in solution.wrong for pair in complete])
-    beside = path.with_name("pairs_residuals.csv")
-    write_pair_residuals(beside, table, table.pixel - seen, away, used)
-    return [path.name, beside.name]
-
-
-def _table(scene: bpy.types.Scene, camera: bpy.types.Object, path: Path) -> Pairs:
-    complete = [pair for pair in alignment.pairs_of(camera) if pair.is_complete]
-    n = len(complete)
-    return Pairs(
-        pixel=np.array([pair.pixel for pair in complete]).reshape(-1, 2),
-        point=np.array([pair.point for pair in complete]).reshape(-1, 3),
-        name=np.array([pair.name for pair in complete], dtype=np.str_),
-        frame=np.array([pair.frame for pair in complete], dtype=np.intp),
-        sigma_px=np.array([pair.sigma_px for pair in complete]),
-        sigma_m=np.array([pair.sigma_m for pair in complete]),
-        used=np.array([pair.enabled for pair in complete], dtype=np.bool_),
-        row=np.arange(2, n + 2),
-        source=path,
-        shift=georeference.read_shift(scene),
-    )
+    beside = file.with_name("pairs_residuals.csv")
+    write_pair_residuals(beside, table, left, away, used)
+    return [file.name, beside.name]
 
 
 def _number(value: float | None) -> float:

@@ -9,23 +9,23 @@ from mathutils import Vector
 
 from ....core.camera.resection.problem import POSE_PAIRS
 from ....core.errors import RockfallError
-from ....core.progress import silent
-from ...scene import alignment, footage_blend, store, terrain, videos
-from ...view import image_view, look
+from ...scene import alignment, footage_blend, pairs, store, terrain, videos
+from ...view import image_view, job, look
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
-from . import following
+from . import following, looking, marking, solving
 
 TOOL = "rockfall.align_tool"
 FINE = 0.1
-POLL_S = 0.2
+NEAR_PX = 11.0
+"""A click this near to a mark takes hold of it, in pixels at interface scale 1."""
 
 
 def _pair(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether there is an active pair; if not, what to do."""
     if not has_video(cls, context):
         return False
-    if alignment.active_pair(videos.active_camera(context.scene)) is not None:
+    if pairs.active_pair(videos.active_camera(context.scene)) is not None:
         return True
     cls.poll_message_set("There is no pair yet")
     return False
@@ -47,7 +47,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
     @reported
     def _begin(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        self._known = alignment.pairs_of(camera), str(camera.get(store.OPEN_PAIR, ""))
+        self._before = marking.remember(camera)
         self._camera = camera[store.ID]
         rectangle = image_view.image_rectangle(context.region, context.region_data, scene, camera)
         if rectangle is None and context.region_data.view_perspective == "CAMERA":
@@ -58,12 +58,12 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
         self._taken = self._nearest(context, camera, rectangle)
         if self._taken:
             self._pair, self._side = self._taken[:2]
-            alignment.activate(camera, self._pair)
+            marking.activate(camera, self._pair)
             self._place = np.array(self._taken[2])
         else:
-            self._side = alignment.PIXEL if rectangle is not None and not self._shift else alignment.POINT
+            self._side = pairs.PIXEL if rectangle is not None and not self._shift else pairs.POINT
             self._place = self._mouse.copy()
-            if rectangle is not None and self._shift and not alignment.is_placed(camera):
+            if rectangle is not None and self._shift and not videos.is_solved(camera):
                 raise RockfallError(
                     "The camera has no place yet, so what shines through is not what it sees. Click the terrain in "
                     "another view, or place the camera by eye with Use This View."
@@ -75,7 +75,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
                     if terrain.tiles(scene)
                     else "There is no terrain to click on. Import it first (step 1)."
                 )
-            self._pair = alignment.mark(scene, camera, self._side, place)
+            self._pair = marking.mark(scene, camera, self._side, place)
         context.window_manager.modal_handler_add(self)
         self._show(context)
         return {"RUNNING_MODAL"}
@@ -95,30 +95,27 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
             step, self._mouse = now - self._mouse, now
             self._place += step * (FINE if event.shift else 1.0)
             self._moved = self._moved or bool(step.any())
-            self._move(context, camera, settle=False)
+            self._move(context, camera, is_held=True)
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if self._taken:
-                self._move(context, camera, settle=True)
+                self._move(context, camera, is_held=False)
             self._show(context)
             return {"FINISHED"}
         elif event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
-            pairs, opened = self._known
-            camera[store.OPEN_PAIR] = opened
-            alignment.keep_pairs(camera, pairs)
-            alignment.solve(context.scene, camera)
+            marking.restore(context.scene, camera, self._before)
             self._show(context)
             return {"CANCELLED"}
         return {"RUNNING_MODAL"}
 
-    def _move(self, context: bpy.types.Context, camera: bpy.types.Object, *, settle: bool) -> None:
+    def _move(self, context: bpy.types.Context, camera: bpy.types.Object, *, is_held: bool) -> None:
         try:
             if not self._moved:
-                if settle:
-                    alignment.settle(context.scene, camera, self._pair)
+                if not is_held:
+                    marking.accept(context.scene, camera, self._pair)
                 return
             place = self._there(context, camera)
             if place is not None:
-                alignment.move(context.scene, camera, self._pair, self._side, place, settle=settle)
+                marking.move(context.scene, camera, self._pair, self._side, place, is_held=is_held)
         except RockfallError:
             return  # outside of the picture: the mark stays where it was
         self._show(context)
@@ -129,21 +126,21 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
         rectangle = image_view.image_rectangle(region, context.region_data, scene, camera)
         if rectangle is not None:
             pixel = image_view.to_pixel(rectangle, videos.size_of(camera), self._place)
-            if self._side == alignment.PIXEL:
+            if self._side == pairs.PIXEL:
                 return tuple(pixel.tolist())
-            return alignment.point_at(scene, camera, pixel.tolist(), videos.true_frame(scene, camera))
-        ray = alignment.free_ray(context.region_data, region.width, region.height, *self._place)
-        return alignment.meet(scene, *ray)
+            return looking.point_at(scene, camera, pixel.tolist(), videos.true_frame(scene, camera))
+        ray = looking.free_ray(context.region_data, region.width, region.height, *self._place)
+        return looking.meet(scene, *ray)
 
     def _nearest(
         self, context: bpy.types.Context, camera: bpy.types.Object, rectangle: image_view.Rectangle | None
     ) -> tuple[str, str, tuple[float, float]] | None:
         """The mark under the mouse: its pair, its side and where it is in the region."""
         frame, through = videos.true_frame(context.scene, camera), rectangle is not None
-        pairs, side, places = alignment.marks(camera, frame, through_camera=through)
-        reach = alignment.NEAR_PX * context.preferences.system.ui_scale
+        marked, side, places = marking.marks(camera, frame, through_camera=through)
+        reach = NEAR_PX * context.preferences.system.ui_scale
         best = None
-        for pair, place in zip(pairs, places, strict=True):
+        for pair, place in zip(marked, places, strict=True):
             if through:
                 spot = image_view.to_region(rectangle, videos.size_of(camera), place)
             else:
@@ -179,8 +176,8 @@ class ROCKFALL_OT_delete_pair(bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera = videos.active_camera(context.scene)
-        pairs = alignment.pairs_of(camera) if self.every else [alignment.active_pair(camera)]
-        alignment.delete(context.scene, camera, [pair.id for pair in pairs])
+        chosen = pairs.pairs_of(camera) if self.every else [pairs.active_pair(camera)]
+        marking.delete(context.scene, camera, [pair.id for pair in chosen])
         return {"FINISHED"}
 
 
@@ -203,13 +200,13 @@ class ROCKFALL_OT_accept_pair(bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera = videos.active_camera(context.scene)
-        alignment.settle(context.scene, camera, _proposal(camera).id)
+        marking.accept(context.scene, camera, _proposal(camera).id)
         return {"FINISHED"}
 
 
-def _proposal(camera: bpy.types.Object) -> alignment.Pair | None:
+def _proposal(camera: bpy.types.Object) -> pairs.Pair | None:
     """The prediction that a person means: of the open pair, or of the active one."""
-    for pair in (alignment.open_pair(camera), alignment.active_pair(camera)):
+    for pair in (pairs.open_pair(camera), pairs.active_pair(camera)):
         if pair is not None and pair.proposed:
             return pair
     return None
@@ -224,7 +221,7 @@ class ROCKFALL_OT_align_views(OfVideo, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        alignment.look_through(scene, camera)
+        looking.look_through(scene, camera)
         footage_blend.set_blend(camera, footage_blend.blend_of(camera))
         if context.window is None or not _views(context):
             return {"FINISHED"}
@@ -296,9 +293,9 @@ class ROCKFALL_OT_use_view(bpy.types.Operator):
         scene, camera = context.scene, videos.active_camera(context.scene)
         window = next(region for region in context.area.regions if region.type == "WINDOW")
         view = context.space_data.region_3d
-        seen = alignment.seen_camera(scene, camera, view, window.width, keep_focal=self.keep_focal)
-        alignment.place_by_eye(scene, camera, seen)
-        alignment.look_through(scene, camera)
+        seen = looking.seen_camera(scene, camera, view, window.width, keep_focal=self.keep_focal)
+        solving.place_by_eye(scene, camera, seen)
+        looking.look_through(scene, camera)
         view.view_perspective = "CAMERA"
         footage_blend.set_blend(camera, 0.5)
         return {"FINISHED"}
@@ -318,7 +315,7 @@ class ROCKFALL_OT_go_to_pair(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        pair = alignment.active_pair(camera)
+        pair = pairs.active_pair(camera)
         frame = videos.scene_frame_of(scene, camera, pair.frame)
         scene.frame_set(int(frame // 1), subframe=float(frame % 1))
         for area in _views(context) if context.window and pair.point else ():
@@ -348,7 +345,7 @@ class ROCKFALL_OT_propose_pairs(bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        count = alignment.propose_here(scene, camera)
+        count = marking.propose_here(scene, camera)
         if not count:
             raise RockfallError("No other pair's point is in the picture here. Mark new pairs in this frame.")
         if count < POSE_PAIRS:
@@ -356,86 +353,23 @@ class ROCKFALL_OT_propose_pairs(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_follow_background(bpy.types.Operator):
+class ROCKFALL_OT_follow_background(job.InBackground, bpy.types.Operator):
     """Follow the background through the whole video and give the camera a pose for each frame; Esc stops it"""
 
     bl_idname = "rockfall.follow_background"
     bl_label = "Follow the Background"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not has_video(cls, context):
-            return False
-        if following.running:
-            cls.poll_message_set("The background is being followed already")
+        if not has_video(cls, context) or not job.is_free(cls):
             return False
         if videos.is_solved(videos.active_camera(context.scene)):
             return True
         cls.poll_message_set("First solve the camera in one frame")
         return False
 
-    @reported
-    def _begin(self, context: bpy.types.Context) -> set[str]:
-        camera = videos.active_camera(context.scene)
-        self._camera, self._scene = camera[store.ID], context.scene.name
-        self._job = following.Job(following.prepare(context.scene, camera))
-        following.running[:] = [self._job]
-        self._job.start()
-        self._timer = context.window_manager.event_timer_add(POLL_S, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        return self._begin(context)
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC" and event.value == "PRESS":
-            self._job.stop()
-        if self._job.stopped:
-            return self._end(context, "Stopped. The camera is as it was.", {"CANCELLED"})
-        if event.type != "TIMER":
-            return {"PASS_THROUGH"}
-        if not self._job.is_done:
-            for area in context.screen.areas:
-                area.tag_redraw()
-            return {"PASS_THROUGH"}
-        if self._job.problem:
-            return self._end(context, self._job.problem, {"CANCELLED"}, "ERROR")
-        scene = bpy.data.scenes.get(self._scene)
-        camera = videos.by_id(scene, self._camera) if scene is not None else None
-        if camera is None:
-            return self._end(context, "The camera is gone: what was followed is not used.", {"CANCELLED"}, "WARNING")
-        return self._end(context, following.apply(scene, camera, self._job.task, self._job.found), {"FINISHED"})
-
-    def _end(self, context: bpy.types.Context, said: str, result: set[str], kind: str = "INFO") -> set[str]:
-        following.running.clear()
-        context.window_manager.event_timer_remove(self._timer)
-        for area in context.screen.areas:
-            area.tag_redraw()
-        self.report({kind}, said)
-        return result
-
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, camera = context.scene, videos.active_camera(context.scene)
-        task = following.prepare(scene, camera)
-        self.report({"INFO"}, following.apply(scene, camera, task, following.compute(task, silent)))
-        return {"FINISHED"}
-
-
-class ROCKFALL_OT_stop_following(bpy.types.Operator):
-    """Stop following the background; the camera stays as it was"""
-
-    bl_idname = "rockfall.stop_following"
-    bl_label = "Stop"
-    bl_options = {"INTERNAL"}
-    looks_only = True
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        for job in following.running:
-            job.stop()
-        return {"FINISHED"}
+    def prepare(self, context: bpy.types.Context) -> job.Work:
+        return following.work(context.scene, videos.active_camera(context.scene))
 
 
 class AlignTool(bpy.types.WorkSpaceTool):
@@ -479,6 +413,5 @@ CLASSES = (
     ROCKFALL_OT_go_to_pair,
     ROCKFALL_OT_propose_pairs,
     ROCKFALL_OT_follow_background,
-    ROCKFALL_OT_stop_following,
 )
 TOOLS = (AlignTool,)

@@ -14,8 +14,9 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ...scene import alignment, problems, store, videos
+from ...scene import alignment, pairs, problems, store, videos
 from ...view import image_view
+from . import marking
 
 TOOL = "rockfall.align_tool"
 RING, CROSS, TEXT, HINT, GAP = 8.0, 6.0, 14.0, 14.0, 12.0  # in pixels at interface scale 1
@@ -84,16 +85,15 @@ def _draw_in_picture(context: bpy.types.Context, camera: bpy.types.Object, recta
     """Marks (rings), where the camera sees their points (crosses), and the residuals between them."""
     scene, settings = context.scene, camera.rockfall_alignment
     scale, size = context.preferences.system.ui_scale, videos.size_of(camera)
-    frame, pairs = videos.true_frame(scene, camera), alignment.pairs_of(camera)
-    solution, chosen = alignment.solution_of(camera), alignment.active_pair(camera)
-    moving = alignment.moves(camera)
-    placed = alignment.is_placed(camera)
-    seen = alignment.reprojections(camera, pairs, frame if moving else None) if placed and pairs else None
-    for number, pair in enumerate(pairs):
-        here = pair.pixel is not None and (not moving or pair.frame == frame)
+    frame, marked = videos.true_frame(scene, camera), pairs.pairs_of(camera)
+    solution, chosen = alignment.solution_of(camera), pairs.active_pair(camera)
+    moves, solved = alignment.moves(camera), videos.is_solved(camera)
+    seen = marking.reprojections(camera, marked, frame if moves else None) if solved and marked else None
+    for number, pair in enumerate(marked):
+        here = pair.pixel is not None and (not moves or pair.frame == frame)
         colour = _colour(pair, solution)
         cross = None
-        if seen is not None and np.isfinite(seen[number]).all() and pair.proposed != alignment.PIXEL:
+        if seen is not None and np.isfinite(seen[number]).all() and pair.proposed != pairs.PIXEL:
             cross = _inside(image_view.to_region(rectangle, size, seen[number]), rectangle)
         if not here:
             if cross is not None and pair.is_complete:
@@ -105,26 +105,24 @@ def _draw_in_picture(context: bpy.types.Context, camera: bpy.types.Object, recta
                 cross = tuple(place[i] + 10 * (cross[i] - place[i]) for i in range(2))
             _lines([[place, cross]], colour, 1.5 * scale)
             _cross(cross, CROSS * scale, colour, scale)
-        _mark(place, pair, colour, scale, dashed=pair.proposed == alignment.PIXEL, chosen=chosen == pair)
+        _mark(place, pair, colour, scale, dashed=pair.proposed == pairs.PIXEL, chosen=chosen == pair)
 
 
 def _draw_on_terrain(context: bpy.types.Context, camera: bpy.types.Object) -> None:
     scale = context.preferences.system.ui_scale
-    solution, chosen = alignment.solution_of(camera), alignment.active_pair(camera)
+    solution, chosen = alignment.solution_of(camera), pairs.active_pair(camera)
     drawn: set[tuple[float, float, float]] = set()
-    for pair in alignment.pairs_of(camera):
+    for pair in pairs.pairs_of(camera):
         if pair.point is None or pair.point in drawn:
             continue
         drawn.add(pair.point)
         place = location_3d_to_region_2d(context.region, context.region_data, Vector(pair.point))
         if place is not None:
             colour = _colour(pair, solution)
-            _mark(_spot(place), pair, colour, scale, dashed=pair.proposed == alignment.POINT, chosen=chosen == pair)
+            _mark(_spot(place), pair, colour, scale, dashed=pair.proposed == pairs.POINT, chosen=chosen == pair)
 
 
-def _mark(
-    place: tuple[float, float], pair: alignment.Pair, colour: Colour, scale: float, *, dashed: bool, chosen: bool
-):
+def _mark(place: tuple[float, float], pair: pairs.Pair, colour: Colour, scale: float, *, dashed: bool, chosen: bool):
     radius = RING * scale
     if chosen:
         _lines(_ring(place, radius + 4 * scale), (1.0, 1.0, 1.0, 0.9), 1.5 * scale)
@@ -133,7 +131,7 @@ def _mark(
     _text(place[0] + GAP * scale, place[1] + 0.5 * GAP * scale, pair.name, colour, TEXT * scale)
 
 
-def _colour(pair: alignment.Pair, solution: alignment.Solution) -> Colour:
+def _colour(pair: pairs.Pair, solution: alignment.Solution) -> Colour:
     if pair.id in solution.wrong:
         return (*WRONG, 1.0)
     return (*palette(pair.colour), 1.0 if pair.enabled else 0.4)
@@ -149,19 +147,19 @@ def palette(number: int) -> tuple[float, float, float]:
 def _draw_hint(context: bpy.types.Context, camera: bpy.types.Object, through: bool) -> None:
     """What to do next; the view that waits for a click has a frame in the pair's colour."""
     scene, region = context.scene, context.region
-    said, pair = alignment.hint(scene, camera), alignment.open_pair(camera)
+    said, pair = alignment.hint(scene, camera), pairs.open_pair(camera)
     if pair is None and alignment.placement(camera) == alignment.BY_PAIRS:
         return  # the panel and the header say what could be better
     scale = context.preferences.system.ui_scale
     colour = (1.0, 1.0, 1.0, 1.0)
     here = True
     if pair is not None:
-        here = (pair.missing == alignment.PIXEL) == through
+        here = (pair.missing == pairs.PIXEL) == through
         colour = (*palette(pair.colour), 1.0)
         if here:
             low, high = 2 * scale, (region.width - 2 * scale, region.height - 2 * scale)
             _lines([[(low, low), (high[0], low), high, (low, high[1]), (low, low)]], colour, 3 * scale)
-    elif not alignment.pairs_of(camera):
+    elif not pairs.pairs_of(camera):
         here = through or not _sees(context, camera)
     if not said or not here:
         return

@@ -5,11 +5,12 @@ import math
 
 import bpy
 
-from ...scene import alignment, georeference, videos
+from ...scene import alignment, georeference, pairs, videos
+from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 from . import following
 
-COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, alignment.COLOURS + 1))
+COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, pairs.COLOURS + 1))
 
 
 class ROCKFALL_UL_pairs(bpy.types.UIList):
@@ -38,7 +39,7 @@ class ROCKFALL_UL_pairs(bpy.types.UIList):
         right = cells.row(align=True)
         right.active = item.enabled
         if item.missing:
-            right.label(text="terrain?" if item.missing == alignment.POINT else "picture?")
+            right.label(text="terrain?" if item.missing == pairs.POINT else "picture?")
         else:
             for value in (item.residual_px, item.residual_m):
                 right.label(text=short(value))
@@ -57,7 +58,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
         camera = videos.active_camera(context.scene)
-        if camera is None or not alignment.is_placed(camera):
+        if camera is None or not videos.is_solved(camera):
             return "TO_DO"
         solution = alignment.solution_of(camera)
         return "ATTENTION" if solution.problem or solution.wrong or following.is_stale(camera) else "READY"
@@ -70,8 +71,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
             return
         settings, solution = camera.rockfall_alignment, alignment.solution_of(camera)
         self._state(context, camera, solution)
-        if following.running:
-            self._progress(context)
+        job.draw(context, layout, "alignment")
         column = layout.column(align=True)
         column.scale_y = 1.3
         column.operator("rockfall.align_views", icon="SPLIT_VERTICAL")
@@ -92,7 +92,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
         elif placed == alignment.FROM_FILE:
             advise(context, layout, True, f"{camera.name} comes from a file.")
         elif placed and not solution.problem:
-            count = sum(pair.is_complete and pair.enabled for pair in alignment.pairs_of(camera))
+            count = sum(pair.enabled for pair in pairs.complete_of(camera))
             good = count - len(solution.wrong)
             fit = f"{good} pairs fit to {solution.rmse_px:.2f} px." if math.isfinite(solution.rmse_px) else ""
             advise(context, layout, True, f"{camera.name} is solved. {fit}")
@@ -101,13 +101,6 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
         show_remarks(context, layout, solution.remarks)
         if next_step:
             advise(context, layout, False, next_step)
-
-    def _progress(self, context: bpy.types.Context) -> None:
-        box = self.layout.box()
-        for job in following.running:
-            box.progress(factor=job.part, text=f"{100 * job.part:.0f} %")
-            paragraph(context, box, f"{job.said}. Esc stops it.", "TIME")
-        box.operator("rockfall.stop_following", icon="CANCEL")
 
     def _pairs(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
         if len(settings.rows):

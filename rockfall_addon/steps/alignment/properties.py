@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the alignment panel shows and edits of a camera. Pairs and solutions are doubles, see `scene.alignment`."""
+"""What the alignment panel shows and edits of a camera. Pairs and solutions are doubles, see `scene`."""
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+
+from ...scene import alignment, footage_blend, store
+from . import marking, solving
 
 
 def _scene_of(camera: bpy.types.Object) -> bpy.types.Scene:
@@ -10,67 +13,47 @@ def _scene_of(camera: bpy.types.Object) -> bpy.types.Scene:
 
 
 def _row_edited(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ...scene import alignment
-
     if self.pair:
         camera = self.id_data
-        alignment.edit(_scene_of(camera), camera, self.pair, name=self.name, enabled=self.enabled)
+        marking.edit(_scene_of(camera), camera, self.pair, name=self.name, enabled=self.enabled)
 
 
 def _solve(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ...scene import alignment
-
-    alignment.solve(_scene_of(self.id_data), self.id_data)
+    solving.solve(_scene_of(self.id_data), self.id_data)
 
 
 def _focal_locked(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ...scene import alignment
-
     if not self.free_focal:
-        alignment.lock_focal(self.id_data)
-    alignment.solve(_scene_of(self.id_data), self.id_data)
+        solving.lock_focal(self.id_data)
+    solving.solve(_scene_of(self.id_data), self.id_data)
 
 
 def _get_focal(self: bpy.types.PropertyGroup) -> float:
-    from ...scene import alignment
-
     return alignment.focal_px(self.id_data)
 
 
 def _set_focal(self: bpy.types.PropertyGroup, value: float) -> None:
-    from ...scene import alignment, store
-
-    alignment.set_focal(_scene_of(self.id_data), self.id_data, store.double(value))
+    solving.set_focal(_scene_of(self.id_data), self.id_data, store.double(value))
 
 
 def _get_focal_mm(self: bpy.types.PropertyGroup) -> float:
-    from ...scene import alignment
-
     return alignment.focal_mm(self.id_data, alignment.focal_px(self.id_data))
 
 
 def _set_focal_mm(self: bpy.types.PropertyGroup, value: float) -> None:
-    from ...scene import alignment, store
-
     camera = self.id_data
-    alignment.set_focal(_scene_of(camera), camera, store.double(value) / alignment.focal_mm(camera, 1.0))
+    solving.set_focal(_scene_of(camera), camera, store.double(value) / alignment.focal_mm(camera, 1.0))
 
 
 def _get_blend(self: bpy.types.PropertyGroup) -> float:
-    from ...scene import footage_blend
-
     return footage_blend.blend_of(self.id_data)
 
 
 def _set_blend(self: bpy.types.PropertyGroup, value: float) -> None:
-    from ...scene import footage_blend
-
     footage_blend.set_blend(self.id_data, value)
 
 
 def _wiped(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ...scene import footage_blend
-
     footage_blend.follow_wipe(self.id_data)
 
 

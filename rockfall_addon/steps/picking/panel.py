@@ -4,7 +4,7 @@
 import bpy
 
 from ...scene import places, problems, sightings, store, videos
-from ...view import pointing
+from ...view import job, pointing
 from ...view.panel import RockfallPanel, State, advise, paragraph
 from . import editing
 
@@ -95,6 +95,7 @@ class ROCKFALL_PT_tracking(RockfallPanel, bpy.types.Panel):
         if not settings.whole_video:
             column.prop(settings, "track_frames")
         layout.operator("rockfall.track_block", icon="TRACKING")
+        job.draw(context, layout, "picking")
         row = layout.row(align=True)
         row.operator("rockfall.propose_impacts", icon="OUTLINER_OB_LIGHTPROBE")
         row.operator("rockfall.clear_track", text="", icon="X")

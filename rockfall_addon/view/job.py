@@ -64,12 +64,17 @@ class Job:
     @property
     def line(self) -> str:
         """Where the work is."""
-        return f"{self.text}: {self.done} of {self.total}" if self.total else f"{self.text} …"
+        return f"{self.text}: {self.done} of {self.total}." if self.total else f"{self.text} …"
 
     @property
     def share(self) -> float:
         """How much of the present part of the work is done."""
         return self.done / self.total if self.total else 0.0
+
+    @property
+    def percent(self) -> str:
+        """The same in words."""
+        return f"{100 * self.share:.0f} %" if self.total else ""
 
     def stop(self) -> None:
         """End at the next word of progress."""
@@ -203,7 +208,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str) -> N
     for job in _running:
         if job.work.step == step:
             box = layout.box()
-            box.progress(factor=job.share, text=f"{100 * job.share:.0f} %" if job.total else "")
+            box.progress(factor=job.share, text=job.percent)
             paragraph(context, box, f"{job.line}  Esc stops it.", "TIME")
             box.operator("rockfall.stop_job", text="Stop", icon="CANCEL")
     for other, words in _ended:
@@ -233,8 +238,13 @@ def _end(job: Job, words: str, *, is_problem: bool = False) -> None:
     if is_problem:
         _ended.append((job.work.step, words))
         print(f"Rockfall: {words}")
-    _in_window(lambda window: window.workspace.status_text_set(words))
+    _in_window(lambda window: _say(window, words))
     bpy.app.timers.register(_clear_status, first_interval=LINGER_S, persistent=True)
+
+
+def _say(window: bpy.types.Window, words: str) -> None:
+    window.workspace.status_text_set(words)
+    redraw(bpy.context)
 
 
 def _show_progress(window: bpy.types.Window) -> None:
@@ -248,10 +258,11 @@ def _show_progress(window: bpy.types.Window) -> None:
 
 def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
     for job in _running:
-        row = header.layout.row()
-        row.progress(factor=job.share, text=job.line)
-        row.operator("rockfall.stop_job", text="", icon="CANCEL", emboss=False)
-        row.label(text="Esc stops it")
+        bar = header.layout.row()
+        bar.ui_units_x = 8
+        bar.progress(factor=job.share, text=job.percent)
+        header.layout.operator("rockfall.stop_job", text="", icon="CANCEL", emboss=False)
+        header.layout.label(text=f"{job.line}  Esc stops it.")
 
 
 def _clear_status() -> None:
@@ -266,7 +277,6 @@ def _in_window(action: Callable[[bpy.types.Window], object]) -> None:
         return
     with bpy.context.temp_override(window=manager.windows[0]):
         action(manager.windows[0])
-        redraw(bpy.context)
 
 
 def register() -> None:

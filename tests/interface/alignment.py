@@ -94,7 +94,7 @@ def sidebar(window, shown):
 
 def case_align_with_clicks(window):
     yield from start(window)
-    aligned, videos = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "videos"))
+    aligned, pairs, videos = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs", "videos"))
     ground = table(window)
     look_at(window, ground.point)
     yield 1.0
@@ -108,14 +108,14 @@ def case_align_with_clicks(window):
         if count == 0:
             yield 0.5
             window.screenshot("2-half-pair")
-        pair = aligned.open_pair(the_camera(window))
+        pair = pairs.open_pair(the_camera(window))
         assert pair is not None, f"pair {count} is open"
         if count < 5:
             yield from window.click(*second)
-            assert aligned.open_pair(the_camera(window)) is None, f"pair {count} is complete"
+            assert pairs.open_pair(the_camera(window)) is None, f"pair {count} is complete"
     camera = the_camera(window)
     assert videos.is_solved(camera), aligned.solution_of(camera).problem
-    pair = aligned.open_pair(camera)
+    pair = pairs.open_pair(camera)
     assert pair.proposed == "pixel", "five pairs solve the camera, so the sixth is predicted"
     yield 1.0
     window.screenshot("3-predicted")
@@ -132,12 +132,10 @@ def case_align_with_clicks(window):
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(goal[0]), y=round(goal[1]))
     yield 0.5
     camera = the_camera(window)
-    assert aligned.open_pair(camera) is None
-    assert sum(pair.is_complete for pair in aligned.pairs_of(camera)) == 6
+    assert pairs.open_pair(camera) is None
+    assert sum(pair.is_complete for pair in pairs.pairs_of(camera)) == 6
     focal, rmse = aligned.focal_px(camera), aligned.solution_of(camera).rmse_px
-    print(
-        f"focal {focal:.0f} px, rmse {rmse:.2f} px, {[remark.text for remark in aligned.solution_of(camera).remarks]}"
-    )
+    print(f"focal {focal:.0f} px, rmse {rmse:.2f} px, {' '.join(map(str, aligned.solution_of(camera).remarks))}")
     yield from sidebar(window, True)
     camera = the_camera(window)
     camera.rockfall_alignment.blend = 0.5
@@ -154,26 +152,26 @@ def case_align_with_clicks(window):
     for left in (6, 5):
         yield from window.press("X", *in_picture(window, (640, 600)))
         yield 0.5
-        assert len(aligned.pairs_of(the_camera(window))) == left - 1
+        assert len(pairs.pairs_of(the_camera(window))) == left - 1
     for expected in (5, 6):
         with window.override():
             bpy.ops.ed.undo()
         yield 0.7
-        assert len(aligned.pairs_of(the_camera(window))) == expected
+        assert len(pairs.pairs_of(the_camera(window))) == expected
     assert len(the_camera(window).rockfall_alignment.rows) == 6
     assert abs(aligned.focal_px(the_camera(window)) - focal) < 1e-6, "undo brings the solution back"
     for _ in range(2):
         with window.override():
             bpy.ops.ed.undo()
         yield 0.7
-    assert aligned.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
+    assert pairs.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
     assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
 
 
 def case_align_by_eye(window):
     """Footage that cannot be solved: the view is taken; then terrain that shines through is dragged into place."""
     yield from start(window)
-    aligned = window.part("rockfall_addon.scene.alignment")
+    aligned, pairs = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs"))
     ground = table(window)
     yield from sidebar(window, False)
     window.window.cursor_warp(800, 500)
@@ -195,7 +193,7 @@ def case_align_by_eye(window):
     window.screenshot("1-by-eye")
     x, y = in_picture(window, (640, 360))
     yield from window.click(x, y, shift=True)
-    pair = aligned.open_pair(the_camera(window))
+    pair = pairs.open_pair(the_camera(window))
     assert pair.proposed == "pixel"
     assert np.allclose(pair.pixel, (640, 360), atol=2), "what shines through there"
     surface = window.part("rockfall_addon.scene.terrain").surface_of_scene(bpy.context.scene)
@@ -207,12 +205,68 @@ def case_align_by_eye(window):
     yield 0.3
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x) + 100, y=round(y))
     yield 0.5
-    pair = aligned.pairs_of(the_camera(window))[0]
+    pair = pairs.pairs_of(the_camera(window))[0]
     assert pair.is_complete
     width = in_picture(window, (1280, 0))[0] - in_picture(window, (0, 0))[0]
     assert abs(pair.pixel[0] - 640 - 10 * 1280 / width) < 3, "Shift moves a tenth"
     yield from sidebar(window, True)
     window.screenshot("2-one-pair")
+
+
+def held(window, place):
+    """Press the mouse, and leave it."""
+    yield from window.move(*place)
+    window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(place[0]), y=round(place[1]))
+    yield 0.3
+
+
+def let_go(window, place):
+    window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(place[0]), y=round(place[1]))
+    yield 0.3
+
+
+def seen_state(window):
+    """What Esc must bring back: pairs, and the camera as it is kept and as Blender has it."""
+    camera = the_camera(window)
+    keys = ("rockfall_solved", "rockfall_placed", "rockfall_camera", "rockfall_reference_pose")
+    kept = [
+        repr(camera[key].to_list() if hasattr(camera[key], "to_list") else camera[key]) for key in keys if key in camera
+    ]
+    marked = [repr(pair.to_dict()) for pair in camera.get("rockfall_pairs", ())]
+    return marked, kept, [tuple(row) for row in camera.matrix_world], camera.data.lens
+
+
+def case_align_escape(window):
+    """Esc while a mark is held takes it back, and the camera that was solved with it."""
+    yield from start(window)
+    videos, ground = window.part("rockfall_addon.scene.videos"), table(window)
+    look_at(window, ground.point)
+    yield from sidebar(window, False)
+    for i in (1, 4, 7, 11):
+        yield from window.click(*in_picture(window, ground.pixel[i]))
+        yield from window.click(*on_terrain(window, ground.point[i]))
+    yield from window.click(*in_picture(window, ground.pixel[5]))
+    yield 0.5
+    before, place = seen_state(window), on_terrain(window, ground.point[5])
+    assert not videos.is_solved(the_camera(window))
+    yield from held(window, place)
+    assert videos.is_solved(the_camera(window)), "the fifth pair solves the camera"
+    yield from window.press("ESC", *place)
+    yield from let_go(window, place)
+    assert seen_state(window) == before
+    yield from window.click(*place)
+    yield 0.5
+    before = seen_state(window)
+    assert videos.is_solved(the_camera(window))
+    x, y = in_picture(window, ground.pixel[7])
+    yield from held(window, (x, y))
+    yield from window.move(x + 60, y - 20)
+    assert seen_state(window) != before
+    yield from window.press("ESC", x + 60, y - 20)
+    yield from let_go(window, (x + 60, y - 20))
+    assert seen_state(window) == before
+    yield 0.5
+    window.screenshot("1-as-before")
 
 
 def case_align_follow_hand_held(window):
@@ -224,20 +278,20 @@ def case_align_follow_hand_held(window):
     camera.rockfall_alignment.motion = "ROTATION"
     yield 1.0
     window.screenshot("1-imported")
-    following = window.part("rockfall_addon.steps.alignment.following")
+    job = window.part("rockfall_addon.view.job")
     with window.override():
         bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
-    yield 1.5
-    assert following.running
+    yield 4.0
+    assert job.is_running()
     window.screenshot("2-running")
     yield from window.press("ESC", *window.centre())
     yield 1.0
-    assert not following.running
+    assert not job.is_running()
     assert len(the_camera(window)["rockfall_pose_times_s"]) == 1
     begun = time.perf_counter()
     with window.override():
         bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
-    yield from window.wait_for(lambda: not following.running, 150, "followed")
+    yield from window.wait_for(lambda: not job.is_running(), 150, "followed")
     print(f"followed in {time.perf_counter() - begun:.1f} s")
     yield 1.0
     assert len(the_camera(window)["rockfall_pose_times_s"]) == 300

@@ -311,20 +311,25 @@ def case_pick_track_the_block(window):
     assert sightings.seen_in(camera, "B10").frame.tolist() == [70, 100]
     scene.rockfall_picking.whole_video, scene.rockfall_picking.track_frames = False, 55
 
-    def running():
-        return any(one.bl_idname == "ROCKFALL_OT_track_block" for one in window.window.modal_operators)
-
+    job = window.part("rockfall_addon.view.job")
     with window.override():
-        assert bpy.ops.rockfall.track_block("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+        bpy.ops.rockfall.track_block("INVOKE_DEFAULT")
     yield 1.0
-    assert running()
+    assert job.is_running()
+    assert not bpy.ops.rockfall.track_block.poll(), "one at a time"
     window.screenshot("running")
     yield from window.press("ESC", x, y)
-    yield from window.wait_for(lambda: not running(), 60.0, "tracking stops")
+    yield from window.wait_for(lambda: not job.is_running(), 60.0, "tracking stops")
     assert len(sightings.seen_in(camera, "B10")) == 2, "nothing has changed"
     with window.override():
-        assert bpy.ops.rockfall.track_block("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    yield from window.wait_for(lambda: not running(), 150.0, "tracking ends")
+        bpy.ops.rockfall.track_block("INVOKE_DEFAULT")
+    other = bpy.data.scenes.new("Other")
+    window.window.scene = other
+    yield from window.wait_for(lambda: not job.is_running(), 150.0, "tracking ends")
+    window.window.scene = scene
+    bpy.data.scenes.remove(other)
+    yield 0.5
+    camera = camera_of(window)
     seen = sightings.seen_in(camera, "B10")
     assert len(seen) > 60, len(seen)
     with window.override():

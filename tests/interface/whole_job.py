@@ -75,14 +75,15 @@ def import_demo(window):
 
 def align(window):
     """Six pairs: five of two clicks; of the sixth, the predicted mark is dragged to where the place is seen."""
-    aligned, ground = window.part("rockfall_addon.scene.alignment"), aligning.table(window)
+    aligned, pairs = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs"))
+    ground = aligning.table(window)
     for count, i in enumerate(PAIRS):
         aligning.look_at(window, ground.point[[i]])
         aligning.views(window)[1].spaces.active.region_3d.view_distance = NEAR_M
         yield 0.7
         goal, place = aligning.in_picture(window, ground.pixel[i]), aligning.on_terrain(window, ground.point[i])
         yield from window.click(*place)
-        pair = aligned.open_pair(aligning.the_camera(window))
+        pair = pairs.open_pair(aligning.the_camera(window))
         assert pair is not None, f"pair {count} is open"
         if count + 1 < len(PAIRS):
             yield from window.click(*goal)
@@ -90,10 +91,10 @@ def align(window):
             assert pair.proposed == "pixel", "five pairs solve the camera, so the sixth is predicted"
             window.screenshot("3-predicted")
             yield from drag(window, aligning.in_picture(window, pair.pixel), goal)
-        assert aligned.open_pair(aligning.the_camera(window)) is None, f"pair {count} is complete"
+        assert pairs.open_pair(aligning.the_camera(window)) is None, f"pair {count} is complete"
     camera = aligning.the_camera(window)
     assert window.part("rockfall_addon.scene.videos").is_solved(camera), aligned.solution_of(camera).problem
-    assert sum(pair.is_complete for pair in aligned.pairs_of(camera)) == len(PAIRS)
+    assert sum(pair.is_complete for pair in pairs.pairs_of(camera)) == len(PAIRS)
     focal = aligned.focal_px(camera)
     print(f"focal length {focal:.0f} px, {aligned.solution_of(camera).rmse_px:.2f} px left")
     assert abs(focal / FOCAL_PX - 1) < 0.03, focal
@@ -119,11 +120,11 @@ def follow(window):
     """The camera was held by hand: from the pairs of frame 0 through the video."""
     aligning.the_camera(window).rockfall_alignment.motion = "ROTATION"
     yield 0.5
-    begun, following = time.perf_counter(), window.part("rockfall_addon.steps.alignment.following")
+    begun, job = time.perf_counter(), window.part("rockfall_addon.view.job")
     with in_left_view(window):
         bpy.ops.rockfall.follow_background("INVOKE_DEFAULT")
     yield 1.0
-    yield from window.wait_for(lambda: not following.running, 150, "followed")
+    yield from window.wait_for(lambda: not job.is_running(), 150, "followed")
     print(f"background followed in {time.perf_counter() - begun:.0f} s")
     assert len(aligning.the_camera(window)["rockfall_pose_times_s"]) == 300
     with in_left_view(window):

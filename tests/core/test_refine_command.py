@@ -8,7 +8,7 @@ import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
 from rockfall.core.camera.path import CameraPath, fixed
 from rockfall.core.cli import main
-from rockfall.core.errors import RockfallError
+from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.cameras import read_camera, write_camera
 from rockfall.core.exchange.csv_text import read_table
 from rockfall.core.exchange.footage import open_footage, picks_from_footage
@@ -288,6 +288,10 @@ def test_a_slow_motion_file_runs_at_its_capture_rate(site, tmp_path):
     assert footage.videos[1].clock.rate == pytest.approx(1.0, abs=1e-12)
     change(site, "capture_rate_hz = 50.0", "capture_rate_hz = 400")
     assert open_footage(read_project(site / "project.toml")).videos[1].clock.rate == pytest.approx(1 / 8)
+    without = [",".join([row[0], *row[2:]]) for row in (lines[0].split(","), *slow)]
+    (site / "right.csv").write_text("\n".join(without) + "\n")
+    with pytest.raises(InputError, match="Video right has a capture rate, but nothing tells the rate of its file"):
+        open_footage(read_project(site / "project.toml"))
 
 
 def test_a_camera_that_is_a_little_off_is_put_right(site, tmp_path):

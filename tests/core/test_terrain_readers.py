@@ -14,7 +14,7 @@ from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
 from rockfall.core.terrain.meshes import read_obj
-from rockfall.core.terrain.readers import inspect_terrain, read_terrain
+from rockfall.core.terrain.readers import READERS, inspect_terrain, read_terrain
 from rockfall.core.terrain.writers import write_ply
 
 DATA = Path(__file__).parents[1] / "data"
@@ -332,6 +332,32 @@ def test_the_first_of_several_bands_of_a_geotiff_is_the_height(tmp_path, layout)
     source = geotiff_module.read_geotiff(geotiff(tmp_path / "a.tif", bands, [SCALE, TIEPOINT], **options))
     np.testing.assert_array_equal(source.points[:, 2].reshape(5, 6), first)
     assert "The first of 3 bands is taken as the height." in source.notes
+
+
+@pytest.mark.parametrize(
+    ("trouble", "told"),
+    [
+        (
+            PermissionError(13, "Permission denied"),
+            "The file cannot be read .*Permission denied.*Check its permissions",
+        ),
+        (MemoryError(), "The file is too large for the memory. Reduce it first"),
+    ],
+)
+def test_troubles_of_the_system_are_refusals_too(tmp_path, monkeypatch, trouble, told):
+    def read(path):
+        raise trouble
+
+    monkeypatch.setitem(READERS, ".ply", read)
+    path = write(tmp_path / "a.ply", "ply\n")
+    with pytest.raises(InputError, match=rf"a\.ply: {told}"):
+        read_terrain(path)
+
+
+def test_a_nodata_value_of_a_geotiff_that_is_no_number_is_refused(tmp_path):
+    geotiff(tmp_path / "a.tif", HEIGHTS, [SCALE, TIEPOINT, (42113, 2, "none")])
+    with pytest.raises(InputError, match=r'a\.tif: The NODATA value "none" is not a number'):
+        read_terrain(tmp_path / "a.tif")
 
 
 def test_geotiff_pixel_is_point_nodata_and_transformation(tmp_path):

@@ -4,7 +4,12 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+import numpy as np
+
+from .errors import InputError
 
 FFMPEG_QUIET = "-8"
 
@@ -27,3 +32,18 @@ def quiet_opencv() -> Iterator[Any]:
         yield cv2
     finally:
         cv2.utils.logging.setLogLevel(level)
+
+
+def write_picture(path: Path, picture: np.ndarray) -> None:
+    """Write a picture, (h, w, 3) BGR or (h, w) uint8, in the format of the file's name.
+
+    Raises
+    ------
+    InputError : there is no such format.
+    """
+    with quiet_opencv() as cv2:
+        try:
+            _, data = cv2.imencode(path.suffix, picture)
+        except cv2.error as error:
+            raise InputError("This is no name of a picture", file=path, advice="Write it as .png") from error
+    path.write_bytes(data.tobytes())

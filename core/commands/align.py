@@ -210,8 +210,9 @@ def _on_terrain(pairs: "Pairs", surface: "Surface") -> list[str]:
 def _draw(
     path: Path, video: "Video", frame: int, pairs: "Pairs", residual_px: Array, used: "Mask", shown: "Mask"
 ) -> None:
-    from ..footage.pair_picture import draw_pairs, write_picture
+    from ..footage.pair_picture import draw_pairs
     from ..footage.video import read_frame
+    from ..opencv import write_picture
 
     marked = pairs.pixel[shown]
     picture = draw_pairs(

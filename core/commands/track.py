@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..footage.pictures import draw_track
     from ..footage.tracking import track_block
     from ..footage.video import open_video
-    from ..opencv import opencv
+    from ..opencv import write_picture
 
     clicks, name = _clicks(arguments)
     with PrintedProgress() as progress:
@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
             progress("Drawing the picture")
             labels = [f"{time:.3f} s" for time in kinks.time_s]
             picture = draw_track(video, track, motion, kinks, labels, clicks[0][0])
-            (folder / "track.png").write_bytes(opencv().imencode(".png", picture)[1].tobytes())
+            write_picture(folder / "track.png", picture)
     _tell(arguments, track, motion, kinks, events)
     return 0
 

@@ -73,7 +73,7 @@ def container_of(path: Path) -> str:
         return BRANDS.get(head[8:12], name)
     if name == "Matroska":
         return "WebM" if b"webm" in head[:64] else name
-    if not name and any(head[start : start + 376 : 188] == b"GG" for start in (0, 4)):
+    if not name and any(head[start : start + 2 * size : size] == b"GG" for start, size in ((0, 188), (4, 192))):
         return "MPEG transport stream"
     return name
 

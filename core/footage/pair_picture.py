@@ -2,11 +2,9 @@
 """The check of a solved camera: marked and re-projected pairs on a frame of the video."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
 from ..opencv import opencv
 from ..vectors import Array
 
@@ -44,20 +42,6 @@ def draw_pairs(
                 for arm in ((6 * unit, 0.0), (0.0, 6 * unit)):
                     cv2.line(shown, _fixed(found - arm), _fixed(found + arm), cross, thick, cv2.LINE_AA, FINE)
     return shown
-
-
-def write_picture(path: str | Path, picture: np.ndarray) -> None:
-    """Write a picture, in the format of the file's name.
-
-    Raises
-    ------
-    InputError : it cannot be written.
-    """
-    path = Path(path)
-    done, data = opencv().imencode(path.suffix, picture)
-    if not done:
-        raise InputError(f"The picture cannot be written as {path.suffix}", file=path, advice="Write it as .png")
-    path.write_bytes(data.tobytes())
 
 
 def _fixed(place: Array) -> tuple[int, int]:

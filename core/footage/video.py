@@ -306,10 +306,8 @@ def _described(path: Path) -> Video:
     InputError : there is no picture.
     """
     cv2, capture = opencv(), _capture(path)
-    if not _grab(capture):
-        raise _no_picture(path)
-    there, picture = capture.retrieve()
-    if not there:
+    picture: Any = capture.retrieve()[1] if _grab(capture) else None
+    if picture is None:
         raise _no_picture(path)
     rate, frames = capture.get(cv2.CAP_PROP_FPS), capture.get(cv2.CAP_PROP_FRAME_COUNT)
     across, up = capture.get(cv2.CAP_PROP_SAR_NUM), capture.get(cv2.CAP_PROP_SAR_DEN)
@@ -426,6 +424,7 @@ def _capture(path: Path) -> Any:
     """
     capture = _opened(path, [])
     if not capture.isOpened():
+        _refuse_other_files(path)
         raise _no_picture(path)
     return capture
 

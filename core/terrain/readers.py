@@ -253,8 +253,6 @@ def _cleaned(meshed: triangulation.Meshed, kind: str) -> tuple[Array, NDArray[np
     vertices, faces, loose = cleaning.drop_loose(vertices, faces)
     if loose:
         notes.append(f"Left out {loose:,} points that no triangle uses.")
-    if len(np.unique(faces[:1000])) < 3:
-        raise InputError("The surface has fewer than 3 points", advice="Check the export")
     oriented = winding.orient(vertices, faces, bool(any_up), bool(any_down), float(total[2]))
     if oriented.flipped:
         notes.append(f"Turned {oriented.flipped:,} of {len(faces):,} faces, so that normals point out of the ground.")

@@ -5,8 +5,9 @@ import cv2
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.footage.background import background_motion, destabilise, no_motion, stabilise
+from rockfall.core.footage.background import _fit, background_motion, destabilise, no_motion, stabilise
 from rockfall.core.footage.sources import Pictures
+from scipy.optimize import least_squares
 
 SIZE = (400, 300)
 CORNER = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
@@ -75,6 +76,26 @@ def test_hand_held_panning_is_followed_without_drift() -> None:
     assert len(apart) > 50  # corners that last
     assert np.median(apart) < 0.1
     assert motion.inliers.min() > 100
+
+
+def test_a_homography_is_the_least_squares_fit_to_the_corners_that_agree() -> None:
+    rng = np.random.default_rng(2)
+    reference = rng.uniform(0, 400, (120, 2))
+    true = np.array([[1.02, -0.01, 8.0], [0.015, 0.99, -5.0], [2e-5, 1e-5, 1.0]])
+    moved = np.column_stack([reference, np.ones(120)]) @ np.linalg.inv(true).T
+    pixel = moved[:, :2] / moved[:, 2:] + rng.normal(0, 0.2, (120, 2))
+    pixel[::6] += rng.uniform(8, 40, (20, 2))
+    homography, agrees = _fit(pixel, reference)
+    assert not agrees[::6].any()
+    assert agrees.sum() > 90
+
+    def residual(values: np.ndarray) -> np.ndarray:
+        found = np.column_stack([pixel[agrees], np.ones(agrees.sum())]) @ np.append(values, 1.0).reshape(3, 3).T
+        return (found[:, :2] / found[:, 2:] - reference[agrees]).ravel()
+
+    best = least_squares(residual, (true / true[2, 2]).ravel()[:8], x_scale="jac", xtol=1e-15, ftol=1e-15)
+    found = residual((homography / homography[2, 2]).ravel()[:8])
+    assert found @ found == pytest.approx(2 * best.cost, rel=1e-4)
 
 
 def test_a_tripod_is_the_identity() -> None:

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import rockfall
 from rockfall.core.errors import InputError
+from rockfall.core.footage import tracking_steps
 from rockfall.core.footage.background import no_motion
 from rockfall.core.footage.kinks import find_kinks
 from rockfall.core.footage.sources import Pictures
+from rockfall.core.footage.templates import Sighting, fit
 from rockfall.core.footage.tracking import BlockTrack, track_block
 from rockfall.core.footage.video import open_video
 
@@ -226,6 +228,37 @@ def test_clicks_that_hit_nothing(frame: int, pixel: tuple[float, float], says: s
     pictures, _ = film(Clip())
     with pytest.raises(InputError, match=says):
         track_block(pictures, frame, pixel, background=no_motion(0, 47))
+
+
+@pytest.mark.parametrize(("first", "last"), [(-1, 20), (0, 48), (21, 20)])
+def test_frames_that_are_not_in_the_video(first: int, last: int) -> None:
+    pictures, _ = film(Clip())
+    with pytest.raises(InputError, match=rf"^Frames {first} to {last} are not in the video, .* the frames 0 to 47"):
+        track_block(pictures, 20, (100.0, 100.0), first=first, last=last, background=no_motion(0, 47))
+
+
+def test_a_block_that_fills_the_picture_needs_its_diameter() -> None:
+    clip = Clip(diameter=90.0)
+    with pytest.raises(InputError, match=r"in frame 10 is 90 pixels large\. Give the block's diameter in pixels"):
+        follow(clip, frame=10)
+
+
+@pytest.mark.parametrize("contrast", [2.9, 3.1])
+def test_a_block_that_hardly_stands_out_at_its_click(monkeypatch: pytest.MonkeyPatch, contrast: float) -> None:
+    """At the click three standard deviations of a pixel are needed, elsewhere two."""
+
+    def weak(*arguments: object) -> Sighting | None:
+        seen = fit(*arguments)  # type: ignore[arg-type]
+        return None if seen is None else replace(seen, contrast=contrast)
+
+    monkeypatch.setattr(tracking_steps, "fit", weak)
+    if contrast > 3:
+        assert follow(Clip(frames=24))[0].frame.size == 24
+    else:
+        with pytest.raises(
+            InputError, match=r"^The block hardly stands out from the background in frame 20\. Click on"
+        ):
+            follow(Clip(frames=24))
 
 
 def test_the_filmed_ball() -> None:

@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 import rockfall.core.footage.video as module
 from rockfall.core.errors import InputError
+from rockfall.core.footage.containers import container_of
 from rockfall.core.footage.video import frame_at, open_video, read_frame, read_frames
 from rockfall.core.opencv import FFMPEG_QUIET
 
@@ -223,6 +225,25 @@ def test_a_file_that_was_damaged_since(tmp_path):
         read_frame(video, 66)
 
 
+def refused(path, says):
+    """The refusal of a video; what it says is compared behind the file's path, which holds the name of the test."""
+    with pytest.raises(InputError) as caught:
+        open_video(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert re.search(says, message.removeprefix(str(path)))
+
+
+def test_a_file_that_is_gone_since(tmp_path):
+    path = tmp_path / "film.mp4"
+    path.write_bytes((FOLDER / "constant.mp4").read_bytes())
+    video = open_video(path)
+    path.unlink()
+    with pytest.raises(InputError) as caught:
+        read_frame(video, 3)
+    assert str(caught.value) == f"{path}: There is no such file. Check the path."
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [
@@ -237,8 +258,7 @@ def test_a_file_that_was_damaged_since(tmp_path):
     ],
 )
 def test_what_cannot_be_used_is_named(name, says, capfd):
-    with pytest.raises(InputError, match=says):
-        open_video(FOLDER / name)
+    refused(FOLDER / name, says)
     assert capfd.readouterr().err == ""
 
 
@@ -246,10 +266,60 @@ def test_empty_files_and_pictures_are_named(tmp_path):
     empty, still = tmp_path / "empty.mp4", tmp_path / "still.mp4"
     empty.touch()
     still.write_bytes(cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
-    with pytest.raises(InputError, match="empty"):
-        open_video(empty)
-    with pytest.raises(InputError, match=r"picture file \(PNG\)"):
-        open_video(still)
+    refused(empty, "The file is empty")
+    refused(still, r"This is a picture file \(PNG\), not a video")
+
+
+def test_a_video_whose_pictures_are_all_damaged(tmp_path):
+    path = tmp_path / "zeros.mp4"
+    data = bytearray((FOLDER / "constant.mp4").read_bytes())
+    begin = data.index(b"mdat") + 4
+    size = int.from_bytes(data[begin - 8 : begin - 4], "big") - 8
+    data[begin : begin + size] = bytes(size)
+    path.write_bytes(data)
+    refused(path, "No picture can be decoded: the video is in H.264, which is damaged or not supported here")
+
+
+def test_timestamps_that_run_backwards(tmp_path):
+    """The time of one Matroska block, two bytes behind its track number, is set back."""
+    path = tmp_path / "back.webm"
+    data = bytearray((FOLDER / "vp9.webm").read_bytes())
+    times = [(at, int.from_bytes(data[at : at + 2], "big")) for at in block_times(data)]
+    at, time = times[8]
+    data[at : at + 2] = (time - 200).to_bytes(2, "big")
+    path.write_bytes(data)
+    refused(path, "The timestamps run backwards. Convert it with ffmpeg -i back.webm")
+
+
+def block_times(data):
+    """Where the times of the blocks stand: element A3, its size in one to four bytes, track 1."""
+    for at in range(len(data) - 6):
+        length = 9 - data[at + 1].bit_length()
+        if data[at] == 0xA3 and length <= 4 and data[at + 1 + length] == 0x81:
+            yield at + 2 + length
+
+
+def test_a_picture_that_cannot_be_decoded_although_it_is_there(monkeypatch):
+    class Capture:
+        def retrieve(self):
+            return False, None
+
+    video = open_video(FOLDER / "constant.mp4")
+    monkeypatch.setattr(module, "_grabbed", lambda *_: iter([(3, Capture())]))
+    with pytest.raises(InputError, match=r"Frame 3 at 0\.100 s cannot be decoded: the file is damaged there"):
+        read_frame(video, 3)
+
+
+def test_transport_streams_of_recorders_and_of_cameras(tmp_path):
+    """Packets of 188 bytes, and of 192 with a time in front of each."""
+    assert open_video(FOLDER / "open_groups.ts").container == "MPEG transport stream"
+    data = (FOLDER / "open_groups.ts").read_bytes()
+    camera = tmp_path / "camera.m2ts"
+    camera.write_bytes(b"".join(b"\0\0\1\2" + data[at : at + 188] for at in range(0, len(data), 188)))
+    assert open_video(camera).container == "MPEG transport stream"
+    other = tmp_path / "other.ts"
+    other.write_bytes(b"G" + bytes(1000))
+    assert container_of(other) == ""
 
 
 def test_other_letters_in_the_name(tmp_path):

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``rockfall inspect``: what it says, writes and refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rockfall.core.cli import main
+from rockfall.core.commands.inspect import _timing
+from rockfall.core.footage.video import open_video
 
 FOLDER = Path(__file__).parent.parent / "data" / "videos"
 
@@ -26,6 +29,31 @@ def test_it_tells_what_there_is(capsys):
     assert "2 missing after frame 9 at" in said
     assert "3 frames are missing in 2 gaps" in said
     assert "motion" not in said
+
+
+def test_rates_and_the_first_of_many_gaps():
+    """100 frames at 30 a second, of which some are missing after seven of them."""
+    step = np.full(99, 1 / 30)
+    step[[10, 20, 31, 47, 58, 70, 88]] += np.array([1, 2, 1, 3, 1, 1, 5]) / 30
+    video = replace(open_video(FOLDER / "constant.mp4"), time_s=1.5 + np.r_[0, np.cumsum(step)])
+    rows = dict(_timing(video, None))
+    assert rows["rate"] == "30 frames a second, constant (lowest 5, median 30, highest 30); announced 30"
+    assert rows["duration"] == "3.800 s, frames from 1.500 to 5.267 s"
+    assert rows["gaps"].split("; ") == [
+        "1 missing after frame 10 at 1.833 s",
+        "2 missing after frame 20 at 2.200 s",
+        "1 missing after frame 31 at 2.633 s",
+        "3 missing after frame 47 at 3.200 s",
+        "1 missing after frame 58 at 3.667 s",
+        "and 2 more gaps",
+    ]
+    five = replace(video, time_s=video.time_s[:60])
+    assert dict(_timing(five, None))["gaps"].endswith("; 1 missing after frame 58 at 3.667 s")
+    assert dict(_timing(replace(video, time_s=video.time_s[:5]), None))["gaps"] == "none"
+    doubled = replace(video, time_s=np.repeat(np.arange(20) / 8, 2) + np.tile([0, 0.05], 20))
+    assert (
+        "(lowest 13.33, median 20, highest 20, times rounded to milliseconds)" in dict(_timing(doubled, None))["rate"]
+    )
 
 
 def test_rotation_and_slow_motion(capsys):

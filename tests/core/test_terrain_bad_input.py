@@ -15,27 +15,48 @@ from rockfall.core.terrain.readers import EXTENSIONS, inspect_terrain, read_terr
 DATA = Path(__file__).parents[1] / "data"
 HEADER = "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
 FACES = "element face {}\nproperty list uchar int vertex_indices\n"
+TEXTURE = "property list uchar int texture\n"
 ONE_FACE = HEADER.format(4) + FACES.format(1) + "end_header\n"
 SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
 
 
 def refused(path: Path, match: str, **options) -> str:
-    with pytest.raises(InputError, match=match) as caught:
+    """What the refusal says after the file's path, which holds the name of the test."""
+    with pytest.raises(InputError) as caught:
         read_terrain(path, **options)
     message = str(caught.value)
     assert message.startswith(str(path)), message
-    return message
+    said = message.removeprefix(str(path))
+    assert re.search(match, said), said
+    return said
+
+
+TEXTS = (".obj", ".asc", ".xyz", ".txt", ".csv")
+FOREIGN = {
+    ".ply": 'Not a PLY file: it does not begin with "ply"',
+    ".obj": "The OBJ file has no vertices",
+    ".stl": "truncated or not STL|Not an STL file",
+    ".gltf": "The glTF file cannot be read",
+    ".glb": 'Not a GLB file: it does not begin with "glTF"',
+    ".asc": "is no header line of an ESRI ASCII grid|The header has no ncols",
+    ".xyz": "names no x, y and z|is not a number",
+    ".tif": "The TIFF file cannot be read",
+    ".tiff": "The TIFF file cannot be read",
+    ".las": 'Not a LAS file: it does not begin with "LASF"',
+    ".laz": 'Not a LAS file: it does not begin with "LASF"',
+}
 
 
 @pytest.mark.parametrize("extension", EXTENSIONS)
 def test_empty_or_foreign_files(tmp_path, extension):
     path = tmp_path / f"a{extension}"
     path.write_bytes(b"")
-    refused(path, "empty")
+    refused(path, "^: The file is empty")
     for data in (b"\0\1\2\3" * 200, b"hello there\n" * 20, b"P", b"\xff" * 5000):
         path.write_bytes(data)
-        refused(path, ".")
-        with pytest.raises(InputError):
+        binary = data.startswith(b"\0") and extension in TEXTS
+        said = refused(path, "The file is not text" if binary else FOREIGN.get(extension, FOREIGN[".xyz"]))
+        with pytest.raises(InputError, match=re.escape(said)):
             inspect_terrain(path)
 
 
@@ -69,6 +90,17 @@ def test_missing_file_folder_and_unknown_extension(tmp_path):
         (HEADER.format(4), "header has no end"),
         (HEADER.replace("ascii", "gzip").format(4) + "end_header\n", "row 2"),
         ("ply\nelement vertex 1\nend_header\n", "names no format"),
+        (ONE_FACE.replace("vertex_indices", "corners") + SQUARE + "3 0 1 2\n", "The faces have no vertex_indices"),
+        (ONE_FACE.replace("list uchar int", "int") + SQUARE + "3\n", "The faces have no vertex_indices"),
+        (
+            ONE_FACE.replace("property list", f"{TEXTURE}property list") + SQUARE + "1 7 3 0 1 2\n",
+            "The list texture before the vertex indices is not supported",
+        ),
+        (
+            ONE_FACE.replace("element face", f"{TEXTURE}element face") + SQUARE,
+            "The vertices hold lists",
+        ),
+        (ONE_FACE + SQUARE.replace("\n", " 7\n") + "3 0 1 2\n", "row 10: 4 values, where the header promises 3"),
         ("ply\nformat ascii 1.0\nelement face 1\nproperty float x\nend_header\n1\n", "no vertices"),
     ],
 )  # fmt: skip
@@ -84,6 +116,14 @@ def test_truncated_binary_ply(tmp_path, cut):
     path = tmp_path / "cut.ply"
     path.write_bytes(data[:-cut])
     refused(path, "truncated")
+
+
+def test_binary_ply_without_vertex_indices(tmp_path):
+    path = tmp_path / "a.ply"
+    mesh = trimesh.creation.icosphere(1).export(file_type="ply")
+    assert mesh.count(b"vertex_indices") == 1
+    path.write_bytes(mesh.replace(b"vertex_indices", b"vertex_corners"))
+    refused(path, "The faces have no vertex_indices")
 
 
 def test_ply_whose_first_face_claims_a_huge_list(tmp_path):
@@ -133,14 +173,18 @@ def test_bad_stl_and_glb(tmp_path):
     refused(path, "truncated|values")
     path.write_text(ascii_.replace("vertex 0.", "vertex o.", 1))
     refused(path, "row .*not a number")
+    path.write_text(re.sub(r"(vertex \S+ \S+) \S+", r"\1", ascii_))
+    refused(path, r"row \d+: A corner needs three coordinates")
     path.write_bytes(b"\0" * 84)
-    refused(path, "no faces")
+    refused(path, "The mesh has no faces")
     glb = sphere.export(file_type="glb")
     path = tmp_path / "a.glb"
     path.write_bytes(glb[:-10])
     refused(path, "truncated")
     path.write_bytes(glb[:20] + b"{" * 40 + glb[60:])
     refused(path, "cannot be read")
+    path.write_bytes(trimesh.Scene(trimesh.PointCloud(sphere.vertices)).export(file_type="glb"))
+    refused(path, "The mesh has no faces")
     path = tmp_path / "a.gltf"
     path.write_bytes(sphere.export(file_type="gltf")["model.gltf"])
     refused(path, "cannot be read")
@@ -195,6 +239,14 @@ def test_what_cannot_be_decoded_of_a_tiff_is_refused_in_words(name, problem):
     assert "Export the heights alone, uncompressed or with LZW or deflate" in message
 
 
+def test_tiff_of_odd_bits(tmp_path):
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, np.zeros((20, 20), np.uint16))
+    with tifffile.TiffFile(path, mode="r+") as tiff:
+        tiff.pages.first.tags["BitsPerSample"].overwrite(12)
+    refused(path, "The TIFF has heights of 12 bits. Export the heights alone")
+
+
 def test_damaged_compressed_tiff(tmp_path, capfd):
     path = tmp_path / "a.tif"
     for name in ("lzw_float32", "lzw_float32_tiles", "deflate_predictor3_float32", "packbits_int16"):
@@ -229,8 +281,26 @@ def test_truncated_laz(tmp_path, name):
     damaged = bytearray(data)
     damaged[5000:5400] = b"\xff" * 400
     path.write_bytes(damaged)
-    with pytest.raises(InputError, match="cannot be read"):
-        read_terrain(path)
+    refused(path, "The cloud cannot be read")
+
+
+class PanicException(BaseException):
+    """What the decoder of LAZ raises where it cannot go on."""
+
+
+@pytest.mark.parametrize(("raised", "expected"), [(PanicException, InputError), (KeyboardInterrupt, KeyboardInterrupt)])
+def test_a_decoder_in_panic_is_told_from_a_person_who_stops_it(monkeypatch, raised, expected):
+    def iterate(*_):
+        raise raised("stopped")
+
+    monkeypatch.setattr(laspy.LasReader, "chunk_iterator", iterate)
+    with pytest.raises(expected, match="stopped"):
+        read_terrain(DATA / "las_chablais3.laz")
+
+
+def test_a_decoder_that_ends_early(monkeypatch):
+    monkeypatch.setattr(laspy.LasReader, "chunk_iterator", lambda reader, _: iter([reader.read_points(1000)]))
+    refused(DATA / "las_chablais3.laz", "truncated: its header promises 92097 points, it holds 1000")
 
 
 def test_truncated_las_also_at_the_end_of_a_record(tmp_path):

@@ -77,6 +77,55 @@ def test_patch_integrals_agree_with_sampling():
     assert found.normal[0, 2] > 0
 
 
+def test_the_part_of_a_triangle_inside_a_sphere_has_its_moments():
+    """Area, first and second moments against fine strips across the triangle, for triangles in every position."""
+    from rockfall.core.terrain.patch_kernels import SUMS, add_face
+
+    rng = np.random.default_rng(8)
+    radius, strips, kinds = 1.0, 20_000, 0
+    for size in np.repeat([0.3, 0.8, 1.5, 4.0], 12):
+        corners = rng.normal(0, 0.4, 3) + size * rng.normal(0, 1, (3, 3))
+        twice = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normal = twice / np.linalg.norm(twice)
+        axis = np.array([0.0, 0.6, 0.8])
+        sums = np.zeros(SUMS)
+        add_face(sums, np.empty(6), corners, normal, axis, radius)
+        expected, clipped = strip_moments(corners, normal, radius, strips)
+        np.testing.assert_allclose(sums[:10], expected, atol=2e-6)
+        np.testing.assert_allclose(sums[10:13], sums[0] * normal, atol=1e-12)
+        assert sums[13] == pytest.approx(sums[0] * np.arccos(normal @ axis) ** 2, abs=1e-9)
+        kinds += clipped
+    assert 15 < kinds < 45
+
+
+def strip_moments(corners, normal, radius, strips):
+    """(10,) area, first moments, second moments xx yy zz xy yz zx; and whether the sphere cuts something off."""
+    u = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
+    v, height = np.cross(normal, u), corners[0] @ normal
+    if abs(height) >= radius:
+        return np.zeros(10), True
+    flat = np.column_stack([corners @ u, corners @ v])
+    edges = np.linspace(flat[:, 0].min(), flat[:, 0].max(), strips + 1)
+    x = 0.5 * (edges[1:] + edges[:-1])
+    low, high = np.full(strips, np.inf), np.full(strips, -np.inf)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        (ax, ay), (bx, by) = sorted((flat[a].tolist(), flat[b].tolist()))
+        here = (x >= ax) & (x <= bx) & (bx > ax)
+        y = ay + (x[here] - ax) / (bx - ax) * (by - ay)
+        low[here], high[here] = np.minimum(low[here], y), np.maximum(high[here], y)
+    half = np.sqrt(np.maximum(radius**2 - height**2 - x**2, 0))
+    clipped = bool(((low < -half) | (high > half)).any())
+    low, high = np.clip(low, -half, half), np.clip(high, -half, half)
+    across, width = high - low, edges[1] - edges[0]
+    area, mx, my = (width * part.sum() for part in (across, x * across, (high**2 - low**2) / 2))
+    xx, yy, xy = (width * part.sum() for part in (x**2 * across, (high**3 - low**3) / 3, x * (high**2 - low**2) / 2))
+    centre = height * normal
+    first = area * centre + mx * u + my * v
+    second = area * np.outer(centre, centre) + np.outer(centre, mx * u + my * v) + np.outer(mx * u + my * v, centre)
+    second += xx * np.outer(u, u) + yy * np.outer(v, v) + xy * (np.outer(u, v) + np.outer(v, u))
+    return np.array([area, *first, *np.diag(second), second[0, 1], second[1, 2], second[2, 0]]), clipped
+
+
 def test_big_triangles_beside_small_ones_weigh_by_area():
     """A crease: one side finely meshed, the other two large triangles. The normal is the bisector all the same."""
     n = 60
@@ -218,3 +267,18 @@ def test_density_and_thin_data():
     away = (np.abs(points[:, 1]) < 7) & (np.abs(points[:, 0]) < 7)
     assert thin[away & (points[:, 0] < -3)].all()
     assert not thin[away & (points[:, 0] > 3)].any()
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"azimuth_deg": np.nan},
+        {"altitude_deg": np.inf},
+        {"thin_spacings": 1.0},
+        {"thin_spacings": -2.0},
+        {"thin_spacings": np.nan},
+    ],
+)
+def test_light_and_multiples_that_make_no_sense_are_refused(bad):
+    with pytest.raises(InputError, match=r"^The shading needs a light direction in degrees and a multiple"):
+        shade(height_field(lambda x, y: 0.3 * x, n=5), **bad)

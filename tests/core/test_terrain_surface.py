@@ -4,9 +4,10 @@
 import numpy as np
 import pytest
 import trimesh
-from rockfall.core.errors import InputError
+from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.cleaning import examine_faces, merge_duplicates
+from rockfall.core.terrain.index import build_index
 from rockfall.core.terrain.raycast import cast_rays, closest_points, heights_above
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.terrain.winding import orient
@@ -128,6 +129,39 @@ def test_closest_points_agree_with_trimesh_and_analytic_cases():
     np.testing.assert_allclose(found.distance, distance.min(axis=1), rtol=1e-12)
     np.testing.assert_array_equal(found.face, distance.argmin(axis=1))
     assert closest_points(soup, [50, 0, 0], max_distance=1.0).face[0] == -1
+
+
+def test_closest_points_at_every_corner_case():
+    """Small whole coordinates, so that points lie exactly above corners, edges and on the borders between regions."""
+    rng = np.random.default_rng(5)
+    triangles = rng.integers(-2, 3, (400, 3, 3)).astype(float)
+    triangles[::3, :, 2] = 0.0
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    triangles = triangles[(normals != 0).any(axis=1)]
+    points = np.concatenate([rng.integers(-4, 5, (300, 3)) / 1.0, rng.integers(-8, 9, (300, 3)) / 2.0])
+    for triangle in triangles:
+        found = closest_points(surface_of(triangle, [[0, 1, 2]]), points)
+        assert found.distance == pytest.approx(distance_to(triangle, points), abs=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(found.point - points, axis=1), found.distance, atol=1e-12)
+
+
+def distance_to(triangle, points):
+    """Least distance to the three edges, and to the plane where its foot is inside."""
+    distance = np.full(len(points), np.inf)
+    for k in range(3):
+        begin, way = triangle[k], triangle[(k + 1) % 3] - triangle[k]
+        along = np.clip((points - begin) @ way / (way @ way), 0, 1)
+        distance = np.minimum(distance, np.linalg.norm(points - begin - along[:, None] * way, axis=1))
+    u, v = triangle[1] - triangle[0], triangle[2] - triangle[0]
+    weights = np.linalg.lstsq(np.column_stack([u, v]), (points - triangle[0]).T, rcond=None)[0]
+    inside = (weights >= 0).all(axis=0) & (weights.sum(axis=0) <= 1)
+    foot = np.linalg.norm(triangle[0] + weights.T @ np.array([u, v]) - points, axis=1)
+    return np.where(inside, np.minimum(distance, foot), distance)
+
+
+def test_a_surface_without_faces_has_no_index():
+    with pytest.raises(RockfallError, match=r"^A surface without faces has no spatial index\.$"):
+        build_index(np.zeros((3, 3)), np.zeros((0, 3), np.int32))
 
 
 def test_index_of_many_coinciding_triangles():

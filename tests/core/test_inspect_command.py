@@ -99,6 +99,13 @@ def test_bad_videos_end_with_status_1(name, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+def test_picks_without_a_pair_give_no_speed(tmp_path, capsys):
+    (tmp_path / "picks.csv").write_text("trajectory,time_s,x_m,y_m,z_m\na,0,0,0,0\nb,1,0,0,-4\n")
+    argv = ["inspect", str(FOLDER / "constant.mp4"), "--diameter", "0.35", "--picks", str(tmp_path / "picks.csv")]
+    assert main(argv) == 1
+    assert "picks.csv: No trajectory has two picks, so there is no speed. Use --speed." in capsys.readouterr().err
+
+
 def test_usage(capsys):
     assert main(["inspect", str(FOLDER / "constant.mp4"), "--speed", "-3"]) == 2
     assert main(["inspect"]) == 2

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...core.camera.model import Camera, project, rays
+from ...core.camera.model import Camera, project
+from ...core.camera.path import rays_at
 from ...core.colours import scale_colours
 from ...core.errors import RockfallError
 from ...core.reconstruction.drag import Drag
@@ -288,9 +289,7 @@ def _sightings(
     place = (scene.session_uid, camera[store.ID], name)
     if place in _seen and _seen[place][0] == key:
         return _seen[place][1]
-    viewed = videos.camera_path(camera)
-    position, rotation = viewed.poses_at(seen.time_s)
-    origin, direction = rays(viewed.reference, seen.pixel, position=position, rotation=rotation)
+    origin, direction = rays_at(videos.camera_path(camera), seen.pixel, seen.time_s)
     clock, late = videos.clock_of(camera), videos.row_time_of(camera)
     common = clock.to_common(seen.time_s) + late * (seen.pixel[:, 1] - videos.size_of(camera)[1] / 2)
     where = np.full((len(seen), 3), np.nan)

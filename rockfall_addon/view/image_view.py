@@ -12,7 +12,7 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from numpy.typing import ArrayLike
 
-from ...core.camera import model
+from ...core.camera.path import project_at, rays_at
 from ...core.vectors import Array
 from ..scene import store, videos
 
@@ -85,9 +85,7 @@ def ray(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: ArrayLike, comm
     """
     pixels = np.asarray(pixel, dtype=np.float64)
     rows = pixels.reshape(-1, 2)
-    path = videos.camera_path(camera)
-    position, rotation = path.poses_at(_video_times(camera, common_s, rows))
-    origins, directions = model.rays(path.reference, rows, position=position, rotation=rotation)
+    origins, directions = rays_at(videos.camera_path(camera), rows, _video_times(camera, common_s, rows))
     shape = (*pixels.shape[:-1], 3)
     return origins.reshape(shape), directions.reshape(shape)
 
@@ -96,9 +94,7 @@ def project(scene: bpy.types.Scene, camera: bpy.types.Object, points: ArrayLike,
     """Pixels (..., 2) of local points (..., 3) [m] at common times, one or (n,); NaN where they are not seen."""
     world = np.asarray(points, dtype=np.float64)
     rows = world.reshape(-1, 3)
-    path = videos.camera_path(camera)
-    position, rotation = path.poses_at(_video_times(camera, common_s, rows))
-    pixel = model.project(path.reference, rows, position=position, rotation=rotation)
+    pixel = project_at(videos.camera_path(camera), rows, _video_times(camera, common_s, rows))
     return pixel.reshape(*world.shape[:-1], 2)
 
 

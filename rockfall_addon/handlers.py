@@ -43,7 +43,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     terrain_mesh.mistrust()
     _keep_rate(scene)
     footage.follow(scene)
-    sync.sync(scene)
+    sync.sync(scene, undone=True)
 
 
 @persistent

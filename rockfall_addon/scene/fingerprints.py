@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import bpy
 
-from . import picks, store, terrain, terrain_mesh, timing
+from . import keyframes, picks, store, terrain, terrain_mesh, timing
 
 COMPLETE = "+"
 """Behind the fingerprint of a trajectory that has flights and a block."""
@@ -35,19 +35,19 @@ def by_trajectory(things: Iterable[bpy.types.Object]) -> dict[str, list[bpy.type
     return found
 
 
-def fingerprint(things: Sequence[bpy.types.Object], rate: float) -> str:
-    """Of all that a trajectory is computed from, with what a person is just doing to it."""
+def fingerprint(things: Sequence[bpy.types.Object], rate: float, held: picks.Held = picks.NOTHING_HELD) -> str:
+    """Of all that a trajectory is computed from, with what a person is just doing to it, or to its block's keys."""
     rows = []
     for thing in things:
-        row = [picks.time_of(thing, rate)]
+        row = [picks.time_of(thing, rate, held)]
         for key in _KEPT:
             value = thing.get(key)
             if key == store.EXTRA:
                 row.append(str(value.get("confidence", "")) if value is not None else "")
             else:
                 row.append(value if value is None or isinstance(value, str) else tuple(value))
-        if picks.moved(thing):
-            row.append(tuple(thing.location))
+        if picks.moved(thing, held):
+            row.append((*thing.location, *picks.resting_place(thing, None, 0.0, held)))
         rows.append(repr(row))
     return hashlib.sha1("\n".join(sorted(rows)).encode(), usedforsecurity=False).hexdigest()
 
@@ -64,12 +64,35 @@ def remember(scene: bpy.types.Scene, prints: dict[str, str]) -> None:
         scene[store.SHOWN] = text
 
 
+def mark(trail: bpy.types.Object | None, block: bpy.types.Object | None, text: str) -> None:
+    """Remember beside the flights' mesh and the block's keys which picks they show."""
+    for holder in _holders(trail, block):
+        if holder.get(store.PRINT) != text:
+            holder[store.PRINT] = text
+
+
+def is_marked(trail: bpy.types.Object | None, block: bpy.types.Object | None, text: str) -> bool:
+    """Whether flights and block show these picks; after an undo the scene's own memory may be that of another step."""
+    return all(holder.get(store.PRINT, text) == text for holder in _holders(trail, block))
+
+
+def _holders(trail: bpy.types.Object | None, block: bpy.types.Object | None) -> list[bpy.types.ID]:
+    found = [trail.data if trail is not None else None, keyframes.action_of(block) if block is not None else None]
+    return [holder for holder in found if holder is not None]
+
+
 def remember_all(scene: bpy.types.Scene) -> None:
     """All that is shown is up to date."""
     rate = timing.keyed_rate(scene)
     groups = by_trajectory(picks.things_of(scene))
-    flying = {o[store.TRAJECTORY] for o in scene.objects if o.get(store.ROLE) == store.FLIGHTS_ROLE}
-    remember(scene, {n: fingerprint(things, rate) + (COMPLETE if n in flying else "") for n, things in groups.items()})
+    trails, blocks = (
+        {thing[store.TRAJECTORY]: thing for thing in store.with_role(scene, role)}
+        for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE)
+    )
+    prints = {name: fingerprint(things, rate) for name, things in groups.items()}
+    for name, text in prints.items():
+        mark(trails.get(name), blocks.get(name), text)
+    remember(scene, {name: text + (COMPLETE if name in trails else "") for name, text in prints.items()})
     scene[store.GROUND], scene[store.GROUND_CONTENTS] = ground(scene), ground_contents(scene)
     scene[store.TICK_RATE] = timing.frame_rate(scene)
 

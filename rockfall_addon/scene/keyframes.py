@@ -137,13 +137,17 @@ def key_location_once(thing: bpy.types.Object, frame: float) -> None:
         curve.update()
 
 
+def action_of(thing: bpy.types.Object) -> bpy.types.Action | None:
+    """What holds the keys of an object."""
+    return thing.animation_data.action if thing.animation_data is not None else None
+
+
 def location_curves(thing: bpy.types.Object) -> list[bpy.types.FCurve]:
     """The curves that move an object, as many as there are."""
-    animation = thing.animation_data
-    action = animation.action if animation is not None else None
-    if action is None or not action.layers or not action.layers[0].strips or animation.action_slot is None:
+    action = action_of(thing)
+    if action is None or not action.layers or not action.layers[0].strips or thing.animation_data.action_slot is None:
         return []
-    bag = action.layers[0].strips[0].channelbag(animation.action_slot)
+    bag = action.layers[0].strips[0].channelbag(thing.animation_data.action_slot)
     found = [bag.fcurves.find("location", index=axis) for axis in range(3)] if bag is not None else []
     return [curve for curve in found if curve is not None]
 

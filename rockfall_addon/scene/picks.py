@@ -18,12 +18,11 @@ from ...core.reconstruction.picks import Picks, make_picks
 from ...core.terrain.raycast import closest_points
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
-from . import georeference, keyframes, materials, store, timing
+from . import block_keys, georeference, keyframes, materials, store, timing
+from .block_keys import Change
 
 CONFIDENCE_SIGMA_M = {1: 0.50, 2: 0.20, 3: 0.05}
 """Standard deviation that a person's confidence in a place stands for, where the pick has none of its own [m]."""
-SAME_FRAME = 1e-3
-"""Keys nearer than this have not been moved [frames]."""
 
 MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler than any model's colour
     "impact": (0.95, 0.95, 0.95),
@@ -33,6 +32,12 @@ MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler th
     "stop": (0.84, 0.37, 0.00),
 }
 MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the rough surface
+
+
+Held = Mapping[str, Change]
+"""What a person is just doing to the keys of blocks, by the picks' ids."""
+NOTHING_HELD: Held = {}
+UNCHANGED = Change()
 
 
 def things_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
@@ -68,7 +73,7 @@ def show_picks(
     """
     kept_rate = timing.keyed_rate(scene)
     there = {(o[store.TRAJECTORY], time_of(o, kept_rate)): o for o in things_of(scene)}
-    rate, shown = timing.frame_rate(scene), []
+    rate, version, shown = timing.frame_rate(scene), next_version(scene), []
     for i in range(len(picks.time_s)):
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
         thing = there.pop((trajectory, time), None)
@@ -93,7 +98,7 @@ def show_picks(
         if store.EXTRA not in thing or thing[store.EXTRA].to_dict() != extra:
             thing[store.EXTRA] = extra
         thing[store.PICK_SHIFT] = picks.shift.vector.tolist()
-        pose(thing, normals[i], (time - offsets[trajectory]) * rate, radius_m)
+        pose(thing, normals[i], (time - offsets[trajectory]) * rate, radius_m, version)
         shown.append(thing)
     store.remove_objects(list(there.values()))
     scene[store.PICKS_SOURCE] = picks.source
@@ -120,11 +125,27 @@ def add_pick(
     thing[store.PICK_SHIFT] = georeference.read_shift(scene).vector.tolist()
     offset = timing.offset_of(scene, trajectory, float(time_s))
     frame = (float(time_s) - offset) * timing.frame_rate(scene)
-    pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m)
+    pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m, 0)
     return thing
 
 
-def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float) -> None:
+def next_version(scene: bpy.types.Scene) -> int:
+    """A number above all with which something of picks and blocks was written."""
+    ours = (thing for thing in scene.objects if thing.get(store.ROLE) in (store.PICK_ROLE, store.BLOCK_ROLE))
+    return 1 + max((max(versions(thing)) for thing in ours), default=0)
+
+
+def versions(thing: bpy.types.Object) -> tuple[int, int]:
+    """With which version an object and its action were written; 0 for neither, and for an action that is missing.
+
+    Both are written together. Blender's undo brings back only what the undone step has changed, and not what followed
+    from it later: then they differ, the older one is what was brought back, and it is right.
+    """
+    action, own = keyframes.action_of(thing), int(thing.get(store.WRITTEN, 0))
+    return own, own if action is None else int(action.get(store.WRITTEN, 0))
+
+
+def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float, version: int) -> None:
     """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay."""
     marker = _marker(thing[store.KIND])
     if thing.data is not marker:
@@ -143,6 +164,7 @@ def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float) 
     if not _keyed_at(thing, frame):
         keyframes.key_location_once(thing, frame)
     thing[store.KEY_FRAME] = float(np.float32(frame))
+    thing[store.WRITTEN] = keyframes.action_of(thing)[store.WRITTEN] = version
 
 
 def picks_of(scene: bpy.types.Scene) -> Picks:
@@ -155,10 +177,12 @@ def picks_of(scene: bpy.types.Scene) -> Picks:
     return read(scene, ordered(scene, things_of(scene)))
 
 
-def ordered(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+def ordered(
+    scene: bpy.types.Scene, things: Iterable[bpy.types.Object], held: Held = NOTHING_HELD
+) -> list[bpy.types.Object]:
     """Trajectories in the order of their starts, the picks of each in the order of time."""
     rate = timing.keyed_rate(scene)
-    rows = [(thing[store.TRAJECTORY], time_of(thing, rate), thing) for thing in things]
+    rows = [(thing[store.TRAJECTORY], time_of(thing, rate, held), thing) for thing in things]
     started: dict[str, float] = {}
     for name, time, _ in rows:
         started[name] = min(time, started.get(name, time))
@@ -171,23 +195,25 @@ def read(
     things: Sequence[bpy.types.Object],
     surface: Surface | None = None,
     reach_m: float = 0.0,
+    held: Held = NOTHING_HELD,
 ) -> Picks:
     """The picks of these objects, which are in order, with what a person is just doing to them.
 
     surface, reach_m : see `resting_place`; without a surface a moved pick is where its object is.
+    held : what the person is doing to the keys of blocks.
     """
     rate = timing.keyed_rate(scene)
     extras = [thing[store.EXTRA].to_dict() if store.EXTRA in thing else {} for thing in things]
     names = list(dict.fromkeys(name for extra in extras for name in extra))
     return make_picks(
         [thing[store.TRAJECTORY] for thing in things],
-        [time_of(thing, rate) for thing in things],
-        [resting_place(thing, surface, reach_m) for thing in things],
+        [time_of(thing, rate, held) for thing in things],
+        [resting_place(thing, surface, reach_m, held) for thing in things],
         kind=[thing[store.KIND] for thing in things],
         status=[thing[store.STATUS] for thing in things],
         normal=[
             [np.nan] * 3
-            if store.NORMAL not in thing or (surface is not None and moved(thing))
+            if store.NORMAL not in thing or (surface is not None and moved(thing, held))
             else list(thing[store.NORMAL])
             for thing in things
         ],
@@ -202,45 +228,86 @@ def read(
     )
 
 
-def moved(thing: bpy.types.Object) -> bool:
-    """Whether the object is elsewhere than the pick."""
-    return not _same_place(thing.location, thing[store.POSITION])
+def moved(thing: bpy.types.Object, held: Held = NOTHING_HELD) -> bool:
+    """Whether the object, or the key of its block, is elsewhere than the pick."""
+    return not _same_place(thing.location, thing[store.POSITION]) or any(_held(thing, held).way)
 
 
 def frames_moved(thing: bpy.types.Object) -> float:
     """How far the key was moved in time since it was written [frames]; keys that were added do not count."""
-    kept = thing.get(store.KEY_FRAME)
-    if kept is None:
+    kept, (own, of_action) = thing.get(store.KEY_FRAME), versions(thing)
+    if kept is None or of_action > own:
         return 0.0
     for curve in keyframes.location_curves(thing):
         frames = [point.co[0] for point in curve.keyframe_points]
         if frames:
             nearest = min((frame - kept for frame in frames), key=abs)
-            if abs(nearest) > max(SAME_FRAME, 4e-7 * abs(kept)):
+            if not block_keys.same_frame(nearest + kept, kept):
                 return nearest
     return 0.0
 
 
-def time_of(thing: bpy.types.Object, rate: float) -> float:
+def time_of(thing: bpy.types.Object, rate: float, held: Held = NOTHING_HELD) -> float:
     """The pick's time on the common clock [s], with the edit of its key. `rate` is the one that the keys have."""
-    shift = frames_moved(thing)
+    shift = frames_moved(thing) or _held(thing, held).frames
     return float(thing[store.TIME]) + (shift / rate if shift else 0.0)
 
 
-def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> Array:
-    """(3,) where the pick is, with the edit of its object.
+def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: float, held: Held = NOTHING_HELD) -> Array:
+    """(3,) where the pick is, with the edit of its object, or of the place that a key of its block has.
 
     A pick that was on the terrain, that is nearer to it than `reach_m`, stays on it: it is moved along the terrain, to
     the point closest to its object. A pass is a point in the air and goes where it is put.
     """
     stored = np.array(thing[store.POSITION])
-    if not moved(thing):
+    if not moved(thing, held):
         return stored
     place = np.array(thing.location, dtype=np.float64)
+    if not moved(thing):
+        place = stored + _held(thing, held).way
     if surface is None or thing[store.KIND] == "pass":
         return place
     near = closest_points(surface, np.stack([stored, place]))
     return near.point[1] if near.distance[0] <= reach_m else place
+
+
+def take_edits(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], edits: block_keys.Edits) -> None:
+    """Do to the picks what a person did to the keys of their block; an edit of the pick itself goes before.
+
+    A copy has all that its pick has, but the row of a table and what was clicked for it, which are of another moment.
+    """
+    of, rate = {thing[store.ID]: thing for thing in things}, timing.keyed_rate(scene)
+    for identifier, frames in edits.copied:
+        if identifier in of:
+            copy = of[identifier].copy()
+            copy.animation_data_clear()
+            copy[store.ID], copy[store.ROW] = uuid.uuid4().hex, 0
+            copy[store.TIME] = float(copy[store.TIME]) + frames / rate
+            for key in (store.KEY_FRAME, store.SEEN):
+                copy.pop(key, None)
+            for collection in of[identifier].users_collection:
+                collection.objects.link(copy)
+    for identifier, change in edits.changes.items():
+        thing = of.get(identifier)
+        if thing is None:
+            continue
+        if change.frames and not frames_moved(thing):
+            thing[store.TIME] = float(thing[store.TIME]) + change.frames / rate
+        if any(change.way) and not moved(thing):
+            thing.location = np.array(thing[store.POSITION]) + change.way
+    store.remove_objects([of[identifier] for identifier in edits.deleted if identifier in of])
+
+
+def bring_back(thing: bpy.types.Object, state: Mapping[str, object]) -> None:
+    """Make the pick what it was when its block's keys were written: an undo has brought back the keys alone."""
+    for key in block_keys.STATE:
+        if key in state:
+            thing[key] = state[key]
+        elif key in thing:
+            del thing[key]
+    thing.location = thing[store.POSITION]
+    for curve in keyframes.location_curves(thing)[:1]:
+        thing[store.KEY_FRAME] = float(curve.keyframe_points[0].co[0])  # an edit of its key, if any, is no edit now
 
 
 def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> bool:
@@ -319,6 +386,10 @@ def _keyed_at(thing: bpy.types.Object, frame: float) -> bool:
         and curve.keyframe_points[0].co[1] == thing.location[curve.array_index]
         for curve in curves
     )
+
+
+def _held(thing: bpy.types.Object, held: Held) -> Change:
+    return held.get(thing.get(store.ID, ""), UNCHANGED)
 
 
 def _doubles(things: Sequence[bpy.types.Object], key: str, width: int) -> np.ndarray:

@@ -50,6 +50,11 @@ KEY_FRAME, PICK_SHIFT = "rockfall_key_frame", "rockfall_pick_shift_m"
 SEEN = "rockfall_seen"  # id of a video → frame and pixel in it
 RESULT = "rockfall_result"
 
+# of picks, of what is shown of a run, and of the actions of both; 0.1.0 had none of these
+WRITTEN = "rockfall_written"  # how often something was written: the older of two was brought back by an undo
+PRINT = "rockfall_print"  # fingerprint of the picks that this shows
+BLOCK_KEYS = "rockfall_block_keys"  # of a block's action: frame, place and pick of each key, as text
+
 # of a tile of the terrain
 TERRAIN_FILE, TERRAIN_SUMMARY = "rockfall_file", "rockfall_summary"
 THIN_SHARE, REACH = "rockfall_thin_share", "rockfall_reach_m"

@@ -15,9 +15,11 @@ import numpy as np
 
 from ...core.errors import RockfallError
 from . import (
+    block_keys,
     fingerprints,
     georeference,
     impact_rows,
+    keyframes,
     migration,
     models,
     picks,
@@ -29,9 +31,11 @@ from . import (
     timing,
     trails,
     trajectories,
+    undo,
 )
 
-DRAGGING = ("TRANSFORM_OT_", "ROCKFALL_OT_drag", "ROCKFALL_OT_mark_pair")
+DRAGGING = ("TRANSFORM_OT_", "_OT_duplicate_move", "ROCKFALL_OT_drag", "ROCKFALL_OT_mark_pair")
+"""Parts of the names of operators in which a person holds something; that of a macro is not that of its last step."""
 REACH_RADII = 1.0
 """A pick nearer to the terrain than this many radii of its block lies on it, and stays on it when it is moved."""
 LEAST_REACH_M = 0.1
@@ -42,10 +46,11 @@ _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajecto
 
 @dataclass
 class Done:
-    """What a `sync` has done: trajectories that were computed again, or could not be."""
+    """What a `sync` has done: trajectories that were computed again, or could not be; whether picks came or went."""
 
     rebuilt: list[str]
     failed: list[str]
+    picks_changed: bool = False
 
 
 def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
@@ -65,9 +70,13 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     anywhere = False
     for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
         thing = update.id
-        if isinstance(thing, bpy.types.Object):
+        if isinstance(thing, bpy.types.Action):  # a key that was inserted or deleted moves no object at this frame
+            for user in (user for slot in thing.original.slots for user in slot.users()):
+                if user.get(store.ROLE) == store.BLOCK_ROLE and store.TRAJECTORY in user:
+                    names.add(user[store.TRAJECTORY])
+        elif isinstance(thing, bpy.types.Object):
             role = thing.get(store.ROLE)
-            if role == store.PICK_ROLE and store.TRAJECTORY in thing:
+            if role in (store.PICK_ROLE, store.BLOCK_ROLE) and store.TRAJECTORY in thing:
                 names.add(thing[store.TRAJECTORY])
             elif role == store.TERRAIN_ROLE:
                 anywhere = True
@@ -90,7 +99,9 @@ def work() -> float | None:
     for scene in bpy.data.scenes:
         if scene.session_uid in waiting:
             names = waiting[scene.session_uid]
-            sync(scene, names, dragging=dragging)
+            done = sync(scene, names, dragging=dragging)
+            if done.picks_changed:
+                undo.extend_last_step()
             if dragging:
                 _waiting[scene.session_uid] = names
     return POLL_S if dragging else None
@@ -101,9 +112,10 @@ def is_dragging() -> bool:
     if bpy.app.background or bpy.context.window_manager is None:
         return False
     return any(
-        operator.bl_idname.startswith(DRAGGING)
+        part in operator.bl_idname
         for window in bpy.context.window_manager.windows
         for operator in window.modal_operators
+        for part in DRAGGING
     )
 
 
@@ -113,10 +125,12 @@ def sync(
     *,
     dragging: bool = False,
     again: bool = False,
+    undone: bool = False,
 ) -> Done:
     """Bring what is shown of some trajectories (None: of all) in line with their picks.
 
     dragging : the picks are only read, not written: a person holds them.
+    undone : an undo or redo has just brought something back: no objects come or go.
     again : compute them even where nothing has changed.
     """
     done = Done([], [])
@@ -128,26 +142,31 @@ def sync(
     things = picks.things_of(scene, wanted)
     if not things and store.SHOWN not in scene:
         return done
+    parts = trajectories.parts_of(scene, wanted)
+    edited: dict[str, str] = {}
     if dragging:
         things, resample = _originals(things), False
     else:
         _heal(scene, things)
         again, resample = again or _ground_changed(scene), _rate_changed(scene)
         if (again or resample) and wanted is not None:
-            wanted, things = None, picks.things_of(scene)
+            wanted, things, parts = None, picks.things_of(scene), trajectories.parts_of(scene)
+        edited = _take_edits_of_blocks(scene, things, parts, undone, done)
+        things = picks.things_of(scene, wanted)
     groups = fingerprints.by_trajectory(things)
     prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
     gone = [name for name in prints if name not in groups and (wanted is None or name in wanted)]
     for name in gone:
         _forget(scene, name)
         prints.pop(name), said.pop(name, None)
-    parts = trajectories.parts_of(scene, None if wanted is None else list(groups))
     altered = again or bool(gone)
     for name, members in groups.items():
-        changed = _has_changed(name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging)
-        if changed or again or resample:
-            altered = altered or changed
-            prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, done)
+        held = _held(name, parts) if dragging else picks.NOTHING_HELD
+        changed = _has_changed(name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging, held)
+        if changed or again or resample or name in edited:
+            altered = altered or changed or name in edited
+            prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, held, done)
+            said[name] += filter(None, [edited.get(name)])
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:
@@ -187,15 +206,73 @@ def nudge(scene: bpy.types.Scene, thing: bpy.types.Object, frames: float) -> Non
     sync(scene, [thing[store.TRAJECTORY]])
 
 
+def _take_edits_of_blocks(
+    scene: bpy.types.Scene, things: list[bpy.types.Object], parts: trajectories.Parts, undone: bool, done: Done
+) -> dict[str, str]:
+    """Do to the picks what a person, or an undo, did to their blocks' keys.
+
+    Returns
+    -------
+    The trajectories whose block was edited → why keys of it come back, empty when they do not.
+    """
+    edited = {}
+    for name, members in fingerprints.by_trajectory(things).items():
+        block = parts.get((store.BLOCK_ROLE, name))
+        if block is None:
+            continue
+        action, states = keyframes.action_of(block), block_keys.states_of(block)
+        if action is not None and not states:
+            block_keys.remember_by_frame(block, members)
+            states = block_keys.states_of(block)
+        written = int(action.get(store.WRITTEN, 0)) if action is not None else 0
+        older = [one for one in members if one.get(store.WRITTEN, 0) < written]
+        for thing in members:
+            if thing.get(store.WRITTEN, 0) > written and thing[store.ID] in states:
+                picks.bring_back(thing, states[thing[store.ID]])
+        edits = block_keys.edits_of(block)
+        if not edits or older:
+            continue
+        edited[name] = edits.put_back
+        if edits.put_back or (undone and edits.is_of_objects):
+            continue
+        picks.take_edits(scene, members, edits)
+        block_keys.remember(block, [picks.with_id(scene, one) for one in edits.identifiers])
+        done.picks_changed = done.picks_changed or edits.is_of_objects
+    return edited
+
+
+def _held(name: str, parts: trajectories.Parts) -> picks.Held:
+    """What a person is just doing to the keys of a trajectory's block."""
+    block = parts.get((store.BLOCK_ROLE, name))
+    return picks.NOTHING_HELD if block is None else block_keys.edits_of(block).changes
+
+
 def _has_changed(
-    name: str, members: list[bpy.types.Object], before: str, parts: trajectories.Parts, rate: float, dragging: bool
+    name: str,
+    members: list[bpy.types.Object],
+    before: str,
+    parts: trajectories.Parts,
+    rate: float,
+    dragging: bool,
+    held: picks.Held,
 ) -> bool:
     """Whether the picks differ from what is shown, hold an edit to be absorbed, or what is shown is damaged."""
     if not dragging and any(picks.moved(one) or picks.frames_moved(one) for one in members):
         return True
-    if before.endswith(fingerprints.COMPLETE) and not _complete(name, parts):
-        return True
-    return before.rstrip(fingerprints.COMPLETE) != fingerprints.fingerprint(members, rate)
+    now = fingerprints.fingerprint(members, rate, held)
+    if before.endswith(fingerprints.COMPLETE):
+        trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
+        if trail is None or block is None:
+            return True
+        if not dragging and not (fingerprints.is_marked(trail, block, now) and _of_one_version(members, block)):
+            return True
+    return before.rstrip(fingerprints.COMPLETE) != now
+
+
+def _of_one_version(members: list[bpy.types.Object], block: bpy.types.Object) -> bool:
+    """Whether picks, their keys and those of the block were written together; an undo may bring back some of them."""
+    found = {version for thing in members for version in picks.versions(thing)}
+    return found == {picks.versions(block)[1]}
 
 
 def _try_rebuild(
@@ -204,19 +281,22 @@ def _try_rebuild(
     members: list[bpy.types.Object],
     parts: trajectories.Parts,
     dragging: bool,
+    held: picks.Held,
     done: Done,
 ) -> tuple[str, list[str]]:
     """Compute one trajectory and show it, or keep the last good flights; its fingerprint, and what there is to say."""
-    mark = ""
     try:
-        said = _rebuild(scene, name, members, parts, dragging)
-        done.rebuilt.append(name)
-        mark = fingerprints.COMPLETE if _complete(name, trajectories.parts_of(scene, [name])) else ""
+        said = _rebuild(scene, name, members, parts, dragging, held)
     except RockfallError as error:
-        said = [str(error)]
         _grey(scene, name, parts)
         done.failed.append(name)
-    return fingerprints.fingerprint(members, timing.keyed_rate(scene)) + mark, said
+        return fingerprints.fingerprint(members, timing.keyed_rate(scene), held), [str(error)]
+    done.rebuilt.append(name)
+    text = fingerprints.fingerprint(members, timing.keyed_rate(scene), held)
+    shown = trajectories.parts_of(scene, [name])
+    trail, block = (shown.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
+    fingerprints.mark(trail, block, text)
+    return text + (fingerprints.COMPLETE if trail is not None and block is not None else ""), said
 
 
 def _rebuild(
@@ -225,6 +305,7 @@ def _rebuild(
     members: list[bpy.types.Object],
     parts: trajectories.Parts,
     dragging: bool,
+    held: picks.Held,
 ) -> list[str]:
     """Compute one trajectory and show it; returns what there is to say about it."""
     surface = reconstruction.ground(scene)
@@ -233,28 +314,24 @@ def _rebuild(
     if not dragging:
         for thing in members:
             picks.absorb(scene, thing, surface, reach)
-    members = picks.ordered(scene, members)
-    result = reconstruction.reconstruct_scene(scene, picks.read(scene, members, surface, reach))
+    members = picks.ordered(scene, members, held)
+    result = reconstruction.reconstruct_scene(scene, picks.read(scene, members, surface, reach, held))
     offset = timing.offset_of(scene, name, float(result.picks.time_s[0]))
     trajectories.store_results(members, result)
     if not dragging:
         _pose(scene, members, result, offset)
-    trajectories.show_trajectory(scene, name, result, offset, surface, parts, in_place=dragging)
+    trajectories.show_trajectory(scene, name, result, members, offset, surface, parts, held=dragging)
     impact_rows.fill(scene, name)
     return problems.of_result(scene, result)[name]
 
 
 def _pose(scene: bpy.types.Scene, members: list[bpy.types.Object], result: object, offset: float) -> None:
-    rate, radius = timing.frame_rate(scene), scene.rockfall.marker_radius_m
+    rate, radius, version = timing.frame_rate(scene), scene.rockfall.marker_radius_m, picks.next_version(scene)
     if store.KEYED_RATE not in scene:
         scene[store.KEYED_RATE] = rate
     for thing, normal in zip(members, trajectories.normals_of(result), strict=True):
-        picks.pose(thing, normal, (float(thing[store.TIME]) - offset) * timing.keyed_rate(scene), radius)
-
-
-def _complete(name: str, parts: trajectories.Parts) -> bool:
-    """Whether a trajectory has its flights and its block; a person may delete them."""
-    return (store.FLIGHTS_ROLE, name) in parts and (store.BLOCK_ROLE, name) in parts
+        frame = (float(thing[store.TIME]) - offset) * timing.keyed_rate(scene)
+        picks.pose(thing, normal, frame, radius, version)
 
 
 def _grey(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.reconstruction.picks import Picks
-from . import store
+from . import block_keys, store
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:
@@ -97,6 +97,8 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
     for thing in store.with_role(scene, store.PICK_ROLE):
         if store.KEY_FRAME in thing:
             thing[store.KEY_FRAME] *= factor
+    for thing in store.with_role(scene, store.BLOCK_ROLE):
+        block_keys.stretch(thing, factor)
     scene[store.KEYED_RATE] = rate
     scene.frame_end = max(1, round(scene.frame_end * factor))
     return True

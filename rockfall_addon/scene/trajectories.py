@@ -5,7 +5,7 @@ Of each trajectory: its picks, one polyline of its flights with colours, its blo
 numbers of its impacts. What is there already is brought in line, not made anew.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -17,12 +17,15 @@ from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.raycast import heights_above
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array, norm
-from . import impact_rows, keyframes, materials, picks, store, timing, trails
+from . import block_keys, impact_rows, keyframes, materials, picks, store, timing, trails
 
 BELOW_RADII = 0.2
 """A point of a flight that is deeper under the terrain than this part of the block's radius is shown as below it."""
 BOUNCES_HIGHER = 1.0
 """An R above this deserves doubt: no impact makes a block quicker."""
+
+SAME_TIME_S = 1e-9
+"""A key of the block is that of the pick at this time; with drag there are keys between them."""
 
 Parts = Mapping[tuple[str, str], bpy.types.Object]
 
@@ -46,7 +49,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     store.remove_objects([thing for (_, name), thing in parts.items() if name not in names])
     last = 1.0
     for name in names:
-        show_trajectory(scene, name, result, offsets[name], surface, parts)
+        show_trajectory(scene, name, result, things, offsets[name], surface, parts)
         end = result.flights.end_time_s[result.flights.trajectory == name].max()
         last = max(last, float(end) - offsets[name])
     trails.set_tops(scene)
@@ -60,7 +63,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
         scene.frame_set(0)
 
 
-def parts_of(scene: bpy.types.Scene, trajectories: Sequence[str] | None = None) -> Parts:
+def parts_of(scene: bpy.types.Scene, trajectories: Collection[str] | None = None) -> Parts:
     """(role, trajectory) → the object that shows its flights, or its block. A copy that somebody made is not ours.
 
     trajectories : None for all.
@@ -85,15 +88,17 @@ def show_trajectory(
     scene: bpy.types.Scene,
     name: str,
     result: Reconstruction,
+    things: Sequence[bpy.types.Object],
     offset: float,
     surface: Surface | None,
     parts: Parts,
     *,
-    in_place: bool = False,
+    held: bool = False,
 ) -> None:
     """Bring the flights and the block of one trajectory in line; without a flight there are none.
 
-    in_place : see `motion.write_location_keys`.
+    things : the object of each of the reconstruction's picks.
+    held : a person holds picks or keys; keys of the block that the person holds are left alone.
     """
     which = np.flatnonzero(result.flights.trajectory == name)
     trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
@@ -101,7 +106,7 @@ def show_trajectory(
         store.remove_objects([thing for thing in (trail, block) if thing is not None])
         return
     trail = _show_flights(scene, name, result, which, offset, surface, trail)
-    _show_block(scene, name, result, which, offset, block, in_place)
+    _show_block(scene, name, result, things, which, offset, block, held)
     trails.paint_observed(scene, [trail])
 
 
@@ -201,22 +206,30 @@ def _show_block(
     scene: bpy.types.Scene,
     name: str,
     result: Reconstruction,
+    things: Sequence[bpy.types.Object],
     which: np.ndarray,
     offset: float,
-    thing: bpy.types.Object | None,
-    in_place: bool,
+    block: bpy.types.Object | None,
+    held: bool,
 ) -> None:
-    block = _block_of(result, name)
-    scale = scene.rockfall.block_scale
-    if thing is None:
-        thing = bpy.data.objects.new(f"{name} block", block_mesh())
-        thing[store.ROLE], thing[store.TRAJECTORY] = store.BLOCK_ROLE, name
-        store.collection(scene, "Trajectories", name).objects.link(thing)
-    thing.scale = np.array([block.d1, block.d2, block.d3]) * scale / 2
-    thing.delta_location.z = (scale - 1) * block.radius_m  # an enlarged block must not sink into the slope
+    solid, scale = _block_of(result, name), scene.rockfall.block_scale
+    if block is None:
+        block = bpy.data.objects.new(f"{name} block", block_mesh())
+        block[store.ROLE], block[store.TRAJECTORY] = store.BLOCK_ROLE, name
+        store.collection(scene, "Trajectories", name).objects.link(block)
+    block.scale = np.array([solid.d1, solid.d2, solid.d3]) * scale / 2
+    block.delta_location.z = (scale - 1) * solid.radius_m  # an enlarged block must not sink into the slope
+    if held and block_keys.edits_of(block):
+        return
     keys = keyframes.motion_keys(result.flights, which)
+    mine = np.flatnonzero(result.picks.trajectory == name)
+    away = np.abs(keys.time_s[:, None] - result.picks.time_s[mine])
+    of = [things[mine[i]] if gap < SAME_TIME_S else None for i, gap in zip(away.argmin(1), away.min(1), strict=True)]
     keys.time_s[:] -= offset
-    keyframes.write_location_keys(thing, keys, timing.frame_rate(scene), in_place=in_place)
+    if keyframes.write_location_keys(block, keys, timing.frame_rate(scene), in_place=held):
+        block_keys.remember(block, of)
+        if not held:
+            keyframes.action_of(block)[store.WRITTEN] = max(int(thing.get(store.WRITTEN, 0)) for thing in things)
 
 
 def normals_of(result: Reconstruction) -> np.ndarray:

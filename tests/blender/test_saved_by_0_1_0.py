@@ -166,4 +166,23 @@ def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path) -> 
     untouched = [pick for pick in old["picks"] if pick["rockfall_trajectory"] != "B07"]
     kept = [pick for pick in edited if pick["rockfall_trajectory"] != "B07"]
     for new, was in zip(kept, untouched, strict=True):
-        same({name: new[name] for name in set(new) - COMPUTED}, {name: was[name] for name in set(was) - COMPUTED})
+        same({name: new[name] for name in set(was) - COMPUTED}, {name: was[name] for name in set(was) - COMPUTED})
+
+
+def test_keys_of_its_blocks_drive_their_picks(opened, part, old) -> None:
+    """0.1.0 did not keep which pick a key is of."""
+    picks, store = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.store")
+    (block,) = [o for o in store.with_role(opened, store.BLOCK_ROLE) if o[store.TRAJECTORY] == "B10"]
+    moved = picks.ordered(opened, picks.things_of(opened, ["B10"]))[1]
+    before = stored(moved)
+    bag = block.animation_data.action.layers[0].strips[0].channelbag(block.animation_data.action_slot)
+    for axis in range(3):
+        curve = bag.fcurves.find("location", index=axis)
+        min(curve.keyframe_points, key=lambda point: abs(point.co[0] - before["rockfall_key_frame"])).co_ui[0] += 1.5
+        curve.update()
+    bpy.context.view_layer.update()
+    assert moved["rockfall_time_s"] == pytest.approx(before["rockfall_time_s"] + 1.5 / 30.0, abs=1e-6)
+    others = [pick for pick in all_picks(part, opened) if pick["rockfall_id"] != before["rockfall_id"]]
+    were = [pick for pick in old["picks"] if pick["rockfall_id"] != before["rockfall_id"]]
+    same([pick["rockfall_time_s"] for pick in others], [pick["rockfall_time_s"] for pick in were])
+    same([pick["rockfall_position_m"] for pick in others], [pick["rockfall_position_m"] for pick in were])

@@ -163,6 +163,182 @@ def case_live_key_in_the_dope_sheet(window):
     consistent(window, "B03")
 
 
+def block_of(name):
+    things = (o for o in bpy.context.scene.objects if o.get("rockfall_role") == "block")
+    return next(o for o in things if o["rockfall_trajectory"] == name)
+
+
+def choose_keys(block, frames):
+    """Select the keys of a block at these frames, and no other."""
+    bag = block.animation_data.action.layers[0].strips[0].channelbag(block.animation_data.action_slot)
+    for axis in range(3):
+        for point in bag.fcurves.find("location", index=axis).keyframe_points:
+            chosen = any(abs(point.co[0] - frame) < 0.01 for frame in frames)
+            point.select_control_point = point.select_left_handle = point.select_right_handle = chosen
+
+
+def keys_at(block):
+    bag = block.animation_data.action.layers[0].strips[0].channelbag(block.animation_data.action_slot)
+    return [[point.co[0] for point in bag.fcurves.find("location", index=axis).keyframe_points] for axis in range(3)]
+
+
+def in_step(window, name):
+    """The block has a key at each pick, and the picks are where the flights are."""
+    frames = [pick["rockfall_key_frame"] for pick in picks_of(name)]
+    for axis in keys_at(block_of(name)):
+        assert np.allclose(axis, frames, atol=1e-3), (axis, frames)
+    consistent(window, name)
+
+
+def case_live_keys_of_the_block(window):
+    """All impacts of a run in one row: drag one key, stretch several, duplicate one, delete one; undo each."""
+    yield from load(window)
+    block = block_of("B03")
+    yield from zoom_to(window, block)
+    sheet = window.area()
+    sheet.ui_type = "DOPESHEET"
+    sheet.spaces.active.dopesheet.show_only_selected = True
+    yield 1.0
+    region = next(r for r in sheet.regions if r.type == "WINDOW")
+    x, y = region.x + region.width // 2, region.y + region.height // 2
+    here = {"window": window.window, "area": sheet, "region": region}
+    known = {pick["rockfall_id"]: pick["rockfall_time_s"] for pick in picks_of("B03")}
+    where = [list(pick["rockfall_position_m"]) for pick in picks_of("B03")]
+    frames = [pick["rockfall_key_frame"] for pick in picks_of("B03")]
+    with bpy.context.temp_override(**here):
+        bpy.ops.action.select_all(action="SELECT")
+        bpy.ops.action.view_selected()
+        choose_keys(block, frames[3:4])
+        bpy.ops.ed.undo_push(message="one key chosen")
+    yield 0.5
+
+    def undo():
+        with bpy.context.temp_override(**here):
+            bpy.ops.ed.undo()
+        yield 1.0
+        assert {pick["rockfall_id"]: pick["rockfall_time_s"] for pick in picks_of("B03")} == known
+        in_step(window, "B03")
+
+    # one key is dragged
+    trail = trail_of("B03")
+    before = np.array([vertex.co[:] for vertex in trail.data.vertices])
+    yield from window.press("G", x, y)
+    for step in range(1, 6):
+        yield from window.move(x + 2 * step, y)
+    assert {pick["rockfall_id"]: pick["rockfall_time_s"] for pick in picks_of("B03")} == known, "nothing is written yet"
+    after = np.array([vertex.co[:] for vertex in trail.data.vertices])
+    assert before.shape != after.shape or np.abs(after - before).max() > 0.01, "the flights follow while it is dragged"
+    window.screenshot("key-held")
+    yield from window.press("RET", x + 10, y)
+    yield 1.0
+    pick = picks_of("B03")[3]
+    moved = pick["rockfall_key_frame"] - frames[3]
+    assert 0.1 < moved < 30, moved
+    assert abs(pick["rockfall_time_s"] - known[pick["rockfall_id"]] - moved / bpy.context.scene.render.fps) < 1e-6
+    assert [list(one["rockfall_position_m"]) for one in picks_of("B03")] == where
+    in_step(window, "B03")
+    window.screenshot("key-moved")
+    yield from undo()
+    with bpy.context.temp_override(**here):
+        bpy.ops.ed.redo()
+    yield 1.0
+    assert abs(picks_of("B03")[3]["rockfall_key_frame"] - frames[3] - moved) < 1e-3
+    in_step(window, "B03")
+    yield from undo()
+
+    # Esc takes a held key back
+    block = block_of("B03")
+    choose_keys(block, frames[3:4])
+    yield from window.press("G", x, y)
+    yield from window.move(x + 20, y)
+    yield from window.press("ESC", x + 20, y)
+    yield 1.0
+    assert {pick["rockfall_id"]: pick["rockfall_time_s"] for pick in picks_of("B03")} == known
+    in_step(window, "B03")
+
+    # all keys are stretched about the playhead
+    bpy.context.scene.frame_set(round(frames[0]))
+    block = block_of("B03")
+    choose_keys(block, frames)
+    with bpy.context.temp_override(**here):
+        bpy.ops.ed.undo_push(message="all keys chosen")
+    yield from window.press("S", x + 200, y)
+    for step in range(1, 6):
+        yield from window.move(x + 200 + 6 * step, y)
+    yield from window.press("RET", x + 230, y)
+    yield 1.0
+    stretched = np.array([pick["rockfall_key_frame"] for pick in picks_of("B03")]) - round(frames[0])
+    factor = stretched[-1] / (frames[-1] - round(frames[0]))
+    assert factor > 1.01, factor
+    assert np.allclose(stretched, factor * (np.array(frames) - round(frames[0])), atol=1.01), "to whole frames"
+    in_step(window, "B03")
+    window.screenshot("stretched")
+    yield from undo()
+
+    # a duplicate is a new pick
+    block = block_of("B03")
+    choose_keys(block, frames[2:3])
+    with bpy.context.temp_override(**here):
+        bpy.ops.ed.undo_push(message="one key chosen")
+    yield from window.move(x, y)
+    with bpy.context.temp_override(**here):
+        bpy.ops.action.duplicate_move("INVOKE_DEFAULT")
+    yield 0.3
+    for step in range(1, 4):
+        yield from window.move(x + 2 * step, y)
+    assert len(picks_of("B03")) == len(frames), "not while it is being placed"
+    yield from window.press("RET", x + 6, y)
+    yield 1.0
+    found = picks_of("B03")
+    assert len(found) == len(frames) + 1
+    (new,) = [pick for pick in found if pick["rockfall_id"] not in known]
+    assert list(new["rockfall_position_m"]) == where[2]
+    in_step(window, "B03")
+    window.screenshot("duplicated")
+    yield from undo()
+
+    # a deleted key deletes its pick
+    block = block_of("B03")
+    choose_keys(block, frames[4:5])
+    with bpy.context.temp_override(**here):
+        bpy.ops.ed.undo_push(message="one key chosen")
+        assert bpy.ops.action.delete(confirm=False) == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="Delete Keyframes")
+    yield 1.0
+    assert len(picks_of("B03")) == len(frames) - 1
+    in_step(window, "B03")
+    window.screenshot("deleted")
+    yield from undo()
+    with bpy.context.temp_override(**here):
+        bpy.ops.ed.redo()
+    yield 1.0
+    assert len(picks_of("B03")) == len(frames) - 1
+    in_step(window, "B03")
+    yield from undo()
+    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
+
+
+def case_live_undo_after_scrubbing(window):
+    """The playhead is moved between two edits, so that more of the file differs between the two steps."""
+    yield from load(window)
+    scene = bpy.context.scene
+    pick = picks_of("B03")[3]
+    identifier, before = pick["rockfall_id"], pick["rockfall_time_s"]
+    scene.frame_set(scene.frame_current + 11)
+    yield 0.5
+    pick.rockfall_pick.time_s = repr(before + 0.2)
+    bpy.ops.ed.undo_push(message="Time")  # as Blender does for a field of a panel, before anything else happens
+    yield 1.0
+    assert abs(picks_of("B03")[3]["rockfall_time_s"] - before - 0.2) < 1e-9
+    in_step(window, "B03")
+    with window.override():
+        bpy.ops.ed.undo()
+    yield 1.0
+    pick = next(one for one in picks_of("B03") if one["rockfall_id"] == identifier)
+    assert pick["rockfall_time_s"] == before
+    in_step(window, "B03")
+
+
 def case_live_table_and_numbers(window):
     yield from window.show_sidebar()
     yield from load(window)

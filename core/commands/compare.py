@@ -22,11 +22,11 @@ from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..analysis.comparison import Predictions
+    from ..analysis.predicted_flights import PredictedFlights
     from ..analysis.scores import Score
-    from ..analysis.twins import Twins
     from ..reconstruction.impact import Impacts
 
-FILES = ("predictions.csv", "scores.csv", "comparison.toml", "twins.csv", "figures", "report.html")
+FILES = ("predictions.csv", "scores.csv", "comparison.toml", "predicted_flights.csv", "figures", "report.html")
 SHOWN = (("rn", "R_N"), ("rt", "R_T"), ("r", "R"), ("theta_dev_deg", "θ_dev [°]"))
 
 
@@ -47,12 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_incident_options(parser)
     parser.add_argument("--tables-only", action="store_true", help="neither figures nor the page")
-    twins = parser.add_argument_group("twins: the blocks that leave each impact as a model says, and where they land")
-    twins.add_argument("--terrain", metavar="MESH", help="the terrain on which they land → twins.csv")
-    twins.add_argument(
+    group = parser.add_argument_group(
+        "predicted flights: the blocks that leave each impact as a model says, and where they land"
+    )
+    group.add_argument("--terrain", metavar="MESH", help="the terrain on which they land → predicted_flights.csv")
+    group.add_argument(
         "--gravity", type=not_negative, default=GRAVITY_MPS2, metavar="G", help="[m/s²] (default %(default)s)"
     )
-    twins.add_argument("--drag", action="store_true", help="fly with the drag of air")
+    group.add_argument("--drag", action="store_true", help="fly with the drag of air")
     add_terrain_options(parser)
 
 
@@ -62,8 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.scores import scores
     from ..exchange.comparison_tables import write_predictions, write_scores, write_settings
     from ..exchange.output import output_folder
+    from ..exchange.predicted_flight_tables import write_predicted_flights
     from ..exchange.tables import read_impacts
-    from ..exchange.twin_tables import write_twins
     from ..impact_models.registry import COMPARED, find_model
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
@@ -82,38 +84,38 @@ def run(arguments: argparse.Namespace) -> int:
             radius_m=arguments.radius,
         )
         marks = scores(impacts, predictions)
-        twins = _twins(arguments, impacts, predictions, progress) if arguments.terrain else None
+        flights = _fly(arguments, impacts, predictions, progress) if arguments.terrain else None
         progress("Writing the tables")
         write_predictions(predictions, folder / "predictions.csv")
         write_scores(marks, folder / "scores.csv")
         write_settings(predictions, folder / "comparison.toml")
-        if twins is not None:
-            write_twins(twins, folder / "twins.csv")
+        if flights is not None:
+            write_predicted_flights(flights, folder / "predicted_flights.csv")
         notes = [] if arguments.tables_only else _draw(impacts, predictions, marks, folder, arguments.impacts, progress)
         written = [name for name in FILES if (folder / name).exists()]
-    for line in (*_counts(predictions, len(impacts)), *_table(marks), *_landings(twins), *notes):
+    for line in (*_counts(predictions, len(impacts)), *_table(marks), *_landings(flights), *notes):
         print(line)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
 
 
-def _twins(
+def _fly(
     arguments: argparse.Namespace, impacts: "Impacts", predictions: "Predictions", progress: PrintedProgress
-) -> "Twins":
-    from ..analysis.twins import fly_twins
+) -> "PredictedFlights":
+    from ..analysis.predicted_flights import fly_predictions
     from ..reconstruction.drag import Drag
 
     surface = terrain_as_told(arguments, arguments.terrain, progress)
-    progress("Flying the twins")
+    progress("Flying the predictions")
     drag = Drag() if arguments.drag else None
-    return fly_twins(impacts, predictions, surface, gravity_mps2=arguments.gravity, drag=drag, runs=None)
+    return fly_predictions(impacts, predictions, surface, gravity_mps2=arguments.gravity, drag=drag, runs=None)
 
 
-def _landings(twins: "Twins | None") -> list[str]:
-    """Where the twins of each model's mean land, seen from the real blocks."""
-    from ..analysis.twins import score_twins
+def _landings(flights: "PredictedFlights | None") -> list[str]:
+    """Where the flights of each model's mean land, seen from the real blocks."""
+    from ..analysis.predicted_flights import score_landings
 
-    marks = () if twins is None else score_twins(twins)
+    marks = () if flights is None else score_landings(flights)
     lines = ["Landings with each model's mean, and how far they are from the real ones:"] if marks else []
     for mark in marks:
         text = f"median {mark.median_offset_m:.2f} m, 90 % within {mark.p90_offset_m:.1f} m of {mark.n} flights"

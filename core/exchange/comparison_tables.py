@@ -102,23 +102,6 @@ def write_scores(scores: tuple[Score, ...], path: str | Path) -> None:
             writer.writerow("" if value != value else value for value in astuple(score))
 
 
-def read_scores(path: str | Path) -> tuple[Score, ...]:
-    """Read scores.csv.
-
-    Raises
-    ------
-    InputError : anything that is wrong with the table, with the row.
-    """
-    names = [field.name for field in fields(Score)]
-    table = read_table(path, names, names)
-    numbers = {name: table.numbers(name) for name in names[3:]}
-    counts = table.numbers("n", required=True).astype(np.intp)
-    return tuple(
-        Score(model, quantity, int(n), **{name: float(values[i]) for name, values in numbers.items()})
-        for i, (model, quantity, n) in enumerate(zip(table.text("model"), table.text("quantity"), counts, strict=True))
-    )
-
-
 def write_settings(predictions: Predictions, path: str | Path) -> None:
     """Write comparison.toml: the seed, the spin and all parameters of all models."""
     models = {name: dict(settings) for name, settings in predictions.settings.items()}

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ...core.analysis.comparison import compare
-from ...core.analysis.twins import Twins, fly_twins
+from ...core.analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...core.errors import RockfallError
 from ...core.impact_models.machinery.parameters import Value
 from ...core.impact_models.registry import find_model
@@ -43,7 +43,7 @@ def show_twins(
     result: Reconstruction,
     models: Sequence[str],
     parameters: Mapping[str, Mapping[str, Value]] | None = None,
-) -> Twins:
+) -> PredictedFlights:
     """Show the twins of these models, and of no others; with these parameters, which are kept, or those of the scene.
 
     Raises
@@ -72,14 +72,14 @@ def show_twins(
     return twins
 
 
-def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> Twins:
+def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> PredictedFlights:
     """The twins of the models' means on the scene's terrain; errors as in `show_twins`."""
     surface = terrain.surface_of_scene(scene)
     if surface is None:
         raise RockfallError("The blocks of the models land on the terrain: import one first.")
     own = {name: values for name, values in parameters_of(scene).items() if name in models}
     predictions = compare(result.impacts, models, own)
-    return fly_twins(result.impacts, predictions, surface, gravity_mps2=result.gravity_mps2, drag=result.drag)
+    return fly_predictions(result.impacts, predictions, surface, gravity_mps2=result.gravity_mps2, drag=result.drag)
 
 
 def follow(scene: bpy.types.Scene, result: Reconstruction) -> None:
@@ -109,7 +109,9 @@ def _remove_objects(scene: bpy.types.Scene) -> None:
     store.remove_collection(scene, "Twins")
 
 
-def _show_flights(scene: bpy.types.Scene, model: str, twins: Twins, which: np.ndarray, begin_s: np.ndarray) -> None:
+def _show_flights(
+    scene: bpy.types.Scene, model: str, twins: PredictedFlights, which: np.ndarray, begin_s: np.ndarray
+) -> None:
     pieces = []
     for index in which:
         clock = trails.moments(0.0, float(twins.duration_s[index]))
@@ -126,7 +128,7 @@ def _show_block(
     real: bpy.types.Object,
     model: str,
     number: int,
-    twins: Twins,
+    twins: PredictedFlights,
     which: np.ndarray,
     begin_s: np.ndarray,
 ) -> None:
@@ -146,7 +148,7 @@ def _show_block(
     keyframes.write_visibility_keys(thing, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
 
 
-def _keys(twins: Twins, which: np.ndarray, begin_s: np.ndarray) -> keyframes.Keys:
+def _keys(twins: PredictedFlights, which: np.ndarray, begin_s: np.ndarray) -> keyframes.Keys:
     """Of each flight its ends, which make the parabola; with drag, more of them."""
     times, places, speeds, held = [], [], [], []
     for index in which:

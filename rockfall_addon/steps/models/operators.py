@@ -6,7 +6,7 @@ import numpy as np
 from bpy.props import EnumProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ....core.analysis.twins import score_twins
+from ....core.analysis.predicted_flights import score_landings
 from ....core.exchange.parameters import read_parameters
 from ....core.impact_models.registry import COMPARED, MODELS
 from ...scene import models, reconstruction, store
@@ -46,7 +46,7 @@ class ROCKFALL_OT_show_twins(bpy.types.Operator):
             models.remove_twins(scene)
             return {"FINISHED"}
         chosen = [name for name, *_ in CHOICES if name in self.models]
-        marks = score_twins(models.show_twins(scene, reconstruction.reconstruct_scene(scene), chosen))
+        marks = score_landings(models.show_twins(scene, reconstruction.reconstruct_scene(scene), chosen))
         said = [
             f"{MODELS[mark.model].title}: {mark.median_offset_m:.1f} m"
             for mark in marks

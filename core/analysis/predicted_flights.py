@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Twins: the block that leaves a measured impact as a model says, flown to where it meets the terrain.
+"""Predicted flights: the block that leaves a measured impact as a model says, flown to where it lands.
 
 The comparison of Noël et al. 2018, § 5, flight by flight: same impact, same incident velocity, and then the model's
 restituted velocity instead of the measured one.
@@ -26,14 +26,14 @@ DEFAULT_CLEARING_M = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Twins:
-    """n flights, the rows of twins.csv; positions local.
+class PredictedFlights:
+    """n flights, the rows of predicted_flights.csv; positions local.
 
     Attributes
     ----------
     model : (n,) names.
     replicate : (n,) 0 for the model's mean.
-    site, trajectory, impact : (n,) the impact that the twin leaves.
+    site, trajectory, impact : (n,) the impact that the block leaves.
     time_s : (n,) of that impact [s].
     launches : the starts: position, the model's v2, drag.
     duration_s : (n,) of the flight to the terrain [s].
@@ -78,26 +78,26 @@ class Twins:
 
     @property
     def duration_difference_s(self) -> Array:
-        """(n,) twin − measured [s]."""
+        """(n,) predicted − measured [s]."""
         return self.duration_s - self.measured_duration_s
 
     @property
     def length_difference_m(self) -> Array:
-        """(n,) twin − measured [m]."""
+        """(n,) predicted − measured [m]."""
         return self.length_m - norm(self.measured_landing - self.launches.position)
 
     @property
     def height_difference_m(self) -> Array:
-        """(n,) twin − measured [m]."""
+        """(n,) predicted − measured [m]."""
         return self.height_m - self.measured_height_m
 
     @property
     def landing_offset_m(self) -> Array:
-        """(n,) distance between the twin's landing and the measured one [m]; NaN where the twin left the terrain."""
+        """(n,) distance between the landing and the measured one [m]; NaN where it left the terrain."""
         return np.where(self.left_terrain, np.nan, norm(self.landing - self.measured_landing))
 
     def states(self, which: Indices, time_s: Array) -> tuple[Array, Array]:
-        """Exact positions and velocities (q, 3) of the twins `which` (q,) at times (q,) on the common clock [s].
+        """Exact positions and velocities (q, 3) of the flights `which` (q,) at times (q,) on the common clock [s].
 
         Outside the flight the motion is continued.
         """
@@ -105,15 +105,15 @@ class Twins:
 
 
 @dataclass(frozen=True)
-class TwinScore:
-    """How far the twins of one model's mean land from the real blocks.
+class LandingScore:
+    """How far the flights of one model's mean land from the real blocks.
 
     Attributes
     ----------
     n : flights with both landings.
     median_offset_m, p90_offset_m : distance between the landings [m].
-    median_length_difference_m, median_duration_difference_s, median_height_difference_m : twin − measured.
-    into_ground, left_terrain : how many of the model's twins.
+    median_length_difference_m, median_duration_difference_s, median_height_difference_m : predicted − measured.
+    into_ground, left_terrain : how many of the model's flights.
     """
 
     model: str
@@ -127,7 +127,7 @@ class TwinScore:
     left_terrain: int
 
 
-def fly_twins(
+def fly_predictions(
     impacts: Impacts,
     predictions: Predictions,
     surface: Surface,
@@ -137,7 +137,7 @@ def fly_twins(
     runs: Sequence[int] | None = (0,),
     step_s: float = STEP_S,
     limit_s: float = LIMIT_S,
-) -> Twins:
+) -> PredictedFlights:
     """Fly every predicted impact to the terrain, all at once.
 
     Parameters
@@ -180,7 +180,7 @@ def fly_twins(
     real = Launches(position[row], np.nan_to_num(impacts.v2[row]), drag_per_m[row], gravity_mps2)
     measured_height = greatest_heights(real, measured_duration[row], surface)
     measured_landing = np.where((follower >= 0)[:, None], position[follower], np.nan)
-    return Twins(
+    return PredictedFlights(
         model=np.repeat(np.array(predictions.models), len(runs) * row.size),
         replicate=np.tile(np.repeat(np.array(runs, dtype=np.intp), row.size), len(predictions.models)),
         site=impacts.site[rows],
@@ -201,27 +201,27 @@ def fly_twins(
     )
 
 
-def select(twins: Twins, which: Indices | Mask) -> Twins:
-    """Some of the twins."""
-    start = twins.launches
+def select(flights: PredictedFlights, which: Indices | Mask) -> PredictedFlights:
+    """Some of the flights."""
+    start = flights.launches
     arrays: dict[str, Any] = {
-        name: value[which] for name, value in vars(twins).items() if isinstance(value, np.ndarray)
+        name: value[which] for name, value in vars(flights).items() if isinstance(value, np.ndarray)
     }
     launches = Launches(start.position[which], start.velocity[which], start.drag_per_m[which], start.gravity_mps2)
-    return replace(twins, launches=launches, **arrays)
+    return replace(flights, launches=launches, **arrays)
 
 
-def score_twins(twins: Twins) -> tuple[TwinScore, ...]:
+def score_landings(flights: PredictedFlights) -> tuple[LandingScore, ...]:
     """The flights of each model's mean against the real ones."""
     scores = []
-    for model in twins.models:
-        own = select(twins, (twins.model == model) & (twins.replicate == 0))
+    for model in flights.models:
+        own = select(flights, (flights.model == model) & (flights.replicate == 0))
         both = np.isfinite(own.landing_offset_m)
         values = (own.landing_offset_m, own.length_difference_m, own.duration_difference_s, own.height_difference_m)
         offset, length, duration, height = (_median(each[both]) for each in values)
         p90 = float(np.quantile(own.landing_offset_m[both], 0.9)) if both.any() else np.nan
         lost = int(own.into_ground.sum()), int(own.left_terrain.sum())
-        scores.append(TwinScore(model, int(both.sum()), offset, p90, length, duration, height, *lost))
+        scores.append(LandingScore(model, int(both.sum()), offset, p90, length, duration, height, *lost))
     return tuple(scores)
 
 
@@ -246,7 +246,7 @@ def _check_positions(impacts: Impacts, row: Indices) -> None:
         raise InputError(
             f"The position of impact {impacts.impact[missing[0]]} is not known",
             trajectory=str(impacts.trajectory[missing[0]]),
-            advice="Give x_m, y_m, z_m in the table: the twins start there",
+            advice="Give x_m, y_m, z_m in the table: the flights start there",
         )
 
 

@@ -1,21 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Twins land where the parabola meets the terrain: analytic planes, real flights, border and ground."""
+"""PredictedFlights land where the parabola meets the terrain: analytic planes, real flights, border and ground."""
 
+import csv
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from rockfall.core.analysis.comparison import compare
-from rockfall.core.analysis.twins import fly_twins, score_twins
+from rockfall.core.analysis.predicted_flights import fly_predictions, score_landings
 from rockfall.core.cli import main
 from rockfall.core.colours import OBSERVED_COLOUR
 from rockfall.core.commands.demo import SITE
 from rockfall.core.constants import GRAVITY_MPS2 as G
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.opening import open_project
+from rockfall.core.exchange.predicted_flight_tables import write_predicted_flights
 from rockfall.core.exchange.project import read_project
+from rockfall.core.exchange.selection import rows_of
 from rockfall.core.exchange.tables import read_impacts, write_impacts
-from rockfall.core.exchange.twin_tables import read_twins, write_twins
 from rockfall.core.film.job import FilmJob
 from rockfall.core.film.wording import compared_lines
 from rockfall.core.georeference import GlobalShift
@@ -144,27 +146,41 @@ def as_model(impacts, velocity=None):
 
 def test_the_real_velocity_lands_on_the_next_impact():
     surface, impacts = bounces()
-    twins = fly_twins(impacts, as_model(impacts), surface)
-    assert len(twins) == 4
-    assert np.nanmax(twins.landing_offset_m) < 1e-6
-    for values in (twins.duration_difference_s, twins.length_difference_m, twins.height_difference_m):
+    flights = fly_predictions(impacts, as_model(impacts), surface)
+    assert len(flights) == 4
+    assert np.nanmax(flights.landing_offset_m) < 1e-6
+    for values in (flights.duration_difference_s, flights.length_difference_m, flights.height_difference_m):
         assert np.nanmax(np.abs(values)) < 1e-6
-    halfway = twins.time_s + twins.duration_s / 2
-    position, velocity = twins.states(np.arange(4), halfway)
-    expected = twins.launches.position + (twins.launches.velocity + velocity) / 2 * (twins.duration_s / 2)[:, None]
+    halfway = flights.time_s + flights.duration_s / 2
+    position, velocity = flights.states(np.arange(4), halfway)
+    expected = (
+        flights.launches.position + (flights.launches.velocity + velocity) / 2 * (flights.duration_s / 2)[:, None]
+    )
     np.testing.assert_allclose(position, expected, atol=1e-9)
+
+
+def test_the_order_of_the_rows_does_not_matter():
+    """Also not for the flight that ends at the impact in the first row."""
+    surface, impacts = bounces()
+    turned = rows_of(impacts, slice(None, None, -1))
+    one, other = (fly_predictions(each, as_model(each), surface) for each in (impacts, turned))
+    order = [np.argsort(each.impact) for each in (one, other)]
+    for name in ("measured_duration_s", "measured_landing", "landing_offset_m", "height_difference_m"):
+        there, here = (getattr(each, name)[rows] for each, rows in zip((one, other), order, strict=True))
+        np.testing.assert_allclose(here, there, atol=1e-9, err_msg=name)
+    assert np.isfinite(other.measured_duration_s).all()
 
 
 def test_the_real_velocity_lands_on_the_next_impact_of_the_demo_within_the_noise():
     surface, result = open_project(read_project(SITE / "project.toml"))
-    twins = fly_twins(result.impacts, as_model(result.impacts), surface)
-    assert np.isfinite(twins.landing_offset_m).sum() > 60
-    assert np.nanmedian(twins.landing_offset_m) < 0.005
-    assert np.nanmax(twins.landing_offset_m) < 0.05
-    models = fly_twins(result.impacts, compare(result.impacts), surface)
-    finer = fly_twins(result.impacts, compare(result.impacts), surface, step_s=0.004)
+    flights = fly_predictions(result.impacts, as_model(result.impacts), surface)
+    assert np.isfinite(flights.landing_offset_m).sum() > 60
+    assert np.nanmedian(flights.landing_offset_m) < 0.005
+    assert np.nanmax(flights.landing_offset_m) < 0.05
+    models = fly_predictions(result.impacts, compare(result.impacts), surface)
+    finer = fly_predictions(result.impacts, compare(result.impacts), surface, step_s=0.004)
     assert np.linalg.norm(models.landing - finer.landing, axis=1).max() < 1e-3
-    marks = {mark.model: mark for mark in score_twins(models)}
+    marks = {mark.model: mark for mark in score_landings(models)}
     assert tuple(marks) == COMPARED
     assert marks["pfeiffer_bowen_1989"].median_offset_m == pytest.approx(marks["stevens_1998"].median_offset_m)
     assert all(mark.n > 80 for mark in marks.values())
@@ -174,7 +190,9 @@ def test_a_models_block_lands_where_its_parabola_meets_the_plane():
     surface, impacts = bounces()
     normal = np.array([np.sin(np.radians(35)), 0, np.cos(np.radians(35))])
     settings = {"azimi_desvarreux_1977": {"rn": 0.35, "rt": 0.85, "definition": "velocity"}}
-    (mark,) = score_twins(fly_twins(impacts, compare(impacts, ["azimi_desvarreux_1977"], parameters=settings), surface))
+    (mark,) = score_landings(
+        fly_predictions(impacts, compare(impacts, ["azimi_desvarreux_1977"], parameters=settings), surface)
+    )
     inwards = (impacts.v1 @ normal)[:, None] * normal
     flown = []
     for velocity in (0.85 * (impacts.v1 - inwards) - 0.35 * inwards, impacts.v2):
@@ -196,35 +214,35 @@ def test_a_models_block_lands_where_its_parabola_meets_the_plane():
 def test_a_model_into_the_ground_flies_nowhere():
     surface, impacts = bounces()
     predictions = as_model(impacts, velocity=[1.0, 0.0, -5.0])
-    twins = fly_twins(impacts, replace(predictions, into_ground=np.ones_like(predictions.into_ground)), surface)
-    assert twins.into_ground.all()
-    np.testing.assert_array_equal(twins.length_m, 0.0)
-    real = np.linalg.norm(twins.measured_landing - twins.launches.position, axis=1)
-    np.testing.assert_allclose(twins.landing_offset_m, real)
+    flights = fly_predictions(impacts, replace(predictions, into_ground=np.ones_like(predictions.into_ground)), surface)
+    assert flights.into_ground.all()
+    np.testing.assert_array_equal(flights.length_m, 0.0)
+    real = np.linalg.norm(flights.measured_landing - flights.launches.position, axis=1)
+    np.testing.assert_allclose(flights.landing_offset_m, real)
 
 
 def test_runs_are_flown_model_by_model():
     surface, impacts = bounces()
     predictions = compare(impacts, ["noel_2017", "stevens_1998"], replicates=3, seed=5)
-    twins = fly_twins(impacts, predictions, surface, runs=None)
+    flights = fly_predictions(impacts, predictions, surface, runs=None)
     m = predictions.row.size
-    assert len(twins) == 2 * 4 * m
-    assert twins.model[4 * m] == "stevens_1998"
-    np.testing.assert_array_equal(twins.replicate[: 4 * m], np.repeat(np.arange(4), m))
-    np.testing.assert_array_equal(twins.launches.velocity, predictions.v2.reshape(-1, 3))
-    mean = fly_twins(impacts, predictions, surface)
-    np.testing.assert_array_equal(mean.landing[:m], twins.landing[:m])
+    assert len(flights) == 2 * 4 * m
+    assert flights.model[4 * m] == "stevens_1998"
+    np.testing.assert_array_equal(flights.replicate[: 4 * m], np.repeat(np.arange(4), m))
+    np.testing.assert_array_equal(flights.launches.velocity, predictions.v2.reshape(-1, 3))
+    mean = fly_predictions(impacts, predictions, surface)
+    np.testing.assert_array_equal(mean.landing[:m], flights.landing[:m])
 
 
 def test_drag_needs_the_block():
     surface, impacts = bounces()
     drag = Drag()
-    twins = fly_twins(impacts, as_model(impacts), surface, drag=drag)
-    np.testing.assert_allclose(twins.launches.drag_per_m, drag.per_metre(Block()), rtol=1e-12)
+    flights = fly_predictions(impacts, as_model(impacts), surface, drag=drag)
+    np.testing.assert_allclose(flights.launches.drag_per_m, drag.per_metre(Block()), rtol=1e-12)
     with pytest.raises(InputError, match="Diameter and mass"):
-        fly_twins(replace(impacts, mass_kg=np.full(len(impacts), np.nan)), as_model(impacts), surface, drag=drag)
+        fly_predictions(replace(impacts, mass_kg=np.full(len(impacts), np.nan)), as_model(impacts), surface, drag=drag)
     with pytest.raises(InputError, match="position of impact"):
-        fly_twins(replace(impacts, position=np.full_like(impacts.position, np.nan)), as_model(impacts), surface)
+        fly_predictions(replace(impacts, position=np.full_like(impacts.position, np.nan)), as_model(impacts), surface)
 
 
 def test_a_film_of_models(tmp_path, capsys):
@@ -242,35 +260,49 @@ def test_model_colours_are_told_apart():
     assert apart.min() > 0.3
 
 
-def test_a_table_of_two_gravities_is_refused(tmp_path):
-    surface, impacts = bounces()
-    write_twins(fly_twins(impacts, compare(impacts, ["noel_2017"]), surface), tmp_path / "twins.csv")
-    header, first, second, *rest = [line.split(",") for line in (tmp_path / "twins.csv").read_text().splitlines()]
-    second[header.index("gravity_mps2")] = "3.71"
-    (tmp_path / "twins.csv").write_text("\n".join(",".join(row) for row in (header, first, second, *rest)) + "\n")
-    with pytest.raises(InputError, match=r"csv, row 3.*: Gravity is not that of the first row"):
-        read_twins(tmp_path / "twins.csv")
+COLUMNS = (
+    "model,replicate,site,trajectory,impact,time_s,x_m,y_m,z_m,v2x_mps,v2y_mps,v2z_mps,gravity_mps2,drag_per_m,"
+    "duration_s,landing_x_m,landing_y_m,landing_z_m,landing_vx_mps,landing_vy_mps,landing_vz_mps,height_m,"
+    "measured_duration_s,measured_x_m,measured_y_m,measured_z_m,measured_height_m,length_m,duration_difference_s,"
+    "length_difference_m,height_difference_m,landing_offset_m,flags"
+)
 
 
-def test_table_round_trip(tmp_path):
+def cells(path):
+    with path.open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def column(rows, name):
+    return np.array([float(row[name] or "nan") for row in rows])
+
+
+def vectors(rows, name):
+    return np.stack([column(rows, name.format(axis)) for axis in "xyz"], axis=1)
+
+
+def test_a_flight_can_be_computed_again_from_its_row(tmp_path):
     surface, impacts = bounces()
     shift = GlobalShift(2600000.0, 1200000.0, 500.0)
     surface = Surface(surface.vertices, surface.faces, shift, "plane", ())
     impacts = replace(impacts, shift=shift)
-    twins = fly_twins(impacts, compare(impacts, replicates=1), surface, runs=None)
-    write_twins(twins, tmp_path / "twins.csv")
-    back = read_twins(tmp_path / "twins.csv", shift)
-    for name, value in vars(twins).items():
-        if isinstance(value, np.ndarray):
-            if value.dtype.kind == "f":
-                np.testing.assert_allclose(getattr(back, name), value, atol=1e-8, err_msg=name)
-            else:
-                np.testing.assert_array_equal(getattr(back, name), value, err_msg=name)
-    np.testing.assert_allclose(back.launches.velocity, twins.launches.velocity, atol=0)
-    np.testing.assert_allclose(back.landing_offset_m, twins.landing_offset_m, atol=1e-8)
+    flights = fly_predictions(impacts, compare(impacts, replicates=1), surface, runs=None)
+    write_predicted_flights(flights, tmp_path / "predicted_flights.csv")
+    rows = cells(tmp_path / "predicted_flights.csv")
+    assert ",".join(rows[0]) == COLUMNS
+    assert [row["model"] for row in rows] == flights.model.tolist()
+    assert [int(row["replicate"]) for row in rows] == flights.replicate.tolist()
+    assert [row["flags"] for row in rows] == ["into_ground" if into else "" for into in flights.into_ground]
+    for name in ("time_s", "duration_s", "height_m", "landing_offset_m", "measured_duration_s", "length_difference_m"):
+        np.testing.assert_array_equal(column(rows, name), getattr(flights, name), err_msg=name)
+    start, v2 = vectors(rows, "{}_m"), vectors(rows, "v2{}_mps")
+    fall = vectors(rows, "landing_{}_m") - start - v2 * column(rows, "duration_s")[:, None]
+    expected = -column(rows, "gravity_mps2") / 2 * column(rows, "duration_s") ** 2
+    np.testing.assert_allclose(fall, np.outer(expected, [0, 0, 1]), atol=1e-8)
+    np.testing.assert_allclose(start, shift.to_survey(flights.launches.position), atol=1e-9)
 
 
-def test_compare_with_a_terrain_leaves_twins(tmp_path, capsys):
+def test_compare_with_a_terrain_leaves_predicted_flights(tmp_path, capsys):
     _, result = open_project(read_project(SITE / "project.toml"))
     write_impacts(result.impacts, tmp_path / "impacts.csv")
     options = ["--model", "noel_2017", "wyllie_2014", "--tables-only", "--terrain", str(SITE / "terrain.ply")]
@@ -278,10 +310,11 @@ def test_compare_with_a_terrain_leaves_twins(tmp_path, capsys):
     status = main(["compare", str(tmp_path / "impacts.csv"), *options, "--out", str(out)])
     said = capsys.readouterr()
     assert status == 0, said.err
-    assert "twins.csv" in said.out
+    assert "predicted_flights.csv" in said.out
     assert "Landings with each model's mean" in said.out
-    twins = read_twins(out / "twins.csv")
-    assert twins.models == ("noel_2017", "wyllie_2014")
+    rows = cells(out / "predicted_flights.csv")
+    assert list(dict.fromkeys(row["model"] for row in rows)) == ["noel_2017", "wyllie_2014"]
     impacts = read_impacts(tmp_path / "impacts.csv")
-    assert set(twins.trajectory.tolist()) <= set(impacts.trajectory.tolist())
-    assert np.nanmedian(twins.landing_offset_m[twins.model == "noel_2017"]) < 4.0
+    assert {row["trajectory"] for row in rows} <= set(impacts.trajectory.tolist())
+    own = [row for row in rows if row["model"] == "noel_2017"]
+    assert np.nanmedian(column(own, "landing_offset_m")) == pytest.approx(1.707, abs=0.001)

@@ -73,11 +73,6 @@ def to_region(rectangle: Rectangle, size: tuple[int, int], uv: ArrayLike) -> Arr
     return np.stack([x, y], axis=-1)
 
 
-def screen_scale(rectangle: Rectangle, size: tuple[int, int]) -> float:
-    """Pixels of the screen per pixel of the video."""
-    return rectangle.width / size[0]
-
-
 def ray(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: ArrayLike, common_s: ArrayLike) -> tuple[Array, Array]:
     """Rays through pixels (2,) or (n, 2) of the picture at common times, one or (n,).
 

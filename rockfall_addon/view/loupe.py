@@ -6,11 +6,17 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
+from ...core.camera.model import rays
 from ...core.errors import RockfallError
-from ..scene import pictures, problems, videos
-from . import drawing, image_view, loupe_picture, pointing
+from ...core.terrain.raycast import cast_rays
+from ...core.vectors import Array
+from ..scene import pictures, places, problems, reconstruction, videos
+from . import drawing, footage_view, image_view, pointing
 
 SHOWN_BY = {"rockfall.pick_tool", "rockfall.align_tool"}
+SIDE = 25
+"""Pixels of the video along each side."""
+OUTSIDE = 40  # grey level
 AWAY = 26  # pixels at interface scale 1, between the mouse and the loupe
 
 _handles: list[object] = []
@@ -24,6 +30,42 @@ def register() -> None:
 def unregister() -> None:
     while _handles:
         bpy.types.WindowManager.draw_cursor_remove(_handles.pop())
+
+
+def crop(picture: np.ndarray, pixel: Array) -> np.ndarray:
+    """(SIDE, SIDE, 3) uint8 about the pixel in the middle, dark outside of the picture."""
+    height, width = picture.shape[:2]
+    column, row = (int(value) for value in np.floor(pixel) - SIDE // 2)
+    found = np.full((SIDE, SIDE, 3), OUTSIDE, dtype=np.uint8)
+    top, left = max(row, 0), max(column, 0)
+    bottom, right = min(row + SIDE, height), min(column + SIDE, width)
+    if top < bottom and left < right:
+        found[top - row : bottom - row, left - column : right - column] = picture[top:bottom, left:right]
+    return found
+
+
+def outline(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Array) -> Array | None:
+    """(49, 2) pixels: the block's outline when it is clicked here; None when that is not on the terrain."""
+    surface = reconstruction.ground(scene)
+    if surface is None or not videos.is_solved(camera):
+        return None
+    _, video_s = pictures.picture_time(scene, camera)
+    lens = pictures.posed(camera, video_s)
+    origin, direction = rays(lens, pixel[None])
+    if not np.isfinite(direction).all():
+        return None
+    hits = cast_rays(surface, origin, direction)
+    if hits.face[0] < 0:
+        return None
+    radius = places.block_of(scene, places.trajectory(scene)).radius_m
+    if scene.rockfall_picking.aim == "CONTACT":
+        normal = surface.face_normals[hits.face[0]]
+        centre = hits.point[0] + radius * normal
+    else:
+        slope = abs(float(surface.face_normals[hits.face[0]] @ direction[0]))
+        centre = hits.point[0] - radius / max(slope, 0.1) * direction[0]
+    found = footage_view.ball(lens, centre, radius)
+    return found[np.isfinite(found[:, 0])]
 
 
 @problems.guarded
@@ -48,26 +90,26 @@ def _draw(mouse: tuple[int, int]) -> None:
     zoom = settings.loupe_zoom * scale
     frame, _ = pictures.picture_time(scene, camera)
     try:
-        crop = loupe_picture.crop(videos.picture(camera, frame), pixel)
+        part = crop(videos.picture(camera, frame), pixel)
     except RockfallError:
         return  # the panel Videos tells that the file is gone
-    side = loupe_picture.SIDE * zoom
+    side = SIDE * zoom
     left = mouse[0] + AWAY * scale
     if spot[0] + AWAY * scale + side > region.width:
         left = mouse[0] - AWAY * scale - side
     low = mouse[1] + AWAY * scale
     if spot[1] + AWAY * scale + side > region.height:
         low = mouse[1] - AWAY * scale - side
-    _picture(crop, left, low, side)
-    outline = loupe_picture.outline(scene, camera, pixel) if tool.idname == "rockfall.pick_tool" else None
-    _cross(pixel, left, low, side, zoom, scale, outline)
+    _picture(part, left, low, side)
+    edge = outline(scene, camera, pixel) if tool.idname == "rockfall.pick_tool" else None
+    _cross(pixel, left, low, side, zoom, scale, edge)
 
 
-def _picture(crop: np.ndarray, left: float, low: float, side: float) -> None:
-    values = np.ones((*crop.shape[:2], 4), dtype=np.float32)
-    values[:, :, :3] = crop[::-1] / 255.0
+def _picture(part: np.ndarray, left: float, low: float, side: float) -> None:
+    values = np.ones((*part.shape[:2], 4), dtype=np.float32)
+    values[:, :, :3] = part[::-1] / 255.0
     data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
-    texture = gpu.types.GPUTexture((crop.shape[1], crop.shape[0]), format="RGBA8", data=data)
+    texture = gpu.types.GPUTexture((part.shape[1], part.shape[0]), format="RGBA8", data=data)
     texture.filter_mode(False)
     shader = gpu.shader.from_builtin("IMAGE")
     right, high = left + side, low + side
@@ -78,10 +120,10 @@ def _picture(crop: np.ndarray, left: float, low: float, side: float) -> None:
 
 
 def _cross(
-    pixel: np.ndarray, left: float, low: float, side: float, zoom: float, scale: float, outline: np.ndarray | None
+    pixel: np.ndarray, left: float, low: float, side: float, zoom: float, scale: float, block: np.ndarray | None
 ) -> None:
     """Frame, crosshair at the very pixel, and the block's outline there."""
-    first = np.floor(pixel) - loupe_picture.SIDE // 2
+    first = np.floor(pixel) - SIDE // 2
     corner = np.array([left, low + side])
 
     def to_screen(pixels: np.ndarray) -> np.ndarray:
@@ -98,8 +140,8 @@ def _cross(
     gpu.state.blend_set("ALPHA")
     _plain(np.array(lines), (1.0, 1.0, 1.0, 0.7), scale)
     _plain(np.array([(edge[i], edge[(i + 1) % 4]) for i in range(4)]), (0.0, 0.0, 0.0, 0.9), 2 * scale)
-    if outline is not None and len(outline):
-        points = np.clip(to_screen(outline), (left, low), (left + side, low + side))
+    if block is not None and len(block):
+        points = np.clip(to_screen(block), (left, low), (left + side, low + side))
         _plain(np.stack([points[:-1], points[1:]], axis=1), (1.0, 1.0, 0.35, 0.9), 1.5 * scale)
     gpu.state.blend_set("NONE")
 

@@ -9,13 +9,13 @@ import bpy
 
 from ...core.errors import RockfallError
 from ..scene import store, videos
+from ..scene.next_step import PICK_TOOL
 from . import image_view
 
 FILE = Path(__file__).parents[2] / "assets" / "workspace.blend"
 NAME = "Rockfall"
 """Marks our workspace, which its owner may rename."""
 
-PICK_TOOL = "rockfall.pick_tool"
 MARGIN = 0.97  # share of the free part of the view that the picture fills
 PROBE = 0.1
 

@@ -146,22 +146,23 @@ def test_the_file_of_the_workspace(rockfall, part, tmp_path: Path) -> None:
 
 
 def test_the_next_step_leads_from_the_footage_to_the_end(rockfall, part) -> None:
-    start, scene = part("rockfall_addon.steps.start.panel"), bpy.context.scene
+    following, scene = part("rockfall_addon.scene.next_step"), bpy.context.scene
+    looks = part("rockfall_addon.steps.start.panel").LOOKS
     for expected in (
         "rockfall.load_footage_demo",
         "rockfall.propose_impacts",
         "rockfall.refine",
         "rockfall.apply_refinement",
     ):
-        sentence, buttons = start.next_step(scene)
-        offered = [identifier for identifier, _, _ in buttons]
-        assert sentence.endswith(".")
-        assert expected in offered, (expected, sentence)
-        for identifier in offered:
+        step = following.next_step(scene)
+        assert step.sentence.endswith(".")
+        assert expected in step.actions, (expected, step.sentence)
+        assert set(step.actions) <= set(looks), "each has its text and icon"
+        for identifier in set(step.actions) - {following.PICK_TOOL}:
             module, name = identifier.split(".")
             assert getattr(getattr(bpy.ops, module), name).get_rna_type()
         assert getattr(bpy.ops.rockfall, expected.removeprefix("rockfall."))() == {"FINISHED"}
-    assert start.next_step(scene)[0].startswith("Play")
+    assert following.next_step(scene).sentence.startswith("Play")
 
 
 def test_opening_needs_a_window(rockfall) -> None:

@@ -83,10 +83,10 @@ def case_workspace_with_the_footage(window):
 def case_tutorial_of_the_manual(window):
     """From the demo's footage to a refined trajectory, by the clicks that docs/manual counts."""
     scene = bpy.context.scene
-    start = window.part("rockfall_addon.steps.start.panel")
+    following = window.part("rockfall_addon.scene.next_step")
 
     def press(operator):
-        assert operator in [button[0] for button in start.next_step(scene)[1]], "not offered as the next step"
+        assert operator in following.next_step(scene).actions, "not offered as the next step"
         seen, _ = views(window)
         module, name = operator.split(".")
         with bpy.context.temp_override(window=window.window, area=seen, region=region(seen, "WINDOW")):
@@ -111,7 +111,7 @@ def case_tutorial_of_the_manual(window):
     said = window.part("rockfall_addon.scene.problems").sentences(scene)
     assert not [text for text in said if "went wrong" in text], said
     window.screenshot("4-applied")
-    assert start.next_step(scene)[0].startswith("Play")
+    assert following.next_step(scene).sentence.startswith("Play")
 
 
 def case_first_clicks_of_the_manual(window):

@@ -67,6 +67,14 @@ def test_chosen_models_spin_and_radius(impacts, tmp_path):
     np.testing.assert_allclose(predictions.v2[0, 0, 0], [3.312, 0, 1.860413], rtol=1e-6)
 
 
+def test_a_refused_terrain_is_named_and_not_the_impacts(impacts, tmp_path, capsys):
+    argv = ["compare", str(impacts), "--tables-only", "--terrain", str(tmp_path / "none.ply")]
+    assert main([*argv, "--out", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr().err
+    assert f"rockfall: {tmp_path / 'none.ply'}: " in said
+    assert "impacts.csv: " not in said
+
+
 def test_speeds_in_km_h_are_not_taken_for_metres_a_second(impacts, tmp_path, capsys):
     """As recorded by many: the same results as from the same speeds in m/s, and no advice to rename a column."""
     speeds = HEADER.replace("_mps", "_kmh")

@@ -106,6 +106,10 @@ def test_zero_and_measured_spin():
     table = compare(with_spin(impacts, measured), ["noel_2017"], spin="table")
     np.testing.assert_array_equal(table.omega1[0, 0], measured[[1, 3, 4, 5, 6]])
     assert (2, "no measured angular velocity") in table.skipped
+    measured[3, 1] = np.nan  # a part of a spin is none
+    assert (3, "no measured angular velocity") in compare(
+        with_spin(impacts, measured), ["noel_2017"], spin="table"
+    ).skipped
 
 
 def test_replicates_do_not_depend_on_anything_else():

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.curves import fit_curve
 from rockfall.core.analysis.graphs import (
     PAPER_GRAPHS,
     GraphSpec,
@@ -182,3 +183,26 @@ def test_bad_input(impacts, predictions) -> None:
         make_graph(impacts, PAPER_GRAPHS[0], predictions, "bourrier_hungr")
     with pytest.raises(InputError, match="There are 2"):
         make_graph(impacts, PAPER_GRAPHS[0], predictions, "noel_2017", run=3)
+
+
+@pytest.mark.parametrize(
+    ("trend", "law", "ends"),
+    [
+        ("line", lambda x: 1.0 + 2.0 * x, (2.0, 7.0)),
+        ("origin", lambda x: 2.0 * x, (1.0, 7.0)),
+        ("power", lambda x: 3.0 * x**-1.2, (2.0, 7.0)),
+    ],
+)
+def test_a_curve_is_that_of_its_points(trend, law, ends):
+    """From the least to the greatest of the points, within the axes; a line through the origin from there."""
+    x = np.array([2.0, 3.0, 4.5, 7.0])
+    curve = fit_curve(trend, np.stack([x, law(x)], axis=1), (1.0, 9.0), (0.0, 100.0))
+    np.testing.assert_allclose(curve.y, law(curve.x), rtol=1e-9)
+    assert (curve.x[0], curve.x[-1]) == pytest.approx(ends)
+    narrow = fit_curve(trend, np.stack([x, law(x)], axis=1), (2.5, 6.0), (0.0, 100.0))
+    assert (narrow.x[0], narrow.x[-1]) == pytest.approx((2.5, 6.0))
+    low, high = sorted(law(np.array([3.0, 4.0])))
+    cut = fit_curve(trend, np.stack([x, law(x)], axis=1), (1.0, 9.0), (low, high))
+    assert 0 < cut.x.size < 60
+    assert ((cut.x > 2.99) & (cut.x < 4.01)).all()
+    assert fit_curve("none", np.stack([x, law(x)], axis=1), (1.0, 9.0), (0.0, 100.0)) is None

@@ -116,6 +116,28 @@ def test_penetration(rn, depth):
     assert penetration_depth(rn, 10.0, 0.175, mass) == pytest.approx(depth, abs=6e-5)
 
 
+def test_deep_penetration_is_that_of_the_logarithm():
+    """Pichler et al. 2005 by hand: R_n = 0.23, d = 1 m, 2600 kg; x = 2N/π·ln[(1 + I/N)/(1 + kπ/4N)] + k."""
+    hard, sharp, k = 55e9 * 0.23**7, 2600 / (1.2 * (1200 * np.log(0.23) + 3300)), 1.207
+    edge = np.sqrt(k * np.pi / 4 * hard / 2600)  # the speed [m/s] at which the depth is k diameters
+    assert penetration_depth(0.23, edge, 0.5, 2600.0) == pytest.approx(k, rel=1e-12)
+    for speed in (1.001 * edge, 3 * edge):
+        ratio = (1 + 2600 * speed**2 / hard / sharp) / (1 + k * np.pi / 4 / sharp)
+        depth = 2 * sharp / np.pi * np.log(ratio) + k
+        assert penetration_depth(0.23, speed, 0.5, 2600.0) == pytest.approx(depth, rel=1e-12)
+        assert depth > k
+
+
+def test_noel_without_scatter_is_its_mean():
+    """A standard deviation of zero is allowed, and then chance has no part."""
+    still = {"rn_exponent_sd": 0, "rt_sd": 0}
+    for name in INCIDENT:
+        mean, drawn = (
+            MODELS["noel_2017"].rebound(incident(name), still, rng) for rng in (None, np.random.default_rng(1))
+        )
+        np.testing.assert_array_equal(drawn.velocity, mean.velocity)
+
+
 def test_a_block_that_does_not_approach_has_no_impact():
     state = Incident(
         np.array([[1.0, 0, 1], [1, 0, 0], [np.nan, 0, -1]]),

@@ -150,7 +150,7 @@ class Learning:
     """A pytest plugin: which test runs which lines of the tree, and how long it takes."""
 
     def __init__(self, tree: Path) -> None:
-        self.tree = f"{tree}{os.sep}"
+        self.package = f"{package_of(tree)}{os.sep}"
         self.lines: dict[str, dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
         self.tests: list[tuple[str, float]] = []
         self.failed: set[str] = set()
@@ -161,8 +161,8 @@ class Learning:
         sys.monitoring.set_events(sys.monitoring.COVERAGE_ID, sys.monitoring.events.LINE)
 
     def line(self, code: object, number: int) -> object:
-        if code.co_filename.startswith(self.tree) and self.tests:
-            self.lines[code.co_filename.removeprefix(self.tree)][number].append(len(self.tests) - 1)
+        if code.co_filename.startswith(self.package) and self.tests:
+            self.lines[code.co_filename.removeprefix(self.package)][number].append(len(self.tests) - 1)
         return sys.monitoring.DISABLE
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
@@ -182,7 +182,7 @@ def tests_in(tree: Path, arguments: list[str], plugins: list[object], blender: b
     import pytest
 
     os.chdir(tree)
-    sys.path.insert(0, str(tree.parent / f"{tree.name}-path"))
+    sys.path.insert(0, str(package_of(tree).parent))
     if blender:
         import bpy  # noqa: F401
     return int(pytest.main(["-q", "-p", "no:cacheprovider", "--import-mode=importlib", *arguments], plugins=plugins))
@@ -221,10 +221,15 @@ def copy_tree(to: Path) -> None:
         if name and (ROOT / name).is_file():
             (to / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, to / name)
-    beside = to.parent / f"{to.name}-path"
-    beside.mkdir(exist_ok=True)
-    (beside / "rockfall").unlink(missing_ok=True)
-    (beside / "rockfall").symlink_to(to)
+    package = package_of(to)
+    package.parent.mkdir(exist_ok=True)
+    package.unlink(missing_ok=True)
+    package.symlink_to(to)
+
+
+def package_of(tree: Path) -> Path:
+    """A link to a copy of the tree, by the name that Python and the tests import."""
+    return tree.parent / f"{tree.name}-path" / "rockfall"
 
 
 def learn(work: Path, level: str, words: str) -> dict:

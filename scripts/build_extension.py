@@ -76,6 +76,11 @@ def fetch_wheels(system: str, python: str) -> list[Path]:
         return {(name.lower(), version): path for path in directory.glob("*.whl")
                 for name, version, *_ in [path.name.split("-")]}  # fmt: skip
 
+    directory.mkdir(parents=True, exist_ok=True)
+    for path in sorted(directory.parent.glob("*/*.whl")):
+        key = (path.name.split("-")[0].lower(), path.name.split("-")[1])
+        if key in wanted - present().keys() and fits_any_python(path.name, system):
+            shutil.copy2(path, directory)  # fetched before, for another system or Python
     missing = wanted - present().keys()
     if missing:
         print(f"{system}, Python {python}: fetching {len(missing)} wheels", flush=True)
@@ -91,6 +96,13 @@ def fetch_wheels(system: str, python: str) -> list[Path]:
     if wanted - found.keys():
         raise SystemExit(f"build_extension: pip brought no wheel of {sorted(wanted - found.keys())} for {system}")
     return sorted(found.values())
+
+
+def fits_any_python(name: str, system: str) -> bool:
+    """Whether a wheel is of pure Python or of the stable interface, and for this system."""
+    python, abi, platforms = name.removesuffix(".whl").split("-")[-3:]
+    fits = platforms == "any" or not set(SYSTEMS[system]).isdisjoint(platforms.split("."))
+    return fits and (abi == "abi3" or python.startswith("py"))
 
 
 def stage(directory: Path, wheels: dict[str, list[Path]], *, link: bool = False) -> Path:

@@ -59,6 +59,19 @@ def test_bundled_packages_are_what_the_core_asks_for(build_extension: ModuleType
     assert bundled <= build_extension.pinned_versions().keys()
 
 
+@pytest.mark.parametrize(
+    ("name", "system", "fits"),
+    [
+        ("trimesh-4.9.0-py3-none-any.whl", "windows-x64", True),
+        ("opencv_python_headless-4.13.0-cp37-abi3-manylinux2014_x86_64.manylinux_2_17_x86_64.whl", "linux-x64", True),
+        ("opencv_python_headless-4.13.0-cp37-abi3-win_amd64.whl", "linux-x64", False),
+        ("numba-0.65.0-cp313-cp313-manylinux_2_28_x86_64.whl", "linux-x64", False),
+    ],
+)
+def test_wheels_that_fit_any_python(build_extension: ModuleType, name: str, system: str, fits: bool) -> None:
+    assert build_extension.fits_any_python(name, system) == fits
+
+
 def test_staged_manifest_lists_the_wheels(build_extension: ModuleType, tmp_path: Path) -> None:
     (tmp_path / "scipy-1.0-py3-none-any.whl").write_bytes(b"PK")
     wheels = {"linux-x64": [tmp_path / "scipy-1.0-py3-none-any.whl"]}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fits recover what impacts were made with, their intervals hold it, and the verdicts say when the data cannot tell."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import isnan
 
 import numpy as np
@@ -14,9 +14,10 @@ from rockfall.core.analysis.equivalence import equivalent
 from rockfall.core.analysis.estimation import FitOptions, paired_gain
 from rockfall.core.analysis.fitting import Axis, interval
 from rockfall.core.errors import InputError
+from rockfall.core.exchange.selection import rows_of
 from rockfall.core.impact_models.registry import MODELS
 from rockfall.core.progress import CancelledError
-from rockfall.core.reconstruction.impact import Impacts, apparent
+from rockfall.core.reconstruction.impact import apparent
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
 
@@ -45,17 +46,6 @@ def made_by(impacts, model, parameters=None, *, seed=99, noise_mps=0.0):
     values = {name: getattr(seen, name) for name in ("vn2", "vt2", "rn", "rt", "r", "theta_dev")}
     flags = {**impacts.flags, "into_ground": np.zeros(len(impacts), dtype=np.bool_)}
     return replace(impacts, v2=v2, flags=flags, **values)
-
-
-def rows_of(impacts, rows):
-    taken = {}
-    for field in fields(Impacts):
-        value = getattr(impacts, field.name)
-        if field.name in ("flags", "sigma", "extra"):
-            taken[field.name] = {name: each[rows] for name, each in value.items()}
-        elif field.name != "shift":
-            taken[field.name] = value[rows]
-    return replace(impacts, **taken)
 
 
 def by_name(result):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Edits of picks, by hand, by key, by panel, are followed by their trajectory, and by no other."""
 
+import itertools
 import json
 from pathlib import Path
 
@@ -318,6 +319,32 @@ def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part) -> None:
     update()
     check_shown(slope, part)
     assert picks_of(slope, "B")[1]["rockfall_result"]["bounce_height_m"][0] > 0.3
+
+
+def test_a_marker_lies_on_the_terrain(slope: bpy.types.Scene) -> None:
+    normal = np.array([SLOPE, 0.0, 1.0]) / np.hypot(SLOPE, 1.0)
+    for pick in picks_of(slope, "A")[1:4]:
+        up = np.array(pick.rotation_quaternion.to_matrix())[:, 2]
+        np.testing.assert_allclose(up, normal, atol=1e-5)
+
+
+def test_doubt_of_flights(slope: bpy.types.Scene) -> None:
+    """The relative deviation of the speed at either end, where 20 % are the top; 1 beside a doubtful pick."""
+    picks, mesh = picks_of(slope, "B"), trail(slope, "B").data
+    doubt, at = values(mesh, "doubt"), places(mesh)
+    ends = [np.array(pick["rockfall_position_m"]) for pick in picks]
+    found = [doubt[(at[:, 0] > a[0] + 1e-3) & (at[:, 0] < b[0] - 1e-3)] for a, b in itertools.pairwise(ends)]
+    assert all(np.ptp(one) == 0 for one in found), "one value for each flight"
+
+    def relative(pick: bpy.types.Object, side: int) -> float:
+        result = pick["rockfall_result"]
+        speed = np.linalg.norm(result["incident_mps" if side == 1 else "restituted_mps"])
+        return result[f"sigma_speed{side}"][0] / speed / 0.2
+
+    first, second = picks[1:3]
+    expected = [relative(first, 1), max(relative(first, 2), relative(second, 1)), 1.0, 1.0]
+    np.testing.assert_allclose([one[0] for one in found], np.minimum(expected, 1.0), rtol=1e-5)
+    assert 0.0 < expected[0] < 1.0
 
 
 def raised(x: np.ndarray) -> np.ndarray:

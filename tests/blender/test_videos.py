@@ -141,6 +141,25 @@ def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object,
         assert seen(camera, videos.scene_frame_of(scene(), camera, index)) == index
 
 
+@pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "vp9.webm"])
+def test_no_picture_of_a_healthy_video_is_said_to_be_hidden(part: Part, name: str) -> None:
+    assert part("rockfall_addon.scene.footage").hidden(add(part, name)) == 0
+
+
+def test_a_camera_that_stands_has_no_keys_of_one_that_moved(part: Part) -> None:
+    videos, camera = part("rockfall_addon.scene.videos"), add(part, "variable.mp4")
+    videos.set_camera_path(scene(), camera, solved(part, camera, 20))
+    action = camera.animation_data.action
+    assert len(bpy.data.actions) == 1
+    assert action.users == 1
+    standing = solved(part, camera, 1)
+    videos.set_camera_path(scene(), camera, standing)
+    assert camera.animation_data.action is None
+    assert not bpy.data.actions
+    scene().frame_set(7)
+    np.testing.assert_allclose(camera.matrix_world.translation, standing.reference.position, atol=1e-5)
+
+
 def add(part: Part, name: str) -> bpy.types.Object:
     return part("rockfall_addon.scene.videos").add_video(scene(), DATA / name)
 

@@ -321,6 +321,14 @@ def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part) -> None:
     assert picks_of(slope, "B")[1]["rockfall_result"]["bounce_height_m"][0] > 0.3
 
 
+def test_the_panel_shows_the_stored_kind_and_status(scene: bpy.types.Scene) -> None:
+    for name in ("A", "B"):
+        for pick in picks_of(scene, name):
+            assert pick.rockfall_pick.kind == pick["rockfall_kind"]
+            assert pick.rockfall_pick.status == pick["rockfall_status"]
+    assert [pick.rockfall_pick.status for pick in picks_of(scene, "B")].count("doubtful") == 1
+
+
 def test_a_marker_lies_on_the_terrain(slope: bpy.types.Scene) -> None:
     normal = np.array([SLOPE, 0.0, 1.0]) / np.hypot(SLOPE, 1.0)
     for pick in picks_of(slope, "A")[1:4]:

@@ -37,7 +37,7 @@ STEPS = (
     ("refinement", "5  Refinement", (
         "rockfall.refine", "rockfall.apply_refinement", "rockfall.discard_refinement",
     )),
-    ("models", "6  Models", ("rockfall.show_twins", "rockfall.load_parameters", "rockfall.remove_twins")),
+    ("models", "6  Models", ("rockfall.show_models", "rockfall.load_parameters", "rockfall.remove_models")),
     ("playback", "7  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),
     ("film", "8  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
     ("share", "9  Share", ("rockfall.export_tables", "rockfall.export_project")),

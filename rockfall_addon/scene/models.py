@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Twins in the scene: beside each real block, the block that leaves its impacts as a model says.
+"""Models in the scene: beside each real block, the block that leaves its impacts as a model says.
 
 Of each model: its flight curves, and for each trajectory a block that appears at an impact, flies, and vanishes soon
-after it has landed. Where a twin still flies when the next one starts, a second block takes over.
+after it has landed. Where one still flies when the next one starts, a second block takes over.
 """
 
 import json
@@ -20,11 +20,11 @@ from ...core.reconstruction.trajectory import Reconstruction
 from . import keyframes, store, terrain, timing, trails, trajectories
 
 LINGER_S = 0.2
-"""How long a twin lies where it has landed."""
+"""How long a predicted block lies where it has landed."""
 
 
 def shown_models(scene: bpy.types.Scene) -> tuple[str, ...]:
-    """The models whose twins are in the scene."""
+    """The models whose blocks are in the scene."""
     return tuple(filter(None, str(scene.get(store.SHOWN_MODELS, "")).split(" ")))
 
 
@@ -38,13 +38,13 @@ def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str
     scene[store.MODEL_PARAMETERS] = json.dumps({name: dict(values) for name, values in parameters.items()})
 
 
-def show_twins(
+def show_models(
     scene: bpy.types.Scene,
     result: Reconstruction,
     models: Sequence[str],
     parameters: Mapping[str, Mapping[str, Value]] | None = None,
 ) -> PredictedFlights:
-    """Show the twins of these models, and of no others; with these parameters, which are kept, or those of the scene.
+    """Show the blocks of these models, and of no others; with these parameters, which are kept, or those of the scene.
 
     Raises
     ------
@@ -52,28 +52,28 @@ def show_twins(
     """
     if parameters is not None:
         keep_parameters(scene, parameters)
-    twins = find_twins(scene, result, models)
+    predicted = find_predictions(scene, result, models)
     _remove_objects(scene)
-    scene[store.SHOWN_MODELS] = " ".join(twins.models)
+    scene[store.SHOWN_MODELS] = " ".join(predicted.models)
     offsets = timing.shown_offsets(scene, result.picks)
-    begin_s = twins.time_s - np.array([offsets[name] for name in twins.trajectory.tolist()])
+    begin_s = predicted.time_s - np.array([offsets[name] for name in predicted.trajectory.tolist()])
     blocks = {thing[store.TRAJECTORY]: thing for thing in store.with_role(scene, store.BLOCK_ROLE)}
-    for model in twins.models:
-        which = np.flatnonzero((twins.model == model) & (twins.duration_s > 0))
+    for model in predicted.models:
+        which = np.flatnonzero((predicted.model == model) & (predicted.duration_s > 0))
         if not which.size:
             continue
-        _show_flights(scene, model, twins, which, begin_s)
+        _show_flights(scene, model, predicted, which, begin_s)
         for name, block in blocks.items():
-            own = which[twins.trajectory[which] == name]
-            for number, lane in enumerate(_lanes(begin_s[own], twins.duration_s[own])):
-                _show_block(scene, block, model, number, twins, own[lane], begin_s)
+            own = which[predicted.trajectory[which] == name]
+            for number, lane in enumerate(_lanes(begin_s[own], predicted.duration_s[own])):
+                _show_block(scene, block, model, number, predicted, own[lane], begin_s)
     trails.paint_observed(scene)
     trails.set_trails(scene)
-    return twins
+    return predicted
 
 
-def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> PredictedFlights:
-    """The twins of the models' means on the scene's terrain; errors as in `show_twins`."""
+def find_predictions(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> PredictedFlights:
+    """The flights that the models predict, by their means, on the scene's terrain; errors as in `show_models`."""
     surface = terrain.surface_of_scene(scene)
     if surface is None:
         raise RockfallError("The blocks of the models land on the terrain: import one first.")
@@ -83,18 +83,18 @@ def find_twins(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[
 
 
 def follow(scene: bpy.types.Scene, result: Reconstruction) -> None:
-    """Bring the twins that are shown in line with a changed reconstruction."""
+    """Bring the blocks that are shown in line with a changed reconstruction."""
     models = shown_models(scene)
     if not models:
         return
     try:
-        show_twins(scene, result, models)
+        show_models(scene, result, models)
     except RockfallError:
-        remove_twins(scene)
+        remove_models(scene)
         raise
 
 
-def remove_twins(scene: bpy.types.Scene) -> None:
+def remove_models(scene: bpy.types.Scene) -> None:
     """Show the real blocks only, coloured by speed again."""
     _remove_objects(scene)
     if store.SHOWN_MODELS in scene:
@@ -110,12 +110,12 @@ def _remove_objects(scene: bpy.types.Scene) -> None:
 
 
 def _show_flights(
-    scene: bpy.types.Scene, model: str, twins: PredictedFlights, which: np.ndarray, begin_s: np.ndarray
+    scene: bpy.types.Scene, model: str, predicted: PredictedFlights, which: np.ndarray, begin_s: np.ndarray
 ) -> None:
     pieces = []
     for index in which:
-        clock = trails.moments(0.0, float(twins.duration_s[index]))
-        position, velocity = twins.launches.states(np.full(len(clock), index), clock)
+        clock = trails.moments(0.0, float(predicted.duration_s[index]))
+        position, velocity = predicted.launches.states(np.full(len(clock), index), clock)
         pieces.append((begin_s[index] + clock, position, np.linalg.norm(velocity, axis=1)))
     thing = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, pieces)
     thing[store.MODEL] = model
@@ -128,7 +128,7 @@ def _show_block(
     real: bpy.types.Object,
     model: str,
     number: int,
-    twins: PredictedFlights,
+    predicted: PredictedFlights,
     which: np.ndarray,
     begin_s: np.ndarray,
 ) -> None:
@@ -142,20 +142,20 @@ def _show_block(
     thing.scale, thing.delta_location = real.scale, real.delta_location
     _link(scene, thing, model)
     rate = timing.frame_rate(scene)
-    keyframes.write_location_keys(thing, _keys(twins, which, begin_s), rate)
-    ends = begin_s[which] + twins.duration_s[which] + LINGER_S
+    keyframes.write_location_keys(thing, _keys(predicted, which, begin_s), rate)
+    ends = begin_s[which] + predicted.duration_s[which] + LINGER_S
     ends[:-1] = np.minimum(ends[:-1], begin_s[which[1:]])
     keyframes.write_visibility_keys(thing, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
 
 
-def _keys(twins: PredictedFlights, which: np.ndarray, begin_s: np.ndarray) -> keyframes.Keys:
+def _keys(predicted: PredictedFlights, which: np.ndarray, begin_s: np.ndarray) -> keyframes.Keys:
     """Of each flight its ends, which make the parabola; with drag, more of them."""
     times, places, speeds, held = [], [], [], []
     for index in which:
-        duration = float(twins.duration_s[index])
-        dragged = twins.launches.drag_per_m[index] > 0
+        duration = float(predicted.duration_s[index])
+        dragged = predicted.launches.drag_per_m[index] > 0
         knots = np.linspace(0.0, duration, (int(np.ceil(duration / keyframes.DRAG_KEY_STEP_S)) if dragged else 1) + 1)
-        position, velocity = twins.launches.states(np.full(len(knots), index), knots)
+        position, velocity = predicted.launches.states(np.full(len(knots), index), knots)
         times.append(begin_s[index] + knots)
         places.append(position)
         speeds.append(velocity)

@@ -562,7 +562,7 @@ def test_a_new_pick(slope: bpy.types.Scene, part) -> None:
 
 
 def test_twins_follow_an_edit(slope: bpy.types.Scene, part) -> None:
-    assert bpy.ops.rockfall.show_twins(models={"noel_2017"}) == {"FINISHED"}
+    assert bpy.ops.rockfall.show_models(models={"noel_2017"}) == {"FINISHED"}
 
     def landing() -> list[float]:
         thing = next(o for o in slope.objects if o.get("rockfall_role") == "twin_flights")

@@ -156,7 +156,7 @@ def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path) -> 
     after = stored(second)
     assert after["rockfall_key_frame"] == pytest.approx(before["rockfall_key_frame"] + 0.6, abs=1e-4)
     assert after["rockfall_result"]["incident_mps"] != before["rockfall_result"]["incident_mps"]
-    assert bpy.ops.rockfall.remove_twins() == {"FINISHED"}
+    assert bpy.ops.rockfall.remove_models() == {"FINISHED"}
     assert bpy.ops.rockfall.remove_film() == {"FINISHED"}
     edited = all_picks(part, opened)
     again = tmp_path / "again.blend"

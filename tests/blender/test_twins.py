@@ -40,7 +40,7 @@ def scene(part, tmp_path: Path) -> bpy.types.Scene:
 
 @pytest.fixture
 def shown(scene: bpy.types.Scene) -> bpy.types.Scene:
-    assert bpy.ops.rockfall.show_twins(models=set(MODELS)) == {"FINISHED"}
+    assert bpy.ops.rockfall.show_models(models=set(MODELS)) == {"FINISHED"}
     return scene
 
 
@@ -51,7 +51,7 @@ def of_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
 def expected(part, scene: bpy.types.Scene):
     models = part("rockfall_addon.scene.models")
     result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
-    return models.find_twins(scene, result, MODELS)
+    return models.find_predictions(scene, result, MODELS)
 
 
 def check_motion(part, scene: bpy.types.Scene) -> None:
@@ -138,19 +138,19 @@ def test_removal_leaves_nothing(scene: bpy.types.Scene) -> None:
         return [tuple(each.color) for each in data]
 
     before, painted = names(), colours()
-    bpy.ops.rockfall.show_twins(models=set(MODELS))
+    bpy.ops.rockfall.show_models(models=set(MODELS))
     assert names() > before
     assert colours() != painted
-    assert bpy.ops.rockfall.remove_twins() == {"FINISHED"}
+    assert bpy.ops.rockfall.remove_models() == {"FINISHED"}
     assert names() == before
     assert colours() == painted
     assert "rockfall_twin_models" not in scene
 
 
 def test_showing_others_replaces_them_and_none_removes_them(shown: bpy.types.Scene) -> None:
-    bpy.ops.rockfall.show_twins(models={"dorren_2015"})
+    bpy.ops.rockfall.show_models(models={"dorren_2015"})
     assert {thing["rockfall_model"] for thing in of_role(shown, "twin")} == {"dorren_2015"}
-    bpy.ops.rockfall.show_twins(models=set())
+    bpy.ops.rockfall.show_models(models=set())
     assert not of_role(shown, "twin")
 
 
@@ -170,7 +170,7 @@ def test_parameters_of_a_file_are_used_and_kept(scene: bpy.types.Scene, part, tm
     own = {"azimi_desvarreux_1977": {"rn": 0.9, "rt": 0.4}}
     part("core.exchange.parameters").write_parameters(own, tmp_path / "parameters.toml")
     assert bpy.ops.rockfall.load_parameters(filepath=str(tmp_path / "parameters.toml")) == {"FINISHED"}
-    assert bpy.ops.rockfall.show_twins(models={"azimi_desvarreux_1977"}) == {"FINISHED"}
+    assert bpy.ops.rockfall.show_models(models={"azimi_desvarreux_1977"}) == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"), load_ui=False)
@@ -178,7 +178,7 @@ def test_parameters_of_a_file_are_used_and_kept(scene: bpy.types.Scene, part, tm
     models = part("rockfall_addon.scene.models")
     assert models.parameters_of(scene) == own
     result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
-    twins = models.find_twins(scene, result, models.shown_models(scene))
+    twins = models.find_predictions(scene, result, models.shown_models(scene))
     impacts = result.impacts
     normal = np.sum(impacts.v1 * impacts.normal, axis=1)[:, None] * impacts.normal
     rebound = -0.9 * normal + 0.4 * (impacts.v1 - normal)
@@ -198,7 +198,7 @@ def test_without_terrain_there_are_none(scene: bpy.types.Scene) -> None:
     for thing in of_role(scene, "terrain"):
         bpy.data.objects.remove(thing)
     with pytest.raises(RuntimeError, match="poll"):
-        bpy.ops.rockfall.show_twins(models=set(MODELS))
+        bpy.ops.rockfall.show_models(models=set(MODELS))
 
 
 def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None:

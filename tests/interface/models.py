@@ -10,7 +10,7 @@ def case_show_models_beside_the_real_blocks(window):
     with window.override():
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="demo")
-        assert bpy.ops.rockfall.show_twins(models={"noel_2017", "pfeiffer_bowen_1989"}) == {"FINISHED"}
+        assert bpy.ops.rockfall.show_models(models={"noel_2017", "pfeiffer_bowen_1989"}) == {"FINISHED"}
         bpy.ops.ed.undo_push(message="models")
     scene.rockfall.trail_until_now = True
     scene.frame_set(int(7.0 * scene.render.fps))
@@ -33,7 +33,7 @@ def case_show_models_beside_the_real_blocks(window):
     yield 1.0
     assert shown() == {"noel_2017", "pfeiffer_bowen_1989"}
     with window.override():
-        assert bpy.ops.rockfall.remove_twins() == {"FINISHED"}
+        assert bpy.ops.rockfall.remove_models() == {"FINISHED"}
     yield 1.0
     assert shown() == set()
     window.screenshot("removed")

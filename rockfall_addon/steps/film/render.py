@@ -32,7 +32,7 @@ def make(job: FilmJob, progress: Progress) -> None:
         preset = find_preset(project, job.preset)
         result = _load(scene, job.source, preset)
         if job.models:
-            models.show_twins(scene, result, job.models, job.parameters)
+            models.show_models(scene, result, job.models, job.parameters)
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:

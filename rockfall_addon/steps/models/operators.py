@@ -18,10 +18,10 @@ CHOICES = [
 ]
 
 
-class ROCKFALL_OT_show_twins(bpy.types.Operator):
+class ROCKFALL_OT_show_models(bpy.types.Operator):
     """Show beside the real blocks those that leave the same impacts as a model says, flown to where they land"""
 
-    bl_idname = "rockfall.show_twins"
+    bl_idname = "rockfall.show_models"
     bl_label = "Show Models"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -43,10 +43,10 @@ class ROCKFALL_OT_show_twins(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         if not self.models:
-            models.remove_twins(scene)
+            models.remove_models(scene)
             return {"FINISHED"}
         chosen = [name for name, *_ in CHOICES if name in self.models]
-        marks = score_landings(models.show_twins(scene, reconstruction.reconstruct_scene(scene), chosen))
+        marks = score_landings(models.show_models(scene, reconstruction.reconstruct_scene(scene), chosen))
         said = [
             f"{MODELS[mark.model].title}: {mark.median_offset_m:.1f} m"
             for mark in marks
@@ -75,10 +75,10 @@ class ROCKFALL_OT_load_parameters(bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_remove_twins(bpy.types.Operator):
+class ROCKFALL_OT_remove_models(bpy.types.Operator):
     """Show the real blocks only"""
 
-    bl_idname = "rockfall.remove_twins"
+    bl_idname = "rockfall.remove_models"
     bl_label = "Remove Models"
     bl_options = {"REGISTER", "UNDO"}
 
@@ -87,8 +87,8 @@ class ROCKFALL_OT_remove_twins(bpy.types.Operator):
         return bool(models.shown_models(context.scene))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        models.remove_twins(context.scene)
+        models.remove_models(context.scene)
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_show_twins, ROCKFALL_OT_load_parameters, ROCKFALL_OT_remove_twins)
+CLASSES = (ROCKFALL_OT_show_models, ROCKFALL_OT_load_parameters, ROCKFALL_OT_remove_models)

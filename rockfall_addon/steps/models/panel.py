@@ -31,7 +31,7 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
         for name in (*COMPARED, *(other for other in MODELS if other not in COMPARED)):
             on = name in shown
             button = column.operator(
-                "rockfall.show_twins",
+                "rockfall.show_models",
                 text=MODELS[name].title,
                 icon="CHECKBOX_HLT" if on else "CHECKBOX_DEHLT",
                 depress=on,
@@ -42,7 +42,7 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
             paragraph(context, layout, f"Own parameters: {', '.join(MODELS[name].title for name in own)}", "INFO")
         layout.operator("rockfall.load_parameters", icon="IMPORT")
         if shown:
-            layout.operator("rockfall.remove_twins", icon="X")
+            layout.operator("rockfall.remove_models", icon="X")
 
 
 CLASSES = (ROCKFALL_PT_models,)

@@ -1,0 +1,362 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The motion of one block from its release to its end: it flies, hits, rolls or slides, and stops. Compiled kernels.
+
+Flight is the parabola (`contact`), or with drag a chain of parabolas. At a contact the impact model decides. A block
+whose rebound would hop less than `HOP` of its radius stays on the ground: there it moves on in steps shorter than half
+its radius, each a free fall that the terrain corrects to one radius above its closest point. A free fall that ends
+above that leaves the ground: so blocks fly off crests by themselves.
+
+On the ground the direction follows gravity along the terrain, the speed follows the energy,
+
+    v² ← v² − 2 A g (Δz + μ cosβ Δs)
+
+which gives the same energy line for any step. A is 1 for sliding (Coulomb) and 1/(1 + c) for rolling (Azzoni et al.
+1995), with the inertia c m r²; μ is the coefficient of friction of the zone.
+"""
+
+from math import inf, sqrt
+
+import numpy as np
+
+from ..compiled import kernel
+from ..terrain.kernels import STACK_SIZE, box_distance2, closest_on_triangle, nearest_point
+from .chance import fill_uniform
+from .contact import TOUCHING_M, first_contact, last_root
+
+STOPPED, LEFT, LIMIT = 0, 1, 2
+"""How a run ends."""
+RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED = 0, 1, 2, 3, 4
+"""What a record is about."""
+NO_ROLLING, AZZONI, COULOMB = 0, 1, 2
+
+HOP = 0.1
+"""A rebound that rises less than this part of the radius above the ground is none."""
+NEIGHBOURHOOD, MOST_NEAR = 6.0, 48
+"""On the ground, triangles within so many radii are looked up at once, as long as they are not more."""
+STEP, FALL = 0.5, 0.05
+"""A step on the ground is shorter than these parts of the radius: along the ground, and in free fall."""
+SHARP = 0.866
+"""Cosine between the normals of two steps below which a concave edge takes the speed towards it."""
+DRAG_CHANGE = 0.005
+"""With drag, the speed changes by less than this part on one parabola."""
+SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
+"""Contacts nearer in time than this are one moment; so many are taken one after the other."""
+COLUMNS = 22
+"""run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
+
+
+@kernel
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def _at(p, v, a, t):  # type: ignore[no-untyped-def]
+    """Place and velocity on a parabola."""
+    h = 0.5 * t
+    return (
+        (p[0] + (v[0] + a[0] * h) * t, p[1] + (v[1] + a[1] * h) * t, p[2] + (v[2] + a[2] * h) * t),
+        (v[0] + a[0] * t, v[1] + a[1] * t, v[2] + a[2] * t),
+    )
+
+
+@kernel
+def _along(v, n):  # type: ignore[no-untyped-def]
+    """The part of a vector along the ground."""
+    s = _dot(v, n)
+    return v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2]
+
+
+@kernel
+def _rolling(n, v, radius):  # type: ignore[no-untyped-def]
+    """The spin that rolls: (n × v)/r."""
+    return (
+        (n[1] * v[2] - n[2] * v[1]) / radius,
+        (n[2] * v[0] - n[0] * v[2]) / radius,
+        (n[0] * v[1] - n[1] * v[0]) / radius,
+    )
+
+
+@kernel
+def _grown(rows):  # type: ignore[no-untyped-def]
+    more = np.empty((2 * rows.shape[0], rows.shape[1]))
+    more[: rows.shape[0]] = rows
+    return more
+
+
+@kernel
+def _write(rows, k, run, what, time, p, v, w, v1, w1, n, place):  # type: ignore[no-untyped-def]
+    rows[k, 0], rows[k, 1], rows[k, 2] = run, what, time
+    for axis in range(3):
+        rows[k, 3 + axis], rows[k, 6 + axis], rows[k, 9 + axis] = p[axis], v[axis], w[axis]
+        rows[k, 12 + axis], rows[k, 15 + axis], rows[k, 18 + axis] = v1[axis], w1[axis], n[axis]
+    rows[k, 21] = place
+
+
+@kernel
+def _collect(tree, stack, p, reach, near):  # type: ignore[no-untyped-def]
+    """Fill `near` with the triangles within `reach` of a point; how many, −1 when there is no room."""
+    bounds, first, count, corners = tree
+    square, found = reach * reach, 0
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if box_distance2(bounds, node, p[0], p[1], p[2]) > square:
+            continue
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                x, y, z = closest_on_triangle(corners, i, p[0], p[1], p[2])
+                if (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2 <= square:
+                    if found == near.size:
+                        return -1
+                    near[found] = i
+                    found += 1
+            continue
+        stack[top], stack[top + 1] = first[node], first[node] + 1
+        top += 2
+    return found
+
+
+@kernel
+def _closest(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
+    """The closest point of the terrain within twice the radius: (x, y, z, squared distance, place).
+
+    near, around : the triangles about a place that was passed before, how many they are, its coordinates and how far
+        they reach: a block on the ground asks again nearby, and walks the tree only when it has left them.
+    """
+    dx, dy, dz = p[0] - around[1], p[1] - around[2], p[2] - around[3]
+    if around[0] < 0.0 or sqrt(dx * dx + dy * dy + dz * dz) + 2.0 * radius > around[4]:
+        reach = NEIGHBOURHOOD * radius
+        found = _collect(tree, stack, p, reach, near)
+        if found < 0:
+            reach = 2.5 * radius
+            found = _collect(tree, stack, p, reach, near)
+        if found < 0:
+            around[0] = -1.0
+            return nearest_point(tree, stack, p, 2.0 * radius)
+        around[0], around[1], around[2], around[3], around[4] = found, p[0], p[1], p[2], reach
+    best, place = 4.0 * radius * radius, -1
+    qx, qy, qz = 0.0, 0.0, 0.0
+    for k in range(int(around[0])):
+        x, y, z = closest_on_triangle(tree[3], near[k], p[0], p[1], p[2])
+        square = (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
+        if square < best:
+            best, place, qx, qy, qz = square, near[k], x, y, z
+    return qx, qy, qz, best, place
+
+
+@kernel
+def _touching(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
+    """The centre moved out of the ground, its normal, the place it touches, and the distance that it had."""
+    n, place, distance = (0.0, 0.0, 1.0), -1, inf
+    for k in range(MOST_AT_ONCE):
+        qx, qy, qz, square, found = _closest(tree, stack, p, radius, near, around)
+        if found < 0:
+            break
+        d = sqrt(square)
+        if k == 0:
+            distance = d
+            if d > radius + TOUCHING_M:
+                break
+        elif d >= radius - TOUCHING_M:
+            break
+        if d == 0.0:
+            break
+        n, place = ((p[0] - qx) / d, (p[1] - qy) / d, (p[2] - qz) / d), found
+        p = (qx + radius * n[0], qy + radius * n[1], qz + radius * n[2])
+    return p, n, place, distance
+
+
+@kernel
+def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
+    """When a flight that meets nothing is gone from the box of the terrain."""
+    leave = 0.0
+    low = bounds[0, 2] - radius
+    if a[2] < 0.0 and p[2] > low:
+        leave = max(last_root(p[2] - low, v[2], a[2]), 0.0)
+    for axis in range(2):
+        if v[axis] > 0.0:
+            leave = min(leave, max((bounds[0, axis + 3] + radius - p[axis]) / v[axis], 0.0))
+        elif v[axis] < 0.0:
+            leave = min(leave, max((bounds[0, axis] - radius - p[axis]) / v[axis], 0.0))
+    return leave
+
+
+@kernel
+def run_block(  # type: ignore[no-untyped-def]
+    tree, zone, rebound, parameters, friction, draws, stack, times, near, around, rows, count,
+    run, seed, p, v, w, radius, mass, inertia, drag, gravity, law, most_impacts, most_s, record,
+):  # fmt: skip
+    """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
+
+    Parameters
+    ----------
+    zone : (m,) of each triangle in the order of the leaves: its row in `parameters` (z, k) and `friction` (z,).
+    rebound : a model's compiled function.
+    draws : (d,) work space for the uniform numbers of one impact.
+    inertia : c of c m r². drag : ½ρC_D A/m [1/m]. law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
+    """
+    zero = (0.0, 0.0, 0.0)
+    bounds = tree[0]
+    factor = 1.0 / (1.0 + inertia) if law == AZZONI else 1.0
+    shortest = sqrt(2.0 * FALL * radius / gravity)
+    time, length, impacts, at_once, end = 0.0, 0.0, 0, 0, -1
+    v_max = sqrt(_dot(v, v))
+    grounded, n, place = False, (0.0, 0.0, 1.0), -1
+    around[0] = -1.0  # nothing of another block
+    _write(rows, count, run, RELEASED, time, p, v, w, v, w, n, -1)
+    count += 1
+    while end < 0:
+        if count + 2 >= rows.shape[0]:
+            rows = _grown(rows)
+        if impacts >= most_impacts or time >= most_s:
+            end = LIMIT
+            break
+        speed = sqrt(_dot(v, v))
+        if not grounded:
+            a, horizon = (0.0, 0.0, -gravity), inf
+            if drag > 0.0:
+                horizon = DRAG_CHANGE / (drag * speed + 1e-3)
+                h = 0.5 * horizon
+                k = drag * speed
+                mx, my, mz = v[0] - k * v[0] * h, v[1] - k * v[1] * h, v[2] - (k * v[2] + gravity) * h
+                k = drag * sqrt(mx * mx + my * my + mz * mz)
+                a = (-k * mx, -k * my, -gravity - k * mz)
+            t, e, hit = first_contact(tree, stack, times, p, v, a, radius, horizon)
+            if hit < 0:
+                gone = _leaves(bounds, p, v, a, radius)
+                t = min(horizon, gone)
+                if gone <= horizon:
+                    end = LEFT
+                length += t * 0.5 * (speed + sqrt(_dot(_at(p, v, a, t)[1], _at(p, v, a, t)[1])))
+                p, v = _at(p, v, a, t)
+                time += t
+                v_max = max(v_max, sqrt(_dot(v, v)))
+                continue
+            at_once = at_once + 1 if t < SAME_MOMENT_S else 0
+            before = p
+            p, v = _at(p, v, a, t)
+            time += t
+            chord = (p[0] - before[0], p[1] - before[1], p[2] - before[2])
+            length += sqrt(_dot(chord, chord))
+            n, place = e, hit
+            v1, w1 = v, w
+            v_max = max(v_max, sqrt(_dot(v, v)))
+            if _dot(v, n) < 0.0 and at_once < MOST_AT_ONCE:
+                z = zone[place]
+                fill_uniform(seed, run, impacts, draws)
+                v, w = rebound(v1, n, w1, radius, mass, parameters[z], draws)
+                impacts += 1
+                if record:
+                    _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, n, place)
+                    count += 1
+                v_max = max(v_max, sqrt(_dot(v, v)))
+            rises = _dot(v, n)
+            if n[2] > 0.0 and rises * rises < 2.0 * gravity * n[2] * HOP * radius:
+                grounded, v = True, _along(v, n)
+                if law == NO_ROLLING:
+                    end = STOPPED
+            elif rises <= 0.0:
+                v = _along(v, n)  # a model that sends a block into the ground, or an overhang: it slides off
+            continue
+
+        mu = friction[zone[place]]
+        dt = shortest
+        if speed > 0.0:
+            dt = min(dt, STEP * radius / speed)
+        cosine = n[2]
+        steep = sqrt(max(1.0 - cosine * cosine, 0.0))
+        if speed < 1e-6 and steep <= mu * cosine:
+            end = STOPPED
+            break
+        free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
+        q, e, touched, distance = _touching(tree, stack, free, radius, near, around)
+        if distance > radius + TOUCHING_M:
+            grounded = False
+            if record:
+                _write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
+                count += 1
+            p, v, time = free, falling, time + dt
+            length += speed * dt
+            at_once = 0
+            continue
+        way = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
+        ds = sqrt(_dot(way, way))
+        towards = -_dot(v, e)
+        if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(e, n) < SHARP:
+            fill_uniform(seed, run, impacts, draws)
+            v1, w1 = v, w
+            v, w = rebound(v1, e, w1, radius, mass, parameters[zone[touched]], draws)
+            impacts += 1
+            if record:
+                _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, e, touched)
+                count += 1
+            rises = _dot(v, e)
+            n, place = e, touched
+            if e[2] <= 0.0 or rises * rises >= 2.0 * gravity * e[2] * HOP * radius:
+                grounded = False
+            else:
+                v = _along(v, e)
+            continue
+        pull = (0.0, 0.0, -gravity * factor * dt)
+        turned = _along((v[0] + pull[0], v[1] + pull[1], v[2] + pull[2]), e)
+        size = sqrt(_dot(turned, turned))
+        square = speed * speed
+        if _dot(e, n) < SHARP:
+            square = min(square, size * size)
+        loss = 2.0 * factor * gravity * ((q[2] - p[2]) + mu * max(cosine, 0.0) * ds)
+        left = square - loss
+        n, place = e, touched
+        if speed < 1e-6:
+            # From rest: what is left of gravity along the slope.
+            pulls = factor * gravity * (steep - mu * cosine) * dt
+            v = (turned[0] / size * pulls, turned[1] / size * pulls, turned[2] / size * pulls) if size > 0.0 else zero
+            p, time, length = q, time + dt, length + ds
+            continue
+        if left <= 0.0 or size == 0.0:
+            # It comes to rest within this step, where the energy is spent.
+            part = min(max(square / loss, 0.0), 1.0) if loss > 0.0 and size > 0.0 else 0.0
+            p = (p[0] + part * way[0], p[1] + part * way[1], p[2] + part * way[2])
+            time += 2.0 * part * ds / speed
+            length += part * ds
+            v = zero
+            if part == 0.0 and steep > mu * cosine:
+                v = (turned[0] * 1e-3, turned[1] * 1e-3, turned[2] * 1e-3)
+        else:
+            now = sqrt(left)
+            v = (turned[0] / size * now, turned[1] / size * now, turned[2] / size * now)
+            time += 2.0 * ds / (speed + now)
+            p, length = q, length + ds
+        w = _rolling(n, v, radius)
+        v_max = max(v_max, sqrt(_dot(v, v)))
+        if record:
+            _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
+            count += 1
+    if count + 2 >= rows.shape[0]:
+        rows = _grown(rows)
+    _write(rows, count, run, ENDED, time, p, v, w, v, w, n, place)
+    return rows, count + 1, end, time, impacts, length, v_max
+
+
+@kernel
+def run_blocks(  # type: ignore[no-untyped-def]
+    tree, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass, inertia,
+    drag, gravity, law, most_impacts, most_s, record, results,
+):  # fmt: skip
+    """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
+    stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
+    near, around = np.empty(MOST_NEAR, np.int64), np.empty(5)
+    around[0] = -1.0
+    draws = np.empty(draw_count)
+    rows, count = np.empty((64 * len(runs), COLUMNS)), 0
+    for i in range(len(runs)):
+        rows, count, end, time, impacts, length, v_max = run_block(
+            tree, zone, rebound, parameters, friction, draws, stack, times, near, around, rows, count, runs[i], seed,
+            (place[i, 0], place[i, 1], place[i, 2]), (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
+            (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia, drag[i], gravity, law,
+            most_impacts, most_s, record,
+        )  # fmt: skip
+        results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4] = end, time, impacts, length, v_max
+    return rows[:count].copy()

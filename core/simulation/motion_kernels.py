@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The motion of one block from its release to its end: it flies, hits, rolls or slides, and stops. Compiled kernels.
 
-Flight is the parabola (`contact`), or with drag a chain of parabolas. At a contact the impact model decides. A block
-whose rebound would hop less than `HOP` of its radius stays on the ground: there it moves on in steps shorter than half
-its radius, each a free fall that the terrain corrects to one radius above its closest point. A free fall that ends
+Flight is the parabola (`contact_kernels`), or with drag a chain of parabolas. At a contact the impact model decides. A
+block whose rebound would hop less than `HOP` of its radius stays on the ground: there it moves on in steps shorter than
+half its radius, each a free fall that the terrain corrects to one radius above its closest point. A free fall that ends
 above that leaves the ground: so blocks fly off crests by themselves.
 
 On the ground the direction follows gravity along the terrain, the speed follows the energy,
@@ -20,8 +20,8 @@ import numpy as np
 
 from ..compiled import kernel
 from ..terrain.kernels import STACK_SIZE, box_distance2, closest_on_triangle, nearest_point
-from .chance import fill_uniform
-from .contact import TOUCHING_M, first_contact, last_root
+from .chance_kernels import fill_uniform
+from .contact_kernels import TOUCHING_M, first_contact, last_root
 
 STOPPED, LEFT, LIMIT = 0, 1, 2
 """How a run ends."""
@@ -57,6 +57,38 @@ def _at(p, v, a, t):  # type: ignore[no-untyped-def]
     return (
         (p[0] + (v[0] + a[0] * h) * t, p[1] + (v[1] + a[1] * h) * t, p[2] + (v[2] + a[2] * h) * t),
         (v[0] + a[0] * t, v[1] + a[1] * t, v[2] + a[2] * t),
+    )
+
+
+@kernel
+def _slowed(v, drag, gravity):  # type: ignore[no-untyped-def]
+    """The acceleration by gravity and drag."""
+    k = drag * sqrt(_dot(v, v))
+    return -k * v[0], -k * v[1], -k * v[2] - gravity
+
+
+@kernel
+def _with_drag(v, drag, gravity, h):  # type: ignore[no-untyped-def]
+    """Displacement and velocity after a time h, by a step of Runge and Kutta's fourth order."""
+    a = _slowed(v, drag, gravity)
+    v2 = (v[0] + 0.5 * h * a[0], v[1] + 0.5 * h * a[1], v[2] + 0.5 * h * a[2])
+    b = _slowed(v2, drag, gravity)
+    v3 = (v[0] + 0.5 * h * b[0], v[1] + 0.5 * h * b[1], v[2] + 0.5 * h * b[2])
+    c = _slowed(v3, drag, gravity)
+    v4 = (v[0] + h * c[0], v[1] + h * c[1], v[2] + h * c[2])
+    d = _slowed(v4, drag, gravity)
+    s = h / 6.0
+    return (
+        (
+            s * (v[0] + 2.0 * (v2[0] + v3[0]) + v4[0]),
+            s * (v[1] + 2.0 * (v2[1] + v3[1]) + v4[1]),
+            s * (v[2] + 2.0 * (v2[2] + v3[2]) + v4[2]),
+        ),
+        (
+            v[0] + s * (a[0] + 2.0 * (b[0] + c[0]) + d[0]),
+            v[1] + s * (a[1] + 2.0 * (b[1] + c[1]) + d[1]),
+            v[2] + s * (a[2] + 2.0 * (b[2] + c[2]) + d[2]),
+        ),
     )
 
 
@@ -216,28 +248,35 @@ def run_block(  # type: ignore[no-untyped-def]
             break
         speed = sqrt(_dot(v, v))
         if not grounded:
-            a, horizon = (0.0, 0.0, -gravity), inf
+            a, horizon, then = (0.0, 0.0, -gravity), inf, zero
             if drag > 0.0:
                 horizon = DRAG_CHANGE / (drag * speed + 1e-3)
-                h = 0.5 * horizon
-                k = drag * speed
-                mx, my, mz = v[0] - k * v[0] * h, v[1] - k * v[1] * h, v[2] - (k * v[2] + gravity) * h
-                k = drag * sqrt(mx * mx + my * my + mz * mz)
-                a = (-k * mx, -k * my, -gravity - k * mz)
+                moved, then = _with_drag(v, drag, gravity, horizon)
+                f = 2.0 / (horizon * horizon)
+                a = (
+                    f * (moved[0] - v[0] * horizon),
+                    f * (moved[1] - v[1] * horizon),
+                    f * (moved[2] - v[2] * horizon),
+                )  # the parabola through both ends
             t, e, hit = first_contact(tree, stack, times, p, v, a, radius, horizon)
             if hit < 0:
                 gone = _leaves(bounds, p, v, a, radius)
                 t = min(horizon, gone)
                 if gone <= horizon:
                     end = LEFT
-                length += t * 0.5 * (speed + sqrt(_dot(_at(p, v, a, t)[1], _at(p, v, a, t)[1])))
+                start = v
                 p, v = _at(p, v, a, t)
+                if drag > 0.0 and t == horizon:
+                    v = then
+                length += 0.5 * t * (sqrt(_dot(start, start)) + sqrt(_dot(v, v)))
                 time += t
                 v_max = max(v_max, sqrt(_dot(v, v)))
                 continue
             at_once = at_once + 1 if t < SAME_MOMENT_S else 0
-            before = p
+            before, start = p, v
             p, v = _at(p, v, a, t)
+            if drag > 0.0:
+                v = _with_drag(start, drag, gravity, t)[1]
             time += t
             chord = (p[0] - before[0], p[1] - before[1], p[2] - before[2])
             length += sqrt(_dot(chord, chord))

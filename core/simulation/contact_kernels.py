@@ -162,7 +162,7 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
         if count[node]:
             for i in range(first[node], first[node] + count[node]):
                 t, e = touch(corners, i, p, v, a, radius, times[top], best)
-                if t < best or (t == best and found < 0):
+                if t < best or (t == best < inf and found < 0):
                     best, found, normal = t, i, e
             continue
         left = first[node]

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blocks on the ground, all at once: each its own run, the same bits for any number of threads and batches."""
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..constants import GRAVITY_MPS2
+from ..errors import InputError
+from ..impact_models.registry import find_model
+from ..progress import CancelledError, Progress, silent
+from ..reconstruction.drag import Drag
+from ..vectors import Array, Indices
+from .ground import Ground
+from .release import SPHERE_INERTIA, Releases
+
+Rolling = Literal["azzoni_1995", "coulomb", "none"]
+ROLLING: tuple[Rolling, ...] = ("none", "azzoni_1995", "coulomb")
+"""In the order of the kernels' codes."""
+FRICTION = 0.5
+"""Coefficient of friction on the ground where none is given."""
+BATCH = 64
+"""Runs that one thread takes at a time; larger ones leave a thread without work at the end."""
+
+STOPPED, LEFT_TERRAIN, LIMIT = "stopped", "left_terrain", "limit"
+ENDS = (STOPPED, LEFT_TERRAIN, LIMIT)
+RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED = range(5)
+"""What a record is about, as the kernels write it."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What decides a simulation beside the ground and the releases.
+
+    Attributes
+    ----------
+    model : name of the impact model.
+    parameters : those of the model that are not to have their default, for all zones.
+    zones : zone → parameters of its own there.
+    rolling : how a block moves on the ground: Azzoni et al. 1995, Coulomb's sliding, or none, which stops it there.
+    friction : coefficient μ of either; `zone_friction` where a zone has its own.
+    inertia : c of the block's c m r²: 2/5 for a sphere, 2/3 for a cube.
+    drag : None for none.
+    seed : of all random numbers.
+    most_impacts, most_s : a run that is longer ends with "limit".
+    """
+
+    model: str
+    parameters: Mapping[str, object] = field(default_factory=dict)
+    zones: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    rolling: Rolling = "azzoni_1995"
+    friction: float = FRICTION
+    zone_friction: Mapping[str, float] = field(default_factory=dict)
+    inertia: float = SPHERE_INERTIA
+    gravity_mps2: float = GRAVITY_MPS2
+    drag: Drag | None = None
+    seed: int = 0
+    most_impacts: int = 10_000
+    most_s: float = 3600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """k moments of all runs, in the order of the runs and of time.
+
+    Attributes
+    ----------
+    run : (k,) number of the run, from 0.
+    what : (k,) `RELEASED`, `IMPACT`, `ON_GROUND` (a step on the ground ends), `FLIES_OFF` or `ENDED`.
+    time_s : (k,) since the release.
+    position : (k, 3) of the centre, local [m].
+    v2, omega2 : (k, 3) just after [m/s], [rad/s].
+    v1, omega1 : (k, 3) just before.
+    normal : (k, 3) from the contact to the centre.
+    face : (k,) of the ground, −1 for none.
+    """
+
+    run: Indices
+    what: NDArray[np.int8]
+    time_s: Array
+    position: Array
+    v2: Array
+    omega2: Array
+    v1: Array
+    omega1: Array
+    normal: Array
+    face: Indices
+
+    def __len__(self) -> int:
+        return self.time_s.size
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What became of n blocks.
+
+    Attributes
+    ----------
+    settings, releases, ground : what was simulated; of the releases those that were finished.
+    end : (n,) place in `ENDS`.
+    time_s, length_m, v_max_mps : (n,) until the end, of the path, the greatest speed.
+    impacts : (n,) how many.
+    position : (n, 3) of the centre at the end, local [m].
+    records : all moments if they were asked for, else releases and ends.
+    wanted : how many blocks were asked for; more than n after a cancel.
+    """
+
+    settings: Settings
+    ground: Ground
+    releases: Releases
+    end: Indices
+    time_s: Array
+    length_m: Array
+    v_max_mps: Array
+    impacts: Indices
+    position: Array
+    records: Records
+    wanted: int
+
+    def __len__(self) -> int:
+        return self.end.size
+
+
+def simulate(
+    ground: Ground,
+    releases: Releases,
+    settings: Settings,
+    *,
+    record: bool = True,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> Simulation:
+    """Let blocks fall.
+
+    Parameters
+    ----------
+    record : keep every impact and step; else only how each run begins and ends.
+    threads : None takes all cores. The result does not depend on it.
+    progress : called with the number of finished blocks. A `CancelledError` raised in it ends the simulation with the
+        runs that are finished, from the first on without a gap.
+
+    Raises
+    ------
+    InputError : settings that cannot be.
+    """
+    n = len(releases)
+    numbers, friction = _parameters(ground, settings)
+    model = find_model(settings.model)
+    if not n:
+        raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
+    index = ground.index
+    zone = ground.zone[index.face]
+    drag = releases.drag_per_m(settings.drag)
+    results, starts = np.empty((n, 5)), range(0, n, BATCH)
+    rows: dict[int, Array] = {}
+
+    from .motion_kernels import run_blocks
+
+    def batch(start: int) -> int:
+        part = slice(start, min(start + BATCH, n))
+        runs = np.arange(part.start, part.stop)
+        rows[start] = run_blocks(
+            index.tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
+            releases.position[part], releases.velocity[part], releases.angular_velocity[part],
+            releases.radius_m[part], releases.mass_kg[part], settings.inertia, drag[part], settings.gravity_mps2,
+            ROLLING.index(settings.rolling), settings.most_impacts, settings.most_s, record, results[part],
+        )  # fmt: skip
+        return part.stop - part.start
+
+    finished = 0
+    progress("Simulating", 0, n)
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        waiting = [pool.submit(batch, start) for start in starts]
+        try:
+            for done in as_completed(waiting):
+                finished += done.result()
+                progress("Simulating", finished, n)
+        except CancelledError:
+            for one in waiting:
+                one.cancel()
+    whole = next((start for start in starts if start not in rows), n)
+    if not whole:
+        raise CancelledError
+    records = _records(np.concatenate([rows[start] for start in starts if start < whole]), index.face)
+    end = results[:whole, 0].astype(np.intp)
+    last = np.flatnonzero(records.what == ENDED)
+    return Simulation(
+        settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
+        results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n,
+    )  # fmt: skip
+
+
+def _parameters(ground: Ground, settings: Settings) -> tuple[Array, Array]:
+    """(z, k) the model's numbers in each zone, and (z,) the friction."""
+    if settings.rolling not in ROLLING:
+        raise InputError(f"There is no rolling law {settings.rolling!r}", advice=f"There are {', '.join(ROLLING)}")
+    for what, value in (
+        ("gravity", settings.gravity_mps2), ("inertia", settings.inertia), ("limit of time", settings.most_s),
+        ("limit of impacts", settings.most_impacts),
+    ):  # fmt: skip
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"The {what} is {value}", advice="Give a number above zero")
+    for name in (*settings.zones, *settings.zone_friction):
+        if name not in ground.zones:
+            raise InputError(f"There is no zone {name!r}", advice=f"There are {', '.join(ground.zones)}")
+    model = find_model(settings.model)
+    rows = [model.numbers({**settings.parameters, **settings.zones.get(name, {})}) for name in ground.zones]
+    friction = np.array([settings.zone_friction.get(name, settings.friction) for name in ground.zones])
+    if not (np.isfinite(friction) & (friction >= 0)).all():
+        raise InputError(f"The friction is {friction.min()}", advice="Give a number of zero or more")
+    return np.array(rows), friction
+
+
+def _records(rows: Array, face: NDArray[np.int32]) -> Records:
+    place = rows[:, 21].astype(np.intp)
+    return Records(
+        run=rows[:, 0].astype(np.intp),
+        what=rows[:, 1].astype(np.int8),
+        time_s=rows[:, 2],
+        position=rows[:, 3:6],
+        v2=rows[:, 6:9],
+        omega2=rows[:, 9:12],
+        v1=rows[:, 12:15],
+        omega1=rows[:, 15:18],
+        normal=rows[:, 18:21],
+        face=np.where(place >= 0, face[place], -1),
+    )

@@ -32,6 +32,7 @@ COMMANDS = {
     "track": "follows the block through a video from one click → track.csv, proposed impacts",
     "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
     "refine": "fits picks and times to the pixels of the footage → picks, impacts with standard deviations",
+    "simulate": "whole rockfalls on the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv, summary.json",
     "render": "the animation of a project, through Blender",
 }
 """Name → help; the module of the same name in `commands` does it."""

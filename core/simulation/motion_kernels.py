@@ -39,6 +39,8 @@ SHARP = 0.866
 """Cosine between the normals of two steps below which a concave edge takes the speed towards it."""
 DRAG_CHANGE = 0.005
 """With drag, the speed changes by less than this part on one parabola."""
+HELD, MOST_HELD = 1e-4, 100
+"""A block that moves less than this part of its radius in so many steps is held where it is."""
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
 COLUMNS = 22
@@ -97,6 +99,14 @@ def _along(v, n):  # type: ignore[no-untyped-def]
     """The part of a vector along the ground."""
     s = _dot(v, n)
     return v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2]
+
+
+@kernel
+def _in_corner(v, n, m):  # type: ignore[no-untyped-def]
+    """The part of a vector along the corner of two planes of other normals."""
+    x, y, z = n[1] * m[2] - n[2] * m[1], n[2] * m[0] - n[0] * m[2], n[0] * m[1] - n[1] * m[0]
+    s = (x * v[0] + y * v[1] + z * v[2]) / (x * x + y * y + z * z)
+    return s * x, s * y, s * z
 
 
 @kernel
@@ -180,9 +190,17 @@ def _closest(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _touching(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
-    """The centre moved out of the ground, its normal, the place it touches, and the distance that it had."""
-    n, place, distance = (0.0, 0.0, 1.0), -1, inf
+def _touching(tree, stack, p, v, radius, near, around):  # type: ignore[no-untyped-def]
+    """The centre moved out of the ground, and the contacts that moved it.
+
+    Returns
+    -------
+    p : where the sphere only touches.
+    support, place : the normal that points up most, and where.
+    against, other : the normal that the velocity runs against most, and where.
+    distance : of p from the ground as it was given.
+    """
+    distance, support, place, against, other, most = inf, (0.0, 0.0, -2.0), -1, (0.0, 0.0, 1.0), -1, -inf
     for k in range(MOST_AT_ONCE):
         qx, qy, qz, square, found = _closest(tree, stack, p, radius, near, around)
         if found < 0:
@@ -196,9 +214,13 @@ def _touching(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-
             break
         if d == 0.0:
             break
-        n, place = ((p[0] - qx) / d, (p[1] - qy) / d, (p[2] - qz) / d), found
+        n = ((p[0] - qx) / d, (p[1] - qy) / d, (p[2] - qz) / d)
         p = (qx + radius * n[0], qy + radius * n[1], qz + radius * n[2])
-    return p, n, place, distance
+        if n[2] > support[2]:
+            support, place = n, found
+        if -_dot(v, n) > most:
+            against, other, most = n, found, -_dot(v, n)
+    return p, support, place, against, other, distance
 
 
 @kernel
@@ -234,7 +256,7 @@ def run_block(  # type: ignore[no-untyped-def]
     bounds = tree[0]
     factor = 1.0 / (1.0 + inertia) if law == AZZONI else 1.0
     shortest = sqrt(2.0 * FALL * radius / gravity)
-    time, length, impacts, at_once, end = 0.0, 0.0, 0, 0, -1
+    time, length, impacts, at_once, held, end = 0.0, 0.0, 0, 0, 0, -1
     v_max = sqrt(_dot(v, v))
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
     around[0] = -1.0  # nothing of another block
@@ -297,6 +319,8 @@ def run_block(  # type: ignore[no-untyped-def]
                 grounded, v = True, _along(v, n)
                 if law == NO_ROLLING:
                     end = STOPPED
+            elif at_once >= MOST_AT_ONCE:
+                end = STOPPED  # held between walls
             elif rises <= 0.0:
                 v = _along(v, n)  # a model that sends a block into the ground, or an overhang: it slides off
             continue
@@ -311,7 +335,9 @@ def run_block(  # type: ignore[no-untyped-def]
             end = STOPPED
             break
         free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
-        q, e, touched, distance = _touching(tree, stack, free, radius, near, around)
+        pull = -gravity * factor * dt
+        ahead = _along((v[0], v[1], v[2] + pull), n)
+        q, e, touched, against, other, distance = _touching(tree, stack, free, ahead, radius, near, around)
         if distance > radius + TOUCHING_M:
             grounded = False
             if record:
@@ -321,37 +347,49 @@ def run_block(  # type: ignore[no-untyped-def]
             length += speed * dt
             at_once = 0
             continue
+        if touched < 0:
+            end = STOPPED  # the centre is on the ground itself: there is no way out
+            break
         way = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
         ds = sqrt(_dot(way, way))
-        towards = -_dot(v, e)
-        if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(e, n) < SHARP:
+        held = held + 1 if ds < HELD * radius else 0
+        if held > MOST_HELD:
+            end = STOPPED
+            break
+        towards = -_dot(v, against)
+        if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(against, n) < SHARP:
             fill_uniform(seed, run, impacts, draws)
             v1, w1 = v, w
-            v, w = rebound(v1, e, w1, radius, mass, parameters[zone[touched]], draws)
+            v, w = rebound(v1, against, w1, radius, mass, parameters[zone[other]], draws)
             impacts += 1
             if record:
-                _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, e, touched)
+                _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
                 count += 1
-            rises = _dot(v, e)
-            n, place = e, touched
-            if e[2] <= 0.0 or rises * rises >= 2.0 * gravity * e[2] * HOP * radius:
+            rises = _dot(v, against)
+            if against[2] <= 0.0 or rises * rises >= 2.0 * gravity * against[2] * HOP * radius:
                 grounded = False
             else:
-                v = _along(v, e)
+                v, n, place = _along(v, against), against, other
             continue
-        pull = (0.0, 0.0, -gravity * factor * dt)
-        turned = _along((v[0] + pull[0], v[1] + pull[1], v[2] + pull[2]), e)
-        size = sqrt(_dot(turned, turned))
+        turned = _along((v[0], v[1], v[2] + pull), e)
         square = speed * speed
-        if _dot(e, n) < SHARP:
+        back = _dot(turned, against)
+        blocked = back < 0.0 and _dot(against, e) < SHARP
+        if blocked:
+            turned = _in_corner(turned, e, against)
+        size = sqrt(_dot(turned, turned))
+        if blocked or _dot(e, n) < SHARP:
             square = min(square, size * size)
         loss = 2.0 * factor * gravity * ((q[2] - p[2]) + mu * max(cosine, 0.0) * ds)
         left = square - loss
         n, place = e, touched
         if speed < 1e-6:
-            # From rest: what is left of gravity along the slope.
-            pulls = factor * gravity * (steep - mu * cosine) * dt
-            v = (turned[0] / size * pulls, turned[1] / size * pulls, turned[2] / size * pulls) if size > 0.0 else zero
+            # From rest: what friction leaves of gravity along the ground, and along a wall that the block leans on.
+            pulls = size - mu * (factor * gravity * cosine * dt + (-back if blocked else 0.0))
+            if pulls <= 0.0:
+                end = STOPPED
+                break
+            v = (turned[0] / size * pulls, turned[1] / size * pulls, turned[2] / size * pulls)
             p, time, length = q, time + dt, length + ds
             continue
         if left <= 0.0 or size == 0.0:
@@ -361,8 +399,6 @@ def run_block(  # type: ignore[no-untyped-def]
             time += 2.0 * part * ds / speed
             length += part * ds
             v = zero
-            if part == 0.0 and steep > mu * cosine:
-                v = (turned[0] * 1e-3, turned[1] * 1e-3, turned[2] * 1e-3)
         else:
             now = sqrt(left)
             v = (turned[0] / size * now, turned[1] / size * now, turned[2] / size * now)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tables of a simulation: releases.csv in; runs.csv, hits.csv and summary.json out."""
+
+import hashlib
+import json
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..simulation.engine import ENDS, Simulation
+from ..simulation.ground import Ground
+from ..simulation.release import Releases, overlapping, placed_on
+from ..simulation.results import hits_of, release_names, run_figures
+from ..vectors import norm
+from .csv_text import read_table
+from .tables import POSITION, Columns, vector_columns, write_columns
+
+VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
+SPIN = ("omegax_radps", "omegay_radps", "omegaz_radps")
+DIAMETERS = ("d1_m", "d2_m", "d3_m")
+RELEASES_REQUIRED = ("x_m", "y_m")
+RELEASES_KNOWN = (
+    *RELEASES_REQUIRED, "z_m", "release", *VELOCITY, *SPIN, *DIAMETERS, "diameter_m", "density_kgpm3", "number",
+)  # fmt: skip
+DEEP = 0.01
+"""A release may be in the ground by this part of its radius, as rounded tables put it there."""
+
+
+def read_releases(
+    path: str | Path, ground: Ground, *, diameter_m: float, density_kgpm3: float, number: int = 1
+) -> Releases:
+    """Read releases.csv: places of blocks' centres in survey coordinates.
+
+    Parameters
+    ----------
+    diameter_m, density_kgpm3, number : where the table does not say.
+
+    Raises
+    ------
+    InputError : anything that is wrong with the table, with the row; a release beside the terrain or in the ground.
+
+    Notes
+    -----
+    A release without z lies on the terrain, touching it.
+    """
+    table = read_table(path, RELEASES_REQUIRED, RELEASES_KNOWN)
+    n = len(table)
+    if not n:
+        raise InputError("The table has no release", file=path, advice="Add a row for each place")
+    shift = ground.terrain.shift
+    survey = np.column_stack(
+        [table.numbers("x_m", required=True), table.numbers("y_m", required=True), table.numbers("z_m")]
+    )
+    placed = np.isnan(survey[:, 2])
+    position = shift.to_local(np.where(np.isnan(survey), 0.0, survey))
+    diameter = table.numbers("diameter_m")
+    three = table.vectors(DIAMETERS)
+    mean = three.mean(axis=1)
+    diameter = np.where(np.isnan(diameter), np.where(np.isnan(mean), diameter_m, mean), diameter)
+    density = table.numbers("density_kgpm3")
+    density = np.where(np.isnan(density), density_kgpm3, density)
+    counts = table.numbers("number")
+    counts = np.where(np.isnan(counts), number, counts)
+    for what, values, good in (
+        ("diameter", diameter, diameter > 0), ("density", density, density > 0),
+        ("number of blocks", counts, (counts >= 1) & (counts == np.round(counts))),
+    ):  # fmt: skip
+        for i in np.flatnonzero(~good)[:1].tolist():
+            raise table.error(i, f"The {what} is {values[i]:g}", "Give a number above zero")
+    if placed.any():
+        position[placed] = placed_on(ground, position[placed, :2], diameter[placed])
+        for i in np.flatnonzero(np.isnan(position[:, 2]))[:1].tolist():
+            raise table.error(i, "There is no terrain under this release", "Correct it, or give a larger terrain")
+    velocity, spin = table.vectors(VELOCITY), table.vectors(SPIN)
+    volume = np.pi / 6 * np.where(np.isnan(three).any(axis=1), diameter**3, three.prod(axis=1))
+    releases = Releases(
+        np.array(table.text("release"), dtype=np.str_),
+        position,
+        np.where(np.isnan(velocity), 0.0, velocity),
+        np.where(np.isnan(spin), 0.0, spin),
+        diameter,
+        density * volume,
+    )
+    depth = overlapping(ground, releases)
+    for i in np.flatnonzero(depth > DEEP * releases.radius_m)[:1].tolist():
+        raise table.error(
+            i, f"This release is {depth[i]:.3g} m deep in the ground", "Raise z_m, or leave it empty to put it there"
+        )
+    times = counts.astype(np.intp)
+    return Releases(*(np.repeat(getattr(releases, name), times, axis=0) for name in Releases.__dataclass_fields__))
+
+
+def write_runs(simulation: Simulation, path: str | Path) -> None:
+    """Write runs.csv: one row per block."""
+    releases, figures = simulation.releases, run_figures(simulation)
+    shift = simulation.ground.terrain.shift
+    columns: Columns = {
+        "run": [str(number + 1) for number in range(len(simulation))],
+        "release": release_names(simulation).tolist(),
+        "model": [simulation.settings.model] * len(simulation),
+        "diameter_m": releases.diameter_m,
+        "mass_kg": releases.mass_kg,
+        **vector_columns(("x0_m", "y0_m", "z0_m"), shift.to_survey(releases.position)),
+        **vector_columns(POSITION, shift.to_survey(simulation.position)),
+        "time_s": simulation.time_s,
+        "length_m": simulation.length_m,
+        "impacts": simulation.impacts,
+        "end": [ENDS[end] for end in simulation.end.tolist()],
+        "v_max_mps": simulation.v_max_mps,
+        "kinetic_max_J": figures.kinetic_max_j,
+        "height_max_m": figures.height_max_m,
+        "energy_line_deg": np.degrees(figures.energy_line),
+    }
+    write_columns(path, columns)
+
+
+def write_hits(simulation: Simulation, path: str | Path) -> None:
+    """Write hits.csv: each time that a block meets a structure."""
+    records, releases = simulation.records, simulation.releases
+    rows = hits_of(simulation)
+    run = records.run[rows]
+    v1, radius = records.v1[rows], releases.radius_m[run]
+    place = simulation.ground.terrain.shift.to_survey(records.position[rows])
+    inertia = simulation.settings.inertia * releases.mass_kg[run] * radius**2
+    speed = norm(v1)
+    towards = -(v1 * records.normal[rows]).sum(axis=1)
+    names = np.array(["", *simulation.ground.structures])
+    columns: Columns = {
+        "structure": names[simulation.ground.owner[records.face[rows]]].tolist(),
+        "run": (run + 1).astype(np.str_).tolist(),
+        "time_s": records.time_s[rows],
+        **vector_columns(POSITION, place),
+        "v_mps": speed,
+        "angle_deg": np.degrees(np.arccos(np.clip(towards / speed, -1.0, 1.0))),
+        "kinetic_J": 0.5 * releases.mass_kg[run] * speed**2,
+        "rotational_J": 0.5 * inertia * (records.omega1[rows] ** 2).sum(axis=1),
+    }
+    write_columns(path, columns)
+
+
+def summary(simulation: Simulation, inputs: dict[str, Path], seconds: float) -> dict[str, Any]:
+    """What summary.json says: inputs with their hashes, settings, counts of each end, rate."""
+    settings = simulation.settings
+    ends = np.bincount(simulation.end, minlength=len(ENDS))
+    return {
+        "version": str(import_module((__package__ or "").partition(".core")[0]).__version__),
+        "inputs": {name: {"file": path.name, "sha256": _digest(path)} for name, path in inputs.items()},
+        "model": settings.model,
+        "parameters": dict(settings.parameters),
+        "zones": {name: dict(values) for name, values in settings.zones.items()},
+        "rolling": settings.rolling,
+        "friction": settings.friction,
+        "gravity_mps2": settings.gravity_mps2,
+        "drag": settings.drag is not None,
+        "seed": settings.seed,
+        "blocks": len(simulation),
+        "blocks_wanted": simulation.wanted,
+        "ends": {name: int(count) for name, count in zip(ENDS, ends, strict=True)},
+        "impacts": int(simulation.impacts.sum()),
+        "triangles_without_area": simulation.ground.flat,
+        "seconds": round(seconds, 3),
+    }
+
+
+def write_summary(values: dict[str, Any], path: str | Path) -> None:
+    """Write summary.json."""
+    Path(path).write_text(json.dumps(values, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is read off a simulation: its runs, its impacts, its motion in time, and hits of structures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..progress import Progress, silent
+from ..reconstruction.flight import parabola
+from ..reconstruction.impact import FLAGS, Impacts, apparent
+from ..reconstruction.sampling import STEP_S, TrajectorySamples
+from ..terrain.raycast import heights_above
+from ..vectors import Array, Indices, Mask, Names, dot
+from .engine import FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
+
+HIGHEST_FLIGHTS = 3
+"""The highest point of a run is looked for on so many of its longest flights, the bounces that can be the highest."""
+MOMENTS = 9
+"""At so many moments of each."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunFigures:
+    """Greatest values and angles of n runs.
+
+    Attributes
+    ----------
+    kinetic_max_j : (n,) ½mv² at the greatest speed [J].
+    height_max_m : (n,) of the centre above the terrain, vertically [m]; NaN for a run without a flight.
+    energy_line : (n,) angle below the horizontal of the line from the release to the end [rad]; NaN where both have one
+        place in plan.
+    """
+
+    kinetic_max_j: Array
+    height_max_m: Array
+    energy_line: Array
+
+
+def run_figures(simulation: Simulation) -> RunFigures:
+    """The greatest values of each run."""
+    start, end = simulation.releases.position, simulation.position
+    flat = np.hypot(*(end - start)[:, :2].T)
+    line = np.arctan2(start[:, 2] - end[:, 2], flat)
+    return RunFigures(
+        0.5 * simulation.releases.mass_kg * simulation.v_max_mps**2,
+        _greatest_heights(simulation),
+        np.where(flat > 0, line, np.nan),
+    )
+
+
+def flights_of(simulation: Simulation) -> tuple[Indices, Array]:
+    """Rows of the records at which a flight begins, and how long it lasts [s]; without drag it is a parabola."""
+    records = simulation.records
+    begins = np.isin(records.what[:-1], (RELEASED, IMPACT, FLIES_OFF)) & (records.what[1:] != ON_GROUND)
+    begins &= records.run[:-1] == records.run[1:]
+    rows = np.flatnonzero(begins)
+    duration = records.time_s[rows + 1] - records.time_s[rows]
+    flies = duration > 0
+    return rows[flies], duration[flies]
+
+
+def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
+    """The impacts of all runs, as those that were measured; ``run`` and ``structure`` are further columns.
+
+    The position is that of the contact, the normal that from the contact to the centre.
+    """
+    records, releases, ground = simulation.records, simulation.releases, simulation.ground
+    rows = np.flatnonzero(records.what == IMPACT)
+    run = records.run[rows]
+    v1, v2, normal = records.v1[rows], records.v2[rows], records.normal[rows]
+    values = apparent(v1, v2, normal)
+    mass, radius = releases.mass_kg[run], releases.radius_m[run]
+    inertia = simulation.settings.inertia * mass * radius**2
+    first = np.searchsorted(run, run)
+    nothing = np.full(rows.size, np.nan)
+    flags = {name: np.zeros(rows.size, np.bool_) for name in FLAGS}
+    flags["into_ground"] = values.escape < 0
+    structure = np.array(["", *ground.structures])[ground.owner[records.face[rows]]]
+    return Impacts(
+        site=np.full(rows.size, site),
+        trajectory=release_names(simulation)[run],
+        impact=np.arange(rows.size) - first + 1,
+        time_s=records.time_s[rows],
+        position=records.position[rows] - radius[:, None] * normal,
+        normal=normal,
+        normal_radius_m=nothing,
+        normal_spread=nothing,
+        v1=v1,
+        v2=v2,
+        vn1=values.vn1,
+        vt1=values.vt1,
+        vn2=values.vn2,
+        vt2=values.vt2,
+        rn=values.rn,
+        rt=values.rt,
+        r=values.r,
+        theta1=values.theta1,
+        theta_dev=values.theta_dev,
+        diameter_m=2 * radius,
+        mass_kg=mass,
+        flags=flags,
+        angular_velocity=records.omega1[rows],
+        kinetic1_j=0.5 * mass * dot(v1, v1),
+        kinetic2_j=0.5 * mass * dot(v2, v2),
+        rotational1_j=0.5 * inertia * dot(records.omega1[rows], records.omega1[rows]),
+        rotational2_j=0.5 * inertia * dot(records.omega2[rows], records.omega2[rows]),
+        bounce_height_m=nothing,
+        chord_height_m=nothing,
+        extra={"run": (run + 1).astype(np.str_), "structure": structure},
+        shift=ground.terrain.shift,
+    )
+
+
+def hits_of(simulation: Simulation) -> Indices:
+    """Rows of the records at which a block hits a structure."""
+    records = simulation.records
+    rows = np.flatnonzero(records.what == IMPACT)
+    hit: Mask = simulation.ground.owner[records.face[rows]] > 0
+    return rows[hit]
+
+
+def release_names(simulation: Simulation) -> Names:
+    """(n,) the release of each run; its number where it has no name."""
+    names = simulation.releases.name
+    return np.where(names == "", (np.arange(len(names)) + 1).astype(np.str_), names)
+
+
+def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progress = silent) -> TrajectorySamples:
+    """The motion of all runs at the ends of every flight and step, and every `step_s` in flight.
+
+    Notes
+    -----
+    Between the moments that the records keep a flight is a parabola; with drag, the one through both ends.
+    """
+    records = simulation.records
+    rows, duration = flights_of(simulation)
+    inner = np.maximum(np.ceil(duration / step_s - 1e-6).astype(np.intp) - 1, 0)
+    which = np.repeat(np.arange(rows.size), inner)
+    within = np.arange(which.size) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+    elapsed = within * step_s
+    start = rows[which]
+    place, velocity = _on_flight(simulation, start, duration[which], elapsed)
+    time = np.concatenate([records.time_s, records.time_s[start] + elapsed])
+    run = np.concatenate([records.run, records.run[start]])
+    order = np.lexsort((np.concatenate([np.arange(len(records)), start]), time, run))
+    position = np.concatenate([records.position, place])[order]
+    speed = np.concatenate([records.v2, velocity])[order]
+    run, time = run[order], time[order]
+    mass = simulation.releases.mass_kg[run]
+    progress("Heights above the terrain", 0, 0)
+    return TrajectorySamples(
+        source=np.full(time.size, simulation.settings.model),
+        trajectory=release_names(simulation)[run],
+        run=run + 1,
+        time_s=time,
+        position=position,
+        velocity=speed,
+        height_m=heights_above(simulation.ground.terrain, position),
+        kinetic_j=0.5 * mass * dot(speed, speed),
+        shift=simulation.ground.terrain.shift,
+    )
+
+
+def _on_flight(simulation: Simulation, start: Indices, duration: Array, elapsed: Array) -> tuple[Array, Array]:
+    """Places and velocities (q, 3) on flights that begin at the records `start`, so long after."""
+    records, settings = simulation.records, simulation.settings
+    if settings.drag is None:
+        return parabola(records.position[start], records.v2[start], elapsed, settings.gravity_mps2)
+    whole, part = duration[:, None], elapsed[:, None]
+    bend = 2 * (records.position[start + 1] - records.position[start] - records.v2[start] * whole) / whole**2
+    return records.position[start] + (records.v2[start] + 0.5 * bend * part) * part, records.v2[start] + bend * part
+
+
+def _greatest_heights(simulation: Simulation) -> Array:
+    rows, duration = flights_of(simulation)
+    run = simulation.records.run[rows]
+    order = np.lexsort((-duration, run))
+    rank = np.arange(order.size) - np.searchsorted(run[order], run[order])
+    longest = order[rank < HIGHEST_FLIGHTS]
+    heights = np.full(len(simulation), -np.inf)
+    if longest.size:
+        parts = np.tile(np.linspace(0.0, 1.0, MOMENTS), longest.size)
+        start, whole = np.repeat(rows[longest], MOMENTS), np.repeat(duration[longest], MOMENTS)
+        place, _ = _on_flight(simulation, start, whole, parts * whole)
+        above = heights_above(simulation.ground.terrain, place)
+        np.maximum.at(heights, simulation.records.run[start], np.where(np.isnan(above), -np.inf, above))
+    return np.where(np.isfinite(heights), heights, np.nan)

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall simulate``: tables that agree with each other, and bad input."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rockfall.core.cli import main
+from rockfall.core.exchange.tables import read_impacts
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.terrain.surface import Surface
+from rockfall.core.terrain.writers import write_ply
+
+EAST, NORTH = 2_600_000.0, 1_200_000.0
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+@pytest.fixture(scope="module")
+def terrain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A slope of 35° that runs out on a plain, in survey coordinates."""
+    line = np.arange(0.0, 121.0, 2.0)
+    x, y = np.meshgrid(line, line)
+    z = 500 - 0.7 * np.minimum(x, 60) + 0.3 * np.sin(x) * np.cos(y / 2)
+    vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    i = np.arange(line.size**2).reshape(line.size, -1)
+    lower = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:]], axis=-1).reshape(-1, 3)
+    upper = np.stack([i[:-1, :-1], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 3)
+    faces = np.concatenate([lower, upper]).astype(np.int32)
+    path = tmp_path_factory.mktemp("ground") / "slope.ply"
+    write_ply(Surface(vertices, faces, GlobalShift(EAST, NORTH, 0.0), "slope"), path)
+    return path
+
+
+@pytest.fixture
+def releases(tmp_path: Path) -> Path:
+    path = tmp_path / "releases.csv"
+    path.write_text(
+        "release,x_m,y_m,z_m,diameter_m,number\n"
+        f"cliff,{EAST + 10},{NORTH + 40},,0.4,3\n"
+        f"ledge,{EAST + 14},{NORTH + 70},495.0,0.6,2\n",
+        encoding="utf-8",
+    )
+    return path
+
+
+def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "out"
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "noel_2017", "--seed", "3"]
+    assert main([*argv, "--out", str(out)]) == 0
+    runs = rows_of(out / "runs.csv")
+    assert [row["release"] for row in runs] == ["cliff"] * 3 + ["ledge"] * 2
+    assert [row["end"] for row in runs] == ["stopped"] * 5
+    impacts = read_impacts(out / "impacts.csv")
+    counts = np.unique(impacts.extra["run"].astype(int), return_counts=True)[1]
+    assert counts.tolist() == [int(row["impacts"]) for row in runs]
+    assert abs(impacts.shift.to_survey(impacts.position)[:, 0] - EAST).max() < 121
+    samples = rows_of(out / "trajectories.csv")
+    for row in runs:
+        own = [sample for sample in samples if sample["run"] == row["run"]]
+        last = own[-1]
+        for name in ("x_m", "y_m", "z_m"):
+            assert float(last[name]) == pytest.approx(float(row[name]), abs=1e-5)
+        speeds = [np.hypot(np.hypot(float(s["vx_mps"]), float(s["vy_mps"])), float(s["vz_mps"])) for s in own]
+        assert max(speeds) <= float(row["v_max_mps"]) + 1e-6
+        heights = [float(s["height_m"]) for s in own]
+        assert float(row["height_max_m"]) >= max(heights) - 0.1
+        fall = float(row["z0_m"]) - float(row["z_m"])
+        flat = np.hypot(float(row["x_m"]) - float(row["x0_m"]), float(row["y_m"]) - float(row["y0_m"]))
+        assert float(row["energy_line_deg"]) == pytest.approx(np.degrees(np.arctan2(fall, flat)), abs=1e-9)
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["ends"] == {"stopped": 5, "left_terrain": 0, "limit": 0}
+    assert summary["seed"] == 3
+    assert len(summary["inputs"]["terrain"]["sha256"]) == 64
+    assert "5 blocks with noel_2017" in capsys.readouterr().out
+    again = tmp_path / "again"
+    assert main([*argv, "--threads", "1", "--out", str(again)]) == 0
+    for name in ("runs.csv", "impacts.csv", "trajectories.csv"):
+        assert (again / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_hits_of_a_wall(terrain: Path, releases: Path, tmp_path: Path) -> None:
+    corners = np.array([[55.0, 0, 455], [55.0, 118, 455], [55.0, 118, 470], [55.0, 0, 470]])
+    wall = tmp_path / "wall.ply"
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    write_ply(Surface(corners, faces, GlobalShift(EAST, NORTH, 0.0), "wall"), wall)
+    out = tmp_path / "out"
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "azimi_desvarreux_1977"]
+    assert main([*argv, "--structure", f"wall={wall}", "--record", "none", "--out", str(out)]) == 0
+    hits, runs = rows_of(out / "hits.csv"), rows_of(out / "runs.csv")
+    assert {row["structure"] for row in hits} == {"wall"}
+    assert sorted(path.name for path in out.iterdir()) == ["hits.csv", "runs.csv", "summary.json"]
+    radius = {row["run"]: float(row["diameter_m"]) / 2 for row in runs}
+    for row in hits:
+        away = EAST + 55.0 - float(row["x_m"])
+        assert radius[row["run"]] - 1e-6 < away < 1.5 * radius[row["run"]]
+        speed = float(row["v_mps"])
+        mass = float(runs[int(row["run"]) - 1]["mass_kg"])
+        assert float(row["kinetic_J"]) == pytest.approx(0.5 * mass * speed**2, rel=1e-9)
+    assert all(float(row["x_m"]) < EAST + 55 and row["end"] == "stopped" for row in runs)
+
+
+@pytest.mark.parametrize(
+    ("row", "problem"),
+    [
+        (f"{EAST + 500},{NORTH + 40},480,0.4,1", "row 2: There is no terrain|is beside the terrain"),
+        (f"{EAST + 500},{NORTH + 40},,0.4,1", "row 2: There is no terrain under this release"),
+        (f"{EAST + 10},{NORTH + 40},480,0.4,1", "row 2: This release is 1[0-9]"),
+        (f"{EAST + 10},{NORTH + 40},,-1,1", "row 2: The diameter is -1"),
+        (f"{EAST + 10},{NORTH + 40},,0.4,0", "row 2: The number of blocks is 0"),
+        (f"{EAST + 10},{NORTH + 40},,0.4,1.5", "row 2: The number of blocks is 1.5"),
+        (f"{EAST + 10},wide,,0.4,1", "row 2: .*wide"),
+    ],
+)
+def test_bad_releases(terrain: Path, tmp_path: Path, capsys, row: str, problem: str) -> None:
+    path = tmp_path / "releases.csv"
+    path.write_text(f"x_m,y_m,z_m,diameter_m,number\n{row}\n", encoding="utf-8")
+    out = tmp_path / "out"
+    argv = ["simulate", str(path), "--terrain", str(terrain), "--model", "noel_2017", "--out", str(out)]
+    assert main(argv) == 1
+    assert re.search(problem, capsys.readouterr().err)
+    assert not out.exists()
+
+
+def test_bad_structures(terrain: Path, releases: Path, tmp_path: Path, capsys) -> None:
+    argv = [
+        "simulate",
+        str(releases),
+        "--terrain",
+        str(terrain),
+        "--model",
+        "noel_2017",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert main([*argv, "--structure", "wall"]) == 1
+    assert "--structure wall names no file" in capsys.readouterr().err
+    far = tmp_path / "far.ply"
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1]])
+    write_ply(Surface(corners, np.array([[0, 1, 2]], np.int32), GlobalShift(), "far"), far)
+    assert main([*argv, "--structure", f"wall={far}"]) == 1
+    assert "stands nowhere near the terrain" in capsys.readouterr().err

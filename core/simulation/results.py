@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import Progress, silent
-from ..reconstruction.flight import parabola
+from ..reconstruction.free_flight import fly
 from ..reconstruction.impact import FLAGS, Impacts, apparent
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
 from ..terrain.raycast import heights_above
@@ -49,7 +49,7 @@ def run_figures(simulation: Simulation) -> RunFigures:
 
 
 def flights_of(simulation: Simulation) -> tuple[Indices, Array]:
-    """Rows of the records at which a flight begins, and how long it lasts [s]; without drag it is a parabola."""
+    """Rows of the records at which a flight begins, and how long it lasts [s]."""
     records = simulation.records
     begins = np.isin(records.what[:-1], (RELEASED, IMPACT, FLIES_OFF)) & (records.what[1:] != ON_GROUND)
     begins &= records.run[:-1] == records.run[1:]
@@ -126,12 +126,7 @@ def release_names(simulation: Simulation) -> Names:
 
 
 def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progress = silent) -> TrajectorySamples:
-    """The motion of all runs at the ends of every flight and step, and every `step_s` in flight.
-
-    Notes
-    -----
-    Between the moments that the records keep a flight is a parabola; with drag, the one through both ends.
-    """
+    """The motion of all runs at the ends of every flight and step, and every `step_s` in flight."""
     records = simulation.records
     rows, duration = flights_of(simulation)
     inner = np.maximum(np.ceil(duration / step_s - 1e-6).astype(np.intp) - 1, 0)
@@ -139,7 +134,7 @@ def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progre
     within = np.arange(which.size) - np.repeat(np.cumsum(inner) - inner, inner) + 1
     elapsed = within * step_s
     start = rows[which]
-    place, velocity = _on_flight(simulation, start, duration[which], elapsed)
+    place, velocity = _on_flight(simulation, start, elapsed)
     time = np.concatenate([records.time_s, records.time_s[start] + elapsed])
     run = np.concatenate([records.run, records.run[start]])
     order = np.lexsort((np.concatenate([np.arange(len(records)), start]), time, run))
@@ -161,14 +156,11 @@ def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progre
     )
 
 
-def _on_flight(simulation: Simulation, start: Indices, duration: Array, elapsed: Array) -> tuple[Array, Array]:
+def _on_flight(simulation: Simulation, start: Indices, elapsed: Array) -> tuple[Array, Array]:
     """Places and velocities (q, 3) on flights that begin at the records `start`, so long after."""
     records, settings = simulation.records, simulation.settings
-    if settings.drag is None:
-        return parabola(records.position[start], records.v2[start], elapsed, settings.gravity_mps2)
-    whole, part = duration[:, None], elapsed[:, None]
-    bend = 2 * (records.position[start + 1] - records.position[start] - records.v2[start] * whole) / whole**2
-    return records.position[start] + (records.v2[start] + 0.5 * bend * part) * part, records.v2[start] + bend * part
+    drag = simulation.releases.drag_per_m(settings.drag)[records.run[start]]
+    return fly(records.position[start], records.v2[start], elapsed, settings.gravity_mps2, drag)
 
 
 def _greatest_heights(simulation: Simulation) -> Array:
@@ -181,7 +173,7 @@ def _greatest_heights(simulation: Simulation) -> Array:
     if longest.size:
         parts = np.tile(np.linspace(0.0, 1.0, MOMENTS), longest.size)
         start, whole = np.repeat(rows[longest], MOMENTS), np.repeat(duration[longest], MOMENTS)
-        place, _ = _on_flight(simulation, start, whole, parts * whole)
+        place, _ = _on_flight(simulation, start, parts * whole)
         above = heights_above(simulation.ground.terrain, place)
         np.maximum.at(heights, simulation.records.run[start], np.where(np.isnan(above), -np.inf, above))
     return np.where(np.isfinite(heights), heights, np.nan)

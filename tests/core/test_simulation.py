@@ -263,15 +263,15 @@ def test_terminal_speed_with_drag() -> None:
 
 
 def test_flight_with_drag_is_the_reconstructions_flight() -> None:
-    from rockfall.core.reconstruction.drag import fly
+    from rockfall.core.reconstruction.free_flight import fly
 
     velocity = np.array([[22.0, 3.0, 18.0]])
     releases = make_releases(np.array([[10.0, 60.0, 40.0]]), velocity=velocity, diameter_m=0.3)
     run = simulate(make_ground(slope(0)), releases, Settings("noel_2017", drag=Drag(), most_impacts=1))
     hit = np.flatnonzero(run.records.what == engine.IMPACT)[0]
     drag = releases.drag_per_m(Drag())
-    moved, final = fly(velocity, run.records.time_s[hit : hit + 1], G, drag)
-    np.testing.assert_allclose(run.records.position[hit], releases.position[0] + moved[0], atol=1e-4)
+    place, final = fly(releases.position, velocity, run.records.time_s[hit : hit + 1], G, drag)
+    np.testing.assert_allclose(run.records.position[hit], place[0], atol=1e-4)
     np.testing.assert_allclose(run.records.v1[hit], final[0], atol=1e-4)
 
 

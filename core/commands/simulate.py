@@ -171,7 +171,7 @@ def _sentences(simulation: "Simulation", seconds: float) -> list[str]:
     flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
     sentences.append(
         f"Run-out in plan {np.median(flat):.1f} m (median), {flat.max():.1f} m at most; speeds up to "
-        f"{simulation.v_max_mps.max():.1f} m/s. {n / seconds:.0f} blocks a second."
+        f"{simulation.v_max_mps.max():.1f} m/s. It took {seconds:.1f} s."
     )
     if simulation.ground.flat:
         sentences.append(f"{simulation.ground.flat} triangles without area were left out.")

@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .scene import footage, impact_rows, migration, problems, store, sync, terrain_mesh, timing, videos
+from .scene import footage, impact_rows, migration, problems, store, sync, terrain_mesh, timing, video_files
 from .view import job
 
 _owner = object()
@@ -29,7 +29,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 @problems.guarded
 def _loaded(_path: str, _unused: object = None) -> None:
     terrain_mesh.mistrust()
-    videos.forget_files()
+    video_files.forget_files()
     problems.forget()
     job.forget()
     _listen()  # subscriptions do not survive loading

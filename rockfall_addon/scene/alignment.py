@@ -13,7 +13,7 @@ from ...core.camera.resection.problem import needed_pairs
 from ...core.remarks import Remark, from_plain, to_plain
 from ...core.vectors import Array
 from ...core.workflow.alignment import counting_pairs, reference_frame
-from . import georeference, store, terrain, videos
+from . import camera_paths, georeference, store, terrain, videos
 from .pairs import POINT, complete_of, open_pair, pairs_of, table
 
 GOOD_PAIRS = 8
@@ -68,7 +68,7 @@ def keep_solution(camera: bpy.types.Object, solution: Solution) -> None:
 
 def placement(camera: bpy.types.Object) -> str:
     """How the camera came to its place: `BY_PAIRS`, `BY_EYE`, `FROM_FILE`, or empty."""
-    return str(camera.get(store.PLACED, FROM_FILE)) if videos.is_solved(camera) else ""
+    return str(camera.get(store.PLACED, FROM_FILE)) if camera_paths.is_solved(camera) else ""
 
 
 def moves(camera: bpy.types.Object) -> bool:
@@ -98,7 +98,7 @@ def keep_lens(camera: bpy.types.Object, values: Array) -> None:
 
 def lens_of(camera: bpy.types.Object) -> Array:
     """(9,) the lens as it is now."""
-    return videos.camera_path(camera).reference.intrinsics
+    return camera_paths.camera_path(camera).reference.intrinsics
 
 
 def focal_px(camera: bpy.types.Object) -> float:

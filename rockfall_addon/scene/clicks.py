@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.reconstruction.triangulation import SpacePoints, epipolar_curve, triangulate
 from ...core.vectors import Array
-from . import pictures, reconstruction, store, videos
+from . import camera_paths, clocks, pictures, reconstruction, store, videos
 from .places import Place
 
 NEAR_M, FAR_M = 1.0, 5000.0
@@ -73,10 +73,10 @@ def epipolar(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.
     """(k, 2) pixels in a video on which a pick must lie that was clicked in another one; None when it was not."""
     for identifier, seen in of(thing).items():
         other = videos.by_id(scene, identifier)
-        if other is None or other == camera or not videos.is_solved(other):
+        if other is None or other == camera or not camera_paths.is_solved(other):
             continue
         video_s = _time_of(other, seen.frame)
-        here = float(videos.clock_of(camera).to_video(pictures.common_time(other, video_s, float(seen.pixel[1]))))
+        here = float(clocks.clock_of(camera).to_video(pictures.common_time(other, video_s, float(seen.pixel[1]))))
         surface = reconstruction.ground(scene)
         lenses = pictures.posed(other, video_s), pictures.posed(camera, here)
         return epipolar_curve(lenses[0], seen.pixel, lenses[1], NEAR_M, FAR_M, surface)
@@ -88,7 +88,7 @@ def triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> SpacePoints
     lenses, pixels, sigmas = [], [], []
     for identifier, seen in of(thing).items():
         camera = videos.by_id(scene, identifier)
-        if camera is not None and videos.is_solved(camera):
+        if camera is not None and camera_paths.is_solved(camera):
             lenses.append(pictures.posed(camera, _time_of(camera, seen.frame)))
             pixels.append(seen.pixel[None])
             sigmas.append([seen.sigma_px])

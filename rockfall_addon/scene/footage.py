@@ -17,7 +17,7 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.footage.video import Image
 from ...core.vectors import Array
-from . import migration, store, videos
+from . import camera_paths, clocks, migration, store, video_files, videos
 
 
 def follow(scene: bpy.types.Scene) -> None:
@@ -31,7 +31,7 @@ def follow(scene: bpy.types.Scene) -> None:
     videos.remember(scene, things)
     use_size_of_active(scene)
     for camera in things:
-        videos.follow_clock(scene, camera)
+        camera_paths.follow_clock(scene, camera)
     show_pictures(scene, things)
 
 
@@ -54,14 +54,14 @@ def use_size_of_active(scene: bpy.types.Scene, *, again: bool = False) -> None:
 def show_pictures(scene: bpy.types.Scene, cameras: list[bpy.types.Object]) -> None:
     """Each camera shows the picture of the scene's frame."""
     for camera in cameras:
-        clip = videos.clip_of(camera)
+        clip = video_files.clip_of(camera)
         if clip is None:
             continue
         times = videos.times_of(camera)
-        slack = videos.tolerance_s(times)
-        index = videos.index_at(times, videos.video_time(scene, camera), slack)
+        slack = clocks.tolerance_s(times)
+        index = clocks.index_at(times, clocks.video_time(scene, camera), slack)
         position, exact = clip_position(times, index, clip.fps, clip.frame_duration, slack)
-        offset = position - int(videos.current_frame(scene)) + clip.frame_start
+        offset = position - int(clocks.current_frame(scene)) + clip.frame_start
         if clip.frame_offset != offset:
             clip.frame_offset = offset
         _show_still(scene, camera, None if exact or scene.camera != camera else index)
@@ -87,11 +87,11 @@ def clip_position(times: Array, index: int, rate_hz: float, length: int, slack: 
 
 def hidden(camera: bpy.types.Object) -> int:
     """How many of the pictures no position of the clip shows."""
-    clip = videos.clip_of(camera)
+    clip = video_files.clip_of(camera)
     if clip is None or not clip.fps > 0:
         return 0
     times = videos.times_of(camera)
-    slack = videos.tolerance_s(times)
+    slack = clocks.tolerance_s(times)
     position = np.ceil((times - slack) * clip.fps - 1e-9)
     seen = (position / clip.fps < np.append(times[1:], np.inf) - slack) & (position < clip.frame_duration)
     return int((~seen).sum())
@@ -100,7 +100,7 @@ def hidden(camera: bpy.types.Object) -> int:
 def remove(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """Remove a video: its camera, its clip when nothing else uses it, and what is remembered of it."""
     identifier, data = camera[store.ID], camera.data
-    videos.unsolve(camera)
+    camera_paths.unsolve(camera)
     bpy.data.objects.remove(camera)
     if not data.users:
         _remove_data(data)
@@ -124,7 +124,7 @@ def relink(camera: bpy.types.Object, path: str | Path) -> list[str]:
     RockfallError : the file is no video, or one of another size: its pixels would be others.
     """
     old, (width, height) = videos.times_of(camera), videos.size_of(camera)
-    video = videos.opened(path)
+    video = video_files.opened(path)
     if (video.width, video.height) != (width, height):
         raise RockfallError(
             f"{video.path.name} has {video.width} × {video.height} px, the video of {camera.name} has {width} × "
@@ -144,8 +144,8 @@ def relink(camera: bpy.types.Object, path: str | Path) -> list[str]:
                 "or another video. What was marked keeps its times; look at a frame that you know."
             )
     view = [(b.alpha, b.display_depth) for b in camera.data.background_images][:1]
-    clip = videos.clip_of(camera)
-    videos.write_video(camera, video)
+    clip = video_files.clip_of(camera)
+    video_files.write_video(camera, video)
     if clip is not None and not clip.users:
         bpy.data.movieclips.remove(clip)
     for alpha, depth in view:
@@ -184,7 +184,7 @@ def _still(camera: bpy.types.Object, index: int, image: bpy.types.Image | None) 
     if image is not None and image.get(store.STILL) == index and Path(image.filepath).is_file():
         return image
     path = Path(bpy.app.tempdir) / f"rockfall_{camera[store.ID]}.bmp"
-    path.write_bytes(bitmap(videos.picture(camera, index)))
+    path.write_bytes(bitmap(video_files.picture(camera, index)))
     if image is None:
         image = bpy.data.images.load(str(path))
         image.name = f"{camera.name} still"

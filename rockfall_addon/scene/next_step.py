@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import alignment, migration, places, proposal, sightings, store, videos
+from . import alignment, camera_paths, migration, places, proposal, sightings, store, videos
 
 PICK_TOOL = "rockfall.pick_tool"
 
@@ -31,7 +31,7 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if camera is None and not picks:
         sentence = "Add the videos of the fall, or import a table of timed picks."
         return NextStep(sentence, ("rockfall.add_video", "rockfall.import_picks"))
-    if camera is not None and not videos.is_solved(camera):
+    if camera is not None and not camera_paths.is_solved(camera):
         hint = alignment.hint(scene, camera)
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
         return NextStep(sentence, ("rockfall.align_views",))

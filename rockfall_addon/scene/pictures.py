@@ -9,7 +9,7 @@ import numpy as np
 from ...core.camera.model import Camera
 from ...core.camera.path import CameraPath
 from ...core.errors import RockfallError
-from . import picks, store, timing, videos
+from . import camera_paths, clocks, picks, store, timing, videos
 
 SAME_PICTURE = 0.6
 """A pick that is nearer in time than this belongs to the picture [frames]."""
@@ -17,7 +17,7 @@ SAME_PICTURE = 0.6
 
 def picture_time(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[int, float]:
     """Frame of the picture that is shown, and its true video time [s]."""
-    frame = videos.true_frame(scene, camera)
+    frame = clocks.true_frame(scene, camera)
     return frame, float(videos.times_of(camera)[frame])
 
 
@@ -26,13 +26,13 @@ def common_time(camera: bpy.types.Object, video_s: float, v_px: float | None = N
     late = 0.0
     if v_px is not None:
         late = videos.row_time_of(camera) * (v_px - videos.size_of(camera)[1] / 2)
-    return float(videos.clock_of(camera).to_common(video_s)) + late
+    return float(clocks.clock_of(camera).to_common(video_s)) + late
 
 
 def frame_step_s(camera: bpy.types.Object) -> float:
     """Usual time between two pictures, on the common clock [s]."""
     times = videos.times_of(camera)
-    return float(np.median(np.diff(times))) * videos.clock_of(camera).speed if times.size > 1 else 0.04
+    return float(np.median(np.diff(times))) * clocks.clock_of(camera).speed if times.size > 1 else 0.04
 
 
 def aligned_path(camera: bpy.types.Object) -> CameraPath:
@@ -42,12 +42,12 @@ def aligned_path(camera: bpy.types.Object) -> CameraPath:
     ------
     RockfallError : its pose is not known.
     """
-    if not videos.is_solved(camera):
+    if not camera_paths.is_solved(camera):
         raise RockfallError(
             f"The camera of {camera.name} is not aligned, so its pixels have no place on the terrain. Align it first, "
             "or pick on the terrain in a free view."
         )
-    return videos.camera_path(camera)
+    return camera_paths.camera_path(camera)
 
 
 def posed(camera: bpy.types.Object, video_s: float) -> Camera:
@@ -68,7 +68,7 @@ def now(scene: bpy.types.Scene, name: str) -> float:
     A scene without videos plays trajectories one after the other, each with its own offset.
     """
     if videos.cameras(scene) or (scene.rockfall.playback == "REAL" and timing.origin_s(scene) is not None):
-        return videos.common_time(scene)
+        return clocks.common_time(scene)
     shown = (scene.frame_current + scene.frame_subframe) / timing.frame_rate(scene)
     return shown + timing.kept_offsets(scene).get(name, 0.0)
 

@@ -16,7 +16,18 @@ from ...core.exchange.project import Project, VideoEntry
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import Video, open_video
 from ...core.georeference import GlobalShift
-from . import footage, georeference, sightings, store, video_times, videos
+from . import (
+    camera_paths,
+    clocks,
+    footage,
+    georeference,
+    new_videos,
+    sightings,
+    store,
+    video_files,
+    video_times,
+    videos,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,18 +80,18 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
     for read in found:
         first = not videos.cameras(scene)
         there = (c for c in videos.cameras(scene) if Path(str(c[store.VIDEO_FILE])) == read.video.path.resolve())
-        camera = next(there, None) or videos.add_camera(scene, read.video)
+        camera = next(there, None) or new_videos.add_camera(scene, read.video)
         camera.name = read.entry.name
-        videos.set_clock(camera, read.clock)
+        clocks.set_clock(camera, read.clock)
         camera[store.CAPTURE_RATE] = read.entry.capture_rate_hz or 0.0
         camera[store.ROW_TIME] = read.entry.row_time_s
         if read.entry.events is not None:
             camera[store.EVENTS_FILE] = str(read.entry.events.resolve())
         if first:
             scene[store.TIME_ORIGIN] = float(read.clock.to_common(float(read.video.time_s[0])))
-            videos.begin_with(scene, camera)
+            clocks.begin_with(scene, camera)
         if read.camera is not None and read.camera.path.reference.size == videos.size_of(camera):
-            videos.set_camera_path(
+            camera_paths.set_camera_path(
                 scene,
                 camera,
                 read.camera.path,
@@ -102,15 +113,15 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
     for camera in videos.cameras(scene):
         stem = re.sub(r"[^\w.-]+", "_", camera.name)
         files: dict[str, Path | None] = {"camera": None, "track": None, "events": None}
-        if videos.is_solved(camera):
+        if camera_paths.is_solved(camera):
             files["camera"] = folder / f"{stem}_camera.toml"
             rmse = camera.get(store.RMSE)
             write_camera(
                 files["camera"],
-                videos.camera_path(camera),
+                camera_paths.camera_path(camera),
                 rmse_px=None if rmse is None else float(rmse),
                 crs=georeference.read_shift(scene).crs,
-                pose_covariance=videos.pose_covariance(camera),
+                pose_covariance=camera_paths.pose_covariance(camera),
             )
         track = _track_of(camera)
         if track is not None:
@@ -120,11 +131,11 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
         if events.is_file():
             files["events"] = folder / f"{stem}_events.csv"
             shutil.copyfile(events, files["events"])
-        clock = videos.clock_of(camera)
+        clock = clocks.clock_of(camera)
         entries.append(
             VideoEntry(
                 name=camera.name,
-                file=videos.file_of(camera),
+                file=video_files.file_of(camera),
                 offset_s=clock.offset_s,
                 drift=clock.drift,
                 origin_s=clock.origin_s,

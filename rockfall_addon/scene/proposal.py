@@ -19,7 +19,7 @@ from ...core.reconstruction.refinement.result import Refinement
 from ...core.remarks import Remark
 from ...core.vectors import Array
 from ...core.workflow.refinement import Refined
-from . import fingerprints, picks, reconstruction, sightings, store, sync, trails, videos
+from . import camera_paths, clocks, fingerprints, picks, reconstruction, sightings, store, sync, trails, videos
 
 PROPOSED_COLOUR = (0.2, 0.9, 1.0)
 ROW = 9  # time, x, y, z, its sigma, sigma of the time, normal
@@ -66,7 +66,7 @@ def lacking(scene: bpy.types.Scene) -> str:
         return "Pick the impacts first."
     if not cameras:
         return "Add the video first: the picks are fitted to its pixels."
-    if not any(videos.is_solved(camera) for camera in cameras):
+    if not any(camera_paths.is_solved(camera) for camera in cameras):
         return "Align the camera first: only then do pixels have places."
     if not seen_names(scene):
         return "Track the block, or click it in flight (kind “Block here”), in an aligned video."
@@ -75,7 +75,7 @@ def lacking(scene: bpy.types.Scene) -> str:
 
 def seen_names(scene: bpy.types.Scene) -> list[str]:
     """Trajectories that were seen in aligned videos, in the order of their names."""
-    aligned = [camera for camera in videos.cameras(scene) if videos.is_solved(camera)]
+    aligned = [camera for camera in videos.cameras(scene) if camera_paths.is_solved(camera)]
     return sorted({name for camera in aligned for name in sightings.names_in(camera)})
 
 
@@ -230,14 +230,14 @@ def _apply_shared(scene: bpy.types.Scene, kept: dict[str, Any]) -> None:
         for identifier, values in kept["clocks"].items():
             camera = videos.by_id(scene, identifier)
             if camera is not None:
-                videos.set_clock(camera, Clock(*values))
-                videos.follow_clock(scene, camera)
+                clocks.set_clock(camera, Clock(*values))
+                camera_paths.follow_clock(scene, camera)
     if store.PROPOSAL_POSES in scene:
         for identifier, poses in scene[store.PROPOSAL_POSES].to_dict().items():
             camera = videos.by_id(scene, identifier)
             if camera is None:
                 continue
-            old, reference = videos.camera_path(camera), np.array(poses["reference"])
+            old, reference = camera_paths.camera_path(camera), np.array(poses["reference"])
             one = replace(old.reference, position=reference[:3], rotation=reference[3:].reshape(3, 3))
             new = replace(
                 old,
@@ -247,7 +247,7 @@ def _apply_shared(scene: bpy.types.Scene, kept: dict[str, Any]) -> None:
             )
             covariance = np.array(poses["covariance"]).reshape(6, 6)
             rmse_px = kept["rmse_px"][identifier]
-            videos.set_camera_path(scene, camera, new, rmse_px=rmse_px, pose_covariance=covariance)
+            camera_paths.set_camera_path(scene, camera, new, rmse_px=rmse_px, pose_covariance=covariance)
     if "gravity" in kept["free"]:
         scene[store.GRAVITY] = kept["gravity_mps2"]
     if "drag" in kept["free"] and kept["drag"] is not None:

@@ -12,7 +12,7 @@ from ...core.footage.tracking import BlockTrack
 from ...core.reconstruction.refinement.views import View
 from ...core.vectors import Array, Indices
 from ...core.workflow.sightings import SeenVideo, Sightings, joined
-from . import pictures, store, videos
+from . import camera_paths, clocks, pictures, store, videos
 
 COLUMNS = 7  # number of the name, frame, video time, u, v, sigma, clicked by hand
 
@@ -79,9 +79,9 @@ def seen_video(camera: bpy.types.Object, names: Collection[str]) -> SeenVideo:
     view = View(
         camera.name,
         pictures.aligned_path(camera),
-        videos.clock_of(camera),
+        clocks.clock_of(camera),
         videos.row_time_of(camera),
-        videos.pose_covariance(camera),
+        camera_paths.pose_covariance(camera),
     )
     tables = [(name, seen_in(camera, name)) for name in names]
     parts = [Sightings(np.full(len(t), name), t.frame, t.time_s, t.pixel, t.sigma_px) for name, t in tables]

@@ -9,7 +9,7 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
 from ...core.footage.clock import DRIFT_NEEDS, Clock, synchronise
-from . import footage, picks, reconstruction, store, videos
+from . import clocks, footage, picks, reconstruction, store, videos
 
 
 def go_to(scene: bpy.types.Scene, frame: float) -> None:
@@ -21,25 +21,25 @@ def go_to(scene: bpy.types.Scene, frame: float) -> None:
 def step(scene: bpy.types.Scene, camera: bpy.types.Object, by: int) -> int:
     """Go `by` pictures on, to the very time of that picture; returns its index. It stays within the video."""
     times = videos.times_of(camera)
-    now, slack = videos.video_time(scene, camera), videos.tolerance_s(times)
-    index = videos.index_at(times, now, slack)
+    now, slack = clocks.video_time(scene, camera), clocks.tolerance_s(times)
+    index = clocks.index_at(times, now, slack)
     within = now > times[index] + 2 * slack
     wanted = index + by + (1 if by < 0 and within else 0)
     if now < times[0] - slack:  # before the video: its first picture comes next
         wanted = max(by - 1, 0)
     index = int(np.clip(wanted, 0, times.size - 1))
-    go_to(scene, videos.scene_frame_of(scene, camera, index))
+    go_to(scene, clocks.scene_frame_of(scene, camera, index))
     return index
 
 
 def shown_common_s(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
     """Common time of the picture that is shown: its own timestamp, not that of the scene's frame."""
-    return videos.clock_of(camera).to_common(shown_video_s(scene, camera))
+    return clocks.clock_of(camera).to_common(shown_video_s(scene, camera))
 
 
 def shown_video_s(scene: bpy.types.Scene, camera: bpy.types.Object) -> float:
     """Timestamp of the picture that is shown, video time [s]."""
-    return float(videos.times_of(camera)[videos.true_frame(scene, camera)])
+    return float(videos.times_of(camera)[clocks.true_frame(scene, camera)])
 
 
 def origin_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
@@ -68,8 +68,8 @@ def zero_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
         )
     zero = shown_common_s(scene, camera)
     for each in videos.cameras(scene):
-        old = videos.clock_of(each)
-        videos.set_clock(each, Clock(old.offset_s - zero, old.drift, old.origin_s, old.rate))
+        old = clocks.clock_of(each)
+        clocks.set_clock(each, Clock(old.offset_s - zero, old.drift, old.origin_s, old.rate))
     scene[store.TIME_ORIGIN] = 0.0
     _shown_again(scene)
     go_to(scene, 0.0)
@@ -77,7 +77,7 @@ def zero_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 def fit_range(scene: bpy.types.Scene) -> None:
     """Let the scene last as long as its footage; Blender plays no frames below 0."""
-    ends = [videos.scene_frame_of(scene, camera, index) for camera in videos.cameras(scene) for index in (0, 10**9)]
+    ends = [clocks.scene_frame_of(scene, camera, index) for camera in videos.cameras(scene) for index in (0, 10**9)]
     if ends:
         scene.frame_start = max(0, int(np.floor(min(ends))))
         scene.frame_end = max(int(np.ceil(max(ends))), scene.frame_start + 1)
@@ -85,13 +85,13 @@ def fit_range(scene: bpy.types.Scene) -> None:
 
 def use_rate_of(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     """Play the scene so that each frame is a picture of this video; the present picture stays."""
-    rate = float(videos.facts_of(camera).get("rate_hz", 0.0)) / videos.clock_of(camera).speed
+    rate = float(videos.facts_of(camera).get("rate_hz", 0.0)) / clocks.clock_of(camera).speed
     if rate > 0:
-        index = videos.true_frame(scene, camera)
-        videos.set_scene_rate(scene, rate)
+        index = clocks.true_frame(scene, camera)
+        clocks.set_scene_rate(scene, rate)
         fit_range(scene)
         footage.follow(scene)
-        go_to(scene, videos.scene_frame_of(scene, camera, index))
+        go_to(scene, clocks.scene_frame_of(scene, camera, index))
 
 
 def events_of(camera: bpy.types.Object) -> dict[int, float]:
@@ -133,7 +133,7 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]
     others = [camera for camera in videos.cameras(scene) if camera != reference]
     if reference is None or not others:
         raise RockfallError("There is one video only: nothing is to be synchronised with it.")
-    known, clock, said = events_of(reference), videos.clock_of(reference), []
+    known, clock, said = events_of(reference), clocks.clock_of(reference), []
     for camera in others:
         seen = events_of(camera)
         both = sorted(set(seen) & set(known))
@@ -142,9 +142,9 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]
         common = [clock.to_common(known[number]) for number in both]
         sigma = float(np.hypot(_frame_sigma_s(reference), _frame_sigma_s(camera)))
         drifts = fit_drift and len(both) >= DRIFT_NEEDS
-        own = videos.clock_of(camera)
+        own = clocks.clock_of(camera)
         fit = synchronise(common, [seen[number] for number in both], rate=own.rate, fit_drift=drifts, sigma_s=sigma)
-        videos.set_clock(camera, fit.clock)
+        clocks.set_clock(camera, fit.clock)
         sentence = _sentence(camera, reference, both, fit.residual_s, fit.sigma_offset_s, fit.clock.drift, drifts)
         notes = [note.replace("Event ", "Of the shared events, number ", 1) for note in fit.notes]
         camera[store.SYNCHRONISED] = "\n".join([sentence, *notes])
@@ -186,7 +186,7 @@ def _sentence(
 def _frame_sigma_s(camera: bpy.types.Object) -> float:
     """How well a moment is known that is marked on its picture, on the common clock [s]."""
     rate = float(videos.facts_of(camera).get("rate_hz", 0.0))
-    return time_sigma_s(rate) * videos.clock_of(camera).speed if rate > 0 else 1e-3
+    return time_sigma_s(rate) * clocks.clock_of(camera).speed if rate > 0 else 1e-3
 
 
 def _keep_events(camera: bpy.types.Object, events: dict[int, float]) -> None:

@@ -22,7 +22,9 @@ from ...core.terrain.raycast import cast_rays, heights_above
 from ...core.vectors import Array, cross, norm, perpendicular, unit
 from ...core.workflow.first_picks import FAR_M
 from ..scene import (
+    camera_paths,
     clicks,
+    clocks,
     fingerprints,
     picks,
     pictures,
@@ -108,7 +110,7 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
     settings, found = scene.rockfall_picking, Drawing()
     _, video_s = pictures.picture_time(scene, camera)
     lens, moment = pictures.posed(camera, video_s), pictures.common_time(camera, video_s)
-    times = videos.clock_of(camera).to_common(videos.times_of(camera))
+    times = clocks.clock_of(camera).to_common(videos.times_of(camera))
     step = pictures.frame_step_s(camera)
     things = fingerprints.by_trajectory(picks.things_of(scene))
     filmed = {name: path for name in things if (path := path_of(scene, name, times)) is not None}
@@ -289,8 +291,8 @@ def _sightings(
     place = (scene.session_uid, camera[store.ID], name)
     if place in _seen and _seen[place][0] == key:
         return _seen[place][1]
-    origin, direction = rays_at(videos.camera_path(camera), seen.pixel, seen.time_s)
-    clock, late = videos.clock_of(camera), videos.row_time_of(camera)
+    origin, direction = rays_at(camera_paths.camera_path(camera), seen.pixel, seen.time_s)
+    clock, late = clocks.clock_of(camera), videos.row_time_of(camera)
     common = clock.to_common(seen.time_s) + late * (seen.pixel[:, 1] - videos.size_of(camera)[1] / 2)
     where = np.full((len(seen), 3), np.nan)
     if path is not None:

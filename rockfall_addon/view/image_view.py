@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...core.camera.path import project_at, rays_at
 from ...core.vectors import Array
-from ..scene import store, videos
+from ..scene import camera_paths, clocks, store, videos
 
 SAME_SHAPE = 1e-3
 
@@ -80,7 +80,7 @@ def ray(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: ArrayLike, comm
     """
     pixels = np.asarray(pixel, dtype=np.float64)
     rows = pixels.reshape(-1, 2)
-    origins, directions = rays_at(videos.camera_path(camera), rows, _video_times(camera, common_s, rows))
+    origins, directions = rays_at(camera_paths.camera_path(camera), rows, _video_times(camera, common_s, rows))
     shape = (*pixels.shape[:-1], 3)
     return origins.reshape(shape), directions.reshape(shape)
 
@@ -89,10 +89,10 @@ def project(scene: bpy.types.Scene, camera: bpy.types.Object, points: ArrayLike,
     """Pixels (..., 2) of local points (..., 3) [m] at common times, one or (n,); NaN where they are not seen."""
     world = np.asarray(points, dtype=np.float64)
     rows = world.reshape(-1, 3)
-    pixel = project_at(videos.camera_path(camera), rows, _video_times(camera, common_s, rows))
+    pixel = project_at(camera_paths.camera_path(camera), rows, _video_times(camera, common_s, rows))
     return pixel.reshape(*world.shape[:-1], 2)
 
 
 def _video_times(camera: bpy.types.Object, common_s: ArrayLike, rows: Array) -> Array:
-    times = videos.clock_of(camera).to_video(np.asarray(common_s, dtype=np.float64).reshape(-1))
+    times = clocks.clock_of(camera).to_video(np.asarray(common_s, dtype=np.float64).reshape(-1))
     return np.broadcast_to(times, (len(rows),))

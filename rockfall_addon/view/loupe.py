@@ -10,7 +10,7 @@ from ...core.camera.model import rays
 from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_rays
 from ...core.vectors import Array
-from ..scene import pictures, places, problems, reconstruction, videos
+from ..scene import camera_paths, pictures, places, problems, reconstruction, video_files, videos
 from . import drawing, footage_view, image_view, pointing
 
 SHOWN_BY = {"rockfall.pick_tool", "rockfall.align_tool"}
@@ -47,7 +47,7 @@ def crop(picture: np.ndarray, pixel: Array) -> np.ndarray:
 def outline(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Array) -> Array | None:
     """(49, 2) pixels: the block's outline when it is clicked here; None when that is not on the terrain."""
     surface = reconstruction.ground(scene)
-    if surface is None or not videos.is_solved(camera):
+    if surface is None or not camera_paths.is_solved(camera):
         return None
     _, video_s = pictures.picture_time(scene, camera)
     lens = pictures.posed(camera, video_s)
@@ -90,7 +90,7 @@ def _draw(mouse: tuple[int, int]) -> None:
     zoom = settings.loupe_zoom * scale
     frame, _ = pictures.picture_time(scene, camera)
     try:
-        part = crop(videos.picture(camera, frame), pixel)
+        part = crop(video_files.picture(camera, frame), pixel)
     except RockfallError:
         return  # the panel Videos tells that the file is gone
     side = SIDE * zoom

@@ -11,7 +11,7 @@ from mathutils import Vector
 from ...core.camera.model import project
 from ...core.errors import RockfallError
 from ...core.vectors import Array
-from ..scene import clicks, picks, pictures, places, store, videos
+from ..scene import camera_paths, clicks, picks, pictures, places, store, videos
 from ..scene.places import Place
 from . import image_view
 
@@ -31,7 +31,7 @@ def camera_of(context: bpy.types.Context) -> bpy.types.Object | None:
 def solved_camera_of(context: bpy.types.Context) -> bpy.types.Object | None:
     """`camera_of`, unless its pose is not known: then pixels are taken as in a free view."""
     camera = camera_of(context)
-    return camera if camera is not None and videos.is_solved(camera) else None
+    return camera if camera is not None and camera_paths.is_solved(camera) else None
 
 
 def pixel_at(context: bpy.types.Context, xy: Sequence[float]) -> Array | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import RockfallError
-from ..scene import store, videos
+from ..scene import camera_paths, store, videos
 from ..scene.next_step import PICK_TOOL
 from . import image_view
 
@@ -72,7 +72,7 @@ def look_through_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> No
 def take_pick_tool(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
     """With an aligned camera, the next click is a pick. Needs the window in the context."""
     camera, largest = videos.active_camera(scene), _largest_view(screen)
-    if camera is None or largest is None or not videos.is_solved(camera) or bpy.context.mode != "OBJECT":
+    if camera is None or largest is None or not camera_paths.is_solved(camera) or bpy.context.mode != "OBJECT":
         return
     region = next(region for region in largest.regions if region.type == "WINDOW")
     with bpy.context.temp_override(area=largest, region=region):

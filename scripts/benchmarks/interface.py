@@ -165,9 +165,10 @@ def case_memory(window):
         yield 1.0
         tell("stepped through the clip", ", Blender's cache of pictures")
         videos = window.part("rockfall_addon.scene.videos")
+        video_files = window.part("rockfall_addon.scene.video_files")
         camera = videos.active_camera(scene)
         for index in range(0, int(CLIP_S * RATE_HZ), 6):
-            videos.picture(camera, index)
+            video_files.picture(camera, index)
         yield 1.0
         tell("ten pictures read for the loupe")
         row("at most", f"{memory_mb('VmHWM'):.0f} MB", "with the arrays of this script")

@@ -56,11 +56,11 @@ def camera(part, scene, monkeypatch):
         one = video.open_video(FOOTAGE / "footage.mp4")
         _opened.update({field.name: getattr(one, field.name) for field in fields(one)})
     kept = video.Video(**_opened)
-    monkeypatch.setattr(part("rockfall_addon.scene.videos"), "open_video", lambda path: kept)
+    monkeypatch.setattr(part("rockfall_addon.scene.video_files"), "open_video", lambda path: kept)
     part("rockfall_addon.scene.georeference").write_shift(
         scene, part("core.georeference").GlobalShift(988400, 6375600, 0)
     )
-    return part("rockfall_addon.scene.videos").add_video(scene, FOOTAGE / "footage.mp4")
+    return part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ def mark_all(marking, scene, camera, table, count) -> None:
 def test_imported_pairs_give_the_cores_camera(part, scene, aligned, camera, table) -> None:
     assert bpy.ops.rockfall.import_pairs(filepath=str(PAIRS)) == {"FINISHED"}
     found = solved_by_core(part, table)
-    moving = part("rockfall_addon.scene.videos").camera_path(camera)
+    moving = part("rockfall_addon.scene.camera_paths").camera_path(camera)
     np.testing.assert_allclose(moving.reference.position, found.camera.position, atol=1e-6)
     np.testing.assert_allclose(moving.reference.rotation, found.camera.rotation, atol=1e-9)
     assert moving.reference.fx == pytest.approx(found.camera.fx, rel=1e-9)
@@ -125,7 +125,7 @@ def test_the_poses_covariance_is_that_for_the_lens_as_found(part, scene, camera,
     """As the command line writes it; with the lens free the camera could back away while its focal length grows."""
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     found = solved_by_core(part, table)
-    kept = part("rockfall_addon.scene.videos").pose_covariance(camera)
+    kept = part("rockfall_addon.scene.camera_paths").pose_covariance(camera)
     np.testing.assert_allclose(kept, found.pose_covariance_given_lens, rtol=1e-6)
     along, free = (np.sqrt(np.trace(each[3:, 3:])) for each in (kept, found.pose_covariance))
     assert along < 0.5 * free
@@ -168,7 +168,7 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
 ) -> None:
     surface = slope(table)
     mark_all(marking, scene, camera, table, 4)
-    assert not part("rockfall_addon.scene.videos").is_solved(camera)
+    assert not part("rockfall_addon.scene.camera_paths").is_solved(camera)
     assert "1 more" in aligned.hint(scene, camera)
     order = [4, 5, 7]
     for i in order:
@@ -177,13 +177,13 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
             marking.move(scene, camera, pairs.open_pair(camera).id, "point", table.point[i])
         else:
             marking.mark(scene, camera, "point", table.point[i])
-    assert part("rockfall_addon.scene.videos").is_solved(camera)
+    assert part("rockfall_addon.scene.camera_paths").is_solved(camera)
     assert len([pair for pair in pairs.pairs_of(camera) if pair.is_complete]) == 7
     pair = marking.mark(scene, camera, "pixel", table.pixel[8])
     proposed = pairs.with_id(pairs.pairs_of(camera), pair)
     assert proposed.proposed == "point"
     assert not proposed.is_complete
-    moving = part("rockfall_addon.scene.videos").camera_path(camera)
+    moving = part("rockfall_addon.scene.camera_paths").camera_path(camera)
     np.testing.assert_allclose(
         part("core.camera.model").project(moving.reference, [proposed.point])[0], table.pixel[8], atol=1e-6
     )
@@ -209,13 +209,13 @@ def test_known_focal_length_needs_four_pairs(part, scene, marking, camera, table
     for i in rows:
         marking.mark(scene, camera, "pixel", table.pixel[i])
         marking.mark(scene, camera, "point", table.point[i])
-    moving = part("rockfall_addon.scene.videos").camera_path(camera)
-    assert part("rockfall_addon.scene.videos").is_solved(camera)
+    moving = part("rockfall_addon.scene.camera_paths").camera_path(camera)
+    assert part("rockfall_addon.scene.camera_paths").is_solved(camera)
     assert moving.reference.fx == 2100.0
     assert settings.focal_mm == pytest.approx(43.2666 * 2100 / np.hypot(1280, 720), rel=1e-5)
     before = moving.reference.position
     settings.focal_px = 2150.0
-    after = part("rockfall_addon.scene.videos").camera_path(camera).reference
+    after = part("rockfall_addon.scene.camera_paths").camera_path(camera).reference
     assert after.fx == 2150.0
     assert np.linalg.norm(after.position - before) > 0.5, "the camera has gone back"
 
@@ -263,7 +263,7 @@ def test_bad_pairs_in_words(part, scene, aligned, pairs, marking, camera, table)
         marking.mark(scene, camera, "pixel", table.pixel[i])
         marking.mark(scene, camera, "point", line[i])
     assert "line" in aligned.solution_of(camera).problem
-    assert not part("rockfall_addon.scene.videos").is_solved(camera)
+    assert not part("rockfall_addon.scene.camera_paths").is_solved(camera)
     marking.delete(scene, camera, [pair.id for pair in pairs.pairs_of(camera)])
     assert "rockfall_pairs" not in camera
     assert len(camera.rockfall_alignment.rows) == 0
@@ -272,15 +272,15 @@ def test_bad_pairs_in_words(part, scene, aligned, pairs, marking, camera, table)
 def test_file_keeps_the_doubles(part, scene, aligned, pairs, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     kept, lens = repr(pairs.pairs_of(camera)), aligned.lens_of(camera).tolist()
-    pose = part("rockfall_addon.scene.videos").camera_path(camera).reference.position.tolist()
+    pose = part("rockfall_addon.scene.camera_paths").camera_path(camera).reference.position.tolist()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "aligned.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "aligned.blend"), load_ui=False)
-    videos = part("rockfall_addon.scene.videos")
+    videos, camera_paths = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.camera_paths")
     again = videos.active_camera(bpy.context.scene)
     assert repr(pairs.pairs_of(again)) == kept
     assert aligned.lens_of(again).tolist() == lens
-    assert videos.camera_path(again).reference.position.tolist() == pose
+    assert camera_paths.camera_path(again).reference.position.tolist() == pose
     assert len(again.rockfall_alignment.rows) == 14
     assert aligned.solution_of(again).rmse_px < 0.5
 
@@ -294,15 +294,15 @@ def test_pairs_and_camera_go_through_files(part, scene, aligned, pairs, camera, 
     assert again.frame.tolist() == [0] * 14
     assert bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
     file = part("core.exchange.cameras").read_camera(tmp_path / "camera.toml", table.shift)
-    videos = part("rockfall_addon.scene.videos")
-    solved = videos.camera_path(camera).reference
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    solved = camera_paths.camera_path(camera).reference
     np.testing.assert_allclose(file.path.reference.position, solved.position, atol=1e-8)
     assert file.rmse_px == pytest.approx(aligned.solution_of(camera).rmse_px)
     assert len((tmp_path / "pairs_residuals.csv").read_text().splitlines()) == 15
     bpy.ops.rockfall.delete_pair(every=True)
-    videos.unsolve(camera)
+    camera_paths.unsolve(camera)
     assert bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
-    np.testing.assert_allclose(videos.camera_path(camera).reference.position, solved.position, atol=1e-8)
+    np.testing.assert_allclose(camera_paths.camera_path(camera).reference.position, solved.position, atol=1e-8)
     assert aligned.placement(camera) == "file"
     text = (tmp_path / "camera.toml").read_text().replace("width = 1280", "width = 640")
     (tmp_path / "small.toml").write_text(text)
@@ -312,14 +312,15 @@ def test_pairs_and_camera_go_through_files(part, scene, aligned, pairs, camera, 
 
 def test_a_marked_pair_can_be_taken_back(part, scene, aligned, marking, pairs, solving, camera, table) -> None:
     """Pairs, solution, lens and place of the camera are as before, whether it was solved or not."""
-    videos = part("rockfall_addon.scene.videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
 
     def state() -> tuple:
-        path, lens = videos.camera_path(camera), camera.data
+        path, lens = camera_paths.camera_path(camera), camera.data
         return (
             repr(pairs.pairs_of(camera)), repr(pairs.open_pair(camera)), repr(aligned.solution_of(camera)),
             aligned.placement(camera), path.reference.intrinsics.tolist(), path.position.tolist(),
-            path.rotation.tolist(), repr(videos.pose_covariance(camera)), [list(row) for row in camera.matrix_world],
+            path.rotation.tolist(), repr(camera_paths.pose_covariance(camera)),
+            [list(row) for row in camera.matrix_world],
             (lens.lens, lens.sensor_width, lens.sensor_fit, lens.shift_x), tuple(camera.lock_location),
             repr([(row.name, row.residual_px) for row in camera.rockfall_alignment.rows]),
         )  # fmt: skip
@@ -330,11 +331,11 @@ def test_a_marked_pair_can_be_taken_back(part, scene, aligned, marking, pairs, s
     marking.mark(scene, camera, "pixel", table.pixel[4])
     known, before = state(), marking.remember(camera)
     marking.mark(scene, camera, "point", table.point[4])
-    assert videos.is_solved(camera)
+    assert camera_paths.is_solved(camera)
     marking.restore(scene, camera, before)
     bpy.context.view_layer.update()
     assert state() == known
-    assert not videos.is_solved(camera)
+    assert not camera_paths.is_solved(camera)
     marking.delete(scene, camera, [pair.id for pair in pairs.pairs_of(camera)])
     mark_all(marking, scene, camera, table, 9)
     bpy.context.view_layer.update()
@@ -369,11 +370,11 @@ def test_video_that_has_moved(part, scene, aligned, table, tmp_path) -> None:
     part("rockfall_addon.scene.georeference").write_shift(scene, table.shift)
     file = tmp_path / "clip.mp4"
     shutil.copy(FOOTAGE / "footage.mp4", file)
-    camera = part("rockfall_addon.scene.videos").add_video(scene, file)
+    camera = part("rockfall_addon.scene.new_videos").add_video(scene, file)
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     assert aligned.solution_of(camera).rmse_px < 0.5
     file.unlink()
-    part("rockfall_addon.scene.videos").forget_files()
+    part("rockfall_addon.scene.video_files").forget_files()
     camera.rockfall_alignment.motion = "ROTATION"
     with pytest.raises(RuntimeError, match=r"clip\.mp4"):
         bpy.ops.rockfall.follow_background()
@@ -393,11 +394,11 @@ def test_hand_held_camera_is_followed_and_corrected(
         bpy.ops.rockfall.follow_background()
     camera.rockfall_alignment.motion = "ROTATION"
     assert bpy.ops.rockfall.follow_background() == {"FINISHED"}
-    videos = part("rockfall_addon.scene.videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
     known = following.followed(camera)
     assert (known["reference"], known["frames"]) == (0, 300)
     assert not following.is_stale(camera)
-    moving = videos.camera_path(camera)
+    moving = camera_paths.camera_path(camera)
     assert moving.time_s.size == 300
     true = _true_rotations()[:96]
     turned = moving.rotation[:96] @ np.swapaxes(true, 1, 2)
@@ -415,7 +416,7 @@ def test_hand_held_camera_is_followed_and_corrected(
         assert np.hypot(*(np.array(pair.pixel) - there)) < 6
         marking.move(scene, camera, pair.id, "pixel", there)
     assert aligned.solution_of(camera).keys == (90,)
-    corrected = videos.camera_path(camera)
+    corrected = camera_paths.camera_path(camera)
     assert not np.allclose(corrected.rotation[90], moving.rotation[90], atol=1e-9)
     np.testing.assert_allclose(corrected.rotation[0], moving.rotation[0], atol=1e-9)
     rows = [row for row in camera.rockfall_alignment.rows if row.frame == 90]

@@ -35,12 +35,14 @@ def impacts() -> list[dict[str, str]]:
 def site(part) -> bpy.types.Scene:
     """The demo's terrain and footage, the camera as it truly was."""
     scene = bpy.context.scene
-    videos = part("rockfall_addon.scene.videos")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
     surface = part("core.terrain.readers").read_terrain(
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
     part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     poses = rows("camera.csv")
     model = part("core.camera.model")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
@@ -52,8 +54,8 @@ def site(part) -> bpy.types.Scene:
     nothing = np.zeros(len(poses))
     path = part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
     scene["rockfall_time_origin_s"] = OFFSET_S
-    videos.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
-    videos.set_camera_path(scene, camera, path)
+    clocks.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
+    camera_paths.set_camera_path(scene, camera, path)
     scene.camera = camera
     scene.rockfall.block_diameter_m = 0.39
     return scene
@@ -104,7 +106,7 @@ def test_the_middle_of_the_block_is_a_radius_from_the_ground(site, part, impacts
     """The block's centre at the impact, as pixel → the contact that the truth has."""
     places, pictures = part("rockfall_addon.scene.places"), part("rockfall_addon.scene.pictures")
     camera, paths = camera_of(site, part), part("core.camera.path")
-    path = part("rockfall_addon.scene.videos").camera_path(camera)
+    path = part("rockfall_addon.scene.camera_paths").camera_path(camera)
     assert isinstance(path, paths.CameraPath)
     for row in impacts[:5]:
         frame = round(float(row["time_s"]) * 30)
@@ -178,11 +180,13 @@ def test_grazing_rays_are_warned_of(part) -> None:
         np.array([[0, 1, 2], [0, 2, 3]]), part("core.georeference").GlobalShift(), "plane", (),
     )  # fmt: skip
     part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    videos, places = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.places")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    places = part("rockfall_addon.scene.places")
     editing = part("rockfall_addon.steps.picking.editing")
-    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     lens = part("core.camera.model").look_at(1280, 720, (0, -60, 2), (0, 0, 0), focal_px=1000)
-    videos.set_camera_path(scene, camera, part("core.camera.path").fixed(lens))
+    camera_paths.set_camera_path(scene, camera, part("core.camera.path").fixed(lens))
     place = places.in_picture(scene, camera, np.array([640.0, 360.0]), "B01", centre=False)
     assert place.grazing_deg == pytest.approx(np.degrees(np.arctan2(2, 60)), abs=1e-6)
     assert "grazes the terrain at 1.9°" in place.warning
@@ -199,7 +203,7 @@ def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
     editing = part("rockfall_addon.steps.picking.editing")
     camera = camera_of(site, part)
     site.frame_set(90)
-    part("rockfall_addon.scene.videos").unsolve(camera)
+    part("rockfall_addon.scene.camera_paths").unsolve(camera)
     with pytest.raises(errors.RockfallError, match="not aligned"):
         places.in_picture(site, camera, np.array([640.0, 360.0]), "B10")
     place = places.on_ray(site, np.array([8.0, 60.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
@@ -225,17 +229,20 @@ def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
 
 
 def test_two_views_make_one_point(site, part) -> None:
-    videos, places = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.places")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    places = part("rockfall_addon.scene.places")
     pictures, clicks = part("rockfall_addon.scene.pictures"), part("rockfall_addon.scene.clicks")
     editing = part("rockfall_addon.steps.picking.editing")
     model = part("core.camera.model")
     truth = np.array(local(rows("impacts.csv")[3], "x_m", "y_m", "z_m"))
     first = camera_of(site, part)
-    second = videos.add_video(site, FOOTAGE / "footage.mp4")
-    videos.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
+    second = new_videos.add_video(site, FOOTAGE / "footage.mp4")
+    clocks.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, np.add(truth, (70, -40, 30)), truth, focal_px=2000)
     lens = replace(lens, shift=part("core.georeference").GlobalShift(*ORIGIN))
-    videos.set_camera_path(site, second, part("core.camera.path").fixed(lens))
+    camera_paths.set_camera_path(site, second, part("core.camera.path").fixed(lens))
     frame = round(float(rows("impacts.csv")[3]["time_s"]) * 30)
     site.frame_set(frame)
     for camera in (first, second):
@@ -259,17 +266,20 @@ def test_two_views_make_one_point(site, part) -> None:
 
 def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part) -> None:
     """A normal that came with the pick is of its old place."""
-    videos, places = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.places")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    places = part("rockfall_addon.scene.places")
     pictures, editing = part("rockfall_addon.scene.pictures"), part("rockfall_addon.steps.picking.editing")
     model, raycast = part("core.camera.model"), part("core.terrain.raycast")
     row = rows("impacts.csv")[3]
     truth, moment = np.array(local(row, "x_m", "y_m", "z_m")), float(row["time_s"])
     first = camera_of(site, part)
-    second = videos.add_video(site, FOOTAGE / "footage.mp4")
-    videos.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
+    second = new_videos.add_video(site, FOOTAGE / "footage.mp4")
+    clocks.set_clock(second, part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, np.add(truth, (70, -40, 30)), truth, focal_px=2000)
     lens = replace(lens, shift=part("core.georeference").GlobalShift(*ORIGIN))
-    videos.set_camera_path(site, second, part("core.camera.path").fixed(lens))
+    camera_paths.set_camera_path(site, second, part("core.camera.path").fixed(lens))
     add, surface = part("rockfall_addon.scene.picks").add_pick, part("rockfall_addon.scene.reconstruction").ground(site)
     for seconds, away in ((-0.8, 6.0), (0.8, -6.0)):  # so that the impact has both velocities
         place = raycast.closest_points(surface, truth + np.array([0.0, away, 0.0])).point[0]

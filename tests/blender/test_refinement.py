@@ -34,12 +34,14 @@ def truth() -> list[dict[str, str]]:
 def site(part, truth) -> bpy.types.Scene:
     """Terrain, the true camera, a track of true pixels with 0.3 px of noise, picks 15 cm and 20 ms off."""
     scene = bpy.context.scene
-    videos = part("rockfall_addon.scene.videos")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
     surface = part("core.terrain.readers").read_terrain(
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
     part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     scene["rockfall_time_origin_s"] = OFFSET_S
     poses = rows("camera.csv")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
@@ -48,9 +50,9 @@ def site(part, truth) -> bpy.types.Scene:
         1280, 720, 2100.0, 2100.0, 640.0, 360.0, position=place[0], rotation=turn[0], shift=surface.shift
     )
     times, nothing = np.array([float(row["time_s"]) for row in poses]), np.zeros(len(poses))
-    videos.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
+    clocks.set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
     path = part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
-    videos.set_camera_path(scene, camera, path)
+    camera_paths.set_camera_path(scene, camera, path)
     scene.camera = camera
     scene.rockfall.block_diameter_m = 0.39
     scene.rockfall.normal_radius_m = 0.6
@@ -152,14 +154,16 @@ def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
 
 def test_pixels_of_pictures_without_a_pose_are_not_used(tracked, part) -> None:
     """Where nothing of the background was recognised, the pose is a guess."""
-    proposal, videos = part("rockfall_addon.scene.proposal"), part("rockfall_addon.scene.videos")
+    proposal = part("rockfall_addon.scene.proposal")
+    videos = part("rockfall_addon.scene.videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
     bpy.ops.rockfall.refine()
     whole = proposal.read(tracked)
     (camera,) = videos.cameras(tracked)
-    path, lost = videos.camera_path(camera), np.arange(70, 76)
+    path, lost = camera_paths.camera_path(camera), np.arange(70, 76)
     sigma, place = path.sigma_rotation.copy(), path.position.copy()
     sigma[lost], place[lost] = np.inf, place[lost] + 5.0
-    videos.set_camera_path(tracked, camera, replace(path, sigma_rotation=sigma, position=place))
+    camera_paths.set_camera_path(tracked, camera, replace(path, sigma_rotation=sigma, position=place))
     bpy.ops.rockfall.refine()
     found = proposal.read(tracked)
     assert found.pixels == whole.pixels - lost.size

@@ -100,17 +100,21 @@ def test_every_result_is_equal(opened, part, old) -> None:
 
 
 def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
-    videos, alignment = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.alignment")
+    videos = part("rockfall_addon.scene.videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    clocks = part("rockfall_addon.scene.clocks")
+    video_files = part("rockfall_addon.scene.video_files")
+    alignment = part("rockfall_addon.scene.alignment")
     cameras = videos.cameras(opened)
     assert [camera.name for camera in cameras] == sorted(old["cameras"])
     for camera in cameras:
         before = old["cameras"][camera.name]
-        path = videos.camera_path(camera)
+        path = camera_paths.camera_path(camera)
         for name in ("time_s", "position", "rotation", "sigma_position_m", "sigma_rotation"):
             same(plain(getattr(path, name)), before[name], where=name)
         same(plain(path.reference.intrinsics), before["intrinsics"])
-        same(plain(videos.pose_covariance(camera)), before["pose_covariance"])
-        same(plain(videos.clock_of(camera)), before["clock"])
+        same(plain(camera_paths.pose_covariance(camera)), before["pose_covariance"])
+        same(plain(clocks.clock_of(camera)), before["clock"])
         same(plain(videos.times_of(camera)[:5]), before["video_s"])
         assert len(videos.times_of(camera)) == before["frames"]
         assert videos.row_time_of(camera) == before["row_time_s"]
@@ -124,7 +128,7 @@ def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
         same(seen, before["seen"])
         for name, value in before["settings"].items():
             same(plain(getattr(camera.rockfall_alignment, name)), value, where=name)
-        assert videos.file_of(camera).is_file(), "the footage is found beside the file"
+        assert video_files.file_of(camera).is_file(), "the footage is found beside the file"
     assert len(old["cameras"]["Bridge"]["pairs"]) == 14
 
 

@@ -34,30 +34,33 @@ def number_in(image: np.ndarray) -> int:
 
 @pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "variable.mp4"])
 def test_added_video(part: Part, name: str) -> None:
+    new_videos = part("rockfall_addon.scene.new_videos")
+    video_files = part("rockfall_addon.scene.video_files")
     videos = part("rockfall_addon.scene.videos")
-    camera = videos.add_video(scene(), DATA / name)
-    video = videos.video_of(camera)
-    assert videos.size_of(camera) == (video.width, video.height) == tuple(videos.clip_of(camera).size)
+    clocks = part("rockfall_addon.scene.clocks")
+    camera = new_videos.add_video(scene(), DATA / name)
+    video = video_files.video_of(camera)
+    assert videos.size_of(camera) == (video.width, video.height) == tuple(video_files.clip_of(camera).size)
     np.testing.assert_array_equal(videos.times_of(camera), video.time_s)
     for index in (0, 1, 17, video.frames - 1):
-        frame = videos.scene_frame_of(scene(), camera, index)
-        assert videos.true_frame(scene(), camera, frame) == index
-        assert number_in(videos.picture(camera, index)) == index
+        frame = clocks.scene_frame_of(scene(), camera, index)
+        assert clocks.true_frame(scene(), camera, frame) == index
+        assert number_in(video_files.picture(camera, index)) == index
 
 
 def test_television_rate_is_exact(part: Part) -> None:
-    videos = part("rockfall_addon.scene.videos")
-    videos.add_video(scene(), DATA / "rotated.mov")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    new_videos.add_video(scene(), DATA / "rotated.mov")
     assert scene().render.fps / scene().render.fps_base == 30_000 / 1001
 
 
 @pytest.mark.parametrize(("rate", "fps", "base"), [(30, 30, 1), (29.97002997, 30_000, 1001), (59.94006, 30_000, 500.5)])
 def test_scene_rate(part: Part, rate: float, fps: int, base: float) -> None:
-    assert part("rockfall_addon.scene.videos").scene_rate(rate) == (fps, base)
+    assert part("rockfall_addon.scene.clocks").scene_rate(rate) == (fps, base)
 
 
 def test_odd_rate(part: Part) -> None:
-    fps, base = part("rockfall_addon.scene.videos").scene_rate(29.83)
+    fps, base = part("rockfall_addon.scene.clocks").scene_rate(29.83)
     assert fps == 30
     assert fps / base == pytest.approx(29.83)
 
@@ -110,13 +113,16 @@ def test_picture_behind_the_camera(
     part: Part, seen: Callable[[bpy.types.Object, float], int], name: str, capture_rate_hz: float | None
 ) -> None:
     """Whatever the rates, Blender shows the last picture that is not later than the scene's time."""
-    videos, clock = part("rockfall_addon.scene.videos"), part("core.footage.clock")
-    camera = videos.add_video(scene(), DATA / name)
+    new_videos = part("rockfall_addon.scene.new_videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    videos = part("rockfall_addon.scene.videos")
+    clock = part("core.footage.clock")
+    camera = new_videos.add_video(scene(), DATA / name)
     scene().camera = camera
     scene().render.fps, scene().render.fps_base = 25, 1.0
-    videos.set_capture_rate(camera, capture_rate_hz)
-    one = videos.clock_of(camera)
-    videos.set_clock(camera, clock.Clock(0.35, 2e-3, 0.1, one.rate))
+    clocks.set_capture_rate(camera, capture_rate_hz)
+    one = clocks.clock_of(camera)
+    clocks.set_clock(camera, clock.Clock(0.35, 2e-3, 0.1, one.rate))
     times = videos.times_of(camera)
     shown = []
     for frame in (-3, 0, 4, 8.5, 9, 10, 11, 12, 13, 14, 21, 22.25, 30, 31):
@@ -126,7 +132,7 @@ def test_picture_behind_the_camera(
         if abs(times - video_s).min() < 6e-4:
             continue  # on the edge between two pictures
         shown.append(expected)
-        assert seen(camera, frame) == expected == videos.true_frame(scene(), camera)
+        assert seen(camera, frame) == expected == clocks.true_frame(scene(), camera)
     assert len(set(shown)) > 5
 
 
@@ -134,11 +140,11 @@ def test_picture_behind_the_camera(
     "name", ["constant.mp4", "variable.mp4", "variable.mkv", "slower.mp4", "vp9.webm", "bframes.avi"]
 )
 def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object, float], int], name: str) -> None:
-    videos = part("rockfall_addon.scene.videos")
-    camera = videos.add_video(scene(), DATA / name)
+    new_videos, clocks = part("rockfall_addon.scene.new_videos"), part("rockfall_addon.scene.clocks")
+    camera = new_videos.add_video(scene(), DATA / name)
     scene().camera = camera
     for index in range(0, 40, 1):
-        assert seen(camera, videos.scene_frame_of(scene(), camera, index)) == index
+        assert seen(camera, clocks.scene_frame_of(scene(), camera, index)) == index
 
 
 @pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "vp9.webm"])
@@ -147,13 +153,13 @@ def test_no_picture_of_a_healthy_video_is_said_to_be_hidden(part: Part, name: st
 
 
 def test_a_camera_that_stands_has_no_keys_of_one_that_moved(part: Part) -> None:
-    videos, camera = part("rockfall_addon.scene.videos"), add(part, "variable.mp4")
-    videos.set_camera_path(scene(), camera, solved(part, camera, 20))
+    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "variable.mp4")
+    camera_paths.set_camera_path(scene(), camera, solved(part, camera, 20))
     action = camera.animation_data.action
     assert len(bpy.data.actions) == 1
     assert action.users == 1
     standing = solved(part, camera, 1)
-    videos.set_camera_path(scene(), camera, standing)
+    camera_paths.set_camera_path(scene(), camera, standing)
     assert camera.animation_data.action is None
     assert not bpy.data.actions
     scene().frame_set(7)
@@ -161,7 +167,7 @@ def test_a_camera_that_stands_has_no_keys_of_one_that_moved(part: Part) -> None:
 
 
 def add(part: Part, name: str) -> bpy.types.Object:
-    return part("rockfall_addon.scene.videos").add_video(scene(), DATA / name)
+    return part("rockfall_addon.scene.new_videos").add_video(scene(), DATA / name)
 
 
 @pytest.fixture
@@ -173,7 +179,9 @@ def pair(part: Part) -> tuple[bpy.types.Object, bpy.types.Object]:
 @pytest.mark.parametrize("fit_drift", [False, True])
 def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     """Events at pictures whose times are known lead back to the clock that was made up for the second video."""
-    videos, times = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.video_times")
+    videos = part("rockfall_addon.scene.videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    times = part("rockfall_addon.scene.video_times")
     reference, other = (add(part, "slower.mp4") for _ in range(2))
     assert times.reference_camera(scene()) == reference
     drift = 0.02 if fit_drift else 0.0
@@ -182,36 +190,36 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     other_s = videos.times_of(other)
     step = 0.0
     for number, common in enumerate(seen, start=1):
-        times.go_to(scene(), videos.frame_at(scene(), common))
+        times.go_to(scene(), clocks.frame_at(scene(), common))
         times.mark_event(scene(), reference, number)
         index = int(np.abs(other_s - truth.to_video(common)).argmin())
         step = max(step, abs(float(other_s[index] - truth.to_video(common))))
-        times.go_to(scene(), videos.scene_frame_of(scene(), other, index))
+        times.go_to(scene(), clocks.scene_frame_of(scene(), other, index))
         assert times.mark_event(scene(), other, number) == pytest.approx(other_s[index], abs=1e-9)
     said = times.synchronise_cameras(scene(), fit_drift=fit_drift)
-    found = videos.clock_of(other)
+    found = clocks.clock_of(other)
     np.testing.assert_allclose(found.to_common(other_s), truth.to_common(other_s), atol=4 * step)
     assert "4 events" in said[0]
     assert other["rockfall_synchronised"].startswith(said[0])
-    assert videos.clock_of(reference).offset_s == 0.0
+    assert clocks.clock_of(reference).offset_s == 0.0
 
 
 def test_next_video_begins_with_the_others(part: Part) -> None:
-    videos = part("rockfall_addon.scene.videos")
+    clocks, videos = part("rockfall_addon.scene.clocks"), part("rockfall_addon.scene.videos")
     camera = add(part, "constant.mp4")
-    videos.set_clock(camera, part("core.footage.clock").Clock(465.5))
+    clocks.set_clock(camera, part("core.footage.clock").Clock(465.5))
     other = add(part, "variable.mp4")
-    assert videos.clock_of(other).to_common(float(videos.times_of(other)[0])) == 465.5
+    assert clocks.clock_of(other).to_common(float(videos.times_of(other)[0])) == 465.5
 
 
 def test_pixels_that_are_not_square(part: Part) -> None:
     """Of the same angle of view across and up: fx · width of a pixel = fy · height of a pixel."""
     from dataclasses import replace
 
-    videos = part("rockfall_addon.scene.videos")
+    new_videos, camera_paths = part("rockfall_addon.scene.new_videos"), part("rockfall_addon.scene.camera_paths")
     video = replace(part("core.footage.video").open_video(DATA / "constant.mp4"), pixel_aspect=1.25)
-    camera = videos.add_camera(scene(), video)
-    one = videos.camera_path(camera).reference
+    camera = new_videos.add_camera(scene(), video)
+    one = camera_paths.camera_path(camera).reference
     assert one.fy / one.fx == pytest.approx(1.25)
     scene().camera = camera
     scene().frame_set(1)
@@ -228,42 +236,44 @@ def test_nothing_to_synchronise(part: Part, pair: tuple[bpy.types.Object, ...]) 
 
 
 def test_stepping_lands_on_true_frames(part: Part) -> None:
-    videos, times = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.video_times")
+    videos = part("rockfall_addon.scene.videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    times = part("rockfall_addon.scene.video_times")
     camera = add(part, "variable.mp4")
     scene().render.fps = 24
     stamps = videos.times_of(camera)
     scene().frame_set(0)
     for index in range(1, 40):
         assert bpy.ops.rockfall.step_frame(step=1) == {"FINISHED"}
-        assert videos.true_frame(scene(), camera) == index
-        assert videos.video_time(scene(), camera) == pytest.approx(stamps[index], abs=2e-7)
+        assert clocks.true_frame(scene(), camera) == index
+        assert clocks.video_time(scene(), camera) == pytest.approx(stamps[index], abs=2e-7)
     bpy.ops.rockfall.step_frame(step=-10)
-    assert videos.true_frame(scene(), camera) == 29
-    times.go_to(scene(), videos.frame_at(scene(), float(stamps[10] + 0.4 * (stamps[11] - stamps[10]))))
+    assert clocks.true_frame(scene(), camera) == 29
+    times.go_to(scene(), clocks.frame_at(scene(), float(stamps[10] + 0.4 * (stamps[11] - stamps[10]))))
     bpy.ops.rockfall.step_frame(step=-1)
-    assert videos.video_time(scene(), camera) == pytest.approx(stamps[10], abs=2e-7), "back to the picture's own time"
+    assert clocks.video_time(scene(), camera) == pytest.approx(stamps[10], abs=2e-7), "back to the picture's own time"
     bpy.ops.rockfall.step_frame(step=-100)
     bpy.ops.rockfall.step_frame(step=1000)
-    assert videos.true_frame(scene(), camera) == stamps.size - 1
+    assert clocks.true_frame(scene(), camera) == stamps.size - 1
     scene().frame_set(-40)
     bpy.ops.rockfall.step_frame(step=1)
-    assert videos.video_time(scene(), camera) == pytest.approx(stamps[0], abs=2e-7), (
+    assert clocks.video_time(scene(), camera) == pytest.approx(stamps[0], abs=2e-7), (
         "from before the video to its start"
     )
 
 
 def test_time_origin(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
-    videos = part("rockfall_addon.scene.videos")
+    clocks = part("rockfall_addon.scene.clocks")
     camera, other = pair
     scene().camera = camera
     scene().frame_set(12)
     assert bpy.ops.rockfall.time_origin_here(what="SCENE") == {"FINISHED"}
-    assert (scene().frame_current, videos.true_frame(scene(), camera)) == (0, 12)
-    assert videos.common_time(scene()) == pytest.approx(0.4)
+    assert (scene().frame_current, clocks.true_frame(scene(), camera)) == (0, 12)
+    assert clocks.common_time(scene()) == pytest.approx(0.4)
     assert bpy.ops.rockfall.time_origin_here(what="CLOCK") == {"FINISHED"}
-    assert videos.common_time(scene()) == 0.0
-    assert videos.true_frame(scene(), camera) == 12
-    assert videos.clock_of(other).to_common(0.4) == pytest.approx(0.0), "all clocks are set"
+    assert clocks.common_time(scene()) == 0.0
+    assert clocks.true_frame(scene(), camera) == 12
+    assert clocks.clock_of(other).to_common(0.4) == pytest.approx(0.0), "all clocks are set"
 
 
 def test_common_clock_stays_with_picks(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
@@ -309,24 +319,27 @@ def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
 @pytest.mark.parametrize("frames", [1, 20])
 def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
     """Its doubles come back exactly, also from a file, and Blender's camera sees what ours does."""
-    videos, model = part("rockfall_addon.scene.videos"), part("core.camera.model")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    videos = part("rockfall_addon.scene.videos")
+    clocks = part("rockfall_addon.scene.clocks")
+    model = part("core.camera.model")
     camera = add(part, "variable.mp4")
     moving = solved(part, camera, frames)
-    videos.set_camera_path(scene(), camera, moving, rmse_px=0.4, pose_covariance=np.diag(np.arange(1.0, 7.0)))
+    camera_paths.set_camera_path(scene(), camera, moving, rmse_px=0.4, pose_covariance=np.diag(np.arange(1.0, 7.0)))
     scene().camera = camera
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "solved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "solved.blend"))
     (camera,) = videos.cameras(scene())
-    back = videos.camera_path(camera)
+    back = camera_paths.camera_path(camera)
     for name in ("time_s", "position", "rotation", "sigma_position_m", "sigma_rotation"):
         np.testing.assert_array_equal(getattr(back, name), getattr(moving, name))
     np.testing.assert_array_equal(back.reference.intrinsics, moving.reference.intrinsics)
-    np.testing.assert_array_equal(videos.pose_covariance(camera), np.diag(np.arange(1.0, 7.0)))
+    np.testing.assert_array_equal(camera_paths.pose_covariance(camera), np.diag(np.arange(1.0, 7.0)))
     straight = model.with_intrinsics(moving.reference, [*moving.reference.intrinsics[:4], 0, 0, 0, 0, 0])
     points = np.random.default_rng(3).uniform((-3, -3, -1), (3, 3, 3), (10, 3))
     for rate, index in ((30, 0), (30, 7), (24, 13)):
         scene().render.fps = rate
-        frame = videos.scene_frame_of(scene(), camera, index if frames > 1 else 0)
+        frame = clocks.scene_frame_of(scene(), camera, index if frames > 1 else 0)
         scene().frame_set(int(frame // 1), subframe=frame % 1)
         position, rotation = moving.poses_at([moving.time_s[index if frames > 1 else 0]])
         ours = model.project(straight, points, position=position.repeat(10, 0), rotation=rotation.repeat(10, 0))
@@ -340,24 +353,26 @@ def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
         clip = np.column_stack([points, np.ones(10)]) @ np.array(matrix @ camera.matrix_world.inverted()).T
         theirs = (clip[:, :2] / clip[:, 3:] * [1, -1] + 1) / 2 * [64, 48]
         np.testing.assert_allclose(theirs, ours, atol=2e-3)
-    assert videos.is_solved(camera)
+    assert camera_paths.is_solved(camera)
     place = np.array(camera.matrix_world)
-    videos.unsolve(camera)
+    camera_paths.unsolve(camera)
     np.testing.assert_allclose(np.array(camera.matrix_world), place, atol=1e-5)
-    np.testing.assert_allclose(videos.camera_path(camera).reference.fx, 80.1, rtol=1e-6)
+    np.testing.assert_allclose(camera_paths.camera_path(camera).reference.fx, 80.1, rtol=1e-6)
 
 
 def test_solved_camera_of_another_size(part: Part) -> None:
     camera = add(part, "rotated.mov")
     with pytest.raises(part("core.errors").RockfallError, match="64 × 48"):
-        part("rockfall_addon.scene.videos").set_camera_path(scene(), camera, solved(part, camera, 1))
+        part("rockfall_addon.scene.camera_paths").set_camera_path(scene(), camera, solved(part, camera, 1))
 
 
 def test_pixels_and_rays(part: Part) -> None:
-    videos, view = part("rockfall_addon.scene.videos"), part("rockfall_addon.view.image_view")
+    clocks = part("rockfall_addon.scene.clocks")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    view = part("rockfall_addon.view.image_view")
     camera = add(part, "variable.mp4")
-    videos.set_clock(camera, part("core.footage.clock").Clock(5.0, 1e-3, 0.1, 0.25))
-    videos.set_camera_path(scene(), camera, solved(part, camera, 20))
+    clocks.set_clock(camera, part("core.footage.clock").Clock(5.0, 1e-3, 0.1, 0.25))
+    camera_paths.set_camera_path(scene(), camera, solved(part, camera, 20))
     pixels = np.random.default_rng(4).uniform((5, 5), (59, 43), (12, 2))
     common = np.linspace(5.0, 5.1, 12)
     origins, directions = view.ray(scene(), camera, pixels, common)
@@ -369,6 +384,8 @@ def test_pixels_and_rays(part: Part) -> None:
 
 
 def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
+    video_files = part("rockfall_addon.scene.video_files")
+    clocks = part("rockfall_addon.scene.clocks")
     videos = part("rockfall_addon.scene.videos")
     camera = add(part, "constant.mp4")
     copy = camera.copy()  # linked data, as Alt D makes it
@@ -376,10 +393,10 @@ def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
     scene().frame_set(3)
     assert copy["rockfall_id"] != camera["rockfall_id"]
     assert copy.data != camera.data
-    assert videos.clip_of(copy) != videos.clip_of(camera)
-    videos.set_clock(copy, part("core.footage.clock").Clock(0.1))
+    assert video_files.clip_of(copy) != video_files.clip_of(camera)
+    clocks.set_clock(copy, part("core.footage.clock").Clock(0.1))
     scene().frame_set(9)
-    offsets = [videos.clip_of(each).frame_offset for each in (camera, copy)]
+    offsets = [video_files.clip_of(each).frame_offset for each in (camera, copy)]
     assert offsets[0] - offsets[1] == 3, "one shows picture 9, the other picture 6"
     camera.name = "Left"
     assert videos.by_id(scene(), camera["rockfall_id"]) == camera
@@ -401,11 +418,15 @@ def test_camera_deleted(part: Part) -> None:
 
 
 def test_file_moved(part: Part, tmp_path: Path) -> None:
-    videos, words = part("rockfall_addon.scene.videos"), part("rockfall_addon.steps.videos.wording")
+    new_videos = part("rockfall_addon.scene.new_videos")
+    videos = part("rockfall_addon.scene.videos")
+    video_files = part("rockfall_addon.scene.video_files")
+    clocks = part("rockfall_addon.scene.clocks")
+    words = part("rockfall_addon.steps.videos.wording")
     errors = part("core.errors")
     there = tmp_path / "there.mp4"
     there.write_bytes((DATA / "constant.mp4").read_bytes())
-    camera = videos.add_video(scene(), there)
+    camera = new_videos.add_video(scene(), there)
     camera["rockfall_events"] = '{"1": 0.4}'
     there.rename(tmp_path / "elsewhere.mp4")
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "moved.blend"))
@@ -414,9 +435,9 @@ def test_file_moved(part: Part, tmp_path: Path) -> None:
     assert words.is_missing(camera)
     assert "there.mp4" in words.missing(camera)
     with pytest.raises(errors.RockfallError, match="Find the File"):
-        videos.picture(camera, 0)
+        video_files.picture(camera, 0)
     scene().frame_set(12)
-    assert videos.true_frame(scene(), camera) == 12, "times are known without the file"
+    assert clocks.true_frame(scene(), camera) == 12, "times are known without the file"
     assert not scene().get("rockfall_problem")
     with pytest.raises(RuntimeError, match="another one"):
         bpy.ops.rockfall.relink_video(filepath=str(DATA / "rotated.mov"))
@@ -425,7 +446,7 @@ def test_file_moved(part: Part, tmp_path: Path) -> None:
     assert bpy.ops.rockfall.relink_video(filepath=str(tmp_path / "elsewhere.mp4")) == {"FINISHED"}
     assert not words.is_missing(camera)
     assert part("rockfall_addon.scene.video_times").events_of(camera) == {1: 0.4}
-    assert number_in(videos.picture(camera, 12)) == 12
+    assert number_in(video_files.picture(camera, 12)) == 12
     assert len(bpy.data.movieclips) == 1
 
 
@@ -452,30 +473,30 @@ def test_good_among_bad(part: Part) -> None:
 
 
 def test_scene_rate_changed(part: Part) -> None:
-    videos, words = part("rockfall_addon.scene.videos"), part("rockfall_addon.steps.videos.wording")
+    clocks, words = part("rockfall_addon.scene.clocks"), part("rockfall_addon.steps.videos.wording")
     camera = add(part, "constant.mp4")
     assert words.rates(scene(), camera) == ""
     scene().render.fps = 24
     assert "24" in words.rates(scene(), camera)
     scene().frame_set(12)
-    assert videos.true_frame(scene(), camera) == 15
+    assert clocks.true_frame(scene(), camera) == 15
     assert bpy.ops.rockfall.use_video_rate() == {"FINISHED"}
     assert (scene().render.fps, scene().frame_current) == (30, 15)
 
 
 def test_slow_motion(part: Part) -> None:
     """240 pictures a second stored at 30: the fall takes an eighth of the file's duration."""
-    videos = part("rockfall_addon.scene.videos")
+    clocks = part("rockfall_addon.scene.clocks")
     camera = add(part, "constant.mp4")
     camera.rockfall_video.capture_rate_hz = 240
-    assert videos.clock_of(camera).to_common(0.8) == pytest.approx(0.1)
+    assert clocks.clock_of(camera).to_common(0.8) == pytest.approx(0.1)
     assert camera.rockfall_video.capture_rate_hz == 240
     assert bpy.ops.rockfall.use_video_rate() == {"FINISHED"}
     assert scene().render.fps == 240
     scene().frame_set(17)
-    assert videos.true_frame(scene(), camera) == 17
+    assert clocks.true_frame(scene(), camera) == 17
     camera.rockfall_video.offset_s = 0.35
-    assert videos.clock_of(camera).offset_s == 0.35, "as typed, not its single precision"
+    assert clocks.clock_of(camera).offset_s == 0.35, "as typed, not its single precision"
 
 
 def test_words_about_videos(part: Part) -> None:
@@ -500,9 +521,10 @@ def test_disabled_and_enabled(part: Part, installation: object) -> None:
     installation.disable()
     installation.enable()
     videos = installation.part("rockfall_addon.scene.videos")
+    clocks = installation.part("rockfall_addon.scene.clocks")
     (camera,) = videos.cameras(scene())
     scene().frame_set(20)
-    assert videos.true_frame(scene(), camera) == 20
+    assert clocks.true_frame(scene(), camera) == 20
 
 
 DEMO = Path(__file__).resolve().parents[2] / "assets" / "demo"
@@ -510,17 +532,20 @@ DEMO = Path(__file__).resolve().parents[2] / "assets" / "demo"
 
 def test_footage_project(part: Part) -> None:
     """The demo's camera and track, as the command line made them, and the terrain under its pixels."""
-    videos, view = part("rockfall_addon.scene.videos"), part("rockfall_addon.view.image_view")
+    videos = part("rockfall_addon.scene.videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    clocks = part("rockfall_addon.scene.clocks")
+    view = part("rockfall_addon.view.image_view")
     assert part("rockfall_addon.scene.project").load_project(scene(), DEMO / "footage" / "project.toml") is None
     (camera,) = videos.cameras(scene())
-    assert videos.is_solved(camera)
-    assert videos.clock_of(camera).offset_s == 465.499
-    assert videos.video_time(scene(), camera, 0) == pytest.approx(0.0), "frame 0 is the first picture"
+    assert camera_paths.is_solved(camera)
+    assert clocks.clock_of(camera).offset_s == 465.499
+    assert clocks.video_time(scene(), camera, 0) == pytest.approx(0.0), "frame 0 is the first picture"
     assert (scene().frame_start, scene().frame_end, scene().render.fps) == (0, 299, 30)
     pairs = part("core.exchange.cameras").read_pairs(
         DEMO / "footage" / "pairs.csv", part("rockfall_addon.scene.georeference").read_shift(scene())
     )
-    seen = view.project(scene(), camera, pairs.point, videos.common_time(scene(), 0))
+    seen = view.project(scene(), camera, pairs.point, clocks.common_time(scene(), 0))
     assert np.sqrt(np.mean((seen - pairs.pixel) ** 2)) < 2.0
     assert part("rockfall_addon.scene.sightings").names_in(camera) == ["B10"]
 

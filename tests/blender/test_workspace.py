@@ -173,11 +173,14 @@ def test_opening_needs_a_window(rockfall) -> None:
 
 def test_footage_demo_is_ready_to_be_picked(rockfall, part) -> None:
     assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
-    scene, videos = bpy.context.scene, part("rockfall_addon.scene.videos")
+    scene = bpy.context.scene
+    videos = part("rockfall_addon.scene.videos")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    clocks = part("rockfall_addon.scene.clocks")
     (camera,) = videos.cameras(scene)
-    assert videos.is_solved(camera)
+    assert camera_paths.is_solved(camera)
     assert scene.camera == camera
-    assert videos.video_time(scene, camera) == pytest.approx(51 / 30, abs=1e-6)
+    assert clocks.video_time(scene, camera) == pytest.approx(51 / 30, abs=1e-6)
     sightings = part("rockfall_addon.scene.sightings")
     assert sightings.names_in(camera) == ["B10"]
     assert part("rockfall_addon.scene.places").trajectory(scene) == "B10"

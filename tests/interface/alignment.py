@@ -22,7 +22,7 @@ def start(window):
     window.part("rockfall_addon.scene.georeference").write_shift(scene, result.picks.shift)
     shading = window.part("core.terrain.shading").shade(surface)
     window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
-    camera = window.part("rockfall_addon.scene.videos").add_video(scene, FOOTAGE / "footage.mp4")
+    camera = window.part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
     yield 1.0
     with window.override():
         assert bpy.ops.rockfall.align_views() == {"FINISHED"}
@@ -94,7 +94,9 @@ def sidebar(window, shown):
 
 def case_align_with_clicks(window):
     yield from start(window)
-    aligned, pairs, videos = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs", "videos"))
+    aligned, pairs, camera_paths = (
+        window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs", "camera_paths")
+    )
     ground = table(window)
     look_at(window, ground.point)
     yield 1.0
@@ -114,7 +116,7 @@ def case_align_with_clicks(window):
             yield from window.click(*second)
             assert pairs.open_pair(the_camera(window)) is None, f"pair {count} is complete"
     camera = the_camera(window)
-    assert videos.is_solved(camera), aligned.solution_of(camera).problem
+    assert camera_paths.is_solved(camera), aligned.solution_of(camera).problem
     pair = pairs.open_pair(camera)
     assert pair.proposed == "pixel", "five pairs solve the camera, so the sixth is predicted"
     yield 1.0
@@ -239,7 +241,7 @@ def seen_state(window):
 def case_align_escape(window):
     """Esc while a mark is held takes it back, and the camera that was solved with it."""
     yield from start(window)
-    videos, ground = window.part("rockfall_addon.scene.videos"), table(window)
+    camera_paths, ground = window.part("rockfall_addon.scene.camera_paths"), table(window)
     look_at(window, ground.point)
     yield from sidebar(window, False)
     for i in (1, 4, 7, 11):
@@ -248,16 +250,16 @@ def case_align_escape(window):
     yield from window.click(*in_picture(window, ground.pixel[5]))
     yield 0.5
     before, place = seen_state(window), on_terrain(window, ground.point[5])
-    assert not videos.is_solved(the_camera(window))
+    assert not camera_paths.is_solved(the_camera(window))
     yield from held(window, place)
-    assert videos.is_solved(the_camera(window)), "the fifth pair solves the camera"
+    assert camera_paths.is_solved(the_camera(window)), "the fifth pair solves the camera"
     yield from window.press("ESC", *place)
     yield from let_go(window, place)
     assert seen_state(window) == before
     yield from window.click(*place)
     yield 0.5
     before = seen_state(window)
-    assert videos.is_solved(the_camera(window))
+    assert camera_paths.is_solved(the_camera(window))
     x, y = in_picture(window, ground.pixel[7])
     yield from held(window, (x, y))
     yield from window.move(x + 60, y - 20)
@@ -271,7 +273,7 @@ def case_align_escape(window):
 
 def case_align_follow_hand_held(window):
     yield from start(window)
-    aligned, videos = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "videos"))
+    aligned, camera_paths = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "camera_paths"))
     with window.override():
         assert bpy.ops.rockfall.import_pairs(filepath=str(FOOTAGE / "pairs.csv")) == {"FINISHED"}
     camera = the_camera(window)
@@ -304,5 +306,5 @@ def case_align_follow_hand_held(window):
         assert bpy.ops.rockfall.propose_pairs() == {"FINISHED"}
     yield 1.0
     window.screenshot("4-correct-here")
-    assert videos.is_solved(the_camera(window))
+    assert camera_paths.is_solved(the_camera(window))
     assert aligned.hint(scene, the_camera(window))

@@ -34,21 +34,24 @@ def open_site(window):
     with window.override():
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete()
-    videos, model = window.part("rockfall_addon.scene.videos"), window.part("core.camera.model")
+    new_videos = window.part("rockfall_addon.scene.new_videos")
+    clocks = window.part("rockfall_addon.scene.clocks")
+    camera_paths = window.part("rockfall_addon.scene.camera_paths")
+    model = window.part("core.camera.model")
     shift = window.part("core.georeference").GlobalShift(*ORIGIN)
     surface = window.part("core.terrain.readers").read_terrain(ROOT / "assets" / "demo" / "terrain.ply", shift=shift)
     shading = window.part("core.terrain.shading").shade(surface)
     window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
-    camera = videos.add_video(scene, FOOTAGE / "footage.mp4")
+    camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     poses = rows("camera.csv")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
     turn = np.array([[float(row[f"r{i}{j}"]) for i in "123" for j in "123"] for row in poses]).reshape(-1, 3, 3)
     lens = model.Camera(1280, 720, 2100.0, 2100.0, 640.0, 360.0, position=place[0], rotation=turn[0], shift=shift)
     times, nothing = np.array([float(row["time_s"]) for row in poses]), np.zeros(len(poses))
     scene["rockfall_time_origin_s"] = OFFSET_S
-    videos.set_clock(camera, window.part("core.footage.clock").Clock(OFFSET_S))
+    clocks.set_clock(camera, window.part("core.footage.clock").Clock(OFFSET_S))
     path = window.part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
-    videos.set_camera_path(scene, camera, path)
+    camera_paths.set_camera_path(scene, camera, path)
     scene.camera = camera
     camera.data.background_images[0].display_depth = "FRONT"
     camera.data.background_images[0].alpha = 0.9
@@ -352,12 +355,15 @@ def case_pick_in_two_views(window):
     scene = bpy.context.scene
     _, impacts = yield from pick_impacts(window, 1, 2)
     truth = local(impacts[0], "x_m", "y_m", "z_m")
-    videos, model = window.part("rockfall_addon.scene.videos"), window.part("core.camera.model")
-    second = videos.add_video(scene, FOOTAGE / "footage.mp4")
-    videos.set_clock(second, window.part("core.footage.clock").Clock(OFFSET_S))
+    new_videos = window.part("rockfall_addon.scene.new_videos")
+    clocks = window.part("rockfall_addon.scene.clocks")
+    camera_paths = window.part("rockfall_addon.scene.camera_paths")
+    model = window.part("core.camera.model")
+    second = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
+    clocks.set_clock(second, window.part("core.footage.clock").Clock(OFFSET_S))
     lens = model.look_at(1280, 720, truth + np.array([60.0, -50.0, 30.0]), truth, focal_px=1500)
     lens = replace(lens, shift=window.part("core.georeference").GlobalShift(*ORIGIN))
-    videos.set_camera_path(scene, second, window.part("core.camera.path").fixed(lens))
+    camera_paths.set_camera_path(scene, second, window.part("core.camera.path").fixed(lens))
     scene.camera = second
     with window.override():
         bpy.ops.rockfall.look_through()

@@ -51,7 +51,7 @@ def case_every_picture_on_the_screen(window):
     space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
     space.overlay.show_text = space.show_gizmo = space.overlay.show_cursor = False
     space.shading.background_type = "VIEWPORT"
-    videos = window.part("rockfall_addon.scene.videos")
+    videos, clocks = window.part("rockfall_addon.scene.videos"), window.part("rockfall_addon.scene.clocks")
     scene = bpy.context.scene
     for name in ("constant.mp4", "variable.mp4"):
         add(window, name)
@@ -64,7 +64,7 @@ def case_every_picture_on_the_screen(window):
                 bpy.ops.rockfall.step_frame(step=1)
             yield 0.4
             path = window.screenshot(f"{Path(name).suffix[1:]}-{Path(name).stem}")
-            assert videos.true_frame(scene, camera) == index
+            assert clocks.true_frame(scene, camera) == index
             if (found := bars(window, camera, path)) != index:
                 wrong[index] = found
         assert not wrong, f"{name}: {wrong}"
@@ -127,7 +127,7 @@ def case_video_undone_and_redone(window):
         bpy.ops.ed.undo_push(message="before")
         bpy.ops.rockfall.add_video("EXEC_DEFAULT", True, filepath=str(DATA / "constant.mp4"))
     yield 1.0
-    videos = window.part("rockfall_addon.scene.videos")
+    videos, clocks = window.part("rockfall_addon.scene.videos"), window.part("rockfall_addon.scene.clocks")
     (camera,) = videos.cameras(bpy.context.scene)
     identifier = camera["rockfall_id"]
     with window.override():
@@ -135,7 +135,7 @@ def case_video_undone_and_redone(window):
         bpy.ops.ed.undo_push(message="offset")
         bpy.ops.ed.undo()
     yield 1.0
-    assert videos.clock_of(videos.by_id(bpy.context.scene, identifier)).offset_s == 0.0
+    assert clocks.clock_of(videos.by_id(bpy.context.scene, identifier)).offset_s == 0.0
     with window.override():
         bpy.ops.ed.undo()
     yield 1.0
@@ -145,7 +145,7 @@ def case_video_undone_and_redone(window):
         bpy.ops.ed.redo()
     yield 1.0
     camera = videos.by_id(bpy.context.scene, identifier)
-    assert videos.clock_of(camera).offset_s == 0.25
+    assert clocks.clock_of(camera).offset_s == 0.25
     with window.override():
         bpy.ops.object.select_all(action="DESELECT")
         camera.select_set(True)

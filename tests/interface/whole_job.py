@@ -70,7 +70,7 @@ def import_demo(window):
         bpy.ops.ed.undo_push(message="imported")
     yield 2.0
     window.screenshot("2-imported")
-    assert not window.part("rockfall_addon.scene.videos").is_solved(aligning.the_camera(window))
+    assert not window.part("rockfall_addon.scene.camera_paths").is_solved(aligning.the_camera(window))
 
 
 def align(window):
@@ -93,7 +93,7 @@ def align(window):
             yield from drag(window, aligning.in_picture(window, pair.pixel), goal)
         assert pairs.open_pair(aligning.the_camera(window)) is None, f"pair {count} is complete"
     camera = aligning.the_camera(window)
-    assert window.part("rockfall_addon.scene.videos").is_solved(camera), aligned.solution_of(camera).problem
+    assert window.part("rockfall_addon.scene.camera_paths").is_solved(camera), aligned.solution_of(camera).problem
     assert sum(pair.is_complete for pair in pairs.pairs_of(camera)) == len(PAIRS)
     focal = aligned.focal_px(camera)
     print(f"focal length {focal:.0f} px, {aligned.solution_of(camera).rmse_px:.2f} px left")

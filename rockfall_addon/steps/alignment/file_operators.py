@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ....core.errors import RockfallError
-from ...scene import alignment, pairs, videos
+from ...scene import alignment, camera_paths, pairs, videos
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
 from . import files
@@ -96,7 +96,7 @@ class ROCKFALL_OT_export_camera(bpy.types.Operator, ExportHelper):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not has_video(cls, context):
             return False
-        if videos.is_solved(videos.active_camera(context.scene)):
+        if camera_paths.is_solved(videos.active_camera(context.scene)):
             return True
         cls.poll_message_set("The camera is not solved yet")
         return False

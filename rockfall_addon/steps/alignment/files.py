@@ -11,7 +11,7 @@ from ....core.camera.pairs import pair_residuals
 from ....core.errors import InputError
 from ....core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
-from ...scene import alignment, georeference, pairs, store, videos
+from ...scene import alignment, camera_paths, clocks, georeference, pairs, store, videos
 from . import solving
 
 
@@ -23,7 +23,7 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
     RockfallError : the table is bad, or a pixel is outside of the video's picture. Nothing has changed.
     """
     table = read_pairs(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
-    (width, height), shown = videos.size_of(camera), videos.true_frame(scene, camera)
+    (width, height), shown = videos.size_of(camera), clocks.true_frame(scene, camera)
     frames = len(camera[store.VIDEO_TIMES])
     marked, added = pairs.pairs_of(camera), []
     for i, pixel in enumerate(table.pixel):
@@ -94,15 +94,15 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
         georeference.write_shift(scene, one.shift)
     if not file.path.is_fixed and settings.motion == "FIXED":
         settings.motion = "ROTATION"
-    videos.set_camera_path(scene, camera, file.path, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
+    camera_paths.set_camera_path(scene, camera, file.path, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
     camera[store.PLACED] = alignment.FROM_FILE
     solving.check(scene, camera, alignment.Solution(rmse_px=_number(file.rmse_px), sigma=dict(file.sigma)))
 
 
 def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, file: str | Path) -> list[str]:
     """Write camera.toml and, when there are pairs, pairs_residuals.csv beside it. Returns the names of the files."""
-    file, solution, path = Path(file), alignment.solution_of(camera), videos.camera_path(camera)
-    covariance = videos.pose_covariance(camera)
+    file, solution, path = Path(file), alignment.solution_of(camera), camera_paths.camera_path(camera)
+    covariance = camera_paths.pose_covariance(camera)
     write_camera(file, path, rmse_px=solution.rmse_px, sigma=solution.sigma, pose_covariance=covariance)
     complete = pairs.complete_of(camera)
     if not complete:

@@ -17,7 +17,7 @@ from ....core.progress import Progress
 from ....core.remarks import from_plain, to_plain
 from ....core.workflow.alignment import SolvedFrames
 from ....core.workflow.following import Background, FollowedCamera, follow_background
-from ...scene import alignment, pairs, store, terrain, videos
+from ...scene import alignment, camera_paths, pairs, store, terrain, video_files, videos
 from ...view import job
 from . import solving
 
@@ -35,12 +35,12 @@ def work(scene: bpy.types.Scene, camera: bpy.types.Object) -> job.Work:
     ------
     RockfallError : the camera is not solved, or does not move.
     """
-    if not videos.is_solved(camera):
+    if not camera_paths.is_solved(camera):
         raise RockfallError("First solve the camera in one frame, from pairs.")
     if not alignment.moves(camera):
         raise RockfallError("This camera stands still. Choose Hand-held, if it does not.")
-    video, surface = videos.video_of(camera), terrain.surface_of_scene(scene)
-    solution, path = alignment.solution_of(camera), videos.camera_path(camera)
+    video, surface = video_files.video_of(camera), terrain.surface_of_scene(scene)
+    solution, path = alignment.solution_of(camera), camera_paths.camera_path(camera)
     times = pairs.times_of(camera, solution.keys).tolist()
     keys = {frame: camera_at(path, time) for frame, time in zip(solution.keys, times, strict=True)}
     solved = SolvedFrames(solution.reference, path.reference, keys)
@@ -72,12 +72,12 @@ def _background(video: Video, progress: Progress) -> Background:
 def apply(scene: bpy.types.Scene, camera: bpy.types.Object, solved: SolvedFrames, found: FollowedCamera) -> str:
     """Give the camera the poses that were found; returns a sentence about them."""
     frames = len(camera[store.VIDEO_TIMES])
-    videos.set_camera_path(
+    camera_paths.set_camera_path(
         scene,
         camera,
         found.path,
         rmse_px=camera.get(store.RMSE),
-        pose_covariance=videos.pose_covariance(camera),
+        pose_covariance=camera_paths.pose_covariance(camera),
     )
     camera[store.FOLLOWED] = json.dumps(
         {

@@ -12,7 +12,7 @@ from ....core.camera.path import rays_at
 from ....core.errors import RockfallError
 from ....core.terrain.raycast import cast_rays
 from ....core.vectors import Array
-from ...scene import alignment, georeference, pairs, store, terrain, videos
+from ...scene import alignment, camera_paths, georeference, pairs, store, terrain, videos
 
 type Point = tuple[float, float, float]
 
@@ -28,7 +28,7 @@ def look_through(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 def point_at(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Sequence[float], frame: int) -> Point | None:
     """Where the ray of a pixel meets the terrain; None where it does not."""
-    return meet(scene, *rays_at(videos.camera_path(camera), [pixel], pairs.times_of(camera, [frame])))
+    return meet(scene, *rays_at(camera_paths.camera_path(camera), [pixel], pairs.times_of(camera, [frame])))
 
 
 def meet(scene: bpy.types.Scene, origin: Array, direction: Array) -> Point | None:

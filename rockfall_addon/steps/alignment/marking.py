@@ -11,7 +11,7 @@ import numpy as np
 from ....core.camera.path import project_at
 from ....core.errors import RockfallError
 from ....core.vectors import Array
-from ...scene import alignment, pairs, store, videos
+from ...scene import alignment, camera_paths, clocks, pairs, store, videos
 from ...scene.pairs import PIXEL, POINT, Pair, keep_pairs, open_pair, pairs_of, with_id
 from . import looking
 from .solving import fill_rows, solve
@@ -52,7 +52,7 @@ def mark(
     marked, place = pairs_of(camera), tuple(float(value) for value in place)
     if side == PIXEL:
         _check_inside(camera, place)
-    shown = videos.true_frame(scene, camera) if frame is None else frame
+    shown = clocks.true_frame(scene, camera) if frame is None else frame
     pair = open_pair(camera)
     if pair is None:
         pair = _new(marked, shown)
@@ -133,7 +133,7 @@ def propose_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> int:
 
     Returns how many are in the picture.
     """
-    frame, marked = videos.true_frame(scene, camera), pairs_of(camera)
+    frame, marked = clocks.true_frame(scene, camera), pairs_of(camera)
     here = {pair.point for pair in marked if pair.frame == frame}
     added: list[Pair] = []
     for pair in marked:
@@ -159,16 +159,16 @@ def remember(camera: bpy.types.Object) -> Before:
 
 def restore(scene: bpy.types.Scene, camera: bpy.types.Object, before: Before) -> None:
     """Bring an alignment back, and show the camera as it was."""
-    if videos.is_solved(camera):
-        videos.unsolve(camera)
+    if camera_paths.is_solved(camera):
+        camera_paths.unsolve(camera)
     for key in ALIGNED:
         if key in before.kept:
             camera[key] = before.kept[key]
         elif key in camera:
             del camera[key]
-    if videos.is_solved(camera):
-        videos.write_lens(camera, videos.camera_path(camera).reference)
-        videos.write_keys(scene, camera)
+    if camera_paths.is_solved(camera):
+        camera_paths.write_lens(camera, camera_paths.camera_path(camera).reference)
+        camera_paths.write_keys(scene, camera)
     else:
         for thing, values in ((camera, before.place), (camera.data, before.lens)):
             for name, value in values.items():
@@ -215,7 +215,7 @@ def reprojections(camera: bpy.types.Object, marked: Sequence[Pair], frame: int |
     """(n, 2) where the camera sees the points, each in its pair's frame or all in one; NaN where it does not."""
     points = np.array([pair.point if pair.point is not None else (np.nan,) * 3 for pair in marked]).reshape(-1, 3)
     frames = [pair.frame if frame is None else frame for pair in marked]
-    return project_at(videos.camera_path(camera), points, pairs.times_of(camera, frames))
+    return project_at(camera_paths.camera_path(camera), points, pairs.times_of(camera, frames))
 
 
 def _store(scene: bpy.types.Scene, camera: bpy.types.Object, marked: list[Pair], pair: Pair) -> None:
@@ -240,7 +240,7 @@ def _with_prediction(scene: bpy.types.Scene, camera: bpy.types.Object, pair: Pai
     """The pair with its other side where the camera as it is now has it; nothing while nothing is known."""
     other = POINT if side == PIXEL else PIXEL
     found = None
-    if videos.is_solved(camera):
+    if camera_paths.is_solved(camera):
         at = looking.point_at
         found = at(scene, camera, pair.pixel, pair.frame) if side == PIXEL else pixel_of(camera, pair)
     if found is None:

@@ -9,7 +9,7 @@ from mathutils import Vector
 
 from ....core.camera.resection.problem import POSE_PAIRS
 from ....core.errors import RockfallError
-from ...scene import alignment, footage_blend, pairs, store, terrain, videos
+from ...scene import alignment, camera_paths, clocks, footage_blend, pairs, store, terrain, videos
 from ...view import image_view, job, look
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
@@ -63,7 +63,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
         else:
             self._side = pairs.PIXEL if rectangle is not None and not self._shift else pairs.POINT
             self._place = self._mouse.copy()
-            if rectangle is not None and self._shift and not videos.is_solved(camera):
+            if rectangle is not None and self._shift and not camera_paths.is_solved(camera):
                 raise RockfallError(
                     "The camera has no place yet, so what shines through is not what it sees. Click the terrain in "
                     "another view, or place the camera by eye with Use This View."
@@ -128,7 +128,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
             pixel = image_view.to_pixel(rectangle, videos.size_of(camera), self._place)
             if self._side == pairs.PIXEL:
                 return tuple(pixel.tolist())
-            return looking.point_at(scene, camera, pixel.tolist(), videos.true_frame(scene, camera))
+            return looking.point_at(scene, camera, pixel.tolist(), clocks.true_frame(scene, camera))
         ray = looking.free_ray(context.region_data, region.width, region.height, *self._place)
         return looking.meet(scene, *ray)
 
@@ -136,7 +136,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
         self, context: bpy.types.Context, camera: bpy.types.Object, rectangle: image_view.Rectangle | None
     ) -> tuple[str, str, tuple[float, float]] | None:
         """The mark under the mouse: its pair, its side and where it is in the region."""
-        frame, through = videos.true_frame(context.scene, camera), rectangle is not None
+        frame, through = clocks.true_frame(context.scene, camera), rectangle is not None
         marked, side, places = marking.marks(camera, frame, through_camera=through)
         reach = NEAR_PX * context.preferences.system.ui_scale
         best = None
@@ -316,7 +316,7 @@ class ROCKFALL_OT_go_to_pair(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
         pair = pairs.active_pair(camera)
-        frame = videos.scene_frame_of(scene, camera, pair.frame)
+        frame = clocks.scene_frame_of(scene, camera, pair.frame)
         scene.frame_set(int(frame // 1), subframe=float(frame % 1))
         for area in _views(context) if context.window and pair.point else ():
             view = area.spaces.active.region_3d
@@ -337,7 +337,7 @@ class ROCKFALL_OT_propose_pairs(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not has_video(cls, context):
             return False
-        if videos.is_solved(videos.active_camera(context.scene)):
+        if camera_paths.is_solved(videos.active_camera(context.scene)):
             return True
         cls.poll_message_set("First solve the camera in one frame")
         return False
@@ -363,7 +363,7 @@ class ROCKFALL_OT_follow_background(job.InBackground, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not has_video(cls, context) or not job.is_free(cls):
             return False
-        if videos.is_solved(videos.active_camera(context.scene)):
+        if camera_paths.is_solved(videos.active_camera(context.scene)):
             return True
         cls.poll_message_set("First solve the camera in one frame")
         return False

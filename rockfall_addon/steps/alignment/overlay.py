@@ -14,7 +14,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ...scene import alignment, pairs, problems, store, videos
+from ...scene import alignment, camera_paths, clocks, pairs, problems, store, video_files, videos
 from ...view import image_view
 from . import marking
 
@@ -85,9 +85,9 @@ def _draw_in_picture(context: bpy.types.Context, camera: bpy.types.Object, recta
     """Marks (rings), where the camera sees their points (crosses), and the residuals between them."""
     scene, settings = context.scene, camera.rockfall_alignment
     scale, size = context.preferences.system.ui_scale, videos.size_of(camera)
-    frame, marked = videos.true_frame(scene, camera), pairs.pairs_of(camera)
+    frame, marked = clocks.true_frame(scene, camera), pairs.pairs_of(camera)
     solution, chosen = alignment.solution_of(camera), pairs.active_pair(camera)
-    moves, solved = alignment.moves(camera), videos.is_solved(camera)
+    moves, solved = alignment.moves(camera), camera_paths.is_solved(camera)
     seen = marking.reprojections(camera, marked, frame if moves else None) if solved and marked else None
     for number, pair in enumerate(marked):
         here = pair.pixel is not None and (not moves or pair.frame == frame)
@@ -208,11 +208,11 @@ def _covered_top(area: bpy.types.Area) -> float:
 def _draw_wipe(context: bpy.types.Context, camera: bpy.types.Object, rectangle: image_view.Rectangle) -> None:
     """The footage, drawn by us, to the left of the line."""
     share, scale = camera.rockfall_alignment.wipe, context.preferences.system.ui_scale
-    frame = videos.true_frame(context.scene, camera)
+    frame = clocks.true_frame(context.scene, camera)
     key = (camera[store.ID], frame)
     if key not in _textures:
         _textures.clear()
-        picture = videos.picture(camera, frame)[::-1].astype(np.float32) / 255.0
+        picture = video_files.picture(camera, frame)[::-1].astype(np.float32) / 255.0
         height, width = picture.shape[:2]
         full = np.ones((height, width, 4), dtype=np.float32)
         full[:, :, :3] = picture

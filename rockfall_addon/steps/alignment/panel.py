@@ -5,7 +5,7 @@ import math
 
 import bpy
 
-from ...scene import alignment, georeference, pairs, videos
+from ...scene import alignment, camera_paths, georeference, pairs, videos
 from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 from . import following
@@ -58,7 +58,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
         camera = videos.active_camera(context.scene)
-        if camera is None or not videos.is_solved(camera):
+        if camera is None or not camera_paths.is_solved(camera):
             return "TO_DO"
         solution = alignment.solution_of(camera)
         return "ATTENTION" if solution.problem or solution.wrong or following.is_stale(camera) else "READY"
@@ -229,8 +229,9 @@ class ROCKFALL_PT_alignment_files(RockfallPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, camera = self.layout, videos.active_camera(context.scene)
-        if videos.is_solved(camera):
-            place = georeference.read_shift(context.scene).to_survey(videos.camera_path(camera).reference.position)
+        if camera_paths.is_solved(camera):
+            local = camera_paths.camera_path(camera).reference.position
+            place = georeference.read_shift(context.scene).to_survey(local)
             sigma = alignment.solution_of(camera).sigma or {}
             rows = []
             for axis, value in zip("xyz", place.tolist(), strict=True):

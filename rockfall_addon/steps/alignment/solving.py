@@ -14,7 +14,7 @@ from ....core.camera.resection.problem import needed_pairs
 from ....core.errors import RockfallError
 from ....core.vectors import Array
 from ....core.workflow.alignment import AlignmentOptions, SolvedFrames, align
-from ...scene import alignment, georeference, pairs, store, videos
+from ...scene import alignment, camera_paths, georeference, pairs, store, videos
 from ...scene.alignment import Solution
 
 
@@ -31,7 +31,7 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
         check(scene, camera, Solution(problem=str(error) if enough else ""))  # too few is how everybody begins
         return False
     camera[store.PLACED] = alignment.BY_PAIRS
-    videos.set_camera_path(
+    camera_paths.set_camera_path(
         scene,
         camera,
         _path(camera, aligned.solved),
@@ -51,7 +51,8 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
 
 
 def _options(scene: bpy.types.Scene, camera: bpy.types.Object) -> AlignmentOptions:
-    now, lens, free = videos.camera_path(camera).reference, alignment.known_lens(camera), alignment.free_of(camera)
+    now = camera_paths.camera_path(camera).reference
+    lens, free = alignment.known_lens(camera), alignment.free_of(camera)
     if "f" in free:
         lens[:2] = now.intrinsics[:2]
     start = with_intrinsics(replace(now, shift=georeference.read_shift(scene)), lens)
@@ -60,7 +61,7 @@ def _options(scene: bpy.types.Scene, camera: bpy.types.Object) -> AlignmentOptio
 
 def _path(camera: bpy.types.Object, solved: SolvedFrames) -> CameraPath:
     """The path that the camera had, bent so that it passes through the frames that are solved."""
-    path = videos.camera_path(camera)
+    path = camera_paths.camera_path(camera)
     if not alignment.moves(camera) or path.is_fixed:
         return fixed(solved.camera)
     cameras = {solved.frame: solved.camera, **solved.keys}
@@ -71,9 +72,9 @@ def _path(camera: bpy.types.Object, solved: SolvedFrames) -> CameraPath:
 def check(scene: bpy.types.Scene, camera: bpy.types.Object, solution: Solution) -> None:
     """Store a solution with the residuals of all complete pairs, counted or not, against the camera as it is now."""
     complete = pairs.complete_of(camera)
-    if complete and videos.is_solved(camera):
+    if complete and camera_paths.is_solved(camera):
         table = pairs.table(complete, georeference.read_shift(scene))
-        left, away = pair_residuals(videos.camera_path(camera), table, pairs.times_of(camera, table.frame))
+        left, away = pair_residuals(camera_paths.camera_path(camera), table, pairs.times_of(camera, table.frame))
         names = [pair.id for pair in complete]
         solution = replace(
             solution,
@@ -113,12 +114,12 @@ def set_lens(scene: bpy.types.Scene, camera: bpy.types.Object, values: Array) ->
     """Solve the camera with what is known of its lens; where it cannot be solved, show it with (9,) this lens."""
     if solve(scene, camera):
         return
-    path = videos.camera_path(camera)
+    path = camera_paths.camera_path(camera)
     changed = with_intrinsics(path.reference, values)
-    if videos.is_solved(camera):
-        videos.set_camera_path(scene, camera, replace(path, reference=changed))
+    if camera_paths.is_solved(camera):
+        camera_paths.set_camera_path(scene, camera, replace(path, reference=changed))
     else:
-        videos.write_lens(camera, changed)
+        camera_paths.write_lens(camera, changed)
 
 
 def lock_focal(camera: bpy.types.Object) -> None:
@@ -136,7 +137,7 @@ def lock_lens(camera: bpy.types.Object) -> None:
 
 def place_by_eye(scene: bpy.types.Scene, camera: bpy.types.Object, placed: Camera) -> None:
     """Put the camera where a person says that it stood."""
-    videos.set_camera_path(scene, camera, fixed(placed))
+    camera_paths.set_camera_path(scene, camera, fixed(placed))
     camera[store.PLACED] = alignment.BY_EYE
     camera.pop(store.FOLLOWED, None)
     alignment.keep_lens(camera, placed.intrinsics)

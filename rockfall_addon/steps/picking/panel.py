@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import places, problems, sightings, store, videos
+from ...scene import camera_paths, places, problems, sightings, store, videos
 from ...view import job, pointing
 from ...view.panel import RockfallPanel, State, advise, paragraph
 from . import editing
@@ -106,7 +106,7 @@ def _advice(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> tuple[bo
         return False, "Import the terrain first: picks lie on it."
     if camera is None:
         return True, "Without a video, picks go on the terrain in the 3-D view, at the time of the timeline."
-    if not videos.is_solved(camera):
+    if not camera_paths.is_solved(camera):
         return True, (
             f"{camera.name} is not aligned: clicks are taken as in a free view, at the time of the picture. "
             "Align it to pick in its pixels."

@@ -6,7 +6,7 @@ import bpy
 from ....core.errors import RockfallError
 from ....core.footage.tracking import BlockTrack, track_block
 from ....core.progress import Progress
-from ...scene import places, sightings, store, videos
+from ...scene import clocks, places, sightings, store, video_files, videos
 from ...view import job
 from ...view.of_video import has_video
 from ...view.reporting import reported
@@ -30,11 +30,11 @@ class ROCKFALL_OT_track_block(job.InBackground, bpy.types.Operator):
     def prepare(self, context: bpy.types.Context) -> job.Work:
         scene, settings = context.scene, context.scene.rockfall_picking
         camera, name = _solved_name(context)
-        identifier, video = camera[store.ID], videos.video_of(camera)
+        identifier, video = camera[store.ID], video_files.video_of(camera)
         clicks = tracks.clicks_for(scene, camera, name)
         first, last = 0, video.frames - 1
         if not settings.whole_video:
-            shown = videos.true_frame(scene, camera)
+            shown = clocks.true_frame(scene, camera)
             first, last = max(0, shown - settings.track_frames), min(last, shown + settings.track_frames)
             clicks = [click for click in clicks if first <= click[0] <= last]
             if not clicks:

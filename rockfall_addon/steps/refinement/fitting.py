@@ -8,7 +8,7 @@ import bpy
 from ....core.errors import RockfallError
 from ....core.exchange.opening import drag_of
 from ....core.workflow.refinement import refine_picks
-from ...scene import picks, proposal, reconstruction, sightings, sync, videos
+from ...scene import camera_paths, picks, proposal, reconstruction, sightings, sync, videos
 
 
 def propose(scene: bpy.types.Scene, names: Collection[str] | None, free: Collection[str]) -> None:
@@ -31,7 +31,7 @@ def propose(scene: bpy.types.Scene, names: Collection[str] | None, free: Collect
     used = [name for name in seen if name in table.trajectory]
     if not used:
         raise RockfallError(f"There are no picks of {', '.join(seen)}. Pick them, or propose them from the track.")
-    cameras = [camera for camera in videos.cameras(scene) if videos.is_solved(camera)]
+    cameras = [camera for camera in videos.cameras(scene) if camera_paths.is_solved(camera)]
     project = reconstruction.project_settings(scene, [])
     refined = refine_picks(
         table,

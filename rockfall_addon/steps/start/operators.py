@@ -7,7 +7,7 @@ import bpy
 from bpy.props import StringProperty
 from bpy_extras.io_utils import ImportHelper
 
-from ...scene import footage_blend, sightings, store, videos
+from ...scene import clocks, footage_blend, sightings, store, videos
 from ...scene import project as scene_project
 from ...view import look
 from ...view.reporting import reported
@@ -64,9 +64,9 @@ class ROCKFALL_OT_load_footage_demo(_IntoEmptyScene, bpy.types.Operator):
         if camera is not None:
             scene.camera = camera
             footage_blend.set_blend(camera, FOOTAGE_BLEND)
-            common_s = videos.clock_of(camera).to_common(FIRST_IMPACT_S)
+            common_s = clocks.clock_of(camera).to_common(FIRST_IMPACT_S)
             scene.rockfall_picking.trajectory = next(iter(sightings.names_in(camera)), "")
-            scene.frame_set(round(videos.frame_at(scene, float(common_s))))
+            scene.frame_set(round(clocks.frame_at(scene, float(common_s))))
         look.show_relief(context, frame_all=True)
         workspace.open_workspace(context, arrange=True)
         self.report({"INFO"}, "The demo's footage is aligned and its block tracked. Go on with step 4: pick impacts.")

@@ -9,7 +9,7 @@ from bpy_extras.io_utils import ImportHelper
 from mathutils import Matrix
 
 from ....core.errors import RockfallError
-from ...scene import footage, store, video_times, videos
+from ...scene import footage, new_videos, store, video_times, videos
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
 from . import proxies
@@ -53,7 +53,7 @@ class ROCKFALL_OT_add_video(bpy.types.Operator, ImportHelper):
         added, errors = [], []
         for path in paths:
             try:
-                added.append(videos.add_video(context.scene, path, matrix=_present_matrix(context)))
+                added.append(new_videos.add_video(context.scene, path, matrix=_present_matrix(context)))
             except RockfallError as error:
                 errors.append(str(error))
         if not added:

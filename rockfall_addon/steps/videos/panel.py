@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import store, video_times, videos
+from ...scene import camera_paths, store, video_times, videos
 from ...view import image_view
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 from . import proxies, wording
@@ -58,7 +58,7 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
             row.operator(
                 "rockfall.look_through", text=camera.name, icon=icon, depress=chosen, translate=False
             ).identifier = camera[store.ID]
-            row.label(text="", icon="CHECKMARK" if videos.is_solved(camera) else "BLANK1")
+            row.label(text="", icon="CHECKMARK" if camera_paths.is_solved(camera) else "BLANK1")
             row.operator("rockfall.remove_video", text="", icon="X").identifier = camera[store.ID]
 
     def _proxies(self, camera: bpy.types.Object) -> None:

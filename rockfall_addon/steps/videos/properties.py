@@ -19,18 +19,18 @@ def _clock(name: str, unit: float = 1.0) -> dict:
     """Getter and setter of a number of the clock, shown in a unit."""
 
     def get(self: bpy.types.PropertyGroup) -> float:
-        from ...scene import videos
+        from ...scene import clocks
 
-        return getattr(videos.clock_of(self.id_data), name) / unit if _is_video(self.id_data) else 0.0
+        return getattr(clocks.clock_of(self.id_data), name) / unit if _is_video(self.id_data) else 0.0
 
     def put(self: bpy.types.PropertyGroup, value: float) -> None:
         from dataclasses import replace
 
-        from ...scene import videos
+        from ...scene import clocks
 
         if _is_video(self.id_data):
-            clock = replace(videos.clock_of(self.id_data), **{name: store.double(value) * unit})
-            videos.set_clock(self.id_data, clock)
+            clock = replace(clocks.clock_of(self.id_data), **{name: store.double(value) * unit})
+            clocks.set_clock(self.id_data, clock)
             _changed(self.id_data)
 
     return {"get": get, "set": put}
@@ -43,10 +43,10 @@ def _get_capture(self: bpy.types.PropertyGroup) -> float:
 
 
 def _set_capture(self: bpy.types.PropertyGroup, value: float) -> None:
-    from ...scene import videos
+    from ...scene import clocks
 
     if _is_video(self.id_data):
-        videos.set_capture_rate(self.id_data, store.double(value) or None)
+        clocks.set_capture_rate(self.id_data, store.double(value) or None)
         _changed(self.id_data)
 
 

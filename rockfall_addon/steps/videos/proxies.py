@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.errors import RockfallError
-from ...scene import videos
+from ...scene import video_files
 
 SIZES = (25, 50)
 
@@ -16,8 +16,8 @@ def build(context: bpy.types.Context, camera: bpy.types.Object, percent: int) ->
     ------
     RockfallError : the file has moved, its footage is gone, or there is no window: Blender builds proxies in one only.
     """
-    videos.video_of(camera)
-    clip = videos.clip_of(camera)
+    video_files.video_of(camera)
+    clip = video_files.clip_of(camera)
     if clip is None:
         raise RockfallError(f"{camera.name} has no footage behind it any more. Use Find the File to get it back.")
     area = max(context.screen.areas, key=lambda one: one.width * one.height) if context.screen else None
@@ -42,7 +42,7 @@ def build(context: bpy.types.Context, camera: bpy.types.Object, percent: int) ->
 
 def use(camera: bpy.types.Object, percent: int) -> None:
     """Show the proxy of a size behind a camera, or, for 100, the full pictures."""
-    clip = videos.clip_of(camera)
+    clip = video_files.clip_of(camera)
     for background in camera.data.background_images:
         if background.clip is not None and background.clip == clip:
             background.clip_user.proxy_render_size = "FULL" if percent == 100 else f"PROXY_{percent}"
@@ -50,7 +50,7 @@ def use(camera: bpy.types.Object, percent: int) -> None:
 
 def shown(camera: bpy.types.Object) -> str:
     """Which copy is shown, in words; empty when there are none."""
-    clip = videos.clip_of(camera)
+    clip = video_files.clip_of(camera)
     if clip is None or not clip.use_proxy:
         return ""
     sizes = [b.clip_user.proxy_render_size for b in camera.data.background_images if b.clip == clip]

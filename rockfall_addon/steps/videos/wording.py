@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import footage, store, timing, video_times, videos
+from ...scene import clocks, footage, store, timing, video_files, video_times, videos
 from ...view import image_view
 
 OTHER_RATE = 1e-4
@@ -40,14 +40,14 @@ def remarks(camera: bpy.types.Object) -> list[str]:
 
 def is_missing(camera: bpy.types.Object) -> bool:
     """Whether the file has moved."""
-    return not videos.file_of(camera).is_file() or videos.clip_of(camera) is None
+    return not video_files.file_of(camera).is_file() or video_files.clip_of(camera) is None
 
 
 def missing(camera: bpy.types.Object) -> str:
     """What to say about a file that has moved."""
-    if videos.clip_of(camera) is None:
+    if video_files.clip_of(camera) is None:
         return "The footage behind the camera was removed. Nothing that was marked is lost: find the file again."
-    path = videos.file_of(camera)
+    path = video_files.file_of(camera)
     return f"{path.name} is not in {path.parent} any more. Nothing is lost: tell where it is."
 
 
@@ -56,7 +56,7 @@ def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[str]:
     said = []
     if scene.camera == camera and not image_view.shape_agrees(scene, camera):
         said.append("The scene's render size has another shape than the video: footage and terrain do not fit.")
-    times, time = videos.times_of(camera), videos.video_time(scene, camera)
+    times, time = videos.times_of(camera), clocks.video_time(scene, camera)
     if time < times[0] - SOON_S:
         said.append("The scene is before this video begins: its first picture is shown.")
     elif time > times[-1] + videos.stored_step_s(camera) + SOON_S:
@@ -66,7 +66,7 @@ def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[str]:
 
 def rates(scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
     """What to know when the scene plays at another rate than the video; empty when they agree."""
-    rate = float(videos.facts_of(camera).get("rate_hz", 0.0)) / videos.clock_of(camera).speed
+    rate = float(videos.facts_of(camera).get("rate_hz", 0.0)) / clocks.clock_of(camera).speed
     playing = timing.frame_rate(scene)
     if not rate or abs(rate / playing - 1) < OTHER_RATE:
         return ""
@@ -78,11 +78,11 @@ def rates(scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
 
 def now(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[tuple[str, str]]:
     """Which picture is shown."""
-    index, times = videos.true_frame(scene, camera), videos.times_of(camera)
+    index, times = clocks.true_frame(scene, camera), videos.times_of(camera)
     return [
         ("Picture", f"{index} of {times.size - 1}"),
         ("In the video", f"{times[index]:.3f} s"),
-        ("Common time", f"{videos.clock_of(camera).to_common(float(times[index])):.3f} s"),
+        ("Common time", f"{clocks.clock_of(camera).to_common(float(times[index])):.3f} s"),
     ]
 
 

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The files of the videos: stored with their cameras, shown behind them, opened once, found again when they moved."""
+
+import json
+from collections import OrderedDict
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import RockfallError
+from ...core.footage.advice import content_advice, rate_advice
+from ...core.footage.video import Image, Video, open_video, read_frame
+from . import store, videos
+
+KEPT_PICTURES = 6
+
+_videos: dict[tuple[str, float], Video] = {}
+_pictures: OrderedDict[tuple[str, float, int], Image] = OrderedDict()
+
+
+def write_video(camera: bpy.types.Object, video: Video) -> None:
+    """Store what is known of the file, and put its clip behind the camera."""
+    camera[store.VIDEO_FILE] = str(video.path.resolve())
+    camera[store.VIDEO_TIMES] = video.time_s.tolist()
+    camera[store.VIDEO_SIZE] = [float(video.width), float(video.height)]
+    facts = {
+        "codec": video.codec,
+        "container": video.container,
+        "rotation_deg": video.rotation_deg,
+        "header_rate_hz": video.header_rate_hz if np.isfinite(video.header_rate_hz) else 0.0,
+        "header_frames": video.header_frames,
+        "pixel_aspect": video.pixel_aspect,
+        "rate_hz": video.rate_hz if np.isfinite(video.rate_hz) else 0.0,
+        "remarks": content_advice(video),
+        "advice": rate_advice(video, capture_rate_hz=videos.capture_rate_of(camera)),
+    }
+    camera[store.VIDEO_FACTS] = json.dumps(facts)
+    for old in list(camera.data.background_images):
+        old.clip = old.image = None  # removing does not count down their users
+        camera.data.background_images.remove(old)
+    if not video.path.is_file():  # of a project whose video has moved
+        return
+    clip = bpy.data.movieclips.load(camera[store.VIDEO_FILE])
+    clip.name = camera.name
+    background = camera.data.background_images.new()
+    background.source, background.clip = "MOVIE_CLIP", clip
+    background.frame_method = "STRETCH"  # fills the frame to the pixel; fitting could leave a seam
+    background.alpha = 1.0
+
+
+def clip_of(camera: bpy.types.Object) -> bpy.types.MovieClip | None:
+    """The footage behind a camera; None when someone removed it."""
+    clips = (b.clip for b in camera.data.background_images if b.source == "MOVIE_CLIP")
+    return next((clip for clip in clips if clip is not None), None)
+
+
+def file_of(camera: bpy.types.Object) -> Path:
+    """The video file, which may have moved; where Blender was told of another place, that."""
+    stored = Path(bpy.path.abspath(str(camera.get(store.VIDEO_FILE, ""))))
+    clip = clip_of(camera)
+    if not stored.is_file() and clip is not None:
+        elsewhere = Path(bpy.path.abspath(clip.filepath))
+        if elsewhere.is_file():
+            return elsewhere
+    return stored
+
+
+def stored_video(camera: bpy.types.Object) -> Video:
+    """What is known of the video without its file: no pictures can be read with it."""
+    facts = videos.facts_of(camera)
+    width, height = videos.size_of(camera)
+    return Video(
+        path=file_of(camera),
+        width=width,
+        height=height,
+        rotation_deg=int(facts.get("rotation_deg", 0)),
+        codec=str(facts.get("codec", "")),
+        container=str(facts.get("container", "")),
+        header_rate_hz=float(facts.get("header_rate_hz", 0.0)) or np.nan,
+        header_frames=int(facts.get("header_frames", 0)),
+        time_s=videos.times_of(camera),
+        keyframe_s=np.empty(0),
+        pixel_aspect=float(facts.get("pixel_aspect", 1.0)),
+    )
+
+
+def video_of(camera: bpy.types.Object) -> Video:
+    """The video's file, opened; it is opened once.
+
+    Raises
+    ------
+    RockfallError : the file has moved, or is none any more.
+    """
+    path = file_of(camera)
+    if not path.is_file():
+        raise RockfallError(
+            f"The video {path.name} is not at {path.parent} any more. Nothing is lost: use Find the File in the "
+            "Videos panel."
+        )
+    return opened(path)
+
+
+def picture(camera: bpy.types.Object, index: int) -> Image:
+    """The picture of a frame, (h, w, 3) RGB from the top row down; the last few are kept. Do not write into it.
+
+    Raises
+    ------
+    RockfallError : the file has moved, or the frame cannot be decoded.
+    """
+    video = video_of(camera)
+    key = (str(video.path), video.path.stat().st_mtime, int(index))
+    if key not in _pictures:
+        _pictures[key] = np.ascontiguousarray(read_frame(video, int(index))[:, :, ::-1])
+        while len(_pictures) > KEPT_PICTURES:
+            _pictures.popitem(last=False)
+    _pictures.move_to_end(key)
+    return _pictures[key]
+
+
+def opened(path: str | Path) -> Video:
+    """A video file, opened; it is opened once.
+
+    Raises
+    ------
+    RockfallError : the file is no video that can be used.
+    """
+    path = Path(path)
+    key = (str(path), path.stat().st_mtime if path.is_file() else 0.0)
+    if key not in _videos:
+        _videos[key] = open_video(path)
+    return _videos[key]
+
+
+def forget_files() -> None:
+    """Another .blend was opened: nothing of the old one is kept."""
+    _videos.clear()
+    _pictures.clear()

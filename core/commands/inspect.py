@@ -93,7 +93,8 @@ def _timing(video: "Video", capture_rate_hz: float | None) -> list[tuple[str, st
         f"{lost} missing after frame {frame} at {video.time_s[frame]:.3f} s"
         for frame, lost in zip(video.gaps[:FEW_GAPS], video.missing, strict=False)
     ]
-    more = [f"and {video.gaps.size - FEW_GAPS} more gaps"] if video.gaps.size > FEW_GAPS else []
+    further = video.gaps.size - FEW_GAPS
+    more = [f"and {further} more {'gap' if further == 1 else 'gaps'}"] if further > 0 else []
     rows.append(("gaps", "; ".join(gaps + more) or "none"))
     if capture_rate_hz:
         from ..footage.clock import clock_for

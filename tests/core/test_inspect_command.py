@@ -47,6 +47,8 @@ def test_rates_and_the_first_of_many_gaps():
         "1 missing after frame 58 at 3.667 s",
         "and 2 more gaps",
     ]
+    six = replace(video, time_s=video.time_s[:80])
+    assert dict(_timing(six, None))["gaps"].endswith("; 1 missing after frame 58 at 3.667 s; and 1 more gap")
     five = replace(video, time_s=video.time_s[:60])
     assert dict(_timing(five, None))["gaps"].endswith("; 1 missing after frame 58 at 3.667 s")
     assert dict(_timing(replace(video, time_s=video.time_s[:5]), None))["gaps"] == "none"

@@ -37,6 +37,7 @@ class Courses:
     first : (t + 1,) first impact of each of the t trajectories, and m.
     skipped : (row, reason) of the other impacts.
     spin : where the first incident spin comes from.
+    radius_m : of all blocks [m]; None: half the table's diameters.
     """
 
     row: Indices
@@ -45,6 +46,7 @@ class Courses:
     first: Indices
     skipped: tuple[tuple[int, str], ...]
     spin: Spin
+    radius_m: float | None
 
     def __len__(self) -> int:
         return self.row.size
@@ -110,6 +112,7 @@ def find_courses(impacts: Impacts, spin: Spin = "rolling", radius_m: float | Non
         first=np.r_[0, np.flatnonzero(np.diff(group)) + 1, group.size],
         skipped=skipped,
         spin=spin,
+        radius_m=radius_m,
     )
 
 

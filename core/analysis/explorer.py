@@ -250,7 +250,8 @@ class _Page:
             self._say("Choose the parameters to fit.")
             return
         fixed = {key: value for key, value in self.given[name].items() if key not in fitted}
-        options = FitOptions(seed=self.start.seed, spin=self.start.courses.spin)
+        courses = self.start.courses
+        options = FitOptions(seed=self.start.seed, spin=courses.spin, radius_m=courses.radius_m)
 
         def work(progress: Progress) -> Calibration:
             return calibrate(self.start.impacts, name, fitted, fixed, options, progress=progress)

@@ -4,6 +4,7 @@
 import re
 import socket
 import struct
+import time
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from rockfall.core.analysis import extras
 from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.graphs import GraphSpec, make_graph, make_sheet
 from rockfall.core.analysis.scores import scores
 from rockfall.core.analysis.statistics import group_statistics, impact_statistics
@@ -19,6 +21,7 @@ from rockfall.core.errors import DependencyError, InputError
 from rockfall.core.exchange.parameters import read_parameters, write_parameters
 from rockfall.core.exchange.tables import write_impacts
 from rockfall.core.impact_models.registry import MODELS, find_model
+from rockfall.core.progress import CancelledError
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
 
@@ -165,6 +168,36 @@ def test_compare_leaves_figures_and_the_page(impacts, tmp_path, capsys) -> None:
     assert len(list((tmp_path / "out" / "figures").iterdir())) == 6
     assert "inertia = sphere" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "figures, report.html" in capsys.readouterr().out
+
+
+def test_the_live_page_calibrates_with_the_spin_and_the_radius_that_it_shows(impacts, monkeypatch) -> None:
+    """Also where the table has no diameters, and only --radius says how large the blocks are."""
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    from bokeh.document import Document
+    from bokeh.events import ButtonClick
+    from rockfall.core.analysis import calibration
+    from rockfall.core.analysis.explorer import Exploration, open_page
+
+    bare = replace(impacts, diameter_m=np.full(len(impacts), np.nan))
+    shown = find_courses(bare, "zero", 0.21)
+    fitted = []
+
+    def calibrate(impacts, model, parameters, fixed, options, *, progress):
+        fitted.append(find_courses(impacts, options.spin, options.radius_m))
+        raise CancelledError
+
+    monkeypatch.setattr(calibration, "calibrate", calibrate)
+    document = Document()
+    open_page(document, Exploration(bare, shown, ["wyllie_2014"], str))
+    button = document.get_model_by_name("calibrate")
+    button._trigger_event(ButtonClick(button))
+    for _ in range(1000):
+        if document.session_callbacks:
+            break
+        time.sleep(0.01)
+    (courses,) = fitted
+    for name in ("radius_m", "angular_velocity"):
+        np.testing.assert_array_equal(getattr(courses.incident, name), getattr(shown.incident, name), err_msg=name)
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ STEPS = (
         "rockfall.follow_background", "rockfall.stop_job", "rockfall.propose_pairs", None,
         "rockfall.import_camera", "rockfall.export_camera",
     )),
-    ("picks", "4  Picks and Trajectories", (
+    ("picking", "4  Picking", (
         ("wm.tool_set_by_id", "Tool: Pick Impacts", {"name": "rockfall.pick_tool"}), "rockfall.pick_kind",
         "rockfall.remove_pick",
         ("rockfall.nudge_pick_time", "A Tenth of a Frame Earlier", {"frames": -0.1}),

@@ -10,7 +10,7 @@ from . import editing
 
 
 class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
-    bl_label = "4  Picks and Trajectories"
+    bl_label = "4  Picking"
     bl_idname = "ROCKFALL_PT_picks"
 
     @staticmethod

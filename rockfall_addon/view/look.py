@@ -4,7 +4,6 @@
 from math import radians
 
 import bpy
-from bpy.props import BoolProperty
 from mathutils import Quaternion, Vector
 
 from ..scene import store, terrain
@@ -66,40 +65,3 @@ def _frame(context: bpy.types.Context, area: bpy.types.Area, things: list[bpy.ty
     for thing in context.view_layer.objects:
         thing.select_set(thing in selected)
     context.view_layer.objects.active = active
-
-
-class ROCKFALL_OT_show_relief(bpy.types.Operator):
-    """Show the slope's relief and everything on it in the 3-D views"""
-
-    bl_idname = "rockfall.show_relief"
-    bl_label = "Relief View"
-    bl_options = {"REGISTER", "UNDO"}
-    looks_only = True
-
-    frame_all: BoolProperty(name="Frame all", default=True)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        show_relief(context, self.frame_all)
-        return {"FINISHED"}
-
-
-class ROCKFALL_OT_show_impact(bpy.types.Operator):
-    """Go to the moment of the selected pick"""
-
-    bl_idname = "rockfall.show_impact"
-    bl_label = "Go to This Moment"
-    bl_options = {"REGISTER", "UNDO"}
-    looks_only = True
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        pick = context.object
-        return pick is not None and pick.get(store.ROLE) == store.PICK_ROLE and pick.animation_data is not None
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        frame = context.object.animation_data.action.frame_range[0]
-        context.scene.frame_set(int(frame // 1), subframe=float(frame % 1))
-        return {"FINISHED"}
-
-
-CLASSES = (ROCKFALL_OT_show_relief, ROCKFALL_OT_show_impact)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The impact table: sort it, see it in a wide window; the selected pick: move it in time."""
+"""The impact table: sort it, see it in a wide window; the selected pick: go to its moment, move it in time."""
 
 import bpy
 from bpy.props import FloatProperty, StringProperty
@@ -57,6 +57,28 @@ class ROCKFALL_OT_impact_table(bpy.types.Operator):
         return {"FINISHED"}
 
 
+def _has_pick(context: bpy.types.Context) -> bool:
+    return context.object is not None and context.object.get(store.ROLE) == store.PICK_ROLE
+
+
+class ROCKFALL_OT_show_impact(bpy.types.Operator):
+    """Go to the moment of the selected pick"""
+
+    bl_idname = "rockfall.show_impact"
+    bl_label = "Go to This Moment"
+    bl_options = {"REGISTER", "UNDO"}
+    looks_only = True
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_pick(context) and context.object.animation_data is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        frame = context.object.animation_data.action.frame_range[0]
+        context.scene.frame_set(int(frame // 1), subframe=float(frame % 1))
+        return {"FINISHED"}
+
+
 class ROCKFALL_OT_nudge_pick_time(bpy.types.Operator):
     """Move the selected pick in time by a part of a frame"""
 
@@ -68,8 +90,7 @@ class ROCKFALL_OT_nudge_pick_time(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        pick = context.object
-        if pick is not None and pick.get(store.ROLE) == store.PICK_ROLE:
+        if _has_pick(context):
             return True
         cls.poll_message_set("Select a pick first")
         return False
@@ -81,4 +102,9 @@ class ROCKFALL_OT_nudge_pick_time(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_sort_impacts, ROCKFALL_OT_impact_table, ROCKFALL_OT_nudge_pick_time)
+CLASSES = (
+    ROCKFALL_OT_sort_impacts,
+    ROCKFALL_OT_impact_table,
+    ROCKFALL_OT_show_impact,
+    ROCKFALL_OT_nudge_pick_time,
+)

@@ -195,8 +195,24 @@ class ROCKFALL_FH_terrain(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
+class ROCKFALL_OT_show_relief(bpy.types.Operator):
+    """Show the slope's relief and everything on it in the 3-D views"""
+
+    bl_idname = "rockfall.show_relief"
+    bl_label = "Relief View"
+    bl_options = {"REGISTER", "UNDO"}
+    looks_only = True
+
+    frame_all: BoolProperty(name="Frame all", default=True)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        look.show_relief(context, self.frame_all)
+        return {"FINISHED"}
+
+
 CLASSES = (
     ROCKFALL_OT_import_terrain,
+    ROCKFALL_OT_show_relief,
     ROCKFALL_OT_reset_relief,
     ROCKFALL_OT_toggle_full_terrain,
     ROCKFALL_FH_terrain,

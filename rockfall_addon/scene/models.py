@@ -141,7 +141,7 @@ def _show_block(
     thing[store.ROLE], thing[store.MODEL], thing[store.TRAJECTORY] = store.MODEL_BLOCK_ROLE, model, name
     thing.scale, thing.delta_location = real.scale, real.delta_location
     _link(scene, thing, model)
-    rate = timing.frame_rate(scene)
+    rate = timing.keyed_rate(scene)
     keyframes.write_location_keys(thing, _keys(predicted, which, begin_s), rate)
     ends = begin_s[which] + predicted.duration_s[which] + LINGER_S
     ends[:-1] = np.minimum(ends[:-1], begin_s[which[1:]])

@@ -71,9 +71,8 @@ def show_picks(
     -------
     The object of each pick.
     """
-    kept_rate = timing.keyed_rate(scene)
-    there = {(o[store.TRAJECTORY], time_of(o, kept_rate)): o for o in things_of(scene)}
-    rate, version, shown = timing.frame_rate(scene), next_version(scene), []
+    rate, version, shown = timing.keyed_rate(scene), next_version(scene), []
+    there = {(o[store.TRAJECTORY], time_of(o, rate)): o for o in things_of(scene)}
     for i in range(len(picks.time_s)):
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
         thing = there.pop((trajectory, time), None)
@@ -124,7 +123,7 @@ def add_pick(
     thing[store.EXTRA] = dict(extra or {})
     thing[store.PICK_SHIFT] = georeference.read_shift(scene).vector.tolist()
     offset = timing.offset_of(scene, trajectory, float(time_s))
-    frame = (float(time_s) - offset) * timing.frame_rate(scene)
+    frame = (float(time_s) - offset) * timing.keyed_rate(scene)
     pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m, 0)
     return thing
 

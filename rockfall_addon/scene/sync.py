@@ -136,6 +136,7 @@ def sync(
     done = Done([], [])
     if migration.is_newer(scene):
         return done
+    timing.follow_frame_rate(scene)  # what is waiting may be done before Blender says that the rate has changed
     if not dragging:
         terrain_view.follow_edits(scene)
     wanted = None if names is None else set(names)
@@ -326,11 +327,10 @@ def _rebuild(
 
 
 def _pose(scene: bpy.types.Scene, members: list[bpy.types.Object], result: object, offset: float) -> None:
-    rate, radius, version = timing.frame_rate(scene), scene.rockfall.marker_radius_m, picks.next_version(scene)
-    if store.KEYED_RATE not in scene:
-        scene[store.KEYED_RATE] = rate
+    rate, radius, version = timing.keyed_rate(scene), scene.rockfall.marker_radius_m, picks.next_version(scene)
+    scene[store.KEYED_RATE] = rate
     for thing, normal in zip(members, trajectories.normals_of(result), strict=True):
-        frame = (float(thing[store.TIME]) - offset) * timing.keyed_rate(scene)
+        frame = (float(thing[store.TIME]) - offset) * rate
         picks.pose(thing, normal, frame, radius, version)
 
 

@@ -36,12 +36,13 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     surface : the terrain, to tell what passes below it.
     """
     settings = scene.rockfall
+    timing.follow_frame_rate(scene)
+    scene[store.KEYED_RATE] = timing.frame_rate(scene)
     first = not store.with_role(scene, store.FLIGHTS_ROLE)
     if first:
         _choose_sizes(settings, result)
     offsets = timing.offsets_of(scene, result.picks)
     things = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
-    scene[store.KEYED_RATE] = timing.frame_rate(scene)
     timing.keep_offsets(scene, offsets)
     store_results(things, result)
     parts = parts_of(scene)
@@ -226,7 +227,7 @@ def _show_block(
     away = np.abs(keys.time_s[:, None] - result.picks.time_s[mine])
     of = [things[mine[i]] if gap < SAME_TIME_S else None for i, gap in zip(away.argmin(1), away.min(1), strict=True)]
     keys.time_s[:] -= offset
-    if keyframes.write_location_keys(block, keys, timing.frame_rate(scene), in_place=held):
+    if keyframes.write_location_keys(block, keys, timing.keyed_rate(scene), in_place=held):
         block_keys.remember(block, of)
         if not held:
             keyframes.action_of(block)[store.WRITTEN] = max(int(thing.get(store.WRITTEN, 0)) for thing in things)

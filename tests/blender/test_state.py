@@ -340,6 +340,46 @@ def test_a_scene_without_anything_of_ours_stays_so(part) -> None:
     assert [key for key in scene.keys() if key.startswith("rockfall_")] == []  # noqa: SIM118 - no dictionary
 
 
+def on_the_parabolas(scene: bpy.types.Scene, part) -> bool:
+    """Whether the blocks are on their flights at every frame."""
+    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    offsets = part("rockfall_addon.scene.timing").kept_offsets(scene)
+    states, flights = part("core.reconstruction.flight").flight_states, result.flights
+    rate, worst = scene.render.fps / scene.render.fps_base, 0.0
+    for block in things(scene, "block"):
+        name = block["rockfall_trajectory"]
+        bag = block.animation_data.action.layers[0].strips[0].channelbag(block.animation_data.action_slot)
+        for i in np.flatnonzero(flights.trajectory == name):
+            start, end = (rate * (times[i] - offsets[name]) for times in (flights.start_time_s, flights.end_time_s))
+            for frame in range(int(np.ceil(start)), int(end) + 1):
+                there = [bag.fcurves.find("location", index=axis).evaluate(frame) for axis in range(3)]
+                place = states(flights, [i], [frame / rate + offsets[name]])[0][0]
+                worst = max(worst, float(np.linalg.norm(there - place)))
+    return worst < 1e-3
+
+
+@pytest.mark.parametrize("first", ["sync", "recompute", "add_pick"])
+def test_another_frame_rate_before_blender_says_so(scene: bpy.types.Scene, part, first: str) -> None:
+    """In a window what waits may be done after the rate has changed and before the handlers are called."""
+    before, sync = everything(scene, part), part("rockfall_addon.scene.sync")
+    assert on_the_parabolas(scene, part)
+    scene.render.fps = 60
+    if first == "add_pick":
+        place = [30.0, 0.123456789, ground(30.0)]
+        part("rockfall_addon.scene.picks").add_pick(scene, "A", 13.9, place)
+        sync.sync(scene, ["A"])
+    else:
+        getattr(sync, first)(scene)
+    bpy.context.view_layer.update()
+    assert scene["rockfall_keyed_rate_hz"] == 60
+    assert on_the_parabolas(scene, part)
+    times = sorted(o["rockfall_time_s"] for o in things(scene, "pick"))
+    assert times == sorted([*before["time_s"], *([13.9] if first == "add_pick" else [])])
+    frames = [o["rockfall_key_frame"] for o in picks_of(scene, "A")]
+    expected = [(o["rockfall_time_s"] - 10.0) * 60 for o in picks_of(scene, "A")]
+    np.testing.assert_allclose(frames, expected, atol=1e-3)
+
+
 def test_another_frame_rate_keeps_times(scene: bpy.types.Scene, part) -> None:
     before = everything(scene, part)
     scene.render.fps = 60

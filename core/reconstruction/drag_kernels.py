@@ -17,7 +17,7 @@ STEP_ERROR_M = 1e-11
 """Of the displacement in one step, and of what the velocity's error makes of it during the whole flight."""
 FIRST_STEP = 0.1
 """Largest product of the first step and the rate at which drag changes the velocity."""
-MOST_STEPS = 10_000
+MOST_STEPS = 2_000
 NEWTON_STEPS = 30
 MET = 1e-11
 """The flight joins its ends to this part of their distance."""
@@ -82,13 +82,13 @@ def _trial(y, step, drag, gravity, reach, slopes, trial):  # type: ignore[no-unt
 
 @kernel
 def _advance(y, duration, drag, gravity, work):  # type: ignore[no-untyped-def]
-    """Move a state on by a time, which may be negative; NaN where it cannot be integrated."""
+    """Move a state on by a time, which may be negative; NaN where steps vanish or exceed `MOST_STEPS`."""
     slopes, trial = work[:-1], work[-1]
     left, reach = duration, abs(duration)
     rate = abs(drag) * np.sqrt(y[3] * y[3] + y[4] * y[4] + y[5] * y[5]) + np.sqrt(abs(drag) * gravity)
     step = left / np.ceil(max(abs(left) * rate / FIRST_STEP, 1.0))
     for _ in range(MOST_STEPS):
-        if left == 0.0 or not np.isfinite(step):
+        if left == 0.0 or left - step == left or not np.isfinite(step):
             break
         error = _trial(y, step, drag, gravity, reach, slopes, trial)
         if error <= 1.0:

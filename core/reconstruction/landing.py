@@ -101,10 +101,11 @@ def find_landings(
     lowest = float(surface.bounds[0, 2])
     duration, face = np.zeros(n), np.full(n, -1, dtype=np.intp)  # of the landing, or of the last touch near the start
     left = np.zeros(n, dtype=np.bool_)
-    flying, here, time = np.arange(n), launches.position, 0.0
+    flying, here, velocity, time = np.arange(n), launches.position, launches.velocity, 0.0
     while flying.size:
         step = min(step_s, max(time, FIRST_STEP_S), limit_s - time)
-        there, falling = launches.states(flying, time + step)
+        elapsed = np.full(flying.size, step)
+        there, falling = fly(here, velocity, elapsed, launches.gravity_mps2, launches.drag_per_m[flying])
         landed = np.zeros(flying.size, dtype=np.bool_)
         todo, origin = np.arange(flying.size), here.copy()
         while todo.size:
@@ -133,7 +134,7 @@ def find_landings(
         left[away], face[away] = True, -1
         duration[away] = time
         going = ~(landed | gone)
-        flying, here = flying[going], there[going]
+        flying, here, velocity = flying[going], there[going], falling[going]
 
     refined = np.flatnonzero(face >= 0)
     corner = surface.vertices[surface.faces[face[refined], 0]]

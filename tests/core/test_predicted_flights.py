@@ -22,6 +22,7 @@ from rockfall.core.film.job import FilmJob
 from rockfall.core.film.wording import compared_lines
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.registry import COMPARED, MODELS
+from rockfall.core.reconstruction import landing
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.free_flight import fly
@@ -93,6 +94,23 @@ def test_drag_is_the_equation_of_motion():
     np.testing.assert_allclose(moved[:, 2], -moved[:, 0] * np.tan(np.radians(35)), atol=1e-7)
     free = find_landings(launches([0, 0, 0], VELOCITIES[:3]), surface, 0.175)
     assert (found.duration_s < free.duration_s).all()
+
+
+def test_a_flight_with_an_absurd_drag_is_given_up_at_the_limit(monkeypatch):
+    """A drag coefficient of 1e5 lets a block sink at 0.3 m/s; no part of its flight is computed again and again."""
+    flown = []
+
+    def counted(position, velocity, elapsed_s, *law):
+        flown.append(elapsed_s.sum())
+        return fly(position, velocity, elapsed_s, *law)
+
+    monkeypatch.setattr(landing, "fly", counted)
+    drag = Drag(coefficient=1e5).per_metre(Block())
+    found = find_landings(launches([0, 0, 50.0], VELOCITIES, drag), plane(35.0))
+    assert found.left_terrain.all()
+    np.testing.assert_array_equal(found.duration_s, 60.0)
+    np.testing.assert_allclose(found.velocity[:, 2], -np.sqrt(G / drag), atol=1e-9)
+    assert sum(flown) < 4 * found.duration_s.sum()
 
 
 def test_into_the_ground_and_over_the_border():

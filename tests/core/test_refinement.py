@@ -484,6 +484,12 @@ def test_what_cannot_be_refined():
     assert any("outside of the marked motion" in remark.text for remark in late.remarks)
 
 
+NO_FLIGHT = (
+    "No flight with this drag joins the picks of trajectory a, the flight that starts at 2.028 s. "
+    "Check the times, and the block's size."
+)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -494,7 +500,8 @@ def test_what_cannot_be_refined():
         ({"gravity_mps2": np.inf}, "Gravity must be a positive number [m/s²], not inf."),
         ({"sigma_terrain_m": 0.0}, "The standard deviation of the terrain must be a positive number [m], not 0.0."),
         ({"normal_radius_m": np.nan}, "The normal's radius must be a positive number [m], not nan."),
-        ({"drag": Drag(coefficient=-1000.0)}, "No flight with this drag joins the picks. Check the times"),
+        ({"drag": Drag(coefficient=-1000.0)}, NO_FLIGHT),
+        ({"drag": Drag(coefficient=1e5)}, NO_FLIGHT),
     ],
 )
 def test_parameters_out_of_range_are_refused(options, said):

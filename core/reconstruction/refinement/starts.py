@@ -52,8 +52,13 @@ def check_start(setup: Setup) -> None:
     if start.valid:
         return
     problem = setup.problem
-    if not np.isfinite(start.motion.inverse).all():
-        raise RockfallError("No flight with this drag joins the picks. Check the times, and the block's size.")
+    unknown = np.flatnonzero(~np.isfinite(start.motion.inverse).all(axis=(1, 2)))
+    if unknown.size:
+        name = setup.picks.trajectory[setup.nodes[problem.first[unknown[0]]]]
+        raise RockfallError(
+            f"No flight with this drag joins the picks of trajectory {name}, the flight that starts at "
+            f"{start.motion.start_time_s[unknown[0]]:.3f} s. Check the times, and the block's size."
+        )
     lost = np.flatnonzero(~np.isfinite(start.pixels.residual).all(axis=1))
     if not lost.size:
         raise RockfallError("The picks are too close in time to be fitted. Remove one of each pair.")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a user should know about a result, as data: sentences that nobody has to take apart again."""
 
-from collections.abc import Iterable, Mapping
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -35,9 +36,19 @@ def to_plain(remarks: Iterable[Remark]) -> list[dict[str, str]]:
     return [asdict(remark) for remark in remarks]
 
 
-def from_plain(values: Iterable[Mapping[str, Any] | str]) -> tuple[Remark, ...]:
-    """Remarks from JSON; version 0.1.0 kept sentences alone."""
-    return tuple(Remark(value, "advice") if isinstance(value, str) else Remark(**value) for value in values)
+def from_plain(values: Iterable[Mapping[str, Any] | str], bare: Severity = "advice") -> tuple[Remark, ...]:
+    """Remarks from JSON; version 0.1.0 kept sentences alone, which are as grave as `bare` says."""
+    return tuple(Remark(value, bare) if isinstance(value, str) else Remark(**value) for value in values)
+
+
+def to_text(remarks: Sequence[Remark]) -> str:
+    """Remarks as one text to be stored; empty without any."""
+    return json.dumps(to_plain(remarks), ensure_ascii=False) if remarks else ""
+
+
+def from_text(text: str, bare: Severity = "advice") -> tuple[Remark, ...]:
+    """Remarks from a stored text; version 0.1.0 kept one sentence in a line, which is as grave as `bare` says."""
+    return from_plain(json.loads(text) if text.startswith("[") else filter(None, text.split("\n")), bare)
 
 
 def gravest_first(remarks: list[Remark]) -> list[Remark]:

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clocks: from a video's own timestamps to the time that all videos and picks share."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, overload
 
 import numpy as np
 
 from ..errors import InputError
+from ..remarks import Remark
 from ..vectors import Array, Indices
 from .video import Video
 
@@ -83,7 +85,7 @@ class Synchronisation:
     sigma_offset_s : standard deviation of the clock at its origin [s], NaN for one event of unknown accuracy.
     sigma_drift : that of the drift, 0 when it was not fitted.
     suspects : (k,) events that do not agree with the others.
-    notes : what to look at, sentences.
+    remarks : what to look at.
     """
 
     clock: Clock
@@ -91,7 +93,7 @@ class Synchronisation:
     sigma_offset_s: float
     sigma_drift: float
     suspects: Indices
-    notes: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
 
 
 def clock_for(
@@ -124,6 +126,7 @@ def synchronise(
     rate: float = 1.0,
     fit_drift: bool = False,
     sigma_s: Any = None,
+    names: Sequence[str] | None = None,
 ) -> Synchronisation:
     """The clock of a video, from n events whose common times are known: weighted least squares.
 
@@ -133,6 +136,7 @@ def synchronise(
     rate : file rate / capture rate.
     fit_drift : whether to fit the drift too, from three events on.
     sigma_s : (n,) or one, standard deviation of common time − clock [s]; None: told by the scatter.
+    names : (n,) of the events, for the remarks; None: their numbers, from 1 on.
 
     Raises
     ------
@@ -172,7 +176,7 @@ def synchronise(
         sigma_offset_s=float(scale / np.sqrt(weight.sum())),
         sigma_drift=sigma_drift,
         suspects=suspects,
-        notes=tuple(_notes(off, sigma, suspects, drift)),
+        remarks=tuple(_remarks(off, sigma, suspects, drift, names or [str(i + 1) for i in range(seen.size)])),
     )
 
 
@@ -221,17 +225,17 @@ def _suspects(off: Array, sigma: Array) -> Indices:
     return np.flatnonzero(np.abs(off) > WRONG_SIGMAS * usual)
 
 
-def _notes(off: Array, sigma: Array, suspects: Indices, drift: float) -> list[str]:
+def _remarks(off: Array, sigma: Array, suspects: Indices, drift: float, names: Sequence[str]) -> Iterator[Remark]:
     far = off - np.median(np.delete(off, suspects))
-    notes = [
-        f"Event {event + 1} is {far[event]:+.3f} s off the others: look at it again or leave it out."
-        for event in suspects
-    ]
+    for event in suspects:
+        text = f"Event {names[event]} is {far[event]:+.3f} s off the others: look at it again or leave it out."
+        yield Remark(text, "warning", f"event {names[event]}")
     if off.size == 2 and abs(off[1] - off[0]) > WRONG_SIGMAS * np.hypot(*sigma):
-        notes.append(f"The two events disagree by {off[1] - off[0]:+.3f} s: a third would tell which of them is wrong.")
+        text = f"The two events disagree by {off[1] - off[0]:+.3f} s: a third would tell which of them is wrong."
+        yield Remark(text, "warning", "events")
     if abs(drift) > LIKELY_DRIFT and not suspects.size:
-        notes.append(
+        text = (
             f"A drift of {100 * drift:+.2f} % is more than clocks do: the capture rate is probably another one, "
             f"{1 / (1 + drift):.4g} times as high."
         )
-    return notes
+        yield Remark(text, "warning", "drift")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong, in words that the panels show: problems of trajectories, of the scene, and of ourselves."""
+"""What is wrong, as remarks that the panels show: problems of trajectories, of the scene, and of ourselves."""
 
 import json
 from collections.abc import Callable
@@ -9,48 +9,53 @@ import bpy
 import numpy as np
 
 from ...core.reconstruction.trajectory import Reconstruction
+from ...core.remarks import Remark, from_plain, from_text, gravest_first, to_plain, to_text
 from . import fingerprints, migration, picks, store, timing
 
 MOST = 6
 BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon
 CAMERA_ROLE = "camera"
 
-_troubles: list[str] = []  # our own errors, each told once
+_troubles: list[Remark] = []  # our own errors, each once
 
 
-def keep_trajectories(scene: bpy.types.Scene, sentences: dict[str, list[str]]) -> None:
+def keep_trajectories(scene: bpy.types.Scene, remarks: dict[str, list[Remark]]) -> None:
     """Store what there is to say about the trajectories."""
-    text = json.dumps({name: said for name, said in sentences.items() if said})
+    text = json.dumps({name: to_plain(said) for name, said in remarks.items() if said})
     if scene.get(store.TRAJECTORY_PROBLEMS, "{}") != text:
         scene[store.TRAJECTORY_PROBLEMS] = text
 
 
-def of_trajectories(scene: bpy.types.Scene) -> dict[str, list[str]]:
-    """Trajectory → sentences."""
-    return json.loads(scene.get(store.TRAJECTORY_PROBLEMS, "{}"))
+def of_trajectories(scene: bpy.types.Scene) -> dict[str, list[Remark]]:
+    """Trajectory → remarks."""
+    kept = json.loads(scene.get(store.TRAJECTORY_PROBLEMS, "{}"))
+    return {name: list(from_plain(values, "warning")) for name, values in kept.items()}
 
 
-def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[str]]:
+def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[Remark]]:
     """Trajectory → what deserves a look in its reconstruction."""
     names = list(dict.fromkeys(result.picks.trajectory.tolist()))
-    said: dict[str, list[str]] = {name: [] for name in names}
+    said: dict[str, list[Remark]] = {name: [] for name in names}
     for remark in result.remarks:
-        said[remark.about].append(remark.text)
+        said[remark.about].append(remark)
     impacts = result.impacts
     for i in np.flatnonzero(impacts.normal[:, 2] < BACKSIDE):
-        said[str(impacts.trajectory[i])].append(
-            f"Trajectory {impacts.trajectory[i]}, {impacts.time_s[i]:.3f} s: the pick is on the back of the terrain, "
+        name = str(impacts.trajectory[i])
+        text = (
+            f"Trajectory {name}, {impacts.time_s[i]:.3f} s: the pick is on the back of the terrain, "
             "whose normal points down there. Move it to the upper side, or turn the terrain's faces round."
         )
+        said[name].append(Remark(text, "warning", name))
     start = first_instant(scene)
     if start is not None:
         early = np.flatnonzero(result.picks.time_s < start - 1e-6)
         for i in early[:1]:
             name, more = str(result.picks.trajectory[i]), f" and {early.size - 1} more" if early.size > 1 else ""
-            said[name].append(
+            text = (
                 f"Trajectory {name}, {result.picks.time_s[i]:.3f} s{more}: the pick is before the start, at "
                 f"{start:.3f} s. Move its key, or correct the time origin."
             )
+            said[name].append(Remark(text, "warning", name))
     return said
 
 
@@ -69,21 +74,22 @@ def first_instant(scene: bpy.types.Scene) -> float | None:
 
 
 def tell(scene: bpy.types.Scene) -> None:
-    """Bring the panel's text in line: the scene's problems, then those of its trajectories."""
+    """Bring what the panel shows in line: the scene's problems and those of its trajectories, the gravest first."""
     said = _of_scene(scene)
-    for sentences in of_trajectories(scene).values():
-        said += sentences
+    for one in of_trajectories(scene).values():
+        said += one
+    said = gravest_first(said)
     if len(said) > MOST:
-        said = [*said[: MOST - 1], f"… and {len(said) - MOST + 1} more."]
-    text = "\n".join(said)
+        said = [*said[: MOST - 1], Remark(f"… and {len(said) - MOST + 1} more.")]
+    text = to_text(said)
     if scene.get(store.PROBLEM, "") != text:
         scene[store.PROBLEM] = text
 
 
-def sentences(scene: bpy.types.Scene) -> list[str]:
+def remarks(scene: bpy.types.Scene) -> list[Remark]:
     """What the panels show."""
-    newer = [migration.warning(scene)] if migration.is_newer(scene) else []
-    return [*newer, *_troubles, *filter(None, str(scene.get(store.PROBLEM, "")).split("\n"))]
+    newer = [Remark(migration.warning(scene), "problem", "version")] if migration.is_newer(scene) else []
+    return [*newer, *_troubles, *from_text(str(scene.get(store.PROBLEM, "")), "warning")]
 
 
 def guarded[**P, T](function: Callable[P, T]) -> Callable[P, T | None]:
@@ -103,8 +109,9 @@ def guarded[**P, T](function: Callable[P, T]) -> Callable[P, T | None]:
 def failed(where: str, error: Exception) -> None:
     """Remember an error of ours and print it, unless it is known already."""
     text = f"Something went wrong in Rockfall ({where}): {type(error).__name__}: {error}"
-    if text not in _troubles:
-        _troubles.append(text)
+    trouble = Remark(text, "problem", where)
+    if trouble not in _troubles:
+        _troubles.append(trouble)
         print(f"Rockfall: {where}: {type(error).__name__}: {error}")
 
 
@@ -113,17 +120,19 @@ def forget() -> None:
     _troubles.clear()
 
 
-def _of_scene(scene: bpy.types.Scene) -> list[str]:
+def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
     said = []
     scale = scene.unit_settings.scale_length
     if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6 and picks.things_of(scene):
-        said.append(
+        text = (
             f"The scene's unit scale is {scale:g}. Rockfall counts one unit as one metre, so the lengths that Blender "
             "shows are not those of the slope: set Scene Properties > Units > Unit Scale to 1."
         )
+        said.append(Remark(text, "warning", "units"))
     if scene.get(store.GROUND) and not fingerprints.ground(scene):
-        said.append(
+        text = (
             "The terrain is gone. What was computed stays; edited trajectories have no terrain normals and heights. "
             "Undo, or import the terrain again."
         )
+        said.append(Remark(text, "problem", "terrain"))
     return said

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.remarks import Remark
 from . import (
     block_keys,
     fingerprints,
@@ -167,7 +168,8 @@ def sync(
         if changed or again or resample or name in edited:
             altered = altered or changed or name in edited
             prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, held, done)
-            said[name] += filter(None, [edited.get(name)])
+            if edited.get(name):
+                said[name].append(Remark(edited[name], "warning", name))
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:
@@ -284,14 +286,14 @@ def _try_rebuild(
     dragging: bool,
     held: picks.Held,
     done: Done,
-) -> tuple[str, list[str]]:
+) -> tuple[str, list[Remark]]:
     """Compute one trajectory and show it, or keep the last good flights; its fingerprint, and what there is to say."""
     try:
         said = _rebuild(scene, name, members, parts, dragging, held)
     except RockfallError as error:
         _grey(scene, name, parts)
         done.failed.append(name)
-        return fingerprints.fingerprint(members, timing.keyed_rate(scene), held), [str(error)]
+        return fingerprints.fingerprint(members, timing.keyed_rate(scene), held), [Remark(str(error), "problem", name)]
     done.rebuilt.append(name)
     text = fingerprints.fingerprint(members, timing.keyed_rate(scene), held)
     shown = trajectories.parts_of(scene, [name])
@@ -307,7 +309,7 @@ def _rebuild(
     parts: trajectories.Parts,
     dragging: bool,
     held: picks.Held,
-) -> list[str]:
+) -> list[Remark]:
     """Compute one trajectory and show it; returns what there is to say about it."""
     surface = reconstruction.ground(scene)
     block = reconstruction.blocks_of(scene, {name})[name]
@@ -363,7 +365,9 @@ def _finish(scene: bpy.types.Scene) -> None:
         try:
             models.follow(scene, reconstruction.reconstruct_scene(scene))
         except RockfallError as error:
-            problems.keep_trajectories(scene, problems.of_trajectories(scene) | {"": [str(error)]})
+            problems.keep_trajectories(
+                scene, problems.of_trajectories(scene) | {"": [Remark(str(error), "problem", "models")]}
+            )
 
 
 def _ground_changed(scene: bpy.types.Scene) -> bool:

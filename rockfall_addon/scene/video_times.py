@@ -9,6 +9,7 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
 from ...core.footage.clock import DRIFT_NEEDS, Clock, synchronise
+from ...core.remarks import Remark, to_text
 from . import clocks, footage, picks, reconstruction, store, videos
 
 
@@ -122,8 +123,8 @@ def reference_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return next((c for c in (videos.by_id(scene, one) for one in order) if c is not None), None)
 
 
-def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]:
-    """Set the clocks of all cameras that share events with the reference camera; returns sentences about the fit.
+def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[Remark]:
+    """Set the clocks of all cameras that share events with the reference camera; returns remarks about the fit.
 
     Raises
     ------
@@ -143,12 +144,19 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[str]
         sigma = float(np.hypot(_frame_sigma_s(reference), _frame_sigma_s(camera)))
         drifts = fit_drift and len(both) >= DRIFT_NEEDS
         own = clocks.clock_of(camera)
-        fit = synchronise(common, [seen[number] for number in both], rate=own.rate, fit_drift=drifts, sigma_s=sigma)
+        fit = synchronise(
+            common,
+            [seen[number] for number in both],
+            rate=own.rate,
+            fit_drift=drifts,
+            sigma_s=sigma,
+            names=[str(number) for number in both],
+        )
         clocks.set_clock(camera, fit.clock)
         sentence = _sentence(camera, reference, both, fit.residual_s, fit.sigma_offset_s, fit.clock.drift, drifts)
-        notes = [note.replace("Event ", "Of the shared events, number ", 1) for note in fit.notes]
-        camera[store.SYNCHRONISED] = "\n".join([sentence, *notes])
-        said += [sentence, *notes]
+        remarks = [Remark(sentence, "note", camera.name), *fit.remarks]
+        camera[store.SYNCHRONISED] = to_text(remarks)
+        said += remarks
     if not said:
         raise RockfallError(
             f"No event is marked in {reference.name} and in another video. Go to the picture of an impact or a clap in "

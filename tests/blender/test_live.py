@@ -434,7 +434,7 @@ def test_errors_of_ours_are_told_once(scene: bpy.types.Scene, part, monkeypatch,
         picks_of(scene, "A")[1].location.y += 0.1
         update()
     assert capsys.readouterr().out.count("quite unexpected") == 1
-    assert sum("quite unexpected" in text for text in problems.sentences(scene)) == 1
+    assert sum("quite unexpected" in remark.text for remark in problems.remarks(scene)) == 1
     monkeypatch.undo()
     problems.forget()
     picks_of(scene, "A")[1].location.y += 0.1
@@ -583,7 +583,7 @@ def test_a_pick_that_lost_a_property(scene: bpy.types.Scene, part, key: str) -> 
     update()
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("other", None))
     update()
-    assert part("rockfall_addon.scene.problems").sentences(scene) == []
+    assert part("rockfall_addon.scene.problems").remarks(scene) == []
     check_shown(scene, part)
     assert len([row for row in scene.rockfall_impacts if row.trajectory == "A"]) == (
         2 if key in ("rockfall_time_s", "rockfall_position_m") else 3

@@ -307,7 +307,7 @@ def test_a_newer_file_is_left_alone(scene: bpy.types.Scene, part) -> None:
     bpy.context.view_layer.update()
     assert ([tuple(v.co) for v in trail.data.vertices], list(picks[1]["rockfall_position_m"])) == before
     assert scene["rockfall_schema"] == 99
-    assert "newer Rockfall" in problems.sentences(scene)[0]
+    assert "newer Rockfall" in problems.remarks(scene)[0].text
     with pytest.raises(RuntimeError, match="newer Rockfall"):
         bpy.ops.rockfall.reconstruct()
 
@@ -393,3 +393,14 @@ def test_another_frame_rate_keeps_times(scene: bpy.types.Scene, part) -> None:
     trail.data.attributes["tick"].data.foreach_get("value", ticks)
     trail.data.attributes["display_time_s"].data.foreach_get("value", clock)
     np.testing.assert_allclose(np.diff(clock[ticks]).min(), 1 / 60, atol=1e-5)
+
+
+def test_problems_of_a_file_of_0_1_0_are_remarks(scene: bpy.types.Scene, part) -> None:
+    problems, remark = part("rockfall_addon.scene.problems"), part("core.remarks").Remark
+    scene["rockfall_problem"] = "The terrain is gone.\nSo is the camera."
+    scene["rockfall_trajectory_problems"] = '{"A": ["A has a single pick."]}'
+    assert problems.remarks(scene) == [
+        remark("The terrain is gone.", "warning"),
+        remark("So is the camera.", "warning"),
+    ]
+    assert problems.of_trajectories(scene) == {"A": [remark("A has a single pick.", "warning")]}

@@ -112,18 +112,21 @@ def test_a_wrong_event_is_named(wrong, fit_drift):
     common[wrong] += 0.5
     found = synchronise(common, seen, fit_drift=fit_drift)
     assert found.suspects.tolist() == [wrong]
-    assert re.match(rf"Event {wrong + 1} is \+0\.(50|49)\d s off the others", found.notes[0])
+    assert re.match(rf"Event {wrong + 1} is \+0\.(50|49)\d s off the others", found.remarks[0].text)
+    assert (found.remarks[0].severity, found.remarks[0].about) == ("warning", f"event {wrong + 1}")
+    named = synchronise(common, seen, fit_drift=fit_drift, names=list("pqrst"))
+    assert named.remarks[0].text.startswith(f"Event {'pqrst'[wrong]} is ")
     right = synchronise(np.delete(common, wrong), np.delete(seen, wrong), fit_drift=fit_drift)
     assert right.suspects.size == 0
-    assert right.notes == ()
+    assert right.remarks == ()
 
 
 def test_two_events_that_disagree_and_a_rate_that_is_wrong():
-    assert "disagree by +0.400 s" in synchronise([1.0, 5.4], [0.0, 4.0]).notes[0]
-    assert synchronise([1.0, 5.01], [0.0, 4.0]).notes == ()
+    assert "disagree by +0.400 s" in synchronise([1.0, 5.4], [0.0, 4.0]).remarks[0].text
+    assert synchronise([1.0, 5.01], [0.0, 4.0]).remarks == ()
     seen = np.array([0.0, 20, 40, 60])
     found = synchronise(2 * seen, seen, fit_drift=True)
-    assert "0.5 times as high" in found.notes[0]
+    assert "0.5 times as high" in found.remarks[0].text
 
 
 def test_impossible_synchronisations():

@@ -167,7 +167,7 @@ def case_align_with_clicks(window):
             bpy.ops.ed.undo()
         yield 0.7
     assert pairs.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
-    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
+    assert not window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene)
 
 
 def case_align_by_eye(window):

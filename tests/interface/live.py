@@ -117,7 +117,7 @@ def case_live_drag_undo_redo(window):
     pick = next(o for o in picks_of("B03") if o["rockfall_id"] == identifier)
     assert np.allclose(pick["rockfall_position_m"], after, atol=1e-5), "and one brings it again"
     consistent(window, "B03")
-    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
+    assert not window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene)
 
 
 def case_live_key_in_the_dope_sheet(window):
@@ -315,7 +315,7 @@ def case_live_keys_of_the_block(window):
     assert len(picks_of("B03")) == len(frames) - 1
     in_step(window, "B03")
     yield from undo()
-    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
+    assert not window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene)
 
 
 def case_live_undo_after_scrubbing(window):

@@ -82,8 +82,8 @@ def picks():
 
 
 def no_trouble(window):
-    said = window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
-    assert not [text for text in said if "went wrong" in text], said
+    said = window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene)
+    assert not [remark for remark in said if "went wrong" in remark.text], said
 
 
 def pick_impacts(window, count, first=0):

@@ -108,8 +108,8 @@ def case_tutorial_of_the_manual(window):
     window.screenshot("3-refined")
     press("rockfall.apply_refinement")
     yield 3.0
-    said = window.part("rockfall_addon.scene.problems").sentences(scene)
-    assert not [text for text in said if "went wrong" in text], said
+    said = window.part("rockfall_addon.scene.problems").remarks(scene)
+    assert not [remark for remark in said if "went wrong" in remark.text], said
     window.screenshot("4-applied")
     assert following.next_step(scene).sentence.startswith("Play")
 

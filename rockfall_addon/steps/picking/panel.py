@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import camera_paths, places, problems, sightings, store, videos
 from ...view import job, pointing
-from ...view.panel import RockfallPanel, State, advise, paragraph
+from ...view.panel import RockfallPanel, State, advise, paragraph, show_remarks
 from . import editing
 
 
@@ -17,7 +17,7 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
     def step_state(context: bpy.types.Context) -> State:
         if not store.with_role(context.scene, store.PICK_ROLE):
             return "TO_DO"
-        return "ATTENTION" if problems.sentences(context.scene) else "READY"
+        return "ATTENTION" if problems.remarks(context.scene) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
@@ -29,8 +29,7 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
             advise(context, layout, False, f"{way} a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
-        for sentence in problems.sentences(scene):
-            paragraph(context, layout, sentence, "ERROR")
+        show_remarks(context, layout, problems.remarks(scene))
         runs = "trajectory" if len(flights) == 1 else "trajectories"
         advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
         layout.use_property_split = True

@@ -198,7 +198,7 @@ class ROCKFALL_OT_synchronise_videos(OfVideo, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         said = video_times.synchronise_cameras(context.scene, fit_drift=context.scene.rockfall_videos.fit_drift)
-        self.report({"INFO"}, " ".join(said))
+        self.report({"INFO"}, " ".join(remark.text for remark in said))
         return {"FINISHED"}
 
 

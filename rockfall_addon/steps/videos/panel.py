@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import camera_paths, store, video_times, videos
 from ...view import image_view
-from ...view.panel import RockfallPanel, State, advise, facts, paragraph
+from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 from . import proxies, wording
 
 
@@ -40,13 +40,11 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
         if wording.is_missing(camera):
             paragraph(context, layout, wording.missing(camera), "ERROR")
             layout.operator("rockfall.relink_video", icon="FILEBROWSER")
-        for sentence in wording.warnings(scene, camera):
-            paragraph(context, layout, sentence, "ERROR")
+        show_remarks(context, layout, wording.warnings(scene, camera))
         if not image_view.shape_agrees(scene, camera):
             layout.operator("rockfall.use_video_size", icon="FULLSCREEN_ENTER")
         facts(layout, wording.facts(camera))
-        for sentence in wording.remarks(camera):
-            paragraph(context, layout, sentence, "INFO")
+        show_remarks(context, layout, wording.remarks(camera))
         self._proxies(camera)
 
     def _list(self, scene: bpy.types.Scene, active: bpy.types.Object) -> None:
@@ -106,6 +104,7 @@ class ROCKFALL_PT_video_times(RockfallPanel, bpy.types.Panel):
         box = layout.box()
         for sentence in wording.synchronised(scene, camera):
             paragraph(context, box, sentence)
+        show_remarks(context, box, wording.fit(camera))
         settings = scene.rockfall_videos
         box.prop(settings, "event")
         row = box.row(align=True)

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ....core.remarks import Remark, from_plain, from_text
 from ...scene import clocks, footage, store, timing, video_files, video_times, videos
 from ...view import image_view
 
@@ -25,16 +26,17 @@ def facts(camera: bpy.types.Object) -> list[tuple[str, str]]:
     return [*rows, ("Turned by", f"{known['rotation_deg']}°")] if known.get("rotation_deg") else rows
 
 
-def remarks(camera: bpy.types.Object) -> list[str]:
+def remarks(camera: bpy.types.Object) -> list[Remark]:
     """What deserves a look in the file, and what its frame rate is good for."""
     known = videos.facts_of(camera)
-    said = [*known.get("remarks", ()), *known.get("advice", ())]
+    said = [*from_plain(known.get("remarks", ())), *from_plain(known.get("advice", ()))]
     count = footage.hidden(camera)
     if count:
-        said.append(
+        text = (
             f"{count} pictures come too close upon one another for Blender's player. Step by step each is shown; "
             "during playback the next one stands for it."
         )
+        said.append(Remark(text, "note", "playback"))
     return said
 
 
@@ -51,16 +53,17 @@ def missing(camera: bpy.types.Object) -> str:
     return f"{path.name} is not in {path.parent} any more. Nothing is lost: tell where it is."
 
 
-def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[str]:
+def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[Remark]:
     """What makes the view wrong."""
     said = []
     if scene.camera == camera and not image_view.shape_agrees(scene, camera):
-        said.append("The scene's render size has another shape than the video: footage and terrain do not fit.")
+        text = "The scene's render size has another shape than the video: footage and terrain do not fit."
+        said.append(Remark(text, "warning", "render size"))
     times, time = videos.times_of(camera), clocks.video_time(scene, camera)
     if time < times[0] - SOON_S:
-        said.append("The scene is before this video begins: its first picture is shown.")
+        said.append(Remark("The scene is before this video begins: its first picture is shown.", "warning", "time"))
     elif time > times[-1] + videos.stored_step_s(camera) + SOON_S:
-        said.append("The scene is behind the end of this video: its last picture is shown.")
+        said.append(Remark("The scene is behind the end of this video: its last picture is shown.", "warning", "time"))
     return said
 
 
@@ -97,9 +100,13 @@ def synchronised(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[str]:
         return [f"The others are set by the clock of {camera.name}.", f"Events marked here: {marked}."]
     said = [f"{camera.name} is set by the clock of {reference.name}.", f"Events marked here: {marked}."]
     shared = set(own) & set(video_times.events_of(reference))
-    result = str(camera.get(store.SYNCHRONISED, ""))
-    if result:
-        return said + result.split("\n")
+    if fit(camera):
+        return said
     if not shared:
         return [*said, "Go to the picture of the same event in both videos, and mark it in each."]
     return [*said, f"{len(shared)} shared: synchronise."]
+
+
+def fit(camera: bpy.types.Object) -> tuple[Remark, ...]:
+    """What the synchronisation of a video found; empty before it."""
+    return from_text(str(camera.get(store.SYNCHRONISED, "")), "note")

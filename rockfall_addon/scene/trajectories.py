@@ -268,7 +268,7 @@ def store_results(things: Sequence[bpy.types.Object], result: Reconstruction) ->
         columns["sigma_speed2"] = speed_sigma(impacts.v2, sigma["v2"])
         columns["sigma_kinetic1_j"] = impacts.mass_kg * norm(impacts.v1) * columns["sigma_speed1"]
         columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
-    rows = {name: values.reshape(len(impacts), -1).tolist() for name, values in columns.items()}
+    rows = {name: [np.atleast_1d(value).tolist() for value in values] for name, values in columns.items()}
     i = 0
     for thing, kind in zip(things, result.picks.kind.tolist(), strict=True):
         if kind != "impact":

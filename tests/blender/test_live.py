@@ -839,3 +839,15 @@ def test_keys_of_the_block_at_another_frame_rate(scene: bpy.types.Scene, part) -
     assert pick["rockfall_time_s"] == pytest.approx(time + 0.1, abs=1e-6)
     check_shown(scene, part)
     check_block(scene, part, "A")
+
+
+def test_a_run_without_flights_and_with_them_again(slope: bpy.types.Scene, part) -> None:
+    """Where each pick is a stop, nothing moves: block and trail of the run go, and come again."""
+    picks = picks_of(slope, "A")
+    for pick in picks:
+        pick.rockfall_pick.kind = "stop"
+    assert not [o for o in slope.objects if o.get("rockfall_role") in ("block", "flights") and o.name.startswith("A ")]
+    assert part("rockfall_addon.scene.problems").sentences(slope) == []
+    picks[2].rockfall_pick.kind = "impact"
+    check_shown(slope, part)
+    check_block(slope, part, "B")

@@ -378,3 +378,42 @@ def case_live_table_and_numbers(window):
         bpy.ops.rockfall.impact_table("INVOKE_DEFAULT")
     yield 1.0
     window.screenshot("table-scale-2")
+
+
+def case_live_undo_brings_flights_back_and_takes_them(window):
+    """Flights and block of a run go and come with its picks, also when that is undone and done again."""
+    yield from load(window)
+
+    def shown():
+        found = [o for o in bpy.context.scene.objects if o.get("rockfall_trajectory") == "B03"]
+        return sorted(o["rockfall_role"] for o in found if o["rockfall_role"] != "pick")
+
+    def history(*steps):
+        for name, expected, kinds in steps:
+            with window.override():
+                getattr(bpy.ops.ed, name)()
+            yield 1.0
+            assert (shown(), [pick["rockfall_kind"] for pick in picks_of("B03")]) == (expected, kinds), name
+            bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
+            yield 0.5
+
+    both = ["block", "flights"]
+    assert shown() == both
+    start = [pick["rockfall_kind"] for pick in picks_of("B03")]
+    for pick in picks_of("B03"):
+        pick.rockfall_pick.kind = "stop"
+    bpy.ops.ed.undo_push(message="Kind")  # as Blender does for a field of a panel, before anything else happens
+    yield from window.wait_for(lambda: not shown(), what="without flights")
+    none = [pick["rockfall_kind"] for pick in picks_of("B03")]
+    bpy.ops.ed.undo_push(message="Another step, so that the next finds the collections as they are")
+    picks_of("B03")[3].rockfall_pick.kind = "impact"
+    bpy.ops.ed.undo_push(message="Kind")
+    yield from window.wait_for(lambda: shown() == both, what="flights again")
+    again = [pick["rockfall_kind"] for pick in picks_of("B03")]
+    back = ("undo", [], none), ("undo", [], none), ("undo", both, start)
+    there = ("redo", [], none), ("redo", [], none), ("redo", both, again)
+    yield from history(("undo", [], none), ("redo", both, again), *back, *there)
+    consistent(window, "B03")
+    yield from history(*back, *there)
+    consistent(window, "B03")
+    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)

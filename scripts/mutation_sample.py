@@ -7,7 +7,8 @@
 Works on copies of the tree below --work, never in the checkout. First all tests of the level (tests/core, or
 tests/blender for the add-on) run once, to learn which of them execute which line. Then each change is made, and the
 tests of its line run, the quickest first, until one fails. Lines that no test runs by themselves (outside functions, or
-compiled by numba) get the tests that run anything else in their file, or else in the files that import it.
+compiled by numba) get the tests that run anything in their file or in those that import it, and those that are called
+after the file or its folder, or speak of it.
 
 Started again with the same arguments it goes on where it was; remove --work to begin anew, and after an edit. A change
 that ran past its time is counted on its own, not as noticed. Kernels are compiled as always, so a change of one costs
@@ -256,16 +257,36 @@ def learn(work: Path, level: str, words: str) -> dict:
     return known
 
 
+def word_of(file: str) -> re.Pattern[str]:
+    """A line that imports the module of a file."""
+    stem = re.escape(Path(file).stem)
+    return re.compile(rf"\bimport\b.*\b{stem}\b|\b{stem}\b.*\bimport\b")
+
+
+def named_after(file: str, known: dict, tree: Path) -> list[int]:
+    """Numbers of the tests whose file is called after a file or its folder, or speaks of it."""
+    path = Path(file)
+    stem = path.stem.removesuffix("_kernels")
+    words = {stem, path.parent.name if path.parent.name != "machinery" else path.parent.parent.name}
+    found: dict[str, bool] = {}
+    for name, _ in known["tests"]:
+        place = name.partition("::")[0]
+        if place not in found:
+            source = tree / place
+            speaks = source.is_file() and re.search(rf"\b{re.escape(stem)}\b", source.read_text(encoding="utf-8"))
+            found[place] = bool(speaks) or any(word in Path(place).stem for word in words)
+    return [number for number, (name, _) in enumerate(known["tests"]) if found[name.partition("::")[0]]]
+
+
 def tests_for(change: Change, known: dict, tree: Path) -> list[int]:
     """Numbers of the tests that run the changed line, the quickest first."""
     lines, inner = known["lines"], functions_lines((tree / change.file).read_text(encoding="utf-8"))
     found = set(lines.get(change.file, {}).get(str(change.line), ())) if change.line in inner else set()
     if not found:
-        found = {test for tests in lines.get(change.file, {}).values() for test in tests}
-    if not found:
-        word = re.compile(rf"\bimport\b.*\b{Path(change.file).stem}\b|\b{Path(change.file).stem}\b.*\bimport\b")
-        importers = [file for file in lines if word.search((tree / file).read_text(encoding="utf-8"))]
-        found = {test for file in importers for tests in lines[file].values() for test in tests}
+        # Compiled functions leave no trace in the map, nor do modules that are imported by name.
+        near = {file for file in lines if word_of(change.file).search((tree / file).read_text(encoding="utf-8"))}
+        found = {test for file in (*near, change.file) for tests in lines.get(file, {}).values() for test in tests}
+        found |= set(named_after(change.file, known, tree))
     good = [test for test in found if known["tests"][test][0] not in known["failed"]]
     return sorted(good, key=lambda test: known["tests"][test][1])
 

@@ -3,15 +3,22 @@
 
 import bpy
 
-from ..scene import videos
+from ..scene import camera_paths, videos
+from .reporting import possible
 
 
 def has_video(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether there is a video; if not, what to do."""
-    if videos.active_camera(context.scene) is not None:
-        return True
-    cls.poll_message_set("Add a video first")
-    return False
+    return possible(cls, videos.active_camera(context.scene) is not None, "Add a video first")
+
+
+def has_solved(
+    cls: type[bpy.types.Operator], context: bpy.types.Context, otherwise: str = "First solve the camera in one frame"
+) -> bool:
+    """Whether the video's camera is solved; if not, what to do."""
+    if not has_video(cls, context):
+        return False
+    return possible(cls, camera_paths.is_solved(videos.active_camera(context.scene)), otherwise)
 
 
 class OfVideo:

@@ -8,6 +8,7 @@ from typing import Literal
 import bpy
 
 from ...core.remarks import Remark
+from ..scene import store
 
 type State = Literal["TO_DO", "READY", "ATTENTION"]
 """How a step stands."""
@@ -21,6 +22,12 @@ class RockfallPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Rockfall"
+    needs = ""
+    """The role of objects without which there is no panel."""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return not cls.needs or bool(store.with_role(context.scene, cls.needs))
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State | None:
@@ -29,6 +36,26 @@ class RockfallPanel:
 
     def draw_header(self, context: bpy.types.Context) -> None:
         state_mark(self.layout, self.step_state(context))
+
+
+class Rows:
+    """Mix-in of a list: `draw_row` draws an item."""
+
+    use_filter_show = False
+
+    def draw_item(
+        self,
+        context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        data: object,
+        item: bpy.types.PropertyGroup,
+        icon: int,
+        active_data: object,
+        active_property: str,
+        index: int = 0,
+        flt_flag: int = 0,
+    ) -> None:
+        self.draw_row(layout, item)
 
 
 def state_mark(layout: bpy.types.UILayout, state: State | None) -> None:

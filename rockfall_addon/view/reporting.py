@@ -26,6 +26,13 @@ def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
     return wrapper
 
 
+def possible(cls: type[bpy.types.Operator], can: object, otherwise: str) -> bool:
+    """For an operator's poll: whether it can run; if not, its tooltip says what to do."""
+    if not can:
+        cls.poll_message_set(otherwise)
+    return bool(can)
+
+
 def leave_newer_alone(cls: type) -> None:
     """Make a class that is to be registered leave a scene of a newer version as it is.
 

@@ -134,8 +134,8 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
     speed = np.linalg.norm(local(truth[2], "v1x_mps", "v1y_mps", "v1z_mps") + ORIGIN)
     assert np.linalg.norm(list(result["incident_mps"])) == pytest.approx(speed, rel=0.03)
     assert "sigma_r" in result, "impacts show their errors"
-    sentences = part("rockfall_addon.scene.problems").sentences(tracked)
-    assert not [sentence for sentence in sentences if "went wrong" in sentence]
+    remarks = part("rockfall_addon.scene.problems").remarks(tracked)
+    assert not [remark for remark in remarks if "went wrong" in remark.text]
 
 
 def test_what_is_applied_fits_the_pixels(tracked, part) -> None:

@@ -6,23 +6,40 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.props import BoolProperty, StringProperty
-from bpy_extras.io_utils import ExportHelper, ImportHelper
+from bpy_extras.io_utils import ExportHelper
 
 from ....core.errors import RockfallError
-from ...scene import alignment, camera_paths, pairs, videos
-from ...view.of_video import OfVideo, has_video
-from ...view.reporting import reported
+from ...scene import alignment, pairs, videos
+from ...view.from_file import FromFile
+from ...view.of_video import OfVideo, has_solved, has_video
+from ...view.reporting import possible, reported
 from . import files
 
 
-class ROCKFALL_OT_import_pairs(OfVideo, bpy.types.Operator, ImportHelper):
+class _IntoFile(ExportHelper):
+    """Mix-in: `write` puts what is known of the shown camera into the chosen file, and says what it wrote."""
+
+    bl_options = {"REGISTER"}
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        try:
+            written = self.write(context.scene, videos.active_camera(context.scene))
+        except OSError as error:
+            raise RockfallError(
+                f"{Path(self.filepath).name} cannot be written there: {error.strerror}. Choose another place."
+            ) from None
+        self.report({"INFO"}, written)
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_import_pairs(OfVideo, FromFile, bpy.types.Operator):
     """Import pairs of pixels and surveyed points (pairs.csv) for the shown camera"""
 
     bl_idname = "rockfall.import_pairs"
     bl_label = "Import Pairs"
 
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -34,12 +51,11 @@ class ROCKFALL_OT_import_pairs(OfVideo, bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_export_pairs(bpy.types.Operator, ExportHelper):
+class ROCKFALL_OT_export_pairs(_IntoFile, bpy.types.Operator):
     """Write the complete pairs, with survey coordinates"""
 
     bl_idname = "rockfall.export_pairs"
     bl_label = "Export Pairs"
-    bl_options = {"REGISTER"}
 
     filename_ext = ".csv"
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
@@ -49,27 +65,19 @@ class ROCKFALL_OT_export_pairs(bpy.types.Operator, ExportHelper):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not has_video(cls, context):
             return False
-        if pairs.complete_of(videos.active_camera(context.scene)):
-            return True
-        cls.poll_message_set("There are no complete pairs")
-        return False
+        return possible(cls, pairs.complete_of(videos.active_camera(context.scene)), "There are no complete pairs")
 
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        camera = videos.active_camera(context.scene)
-        count = _written(files.export_pairs, context.scene, camera, self.filepath)
-        self.report({"INFO"}, f"{count} pairs written to {Path(self.filepath).name}")
-        return {"FINISHED"}
+    def write(self, scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
+        return f"{files.export_pairs(scene, camera, self.filepath)} pairs written to {Path(self.filepath).name}"
 
 
-class ROCKFALL_OT_import_camera(OfVideo, bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_import_camera(OfVideo, FromFile, bpy.types.Operator):
     """Take a solved camera, or a calibrated lens, from camera.toml"""
 
     bl_idname = "rockfall.import_camera"
     bl_label = "Import Camera"
 
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     lens_only: BoolProperty(
         name="Lens only", description="Take the focal length, the centre and the distortion, and leave the place"
     )
@@ -81,12 +89,11 @@ class ROCKFALL_OT_import_camera(OfVideo, bpy.types.Operator, ImportHelper):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_export_camera(bpy.types.Operator, ExportHelper):
+class ROCKFALL_OT_export_camera(_IntoFile, bpy.types.Operator):
     """Write the camera as camera.toml and what is left of its pairs as pairs_residuals.csv"""
 
     bl_idname = "rockfall.export_camera"
     bl_label = "Export Camera"
-    bl_options = {"REGISTER"}
 
     filename_ext = ".toml"
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
@@ -94,28 +101,10 @@ class ROCKFALL_OT_export_camera(bpy.types.Operator, ExportHelper):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not has_video(cls, context):
-            return False
-        if camera_paths.is_solved(videos.active_camera(context.scene)):
-            return True
-        cls.poll_message_set("The camera is not solved yet")
-        return False
+        return has_solved(cls, context, "The camera is not solved yet")
 
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        camera = videos.active_camera(context.scene)
-        names = _written(files.export_camera, context.scene, camera, self.filepath)
-        self.report({"INFO"}, f"Written: {', '.join(names)}")
-        return {"FINISHED"}
-
-
-def _written(write: object, scene: bpy.types.Scene, camera: bpy.types.Object, path: str) -> object:
-    try:
-        return write(scene, camera, path)
-    except OSError as error:
-        raise RockfallError(
-            f"{Path(path).name} cannot be written there: {error.strerror}. Choose another place."
-        ) from None
+    def write(self, scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
+        return f"Written: {', '.join(files.export_camera(scene, camera, self.filepath))}"
 
 
 CLASSES = (

@@ -11,8 +11,8 @@ from ....core.camera.resection.problem import POSE_PAIRS
 from ....core.errors import RockfallError
 from ...scene import alignment, camera_paths, clocks, footage_blend, pairs, store, terrain, videos
 from ...view import image_view, job, look
-from ...view.of_video import OfVideo, has_video
-from ...view.reporting import reported
+from ...view.of_video import OfVideo, has_solved, has_video
+from ...view.reporting import possible, reported
 from . import following, looking, marking, solving
 
 TOOL = "rockfall.align_tool"
@@ -25,10 +25,7 @@ def _pair(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """Whether there is an active pair; if not, what to do."""
     if not has_video(cls, context):
         return False
-    if pairs.active_pair(videos.active_camera(context.scene)) is not None:
-        return True
-    cls.poll_message_set("There is no pair yet")
-    return False
+    return possible(cls, pairs.active_pair(videos.active_camera(context.scene)) is not None, "There is no pair yet")
 
 
 class ROCKFALL_OT_mark_pair(bpy.types.Operator):
@@ -192,10 +189,9 @@ class ROCKFALL_OT_accept_pair(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         if not has_video(cls, context):
             return False
-        if _proposal(videos.active_camera(context.scene)) is not None:
-            return True
-        cls.poll_message_set("No mark waits to be confirmed")
-        return False
+        return possible(
+            cls, _proposal(videos.active_camera(context.scene)) is not None, "No mark waits to be confirmed"
+        )
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -335,12 +331,7 @@ class ROCKFALL_OT_propose_pairs(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not has_video(cls, context):
-            return False
-        if camera_paths.is_solved(videos.active_camera(context.scene)):
-            return True
-        cls.poll_message_set("First solve the camera in one frame")
-        return False
+        return has_solved(cls, context)
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -361,12 +352,7 @@ class ROCKFALL_OT_follow_background(job.InBackground, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not has_video(cls, context) or not job.is_free(cls):
-            return False
-        if camera_paths.is_solved(videos.active_camera(context.scene)):
-            return True
-        cls.poll_message_set("First solve the camera in one frame")
-        return False
+        return job.is_free(cls) and has_solved(cls, context)
 
     def prepare(self, context: bpy.types.Context) -> job.Work:
         return following.work(context.scene, videos.active_camera(context.scene))

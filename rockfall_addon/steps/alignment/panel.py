@@ -7,30 +7,18 @@ import bpy
 
 from ...scene import alignment, camera_paths, georeference, pairs, videos
 from ...view import job
-from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
+from ...view.panel import RockfallPanel, Rows, State, advise, facts, paragraph, show_remarks
 from . import following
 
 COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, pairs.COLOURS + 1))
 
 
-class ROCKFALL_UL_pairs(bpy.types.UIList):
+class ROCKFALL_UL_pairs(Rows, bpy.types.UIList):
     """Rows: use, colour, name, residuals."""
 
     bl_idname = "ROCKFALL_UL_pairs"
-    use_filter_show = False
 
-    def draw_item(
-        self,
-        context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        data: object,
-        item: bpy.types.PropertyGroup,
-        icon: int,
-        active_data: object,
-        active_property: str,
-        index: int = 0,
-        flt_flag: int = 0,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         row = layout.row(align=True)
         row.prop(item, "enabled", text="")
         row.label(text="", icon="ERROR" if item.is_wrong else COLOURS[item.colour % len(COLOURS)])

@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ....core.film.presets import BUILT_IN
 from ...scene import store, timing
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 from . import dressing, remembered
 from .engine import quickest_engine
 from .render import use_movie
@@ -45,10 +45,11 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if store.with_role(context.scene, store.FLIGHTS_ROLE):
-            return True
-        cls.poll_message_set("There are no trajectories to film: import picks first")
-        return False
+        return possible(
+            cls,
+            store.with_role(context.scene, store.FLIGHTS_ROLE),
+            "There are no trajectories to film: import picks first",
+        )
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -79,10 +80,7 @@ class ROCKFALL_OT_render_film(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if remembered.is_set_up(context.scene):
-            return True
-        cls.poll_message_set("Set up the film first")
-        return False
+        return possible(cls, remembered.is_set_up(context.scene), "Set up the film first")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.data.filepath:

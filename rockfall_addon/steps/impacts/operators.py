@@ -5,7 +5,7 @@ import bpy
 from bpy.props import FloatProperty, StringProperty
 
 from ...scene import impact_rows, store, sync
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 
 WIDE = 760  # pixels at interface scale 1
 
@@ -37,10 +37,9 @@ class ROCKFALL_OT_impact_table(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if len(context.scene.rockfall_impacts):
-            return True
-        cls.poll_message_set("There are no impacts yet: import picks first, or load the demo")
-        return False
+        return possible(
+            cls, len(context.scene.rockfall_impacts), "There are no impacts yet: import picks first, or load the demo"
+        )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_popup(self, width=self._width(context))
@@ -90,10 +89,7 @@ class ROCKFALL_OT_nudge_pick_time(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if _has_pick(context):
-            return True
-        cls.poll_message_set("Select a pick first")
-        return False
+        return possible(cls, _has_pick(context), "Select a pick first")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

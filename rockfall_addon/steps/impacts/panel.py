@@ -40,10 +40,7 @@ NUMBERS = (  # what is shown, key of the result, key of its standard deviation, 
 class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
     bl_label = "Selected Impact"
     bl_idname = "ROCKFALL_PT_impact"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(store.with_role(context.scene, store.PICK_ROLE))
+    needs = store.PICK_ROLE
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, pick = self.layout, context.object

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import bpy
 
 from ...scene import impact_rows, store
-from ...view.panel import RockfallPanel
+from ...view.panel import RockfallPanel, Rows
 
 WIDTHS = {  # of the columns in pixels at interface scale 1, in the order in which they are shown
     "trajectory": 72,
@@ -124,24 +124,12 @@ def _cells(layout: bpy.types.UILayout, columns: Sequence[str]) -> list[tuple[str
     return [*cells, (columns[-1], rest)]
 
 
-class ROCKFALL_UL_impacts(bpy.types.UIList):
+class ROCKFALL_UL_impacts(Rows, bpy.types.UIList):
     """Rows of the impact table."""
 
     bl_idname = "ROCKFALL_UL_impacts"
-    use_filter_show = False
 
-    def draw_item(
-        self,
-        context: bpy.types.Context,
-        layout: bpy.types.UILayout,
-        data: object,
-        item: bpy.types.PropertyGroup,
-        icon: int,
-        active_data: object,
-        active_property: str,
-        index: int = 0,
-        flt_flag: int = 0,
-    ) -> None:
+    def draw_row(self, layout: bpy.types.UILayout, item: bpy.types.PropertyGroup) -> None:
         for name, cell in _cells(layout, columns_for(float(self.list_id))):
             cell.label(text=_text(item, name), icon="ERROR" if name == "trajectory" and _alarming(item) else "NONE")
 
@@ -160,10 +148,7 @@ class ROCKFALL_PT_impact_table(RockfallPanel, bpy.types.Panel):
     bl_label = "Impact Table"
     bl_idname = "ROCKFALL_PT_impact_table"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(store.with_role(context.scene, store.PICK_ROLE))
+    needs = store.PICK_ROLE
 
     def draw(self, context: bpy.types.Context) -> None:
         self.draw_table(self.layout, context, context.region.width / context.preferences.system.ui_scale)

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty
 from ....core.errors import RockfallError
 from ...scene import clicks, picks, pictures, places, sightings, store
 from ...view import pointing
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 from . import editing
 from .properties import KINDS
 
@@ -195,10 +195,7 @@ class ROCKFALL_OT_remove_pick(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if pointing.active_pick(context) is not None:
-            return True
-        cls.poll_message_set("Select a pick first")
-        return False
+        return possible(cls, pointing.active_pick(context) is not None, "Select a pick first")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -216,10 +213,11 @@ class ROCKFALL_OT_use_triangulated(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         thing = pointing.active_pick(context)
-        if thing is not None and len(clicks.of(thing)) > 1:
-            return True
-        cls.poll_message_set("Select a pick, and click the same event in a second aligned video")
-        return False
+        return possible(
+            cls,
+            thing is not None and len(clicks.of(thing)) > 1,
+            "Select a pick, and click the same event in a second aligned video",
+        )
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

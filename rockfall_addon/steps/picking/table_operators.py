@@ -3,15 +3,15 @@
 
 import bpy
 from bpy.props import StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ....core.exchange.tables import read_picks
 from ...scene import georeference, reconstruction, store
 from ...view import look
-from ...view.reporting import reported
+from ...view.from_file import FromFile
+from ...view.reporting import possible, reported
 
 
-class ROCKFALL_OT_import_picks(bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
     """Import a table of timed impacts (picks.csv) and reconstruct the trajectories between them"""
 
     bl_idname = "rockfall.import_picks"
@@ -19,7 +19,6 @@ class ROCKFALL_OT_import_picks(bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER", "UNDO"}
 
     filter_glob: StringProperty(default="*.csv", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context) if self.filepath else super().invoke(context, event)
@@ -47,10 +46,7 @@ class ROCKFALL_OT_reconstruct(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if store.with_role(context.scene, store.PICK_ROLE):
-            return True
-        cls.poll_message_set("Import picks first, or load the demo")
-        return False
+        return possible(cls, store.with_role(context.scene, store.PICK_ROLE), "Import picks first, or load the demo")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -9,7 +9,7 @@ from ....core.progress import Progress
 from ...scene import clocks, places, sightings, store, video_files, videos
 from ...view import job
 from ...view.of_video import has_video
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 from . import tracks
 
 
@@ -63,10 +63,11 @@ class _OfTrack:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         camera, name = _solved_name(context)
-        if camera is not None and name in sightings.names_in(camera):
-            return True
-        cls.poll_message_set("Track the block first, or click it in flight")
-        return False
+        return possible(
+            cls,
+            camera is not None and name in sightings.names_in(camera),
+            "Track the block first, or click it in flight",
+        )
 
 
 class ROCKFALL_OT_propose_impacts(_OfTrack, bpy.types.Operator):

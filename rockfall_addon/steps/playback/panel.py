@@ -11,10 +11,7 @@ class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
     bl_label = "7  Playback"
     bl_idname = "ROCKFALL_PT_playback"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(store.with_role(context.scene, store.FLIGHTS_ROLE))
+    needs = store.FLIGHTS_ROLE
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import places, proposal, store
 from ...view import pointing
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 from . import fitting
 
 
@@ -43,10 +43,7 @@ class _OfProposal:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if proposal.is_there(context.scene):
-            return True
-        cls.poll_message_set("Refine first")
-        return False
+        return possible(cls, proposal.is_there(context.scene), "Refine first")
 
 
 class ROCKFALL_OT_apply_refinement(_OfProposal, bpy.types.Operator):

@@ -10,7 +10,7 @@ from ....core.exchange.output import output_folder
 from ....core.exchange.tables import write_impacts, write_picks, write_trajectories
 from ....core.reconstruction.sampling import sample_trajectories
 from ...scene import project, reconstruction, store, terrain, trails
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 
 
 class _IntoFolder:
@@ -23,10 +23,11 @@ class _IntoFolder:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if store.with_role(context.scene, store.PICK_ROLE):
-            return True
-        cls.poll_message_set("There is nothing to export: import picks first, or load the demo")
-        return False
+        return possible(
+            cls,
+            store.with_role(context.scene, store.PICK_ROLE),
+            "There is nothing to export: import picks first, or load the demo",
+        )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.fileselect_add(self)

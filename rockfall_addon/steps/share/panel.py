@@ -10,10 +10,7 @@ from ...view.panel import RockfallPanel, State, advise
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
     bl_label = "9  Share"
     bl_idname = "ROCKFALL_PT_share"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(store.with_role(context.scene, store.PICK_ROLE))
+    needs = store.PICK_ROLE
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ...scene import clocks, footage_blend, sightings, store, videos
 from ...scene import project as scene_project
 from ...view import look
-from ...view.reporting import reported
+from ...view.from_file import FromFile
+from ...view.reporting import possible, reported
 from . import workspace
 
 DEMO = Path(__file__).parents[3] / "assets" / "demo" / "project.toml"
@@ -27,10 +27,11 @@ class _IntoEmptyScene:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not store.with_role(context.scene, store.TERRAIN_ROLE):
-            return True
-        cls.poll_message_set("This scene has a terrain already: begin a new scene or file first")
-        return False
+        return possible(
+            cls,
+            not store.with_role(context.scene, store.TERRAIN_ROLE),
+            "This scene has a terrain already: begin a new scene or file first",
+        )
 
 
 class ROCKFALL_OT_load_demo(_IntoEmptyScene, bpy.types.Operator):
@@ -73,14 +74,13 @@ class ROCKFALL_OT_load_footage_demo(_IntoEmptyScene, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_open_project(_IntoEmptyScene, bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_open_project(_IntoEmptyScene, FromFile, bpy.types.Operator):
     """Open a project.toml: its terrain, videos, cameras, picks and settings"""
 
     bl_idname = "rockfall.open_project"
     bl_label = "Open Project"
 
     filter_glob: StringProperty(default="*.toml", options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import problems, store
 from ...view import look, workspace
-from ...view.reporting import reported
+from ...view.reporting import possible, reported
 
 AFTER_S = 0.3  # the areas of a new workspace get their sizes when they are drawn
 
@@ -20,10 +20,7 @@ class ROCKFALL_OT_open_workspace(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.window is not None and not bpy.app.background:
-            return True
-        cls.poll_message_set("There is no window")
-        return False
+        return possible(cls, context.window is not None and not bpy.app.background, "There is no window")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -41,10 +38,11 @@ class ROCKFALL_OT_fit_footage(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.screen is not None and any(workspace.camera_views(context.screen)):
-            return True
-        cls.poll_message_set("Look through a camera first")
-        return False
+        return possible(
+            cls,
+            context.screen is not None and any(workspace.camera_views(context.screen)),
+            "Look through a camera first",
+        )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         workspace.fit_footage(context.scene, context.screen)

@@ -5,7 +5,6 @@ import textwrap
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ....core.errors import RockfallError
 from ....core.georeference import GlobalShift
@@ -14,12 +13,13 @@ from ....core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
 from ....core.terrain.shading import shade
 from ...scene import georeference, materials, store, sync, terrain, terrain_look
 from ...view import look
-from ...view.reporting import reported
+from ...view.from_file import FromFile
+from ...view.reporting import possible, reported
 
 TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
 
 
-class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_import_terrain(FromFile, bpy.types.Operator):
     """Import a scanned slope: a mesh, a grid or a point cloud, in survey coordinates"""
 
     bl_idname = "rockfall.import_terrain"
@@ -27,7 +27,6 @@ class ROCKFALL_OT_import_terrain(bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER", "UNDO"}
 
     filter_glob: StringProperty(default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     shift_x: StringProperty(name="Shift X", description="Subtracted from the file's coordinates [m]")
     shift_y: StringProperty(name="Y", description="Subtracted from the file's coordinates [m]")
     shift_z: StringProperty(name="Z", description="Subtracted from the file's coordinates [m]")
@@ -176,10 +175,7 @@ class ROCKFALL_OT_toggle_full_terrain(bpy.types.Operator):
 
 
 def _has_terrain(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    if store.with_role(context.scene, store.TERRAIN_ROLE):
-        return True
-    cls.poll_message_set("Import a terrain first")
-    return False
+    return possible(cls, store.with_role(context.scene, store.TERRAIN_ROLE), "Import a terrain first")
 
 
 class ROCKFALL_FH_terrain(bpy.types.FileHandler):

@@ -62,10 +62,7 @@ class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
     bl_idname = "ROCKFALL_PT_relief"
     bl_parent_id = "ROCKFALL_PT_terrain"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(store.with_role(context.scene, store.TERRAIN_ROLE))
+    needs = store.TERRAIN_ROLE
 
     def draw(self, context: bpy.types.Context) -> None:
         settings = context.scene.rockfall_terrain

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
 from mathutils import Matrix
 
 from ....core.errors import RockfallError
 from ...scene import footage, new_videos, store, video_times, videos
+from ...view.from_file import FromFile
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
 from . import proxies
@@ -31,7 +31,7 @@ KEYS = (
 _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
-class ROCKFALL_OT_add_video(bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_add_video(FromFile, bpy.types.Operator):
     """Add videos of the fall: each gets a camera with its footage behind it, and keeps its own timestamps"""
 
     bl_idname = "rockfall.add_video"
@@ -39,7 +39,6 @@ class ROCKFALL_OT_add_video(bpy.types.Operator, ImportHelper):
     bl_options = {"REGISTER", "UNDO"}
 
     filter_glob: StringProperty(default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
@@ -97,14 +96,13 @@ class ROCKFALL_OT_remove_video(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_relink_video(OfVideo, bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_relink_video(OfVideo, FromFile, bpy.types.Operator):
     """Tell where the file of the active video is now; nothing that was marked in it is lost"""
 
     bl_idname = "rockfall.relink_video"
     bl_label = "Find the File"
 
     filter_glob: StringProperty(default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"})
-    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.execute(context) if self.filepath else super().invoke(context, event)

@@ -847,7 +847,7 @@ def test_a_run_without_flights_and_with_them_again(slope: bpy.types.Scene, part)
     for pick in picks:
         pick.rockfall_pick.kind = "stop"
     assert not [o for o in slope.objects if o.get("rockfall_role") in ("block", "flights") and o.name.startswith("A ")]
-    assert part("rockfall_addon.scene.problems").sentences(slope) == []
+    assert part("rockfall_addon.scene.problems").remarks(slope) == []
     picks[2].rockfall_pick.kind = "impact"
     check_shown(slope, part)
     check_block(slope, part, "B")

@@ -416,4 +416,4 @@ def case_live_undo_brings_flights_back_and_takes_them(window):
     consistent(window, "B03")
     yield from history(*back, *there)
     consistent(window, "B03")
-    assert not window.part("rockfall_addon.scene.problems").sentences(bpy.context.scene)
+    assert not window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene)

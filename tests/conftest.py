@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 LIMIT_S = 480
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: waiting threads cost more than small matrices
 STDERR = pytest.StashKey[int]()
 
 

@@ -4,7 +4,7 @@
 The same tree is a Blender extension and the Python package ``rockfall``: nothing here imports Blender.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 
 def register() -> None:

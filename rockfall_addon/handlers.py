@@ -67,9 +67,9 @@ def _units_changed() -> None:
 
 @problems.guarded
 def _chosen() -> None:
-    thing = impact_rows.selected(bpy.context)
-    if thing is not None:
-        impact_rows.highlight(bpy.context.scene, thing.get(store.ID, ""))
+    obj = impact_rows.selected(bpy.context)
+    if obj is not None:
+        impact_rows.highlight(bpy.context.scene, obj.get(store.ID, ""))
 
 
 @problems.guarded

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, Mask, norm
-from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_told, whole
+from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_asked, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.moving == "full" and not arguments.terrain:
         raise InputError("--moving full needs the terrain", advice="Give it with --terrain MESH, or use rotation")
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        surface = terrain_as_told(arguments, arguments.terrain, progress) if arguments.terrain else None
+        surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
         pairs = read_pairs(arguments.pairs, None if surface is None else surface.shift)
         video = open_video(arguments.video, progress) if arguments.video else None

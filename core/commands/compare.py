@@ -15,7 +15,7 @@ from .options import (
     model_parameters,
     naming,
     not_negative,
-    terrain_as_told,
+    terrain_as_asked,
     whole,
 )
 from .progress import PrintedProgress
@@ -105,7 +105,7 @@ def _fly(
     from ..analysis.predicted_flights import fly_predictions
     from ..reconstruction.drag import Drag
 
-    surface = terrain_as_told(arguments, arguments.terrain, progress)
+    surface = terrain_as_asked(arguments, arguments.terrain, progress)
     progress("Flying the predictions")
     drag = Drag() if arguments.drag else None
     return fly_predictions(impacts, predictions, surface, gravity_mps2=arguments.gravity, drag=drag, runs=None)

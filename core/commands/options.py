@@ -113,7 +113,7 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
 
 
-def terrain_as_told(arguments: argparse.Namespace, file: str, progress: "Progress") -> "Surface":
+def terrain_as_asked(arguments: argparse.Namespace, file: str, progress: "Progress") -> "Surface":
     """Read a terrain with the options of `add_terrain_options`.
 
     Raises

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..reconstruction.sampling import STEP_S
-from .options import add_out, add_terrain_options, not_negative, positive, terrain_as_told
+from .options import add_out, add_terrain_options, not_negative, positive, terrain_as_asked
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.picks}")
         picks = read_picks(arguments.picks)
-        surface = terrain_as_told(arguments, arguments.terrain, progress) if arguments.terrain else None
+        surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress("Reconstructing")
         reconstruction = reconstruct(
             picks,

@@ -16,7 +16,7 @@ from .options import (
     model_parameters,
     not_negative,
     positive,
-    terrain_as_told,
+    terrain_as_asked,
     whole,
 )
 from .progress import PrintedProgress
@@ -87,8 +87,8 @@ def run(arguments: argparse.Namespace) -> int:
     parameters = model_parameters(arguments, [model.name])
     files = _structures(arguments.structure)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        terrain = terrain_as_told(arguments, arguments.terrain, progress)
-        structures = {name: terrain_as_told(arguments, file, progress) for name, file in files.items()}
+        terrain = terrain_as_asked(arguments, arguments.terrain, progress)
+        structures = {name: terrain_as_asked(arguments, file, progress) for name, file in files.items()}
         ground = make_ground(terrain, structures)
         progress(f"Reading {arguments.releases}")
         releases = read_releases(

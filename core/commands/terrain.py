@@ -5,7 +5,7 @@ import argparse
 from pathlib import Path
 
 from ..errors import DependencyError
-from .options import add_out, add_terrain_options, terrain_as_told
+from .options import add_out, add_terrain_options, terrain_as_asked
 from .progress import PrintedProgress
 
 
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..terrain.writers import write_ply
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        surface = terrain_as_told(arguments, arguments.file, progress)
+        surface = terrain_as_asked(arguments, arguments.file, progress)
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")
         written = ["terrain.ply"]

@@ -99,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
             labels = [f"{time:.3f} s" for time in kinks.time_s]
             picture = draw_track(video, track, motion, kinks, labels, clicks[0][0])
             write_picture(folder / "track.png", picture)
-    _tell(arguments, track, motion, kinks, events)
+    _print_summary(arguments, track, motion, kinks, events)
     return 0
 
 
@@ -203,7 +203,7 @@ def _events(
     )
 
 
-def _tell(
+def _print_summary(
     arguments: argparse.Namespace,
     track: "BlockTrack",
     motion: "BackgroundMotion",

@@ -185,7 +185,7 @@ def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool 
     progress(f"Reading the timestamps of {path.name}", 0, 0)
     packet_times, keyframes = _packets(path)
     video = replace(_described(path), time_s=packet_times, keyframe_s=keyframes)
-    if thorough or not _decodes_as_told(video):
+    if thorough or not _decodes_as_declared(video):
         video = _decoded(video, progress)
     if video.frames > 1 and video.time_s[-1] - video.time_s[0] < SAME_TIME_S:
         raise InputError(
@@ -340,7 +340,7 @@ def _packets(path: Path) -> tuple[Array, Array]:
     return np.sort(time_s), np.sort(time_s[np.array(keys, bool)])
 
 
-def _decodes_as_told(video: Video) -> bool:
+def _decodes_as_declared(video: Video) -> bool:
     """Whether decoding finds the packets' timestamps: of the first frames, and from a late keyframe to the end."""
     if video.frames == 0 or video.duplicates.size:
         return False

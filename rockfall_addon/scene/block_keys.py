@@ -73,31 +73,31 @@ class _Rows:
     states: tuple[dict[str, object], ...] = ()
 
 
-def remember(block: bpy.types.Object, things: Sequence[bpy.types.Object | None]) -> None:
+def remember(block: bpy.types.Object, objects: Sequence[bpy.types.Object | None]) -> None:
     """What the keys are now is what was written.
 
-    things : of each key its pick, None for a key between the picks.
+    objects : of each key its pick, None for a key between the picks.
     """
     action, found = keyframes.action_of(block), _read(block)
-    if found is None or len(found.frame) != len(things):
+    if found is None or len(found.frame) != len(objects):
         action.pop(store.BLOCK_KEYS, None)
         return
     rows = [
-        [frame, *place, thing[store.ID] if thing else "", _state(thing) if thing else {}]
-        for frame, place, thing in zip(found.frame.tolist(), found.place.tolist(), things, strict=True)
+        [frame, *place, obj[store.ID] if obj else "", _state(obj) if obj else {}]
+        for frame, place, obj in zip(found.frame.tolist(), found.place.tolist(), objects, strict=True)
     ]
     text = json.dumps(rows)
     if action.get(store.BLOCK_KEYS) != text:
         action[store.BLOCK_KEYS] = text
 
 
-def remember_by_frame(block: bpy.types.Object, things: Sequence[bpy.types.Object]) -> None:
+def remember_by_frame(block: bpy.types.Object, objects: Sequence[bpy.types.Object]) -> None:
     """The same for a block of a file that does not say which pick a key is of: the one whose own key is there."""
     found = _read(block)
-    there = [(float(thing[store.KEY_FRAME]), thing) for thing in things if store.KEY_FRAME in thing]
+    there = [(float(obj[store.KEY_FRAME]), obj) for obj in objects if store.KEY_FRAME in obj]
     if found is not None and there:
         near = [min(there, key=lambda pair: abs(pair[0] - frame)) for frame in found.frame.tolist()]
-        of = [thing if same_frame(at, frame) else None for (at, thing), frame in zip(near, found.frame, strict=True)]
+        of = [obj if same_frame(at, frame) else None for (at, obj), frame in zip(near, found.frame, strict=True)]
         remember(block, of)
 
 
@@ -221,8 +221,8 @@ def _kept(block: bpy.types.Object) -> _Rows | None:
     return _Rows(numbers[:, 0], numbers[:, 1:], tuple(row[4] for row in rows), tuple(row[5] for row in rows))
 
 
-def _state(thing: bpy.types.Object) -> dict[str, object]:
-    return {key: list(value) if hasattr(value := thing[key], "to_list") else value for key in STATE if key in thing}
+def _state(obj: bpy.types.Object) -> dict[str, object]:
+    return {key: list(value) if hasattr(value := obj[key], "to_list") else value for key in STATE if key in obj}
 
 
 def same_frame(frame: Array | float, other: Array | float) -> Array:

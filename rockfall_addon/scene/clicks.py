@@ -30,10 +30,10 @@ class Click:
     centre: bool
 
 
-def keep(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object, place: Place) -> None:
+def keep(scene: bpy.types.Scene, obj: bpy.types.Object, camera: bpy.types.Object, place: Place) -> None:
     """Remember what was clicked in a video for a pick."""
-    seen = thing[store.SEEN].to_dict() if store.SEEN in thing and _holds(thing) else {}
-    seen["position"] = list(thing[store.POSITION])
+    seen = obj[store.SEEN].to_dict() if store.SEEN in obj and _holds(obj) else {}
+    seen["position"] = list(obj[store.POSITION])
     seen[camera[store.ID]] = {
         "frame": int(place.frame),
         "pixel": place.pixel.tolist(),
@@ -42,12 +42,12 @@ def keep(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Obje
         "grazing_deg": float(place.grazing_deg),
         "centre": int(scene.rockfall_picking.aim == "CENTRE"),
     }
-    thing[store.SEEN] = seen
+    obj[store.SEEN] = seen
 
 
-def of(thing: bpy.types.Object) -> dict[str, Click]:
+def of(obj: bpy.types.Object) -> dict[str, Click]:
     """Id of a video → what was clicked in it for a pick that is still there."""
-    if store.SEEN not in thing or not _holds(thing):
+    if store.SEEN not in obj or not _holds(obj):
         return {}
     return {
         identifier: Click(
@@ -58,20 +58,20 @@ def of(thing: bpy.types.Object) -> dict[str, Click]:
             float(seen["grazing_deg"]),
             bool(seen["centre"]),
         )
-        for identifier, seen in thing[store.SEEN].items()
+        for identifier, seen in obj[store.SEEN].items()
         if identifier != "position"
     }
 
 
-def elsewhere(thing: bpy.types.Object, camera: bpy.types.Object) -> bool:
+def elsewhere(obj: bpy.types.Object, camera: bpy.types.Object) -> bool:
     """Whether a pick was clicked in another video, and not in this one."""
-    seen = of(thing)
+    seen = of(obj)
     return bool(seen) and camera[store.ID] not in seen
 
 
-def epipolar(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object) -> Array | None:
+def epipolar(scene: bpy.types.Scene, obj: bpy.types.Object, camera: bpy.types.Object) -> Array | None:
     """(k, 2) pixels in a video on which a pick must lie that was clicked in another one; None when it was not."""
-    for identifier, seen in of(thing).items():
+    for identifier, seen in of(obj).items():
         other = videos.by_id(scene, identifier)
         if other is None or other == camera or not camera_paths.is_solved(other):
             continue
@@ -83,10 +83,10 @@ def epipolar(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.
     return None
 
 
-def triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> SpacePoints | None:
+def triangulated(scene: bpy.types.Scene, obj: bpy.types.Object) -> SpacePoints | None:
     """The point in space of a pick that was clicked in two videos or more; None otherwise."""
     lenses, pixels, sigmas = [], [], []
-    for identifier, seen in of(thing).items():
+    for identifier, seen in of(obj).items():
         camera = videos.by_id(scene, identifier)
         if camera is not None and camera_paths.is_solved(camera):
             lenses.append(pictures.posed(camera, _time_of(camera, seen.frame)))
@@ -95,8 +95,8 @@ def triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> SpacePoints
     return triangulate(lenses, np.array(pixels), np.array(sigmas)) if len(lenses) > 1 else None
 
 
-def _holds(thing: bpy.types.Object) -> bool:
-    return list(thing[store.SEEN].get("position", ())) == list(thing[store.POSITION])
+def _holds(obj: bpy.types.Object) -> bool:
+    return list(obj[store.SEEN].get("position", ())) == list(obj[store.POSITION])
 
 
 def _time_of(camera: bpy.types.Object, frame: int) -> float:

@@ -27,27 +27,27 @@ _KEPT = (
 )
 
 
-def by_trajectory(things: Iterable[bpy.types.Object]) -> dict[str, list[bpy.types.Object]]:
+def by_trajectory(objects: Iterable[bpy.types.Object]) -> dict[str, list[bpy.types.Object]]:
     """The picks of each trajectory, in the order in which they come."""
     found: dict[str, list[bpy.types.Object]] = {}
-    for thing in things:
-        found.setdefault(thing[store.TRAJECTORY], []).append(thing)
+    for obj in objects:
+        found.setdefault(obj[store.TRAJECTORY], []).append(obj)
     return found
 
 
-def fingerprint(things: Sequence[bpy.types.Object], rate: float, held: picks.Held = picks.NOTHING_HELD) -> str:
+def fingerprint(objects: Sequence[bpy.types.Object], rate: float, held: picks.Held = picks.NOTHING_HELD) -> str:
     """Of all that a trajectory is computed from, with what a person is just doing to it, or to its block's keys."""
     rows = []
-    for thing in things:
-        row = [picks.time_of(thing, rate, held)]
+    for obj in objects:
+        row = [picks.time_of(obj, rate, held)]
         for key in _KEPT:
-            value = thing.get(key)
+            value = obj.get(key)
             if key == store.EXTRA:
                 row.append(str(value.get("confidence", "")) if value is not None else "")
             else:
                 row.append(value if value is None or isinstance(value, str) else tuple(value))
-        if picks.moved(thing, held):
-            row.append((*thing.location, *picks.resting_place(thing, None, 0.0, held)))
+        if picks.moved(obj, held):
+            row.append((*obj.location, *picks.resting_place(obj, None, 0.0, held)))
         rows.append(repr(row))
     return hashlib.sha1("\n".join(sorted(rows)).encode(), usedforsecurity=False).hexdigest()
 
@@ -84,12 +84,12 @@ def _holders(trail: bpy.types.Object | None, block: bpy.types.Object | None) -> 
 def remember_all(scene: bpy.types.Scene) -> None:
     """All that is shown is up to date."""
     rate = timing.keyed_rate(scene)
-    groups = by_trajectory(picks.things_of(scene))
+    groups = by_trajectory(picks.objects_of(scene))
     trails, blocks = (
-        {thing[store.TRAJECTORY]: thing for thing in store.with_role(scene, role)}
+        {obj[store.TRAJECTORY]: obj for obj in store.with_role(scene, role)}
         for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE)
     )
-    prints = {name: fingerprint(things, rate) for name, things in groups.items()}
+    prints = {name: fingerprint(objects, rate) for name, objects in groups.items()}
     for name, text in prints.items():
         mark(trails.get(name), blocks.get(name), text)
     remember(scene, {name: text + (COMPLETE if name in trails else "") for name, text in prints.items()})

@@ -24,15 +24,15 @@ def follow(scene: bpy.types.Scene) -> None:
     """Bring cameras and footage in line with the scene: what handlers call. Changes only what has to change."""
     if migration.is_newer(scene) or bpy.app.is_job_running("RENDER"):
         return
-    things = videos.cameras(scene)
-    if not things:
+    objects = videos.cameras(scene)
+    if not objects:
         return
-    _heal(things)
-    videos.remember(scene, things)
+    _heal(objects)
+    videos.remember(scene, objects)
     use_size_of_active(scene)
-    for camera in things:
+    for camera in objects:
         camera_paths.follow_clock(scene, camera)
-    show_pictures(scene, things)
+    show_pictures(scene, objects)
 
 
 def use_size_of_active(scene: bpy.types.Scene, *, again: bool = False) -> None:
@@ -206,26 +206,26 @@ def bitmap(picture: Image) -> bytes:
     )
 
 
-def _heal(things: list[bpy.types.Object]) -> None:
+def _heal(objects: list[bpy.types.Object]) -> None:
     """A copy of a camera becomes a camera of its own: an id, a lens and footage of its own."""
     seen: set[str] = set()
-    for thing in sorted(things, key=lambda one: one.session_uid):
-        if thing.get(store.ID) and thing[store.ID] not in seen:
-            seen.add(thing[store.ID])
+    for obj in sorted(objects, key=lambda one: one.session_uid):
+        if obj.get(store.ID) and obj[store.ID] not in seen:
+            seen.add(obj[store.ID])
             continue
-        thing[store.ID] = uuid.uuid4().hex
-        seen.add(thing[store.ID])
-        if thing.data.users > 1:
-            thing.data = thing.data.copy()
-        for background in thing.data.background_images:
+        obj[store.ID] = uuid.uuid4().hex
+        seen.add(obj[store.ID])
+        if obj.data.users > 1:
+            obj.data = obj.data.copy()
+        for background in obj.data.background_images:
             if background.clip is not None and background.clip.users > 1:
                 background.clip = background.clip.copy()
-        still = _background(thing, "IMAGE")
+        still = _background(obj, "IMAGE")
         if still is not None:
             still.image = None
-            thing.data.background_images.remove(still)
-        if thing.animation_data is not None and thing.animation_data.action is not None:
-            thing.animation_data.action = thing.animation_data.action.copy()
+            obj.data.background_images.remove(still)
+        if obj.animation_data is not None and obj.animation_data.action is not None:
+            obj.animation_data.action = obj.animation_data.action.copy()
 
 
 def _remove_data(data: bpy.types.Camera) -> None:

@@ -14,16 +14,16 @@ def fill(scene: bpy.types.Scene, trajectory: str | None = None) -> None:
     """Write the rows of one trajectory, or of all, from the results that are stored."""
     rows = scene.rockfall_impacts
     names = None if trajectory is None else [trajectory]
-    wanted = [thing for thing in picks.things_of(scene, names) if store.RESULT in thing]
-    wanted.sort(key=lambda thing: (thing[store.TRAJECTORY], thing[store.TIME]))
+    wanted = [obj for obj in picks.objects_of(scene, names) if store.RESULT in obj]
+    wanted.sort(key=lambda obj: (obj[store.TRAJECTORY], obj[store.TIME]))
     there = [i for i, row in enumerate(rows) if trajectory is None or row.trajectory == trajectory]
     for _ in range(len(wanted) - len(there)):
         rows.add()
         there.append(len(rows) - 1)
     for i in reversed(there[len(wanted) :]):
         rows.remove(i)
-    for i, thing in zip(there, wanted, strict=False):
-        _write(rows[i], thing)
+    for i, obj in zip(there, wanted, strict=False):
+        _write(rows[i], obj)
 
 
 def highlight(scene: bpy.types.Scene, identifier: str) -> None:
@@ -43,31 +43,31 @@ def chosen(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return picks.with_id(scene, rows[index].pick) if 0 <= index < len(rows) else None
 
 
-def go_to(context: bpy.types.Context, scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+def go_to(context: bpy.types.Context, scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
     """Select a pick, and nothing else, and go to its moment."""
     layer = context.view_layer
-    if layer is not None and thing.name in layer.objects:
+    if layer is not None and obj.name in layer.objects:
         for other in layer.objects.selected:
-            if other != thing:
+            if other != obj:
                 other.select_set(False)
-        thing.select_set(True)
-        layer.objects.active = thing
-    frame = thing.get(store.KEY_FRAME)
+        obj.select_set(True)
+        layer.objects.active = obj
+    frame = obj.get(store.KEY_FRAME)
     if frame is not None:
         scene.frame_set(math.floor(frame), subframe=frame % 1)
 
 
 def selected(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active pick."""
-    thing = context.object
-    return thing if thing is not None and thing.get(store.ROLE) == store.PICK_ROLE else None
+    obj = context.object
+    return obj if obj is not None and obj.get(store.ROLE) == store.PICK_ROLE else None
 
 
-def _write(row: bpy.types.PropertyGroup, thing: bpy.types.Object) -> None:
-    result = thing[store.RESULT]
-    row.pick, row.trajectory = thing[store.ID], thing[store.TRAJECTORY]
+def _write(row: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
+    result = obj[store.RESULT]
+    row.pick, row.trajectory = obj[store.ID], obj[store.TRAJECTORY]
     row.number, row.flags = result["number"], result["flags"]
-    row.time_s = thing[store.TIME]
+    row.time_s = obj[store.TIME]
     row.speed1_mps, row.speed2_mps = math.hypot(*result["incident_mps"]), math.hypot(*result["restituted_mps"])
     for name in COLUMNS[2:]:
         setattr(row, name, result[name][0])

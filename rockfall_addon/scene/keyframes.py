@@ -69,7 +69,7 @@ def motion_keys(flights: Flights, which: Array, offset: Array | float = 0.0) -> 
     )
 
 
-def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float, *, in_place: bool = False) -> bool:
+def write_location_keys(obj: bpy.types.Object, keys: Keys, rate: float, *, in_place: bool = False) -> bool:
     """Replace an object's location curves by these keys, at frame = time × rate.
 
     in_place : write only when the number of keys stays the same, so that no key is freed while a person drags keys.
@@ -83,10 +83,10 @@ def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float, *, in_
     frames[same] += JUMP_FRAMES
     third = np.diff(frames) / 3
     count = len(frames)
-    if in_place and [len(curve.keyframe_points) for curve in location_curves(thing)] != [count] * 3:
+    if in_place and [len(curve.keyframe_points) for curve in location_curves(obj)] != [count] * 3:
         return False
     interpolation = np.where(keys.held, CONSTANT, BEZIER).astype(np.int32)
-    bag = _channelbag(thing)
+    bag = _channelbag(obj)
     for axis in range(3):
         curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
         points = curve.keyframe_points
@@ -107,9 +107,9 @@ def write_location_keys(thing: bpy.types.Object, keys: Keys, rate: float, *, in_
     return True
 
 
-def write_visibility_keys(thing: bpy.types.Object, spans_s: Sequence[tuple[float, float]], rate: float) -> None:
+def write_visibility_keys(obj: bpy.types.Object, spans_s: Sequence[tuple[float, float]], rate: float) -> None:
     """Hide an object except from the start to the end of each span [s]; the spans follow each other."""
-    bag = _channelbag(thing)
+    bag = _channelbag(obj)
     changes = [(-1.0, 1.0)] + [change for start, end in spans_s for change in ((start, 0.0), (end, 1.0))]
     changes[0] = (min(-1.0, changes[1][0] - 1.0) if spans_s else -1.0, 1.0)
     for name in ("hide_viewport", "hide_render"):
@@ -123,46 +123,46 @@ def write_visibility_keys(thing: bpy.types.Object, spans_s: Sequence[tuple[float
         curve.update()
 
 
-def key_location_once(thing: bpy.types.Object, frame: float) -> None:
+def key_location_once(obj: bpy.types.Object, frame: float) -> None:
     """One key at a (sub-)frame: the place and the time of a pick."""
-    bag = _channelbag(thing)
+    bag = _channelbag(obj)
     for axis in range(3):
         curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
         points = curve.keyframe_points
         if len(points) == 1:
-            points[0].co = (frame, thing.location[axis])
+            points[0].co = (frame, obj.location[axis])
         else:
             points.clear()
-            points.insert(frame, thing.location[axis], options={"FAST"})
+            points.insert(frame, obj.location[axis], options={"FAST"})
         curve.update()
 
 
-def action_of(thing: bpy.types.Object) -> bpy.types.Action | None:
+def action_of(obj: bpy.types.Object) -> bpy.types.Action | None:
     """What holds the keys of an object."""
-    return thing.animation_data.action if thing.animation_data is not None else None
+    return obj.animation_data.action if obj.animation_data is not None else None
 
 
-def location_curves(thing: bpy.types.Object) -> list[bpy.types.FCurve]:
+def location_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
     """The curves that move an object, as many as there are."""
-    action = action_of(thing)
-    if action is None or not action.layers or not action.layers[0].strips or thing.animation_data.action_slot is None:
+    action = action_of(obj)
+    if action is None or not action.layers or not action.layers[0].strips or obj.animation_data.action_slot is None:
         return []
-    bag = action.layers[0].strips[0].channelbag(thing.animation_data.action_slot)
+    bag = action.layers[0].strips[0].channelbag(obj.animation_data.action_slot)
     found = [bag.fcurves.find("location", index=axis) for axis in range(3)] if bag is not None else []
     return [curve for curve in found if curve is not None]
 
 
-def _channelbag(thing: bpy.types.Object) -> bpy.types.ActionChannelbag:
-    animation = thing.animation_data or thing.animation_data_create()
+def _channelbag(obj: bpy.types.Object) -> bpy.types.ActionChannelbag:
+    animation = obj.animation_data or obj.animation_data_create()
     if animation.action is None:
-        action = bpy.data.actions.new(thing.name)
+        action = bpy.data.actions.new(obj.name)
         animation.action = action
-        animation.action_slot = action.slots.new(id_type="OBJECT", name=thing.name)
+        animation.action_slot = action.slots.new(id_type="OBJECT", name=obj.name)
     elif animation.action.users - animation.action.use_fake_user > 1:  # of a linked duplicate
         animation.action = animation.action.copy()
     action, slot = animation.action, animation.action_slot
     if slot is None:
-        slot = animation.action_slot = next(iter(action.slots), None) or action.slots.new("OBJECT", thing.name)
+        slot = animation.action_slot = next(iter(action.slots), None) or action.slots.new("OBJECT", obj.name)
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
     return strip.channelbag(slot, ensure=True)

@@ -16,7 +16,7 @@ def version(scene: bpy.types.Scene) -> int | None:
     """The schema of what is in a scene: 0 before there were numbers, None when nothing of ours is there."""
     if store.SCHEMA in scene:
         return int(scene[store.SCHEMA])
-    return 0 if any(store.ROLE in thing for thing in scene.objects) else None
+    return 0 if any(store.ROLE in obj for obj in scene.objects) else None
 
 
 def is_newer(scene: bpy.types.Scene) -> bool:
@@ -48,9 +48,9 @@ def _from_0(scene: bpy.types.Scene) -> None:
     blocks = scene.get(store.BLOCKS)
     if blocks is not None and not isinstance(blocks, str):
         scene[store.BLOCKS] = json.dumps({name: list(values) for name, values in blocks.items()})
-    things = [thing for thing in picks.things_of(scene) if store.TIME in thing and store.POSITION in thing]
+    objects = [obj for obj in picks.objects_of(scene) if store.TIME in obj and store.POSITION in obj]
     shift = georeference.read_shift(scene).vector.tolist()
-    for thing in things:
+    for obj in objects:
         for key, value in (
             (store.ID, uuid.uuid4().hex),
             (store.KIND, "impact"),
@@ -59,12 +59,12 @@ def _from_0(scene: bpy.types.Scene) -> None:
             (store.EXTRA, {}),
             (store.PICK_SHIFT, shift),
         ):
-            if key not in thing:
-                thing[key] = value
-        curves = keyframes.location_curves(thing)
-        if store.KEY_FRAME not in thing and curves and len(curves[0].keyframe_points):
-            thing[store.KEY_FRAME] = float(curves[0].keyframe_points[0].co[0])
-    if things and store.OFFSETS not in scene:
+            if key not in obj:
+                obj[key] = value
+        curves = keyframes.location_curves(obj)
+        if store.KEY_FRAME not in obj and curves and len(curves[0].keyframe_points):
+            obj[store.KEY_FRAME] = float(curves[0].keyframe_points[0].co[0])
+    if objects and store.OFFSETS not in scene:
         try:
             timing.keep_offsets(scene, timing.offsets_of(scene, picks.picks_of(scene)))
         except RockfallError:  # two picks at one time: the panel will say so

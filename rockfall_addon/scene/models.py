@@ -57,7 +57,7 @@ def show_models(
     scene[store.SHOWN_MODELS] = " ".join(predicted.models)
     offsets = timing.shown_offsets(scene, result.picks)
     begin_s = predicted.time_s - np.array([offsets[name] for name in predicted.trajectory.tolist()])
-    blocks = {thing[store.TRAJECTORY]: thing for thing in store.with_role(scene, store.BLOCK_ROLE)}
+    blocks = {obj[store.TRAJECTORY]: obj for obj in store.with_role(scene, store.BLOCK_ROLE)}
     for model in predicted.models:
         which = np.flatnonzero((predicted.model == model) & (predicted.duration_s > 0))
         if not which.size:
@@ -117,10 +117,10 @@ def _show_flights(
         clock = trails.moments(0.0, float(predicted.duration_s[index]))
         position, velocity = predicted.launches.states(np.full(len(clock), index), clock)
         pieces.append((begin_s[index] + clock, position, np.linalg.norm(velocity, axis=1)))
-    thing = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, pieces)
-    thing[store.MODEL] = model
-    trails.paint(thing.data, np.array(find_model(model).colour))
-    _link(scene, thing, model)
+    obj = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, pieces)
+    obj[store.MODEL] = model
+    trails.paint(obj.data, np.array(find_model(model).colour))
+    _link(scene, obj, model)
 
 
 def _show_block(
@@ -134,18 +134,18 @@ def _show_block(
 ) -> None:
     """A block for the flights `which`, which follow each other without overlap."""
     name = real[store.TRAJECTORY]
-    thing = bpy.data.objects.new(
+    obj = bpy.data.objects.new(
         f"{name} {model}{f' {number + 1}' if number else ''}",
         trajectories.block_mesh(f"Rockfall twin {model}", find_model(model).colour),
     )
-    thing[store.ROLE], thing[store.MODEL], thing[store.TRAJECTORY] = store.MODEL_BLOCK_ROLE, model, name
-    thing.scale, thing.delta_location = real.scale, real.delta_location
-    _link(scene, thing, model)
+    obj[store.ROLE], obj[store.MODEL], obj[store.TRAJECTORY] = store.MODEL_BLOCK_ROLE, model, name
+    obj.scale, obj.delta_location = real.scale, real.delta_location
+    _link(scene, obj, model)
     rate = timing.keyed_rate(scene)
-    keyframes.write_location_keys(thing, _keys(predicted, which, begin_s), rate)
+    keyframes.write_location_keys(obj, _keys(predicted, which, begin_s), rate)
     ends = begin_s[which] + predicted.duration_s[which] + LINGER_S
     ends[:-1] = np.minimum(ends[:-1], begin_s[which[1:]])
-    keyframes.write_visibility_keys(thing, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
+    keyframes.write_visibility_keys(obj, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
 
 
 def _keys(predicted: PredictedFlights, which: np.ndarray, begin_s: np.ndarray) -> keyframes.Keys:
@@ -178,5 +178,5 @@ def _lanes(begin_s: np.ndarray, duration_s: np.ndarray) -> list[list[int]]:
     return lanes
 
 
-def _link(scene: bpy.types.Scene, thing: bpy.types.Object, model: str) -> None:
-    store.collection(scene, "Twins", find_model(model).title).objects.link(thing)
+def _link(scene: bpy.types.Scene, obj: bpy.types.Object, model: str) -> None:
+    store.collection(scene, "Twins", find_model(model).title).objects.link(obj)

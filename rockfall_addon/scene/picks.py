@@ -40,23 +40,23 @@ NOTHING_HELD: Held = {}
 UNCHANGED = Change()
 
 
-def things_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
+def objects_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
     """The objects of the picks, all or those of some trajectories, in no order."""
     names = None if trajectories is None else set(trajectories)
     return [
-        thing
-        for thing in scene.objects
-        if thing.get(store.ROLE) == store.PICK_ROLE
-        and store.TRAJECTORY in thing
-        and store.TIME in thing
-        and store.POSITION in thing
-        and (names is None or thing[store.TRAJECTORY] in names)
+        obj
+        for obj in scene.objects
+        if obj.get(store.ROLE) == store.PICK_ROLE
+        and store.TRAJECTORY in obj
+        and store.TIME in obj
+        and store.POSITION in obj
+        and (names is None or obj[store.TRAJECTORY] in names)
     ]
 
 
 def with_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
     """The pick with an id."""
-    return next((thing for thing in things_of(scene) if thing.get(store.ID) == identifier), None)
+    return next((obj for obj in objects_of(scene) if obj.get(store.ID) == identifier), None)
 
 
 def show_picks(
@@ -72,17 +72,17 @@ def show_picks(
     The object of each pick.
     """
     rate, version, shown = timing.keyed_rate(scene), next_version(scene), []
-    there = {(o[store.TRAJECTORY], time_of(o, rate)): o for o in things_of(scene)}
+    there = {(o[store.TRAJECTORY], time_of(o, rate)): o for o in objects_of(scene)}
     for i in range(len(picks.time_s)):
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
-        thing = there.pop((trajectory, time), None)
-        if thing is None:
+        obj = there.pop((trajectory, time), None)
+        if obj is None:
             number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
-            thing = _new(scene, trajectory, kind, number)
-        thing[store.TRAJECTORY], thing[store.TIME] = trajectory, time
-        thing[store.POSITION] = picks.position[i].tolist()
-        thing[store.KIND], thing[store.STATUS] = kind, str(picks.status[i])
-        thing[store.ROW] = int(picks.row[i])
+            obj = _new(scene, trajectory, kind, number)
+        obj[store.TRAJECTORY], obj[store.TIME] = trajectory, time
+        obj[store.POSITION] = picks.position[i].tolist()
+        obj[store.KIND], obj[store.STATUS] = kind, str(picks.status[i])
+        obj[store.ROW] = int(picks.row[i])
         for key, value in (
             (store.NORMAL, picks.normal[i]),
             (store.SPIN, picks.angular_velocity[i]),
@@ -90,15 +90,15 @@ def show_picks(
             (store.SIGMA_POSITION, picks.sigma_position_m[i : i + 1]),
         ):
             if np.isfinite(value).all() and not (key == store.SIGMA_POSITION and _of_confidence(picks, i)):
-                thing[key] = value.tolist()
-            elif key in thing:
-                del thing[key]
+                obj[key] = value.tolist()
+            elif key in obj:
+                del obj[key]
         extra = {name: str(values[i]) for name, values in picks.extra.items()}
-        if store.EXTRA not in thing or thing[store.EXTRA].to_dict() != extra:
-            thing[store.EXTRA] = extra
-        thing[store.PICK_SHIFT] = picks.shift.vector.tolist()
-        pose(thing, normals[i], (time - offsets[trajectory]) * rate, radius_m, version)
-        shown.append(thing)
+        if store.EXTRA not in obj or obj[store.EXTRA].to_dict() != extra:
+            obj[store.EXTRA] = extra
+        obj[store.PICK_SHIFT] = picks.shift.vector.tolist()
+        pose(obj, normals[i], (time - offsets[trajectory]) * rate, radius_m, version)
+        shown.append(obj)
     store.remove_objects(list(there.values()))
     scene[store.PICKS_SOURCE] = picks.source
     return shown
@@ -115,55 +115,55 @@ def add_pick(
     extra: Mapping[str, str] | None = None,
 ) -> bpy.types.Object:
     """A new pick at a local place; `live.sync` then makes the trajectory follow."""
-    number = len(things_of(scene, [trajectory])) + 1
-    thing = _new(scene, trajectory, kind, number)
-    thing[store.TRAJECTORY], thing[store.TIME], thing[store.ROW] = trajectory, float(time_s), 0
-    thing[store.POSITION] = _writable(scene, position_m)
-    thing[store.KIND], thing[store.STATUS] = kind, status
-    thing[store.EXTRA] = dict(extra or {})
-    thing[store.PICK_SHIFT] = georeference.read_shift(scene).vector.tolist()
+    number = len(objects_of(scene, [trajectory])) + 1
+    obj = _new(scene, trajectory, kind, number)
+    obj[store.TRAJECTORY], obj[store.TIME], obj[store.ROW] = trajectory, float(time_s), 0
+    obj[store.POSITION] = _writable(scene, position_m)
+    obj[store.KIND], obj[store.STATUS] = kind, status
+    obj[store.EXTRA] = dict(extra or {})
+    obj[store.PICK_SHIFT] = georeference.read_shift(scene).vector.tolist()
     offset = timing.offset_of(scene, trajectory, float(time_s))
     frame = (float(time_s) - offset) * timing.keyed_rate(scene)
-    pose(thing, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m, 0)
-    return thing
+    pose(obj, np.full(3, np.nan), frame, scene.rockfall.marker_radius_m, 0)
+    return obj
 
 
 def next_version(scene: bpy.types.Scene) -> int:
     """A number above all with which something of picks and blocks was written."""
-    ours = (thing for thing in scene.objects if thing.get(store.ROLE) in (store.PICK_ROLE, store.BLOCK_ROLE))
-    return 1 + max((max(versions(thing)) for thing in ours), default=0)
+    ours = (obj for obj in scene.objects if obj.get(store.ROLE) in (store.PICK_ROLE, store.BLOCK_ROLE))
+    return 1 + max((max(versions(obj)) for obj in ours), default=0)
 
 
-def versions(thing: bpy.types.Object) -> tuple[int, int]:
+def versions(obj: bpy.types.Object) -> tuple[int, int]:
     """With which version an object and its action were written; 0 for neither, and for an action that is missing.
 
     Both are written together. Blender's undo brings back only what the undone step has changed, and not what followed
     from it later: then they differ, the older one is what was brought back, and it is right.
     """
-    action, own = keyframes.action_of(thing), int(thing.get(store.WRITTEN, 0))
+    action, own = keyframes.action_of(obj), int(obj.get(store.WRITTEN, 0))
     return own, own if action is None else int(action.get(store.WRITTEN, 0))
 
 
-def pose(thing: bpy.types.Object, normal: Array, frame: float, radius_m: float, version: int) -> None:
+def pose(obj: bpy.types.Object, normal: Array, frame: float, radius_m: float, version: int) -> None:
     """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay."""
-    marker = _marker(thing[store.KIND])
-    if thing.data is not marker:
-        thing.data = marker
+    marker = _marker(obj[store.KIND])
+    if obj.data is not marker:
+        obj.data = marker
     up = Vector(normal) if np.isfinite(normal).all() else Vector((0.0, 0.0, 1.0))
     turn = up.to_track_quat("Z", "Y")
-    if thing.rotation_mode != "QUATERNION":
-        thing.rotation_mode = "QUATERNION"
-    if (Quaternion(thing.rotation_quaternion) - turn).magnitude > 1e-6:
-        thing.rotation_quaternion = turn
-    if (thing.scale - Vector((radius_m,) * 3)).length > 1e-6 * radius_m:
-        thing.scale = (radius_m,) * 3
-    place = list(thing[store.POSITION])
-    if not _same_place(thing.location, place):
-        thing.location = place
-    if not _keyed_at(thing, frame):
-        keyframes.key_location_once(thing, frame)
-    thing[store.KEY_FRAME] = float(np.float32(frame))
-    thing[store.WRITTEN] = keyframes.action_of(thing)[store.WRITTEN] = version
+    if obj.rotation_mode != "QUATERNION":
+        obj.rotation_mode = "QUATERNION"
+    if (Quaternion(obj.rotation_quaternion) - turn).magnitude > 1e-6:
+        obj.rotation_quaternion = turn
+    if (obj.scale - Vector((radius_m,) * 3)).length > 1e-6 * radius_m:
+        obj.scale = (radius_m,) * 3
+    place = list(obj[store.POSITION])
+    if not _same_place(obj.location, place):
+        obj.location = place
+    if not _keyed_at(obj, frame):
+        keyframes.key_location_once(obj, frame)
+    obj[store.KEY_FRAME] = float(np.float32(frame))
+    obj[store.WRITTEN] = keyframes.action_of(obj)[store.WRITTEN] = version
 
 
 def picks_of(scene: bpy.types.Scene) -> Picks:
@@ -173,25 +173,25 @@ def picks_of(scene: bpy.types.Scene) -> Picks:
     ------
     InputError : two picks of a trajectory at one time, and whatever else `make_picks` refuses.
     """
-    return read(scene, ordered(scene, things_of(scene)))
+    return read(scene, ordered(scene, objects_of(scene)))
 
 
 def ordered(
-    scene: bpy.types.Scene, things: Iterable[bpy.types.Object], held: Held = NOTHING_HELD
+    scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], held: Held = NOTHING_HELD
 ) -> list[bpy.types.Object]:
     """Trajectories in the order of their starts, the picks of each in the order of time."""
     rate = timing.keyed_rate(scene)
-    rows = [(thing[store.TRAJECTORY], time_of(thing, rate, held), thing) for thing in things]
+    rows = [(obj[store.TRAJECTORY], time_of(obj, rate, held), obj) for obj in objects]
     started: dict[str, float] = {}
     for name, time, _ in rows:
         started[name] = min(time, started.get(name, time))
     rows.sort(key=lambda row: (started[row[0]], row[0], row[1]))
-    return [thing for _, _, thing in rows]
+    return [obj for _, _, obj in rows]
 
 
 def read(
     scene: bpy.types.Scene,
-    things: Sequence[bpy.types.Object],
+    objects: Sequence[bpy.types.Object],
     surface: Surface | None = None,
     reach_m: float = 0.0,
     held: Held = NOTHING_HELD,
@@ -202,24 +202,24 @@ def read(
     held : what the person is doing to the keys of blocks.
     """
     rate = timing.keyed_rate(scene)
-    extras = [thing[store.EXTRA].to_dict() if store.EXTRA in thing else {} for thing in things]
+    extras = [obj[store.EXTRA].to_dict() if store.EXTRA in obj else {} for obj in objects]
     names = list(dict.fromkeys(name for extra in extras for name in extra))
     return make_picks(
-        [thing[store.TRAJECTORY] for thing in things],
-        [time_of(thing, rate, held) for thing in things],
-        [resting_place(thing, surface, reach_m, held) for thing in things],
-        kind=[thing[store.KIND] for thing in things],
-        status=[thing[store.STATUS] for thing in things],
+        [obj[store.TRAJECTORY] for obj in objects],
+        [time_of(obj, rate, held) for obj in objects],
+        [resting_place(obj, surface, reach_m, held) for obj in objects],
+        kind=[obj[store.KIND] for obj in objects],
+        status=[obj[store.STATUS] for obj in objects],
         normal=[
             [np.nan] * 3
-            if store.NORMAL not in thing or (surface is not None and moved(thing, held))
-            else list(thing[store.NORMAL])
-            for thing in things
+            if store.NORMAL not in obj or (surface is not None and moved(obj, held))
+            else list(obj[store.NORMAL])
+            for obj in objects
         ],
-        sigma_time_s=_doubles(things, store.SIGMA_TIME, 1),
-        sigma_position_m=_doubles(things, store.SIGMA_POSITION, 1),
-        angular_velocity=_doubles(things, store.SPIN, 3),
-        row=[thing.get(store.ROW, 0) for thing in things],
+        sigma_time_s=_doubles(objects, store.SIGMA_TIME, 1),
+        sigma_position_m=_doubles(objects, store.SIGMA_POSITION, 1),
+        angular_velocity=_doubles(objects, store.SPIN, 3),
+        row=[obj.get(store.ROW, 0) for obj in objects],
         extra={name: np.array([str(extra.get(name, "")) for extra in extras], dtype=np.str_) for name in names},
         source=str(scene.get(store.PICKS_SOURCE, "")),
         shift=georeference.read_shift(scene),
@@ -227,17 +227,17 @@ def read(
     )
 
 
-def moved(thing: bpy.types.Object, held: Held = NOTHING_HELD) -> bool:
+def moved(obj: bpy.types.Object, held: Held = NOTHING_HELD) -> bool:
     """Whether the object, or the key of its block, is elsewhere than the pick."""
-    return not _same_place(thing.location, thing[store.POSITION]) or any(_held(thing, held).way)
+    return not _same_place(obj.location, obj[store.POSITION]) or any(_held(obj, held).way)
 
 
-def frames_moved(thing: bpy.types.Object) -> float:
+def frames_moved(obj: bpy.types.Object) -> float:
     """How far the key was moved in time since it was written [frames]; keys that were added do not count."""
-    kept, (own, of_action) = thing.get(store.KEY_FRAME), versions(thing)
+    kept, (own, of_action) = obj.get(store.KEY_FRAME), versions(obj)
     if kept is None or of_action > own:
         return 0.0
-    for curve in keyframes.location_curves(thing):
+    for curve in keyframes.location_curves(obj):
         frames = [point.co[0] for point in curve.keyframe_points]
         if frames:
             nearest = min((frame - kept for frame in frames), key=abs)
@@ -246,36 +246,36 @@ def frames_moved(thing: bpy.types.Object) -> float:
     return 0.0
 
 
-def time_of(thing: bpy.types.Object, rate: float, held: Held = NOTHING_HELD) -> float:
+def time_of(obj: bpy.types.Object, rate: float, held: Held = NOTHING_HELD) -> float:
     """The pick's time on the common clock [s], with the edit of its key. `rate` is the one that the keys have."""
-    shift = frames_moved(thing) or _held(thing, held).frames
-    return float(thing[store.TIME]) + (shift / rate if shift else 0.0)
+    shift = frames_moved(obj) or _held(obj, held).frames
+    return float(obj[store.TIME]) + (shift / rate if shift else 0.0)
 
 
-def resting_place(thing: bpy.types.Object, surface: Surface | None, reach_m: float, held: Held = NOTHING_HELD) -> Array:
+def resting_place(obj: bpy.types.Object, surface: Surface | None, reach_m: float, held: Held = NOTHING_HELD) -> Array:
     """(3,) where the pick is, with the edit of its object, or of the place that a key of its block has.
 
     A pick that was on the terrain, that is nearer to it than `reach_m`, stays on it: it is moved along the terrain, to
     the point closest to its object. A pass is a point in the air and goes where it is put.
     """
-    stored = np.array(thing[store.POSITION])
-    if not moved(thing, held):
+    stored = np.array(obj[store.POSITION])
+    if not moved(obj, held):
         return stored
-    place = np.array(thing.location, dtype=np.float64)
-    if not moved(thing):
-        place = stored + _held(thing, held).way
-    if surface is None or thing[store.KIND] == "pass":
+    place = np.array(obj.location, dtype=np.float64)
+    if not moved(obj):
+        place = stored + _held(obj, held).way
+    if surface is None or obj[store.KIND] == "pass":
         return place
     near = closest_points(surface, np.stack([stored, place]))
     return near.point[1] if near.distance[0] <= reach_m else place
 
 
-def take_edits(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], edits: block_keys.Edits) -> None:
+def take_edits(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], edits: block_keys.Edits) -> None:
     """Do to the picks what a person did to the keys of their block; an edit of the pick itself goes before.
 
     A copy has all that its pick has, but the row of a table and what was clicked for it, which are of another moment.
     """
-    of, rate = {thing[store.ID]: thing for thing in things}, timing.keyed_rate(scene)
+    of, rate = {obj[store.ID]: obj for obj in objects}, timing.keyed_rate(scene)
     for identifier, frames in edits.copied:
         if identifier in of:
             copy = of[identifier].copy()
@@ -287,43 +287,43 @@ def take_edits(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], edits
             for collection in of[identifier].users_collection:
                 collection.objects.link(copy)
     for identifier, change in edits.changes.items():
-        thing = of.get(identifier)
-        if thing is None:
+        obj = of.get(identifier)
+        if obj is None:
             continue
-        if change.frames and not frames_moved(thing):
-            thing[store.TIME] = float(thing[store.TIME]) + change.frames / rate
-        if any(change.way) and not moved(thing):
-            thing.location = np.array(thing[store.POSITION]) + change.way
+        if change.frames and not frames_moved(obj):
+            obj[store.TIME] = float(obj[store.TIME]) + change.frames / rate
+        if any(change.way) and not moved(obj):
+            obj.location = np.array(obj[store.POSITION]) + change.way
     store.remove_objects([of[identifier] for identifier in edits.deleted if identifier in of])
 
 
-def bring_back(thing: bpy.types.Object, state: Mapping[str, object]) -> None:
+def bring_back(obj: bpy.types.Object, state: Mapping[str, object]) -> None:
     """Make the pick what it was when its block's keys were written: an undo has brought back the keys alone."""
     for key in block_keys.STATE:
         if key in state:
-            thing[key] = state[key]
-        elif key in thing:
-            del thing[key]
-    thing.location = thing[store.POSITION]
-    for curve in keyframes.location_curves(thing)[:1]:
-        thing[store.KEY_FRAME] = float(curve.keyframe_points[0].co[0])  # an edit of its key, if any, is no edit now
+            obj[key] = state[key]
+        elif key in obj:
+            del obj[key]
+    obj.location = obj[store.POSITION]
+    for curve in keyframes.location_curves(obj)[:1]:
+        obj[store.KEY_FRAME] = float(curve.keyframe_points[0].co[0])  # an edit of its key, if any, is no edit now
 
 
-def absorb(scene: bpy.types.Scene, thing: bpy.types.Object, surface: Surface | None, reach_m: float) -> bool:
+def absorb(scene: bpy.types.Scene, obj: bpy.types.Object, surface: Surface | None, reach_m: float) -> bool:
     """Make what a person did to the object the state of the pick; True when there was something.
 
     On another place the terrain has another normal: one that came with the pick is dropped where there is a terrain.
     """
     changed = False
-    frames = frames_moved(thing)
+    frames = frames_moved(obj)
     if frames:
-        thing[store.TIME] = float(thing[store.TIME]) + frames / timing.keyed_rate(scene)
-        thing[store.KEY_FRAME] = float(thing[store.KEY_FRAME]) + frames
+        obj[store.TIME] = float(obj[store.TIME]) + frames / timing.keyed_rate(scene)
+        obj[store.KEY_FRAME] = float(obj[store.KEY_FRAME]) + frames
         changed = True
-    if moved(thing):
-        thing[store.POSITION] = _writable(scene, resting_place(thing, surface, reach_m))
-        if surface is not None and store.NORMAL in thing:
-            del thing[store.NORMAL]
+    if moved(obj):
+        obj[store.POSITION] = _writable(scene, resting_place(obj, surface, reach_m))
+        if surface is not None and store.NORMAL in obj:
+            del obj[store.NORMAL]
         changed = True
     return changed
 
@@ -351,23 +351,23 @@ def _of_confidence(picks: Picks, i: int) -> bool:
     return text.isdecimal() and CONFIDENCE_SIGMA_M.get(int(text)) == picks.sigma_position_m[i]
 
 
-def set_extra(thing: bpy.types.Object, name: str, text: str) -> None:
+def set_extra(obj: bpy.types.Object, name: str, text: str) -> None:
     """Keep a further column of the pick, such as its note; an empty one is dropped."""
-    extra = thing[store.EXTRA].to_dict() if store.EXTRA in thing else {}
+    extra = obj[store.EXTRA].to_dict() if store.EXTRA in obj else {}
     extra.pop(name, None)
-    thing[store.EXTRA] = extra | ({name: text} if text else {})
+    obj[store.EXTRA] = extra | ({name: text} if text else {})
 
 
-def extra_of(thing: bpy.types.Object, name: str) -> str:
+def extra_of(obj: bpy.types.Object, name: str) -> str:
     """A further column of the pick as text."""
-    return str(thing[store.EXTRA].get(name, "")) if store.EXTRA in thing else ""
+    return str(obj[store.EXTRA].get(name, "")) if store.EXTRA in obj else ""
 
 
 def _new(scene: bpy.types.Scene, trajectory: str, kind: str, number: int) -> bpy.types.Object:
-    thing = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
-    thing[store.ROLE], thing[store.ID] = store.PICK_ROLE, uuid.uuid4().hex
-    store.collection(scene, "Trajectories", trajectory).objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
+    obj[store.ROLE], obj[store.ID] = store.PICK_ROLE, uuid.uuid4().hex
+    store.collection(scene, "Trajectories", trajectory).objects.link(obj)
+    return obj
 
 
 def _same_place(location: Vector, stored: Sequence[float]) -> bool:
@@ -375,24 +375,24 @@ def _same_place(location: Vector, stored: Sequence[float]) -> bool:
     return Vector(stored) == location if len(location) == 3 else False
 
 
-def _keyed_at(thing: bpy.types.Object, frame: float) -> bool:
+def _keyed_at(obj: bpy.types.Object, frame: float) -> bool:
     """Whether the object has the one key that it should have."""
-    curves = list(keyframes.location_curves(thing))
+    curves = list(keyframes.location_curves(obj))
     wanted = float(np.float32(frame))
     return len(curves) == 3 and all(
         len(curve.keyframe_points) == 1
         and curve.keyframe_points[0].co[0] == wanted
-        and curve.keyframe_points[0].co[1] == thing.location[curve.array_index]
+        and curve.keyframe_points[0].co[1] == obj.location[curve.array_index]
         for curve in curves
     )
 
 
-def _held(thing: bpy.types.Object, held: Held) -> Change:
-    return held.get(thing.get(store.ID, ""), UNCHANGED)
+def _held(obj: bpy.types.Object, held: Held) -> Change:
+    return held.get(obj.get(store.ID, ""), UNCHANGED)
 
 
-def _doubles(things: Sequence[bpy.types.Object], key: str, width: int) -> np.ndarray:
-    rows = [list(o[key]) if key in o else [np.nan] * width for o in things]
+def _doubles(objects: Sequence[bpy.types.Object], key: str, width: int) -> np.ndarray:
+    rows = [list(o[key]) if key in o else [np.nan] * width for o in objects]
     return np.array(rows, dtype=np.float64).reshape(-1, width)
 
 

@@ -77,15 +77,15 @@ def in_this_picture(
     scene: bpy.types.Scene, camera: bpy.types.Object | None, name: str | None = None
 ) -> list[bpy.types.Object]:
     """The picks that belong to the picture, or moment, that is shown: of one trajectory, or of all."""
-    things = picks.things_of(scene, None if name is None else [name])
+    objects = picks.objects_of(scene, None if name is None else [name])
     if camera is not None:
         _, video_s = picture_time(scene, camera)
         moment, step = common_time(camera, video_s), frame_step_s(camera)
-        times = dict.fromkeys(things, moment)
+        times = dict.fromkeys(objects, moment)
     else:
         step = 1 / timing.frame_rate(scene)
-        times = {thing: now(scene, thing[store.TRAJECTORY]) for thing in things}
-    return [thing for thing in things if abs(thing[store.TIME] - times[thing]) <= SAME_PICTURE * step]
+        times = {obj: now(scene, obj[store.TRAJECTORY]) for obj in objects}
+    return [obj for obj in objects if abs(obj[store.TIME] - times[obj]) <= SAME_PICTURE * step]
 
 
 def of_this_picture(

@@ -81,7 +81,7 @@ def trajectory(scene: bpy.types.Scene) -> str:
 
 def trajectories(scene: bpy.types.Scene) -> list[str]:
     """Names of the trajectories that have picks, in the order of their names."""
-    return sorted({thing[store.TRAJECTORY] for thing in picks.things_of(scene)})
+    return sorted({obj[store.TRAJECTORY] for obj in picks.objects_of(scene)})
 
 
 def in_picture(

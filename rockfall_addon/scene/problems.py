@@ -62,10 +62,10 @@ def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[
 def first_instant(scene: bpy.types.Scene) -> float | None:
     """Common time of the first picture, or the time origin when the scene plays as filmed; None when neither is set."""
     starts = []
-    for thing in scene.objects:
-        if thing.get(store.ROLE) == CAMERA_ROLE and store.VIDEO_TIMES in thing and store.CLOCK in thing:
-            times = thing[store.VIDEO_TIMES]
-            offset, drift, origin, rate = thing[store.CLOCK]
+    for obj in scene.objects:
+        if obj.get(store.ROLE) == CAMERA_ROLE and store.VIDEO_TIMES in obj and store.CLOCK in obj:
+            times = obj[store.VIDEO_TIMES]
+            offset, drift, origin, rate = obj[store.CLOCK]
             if len(times):
                 starts.append(offset + (1 + drift) * rate * (times[0] - origin))
     if starts:
@@ -73,7 +73,7 @@ def first_instant(scene: bpy.types.Scene) -> float | None:
     return timing.origin_s(scene) if scene.rockfall.playback == "REAL" else None
 
 
-def tell(scene: bpy.types.Scene) -> None:
+def update(scene: bpy.types.Scene) -> None:
     """Bring what the panel shows in line: the scene's problems and those of its trajectories, the gravest first."""
     said = _of_scene(scene)
     for one in of_trajectories(scene).values():
@@ -123,7 +123,7 @@ def forget() -> None:
 def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
     said = []
     scale = scene.unit_settings.scale_length
-    if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6 and picks.things_of(scene):
+    if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6 and picks.objects_of(scene):
         text = (
             f"The scene's unit scale is {scale:g}. Rockfall counts one unit as one metre, so the lengths that Blender "
             "shows are not those of the slope: set Scene Properties > Units > Unit Scale to 1."

@@ -76,7 +76,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
     ------
     RockfallError : there are no picks, two are at one time, or the folder cannot be written.
     """
-    if not picks.things_of(scene):
+    if not picks.objects_of(scene):
         raise RockfallError("There are no picks to export: import some first, or load the demo.")
     table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), georeference.read_shift(scene)
     settings = reconstruction.project_settings(scene, table.trajectory.tolist())

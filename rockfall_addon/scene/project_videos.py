@@ -76,7 +76,7 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
     ----------
     name : of the trajectory, for tracks that name none.
     """
-    things = []
+    objects = []
     for read in found:
         first = not videos.cameras(scene)
         there = (c for c in videos.cameras(scene) if Path(str(c[store.VIDEO_FILE])) == read.video.path.resolve())
@@ -100,11 +100,11 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
             )
         if read.track is not None:
             _keep_track(camera, read.track, name)
-        things.append(camera)
-    if things:
+        objects.append(camera)
+    if objects:
         video_times.fit_range(scene)
         footage.follow(scene)
-    return things
+    return objects
 
 
 def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]:

@@ -62,7 +62,7 @@ class Proposal:
 def lacking(scene: bpy.types.Scene) -> str:
     """What is missing before a refinement, in a sentence; empty when nothing is."""
     cameras = videos.cameras(scene)
-    if not picks.things_of(scene):
+    if not picks.objects_of(scene):
         return "Pick the impacts first."
     if not cameras:
         return "Add the video first: the picks are fitted to its pixels."
@@ -88,7 +88,7 @@ def keep(scene: bpy.types.Scene, refined: Refined, cameras: Sequence[bpy.types.O
     """Keep a refinement of the scene's picks, from the videos of these cameras."""
     before, fit = refined.before, refined.fit
     new, names = fit.picks, list(dict.fromkeys(refined.before.trajectory.tolist()))
-    things = picks.ordered(scene, picks.things_of(scene, names))
+    objects = picks.ordered(scene, picks.objects_of(scene, names))
     first = [f"{name} " if len(names) > 1 else "" for name in before.trajectory.tolist()]
     labels = [f"{first[i]}{before.kind[i]} {before.time_s[i]:.2f}" for i in range(len(before))]
     ids = [camera[store.ID] for camera in cameras]
@@ -97,7 +97,7 @@ def keep(scene: bpy.types.Scene, refined: Refined, cameras: Sequence[bpy.types.O
     kept = {
         "names": names,
         "prints": _prints(scene, names),
-        "ids": [thing[store.ID] for thing in things],
+        "ids": [obj[store.ID] for obj in objects],
         "ends": fit.reconstruction.ends,
         "free": list(free),
         "before_px": fit.rmse_px_before,
@@ -175,17 +175,17 @@ def apply(scene: bpy.types.Scene) -> int:
     if _is_stale(scene, kept):
         raise RockfallError("The picks were changed since this was computed. Refine again.")
     rows = np.array(scene[store.PROPOSAL_ROWS], dtype=np.float64).reshape(-1, ROW)
-    by_id = {thing.get(store.ID): thing for thing in picks.things_of(scene)}
+    by_id = {obj.get(store.ID): obj for obj in picks.objects_of(scene)}
     for identifier, row in zip(kept["ids"], rows.tolist(), strict=True):
-        thing = by_id[identifier]
-        thing[store.TIME] = row[0]
-        thing[store.POSITION] = row[1:4]
-        thing.location = row[1:4]
+        obj = by_id[identifier]
+        obj[store.TIME] = row[0]
+        obj[store.POSITION] = row[1:4]
+        obj.location = row[1:4]
         for key, value in ((store.SIGMA_POSITION, row[4]), (store.SIGMA_TIME, row[5])):
             if np.isfinite(value):
-                thing[key] = [value]
+                obj[key] = [value]
         if np.isfinite(row[6:]).all():  # the place is a radius below the fitted centre, along this very normal
-            thing[store.NORMAL] = row[6:]
+            obj[store.NORMAL] = row[6:]
     _apply_shared(scene, kept)
     discard(scene)
     if scene.rockfall.flights_join != kept["ends"]:

@@ -61,13 +61,13 @@ def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
     trajectories.show_reconstruction(scene, result, ground(scene))
     fingerprints.remember_all(scene)
     problems.keep_trajectories(scene, problems.of_result(scene, result))
-    problems.tell(scene)
+    problems.update(scene)
     models.follow(scene, result)
 
 
 def refresh(scene: bpy.types.Scene) -> Reconstruction | None:
     """Reconstruct and show again what is in the scene; None when it has no picks."""
-    if not pick_objects.things_of(scene):
+    if not pick_objects.objects_of(scene):
         return None
     result = reconstruct_scene(scene)
     show(scene, result)

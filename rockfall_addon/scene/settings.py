@@ -29,9 +29,9 @@ def _row_chosen(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> No
     from . import impact_rows
 
     scene = self.id_data
-    thing = impact_rows.chosen(scene)
-    if thing is not None and thing != impact_rows.selected(context):
-        impact_rows.go_to(context, scene, thing)
+    obj = impact_rows.chosen(scene)
+    if obj is not None and obj != impact_rows.selected(context):
+        impact_rows.go_to(context, scene, obj)
 
 
 def _table_columns() -> list[tuple[str, str, str]]:

@@ -125,9 +125,9 @@ def remove_collection(scene: bpy.types.Scene, name: str) -> None:
 
 def remove_objects(objects: list[bpy.types.Object]) -> None:
     """Remove objects with the data and actions that nothing else uses."""
-    for thing in objects:
-        data, action = thing.data, thing.animation_data.action if thing.animation_data else None
-        bpy.data.objects.remove(thing)
+    for obj in objects:
+        data, action = obj.data, obj.animation_data.action if obj.animation_data else None
+        bpy.data.objects.remove(obj)
         if isinstance(data, bpy.types.Mesh) and not data.users:
             bpy.data.meshes.remove(data)
         if action is not None and not action.users:

@@ -70,21 +70,21 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     names: set[str] = set()
     anywhere = False
     for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
-        thing = update.id
-        if isinstance(thing, bpy.types.Action):  # a key that was inserted or deleted moves no object at this frame
-            for user in (user for slot in thing.original.slots for user in slot.users()):
+        obj = update.id
+        if isinstance(obj, bpy.types.Action):  # a key that was inserted or deleted moves no object at this frame
+            for user in (user for slot in obj.original.slots for user in slot.users()):
                 if user.get(store.ROLE) == store.BLOCK_ROLE and store.TRAJECTORY in user:
                     names.add(user[store.TRAJECTORY])
-        elif isinstance(thing, bpy.types.Object):
-            role = thing.get(store.ROLE)
-            if role in (store.PICK_ROLE, store.BLOCK_ROLE) and store.TRAJECTORY in thing:
-                names.add(thing[store.TRAJECTORY])
+        elif isinstance(obj, bpy.types.Object):
+            role = obj.get(store.ROLE)
+            if role in (store.PICK_ROLE, store.BLOCK_ROLE) and store.TRAJECTORY in obj:
+                names.add(obj[store.TRAJECTORY])
             elif role == store.TERRAIN_ROLE:
                 anywhere = True
                 if update.is_updated_geometry:
-                    terrain_mesh.mistrust(thing.original.data)
-        elif isinstance(thing, bpy.types.Collection) or (
-            isinstance(thing, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
+                    terrain_mesh.mistrust(obj.original.data)
+        elif isinstance(obj, bpy.types.Collection) or (
+            isinstance(obj, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
         ):
             anywhere = True
     if names or (anywhere and migration.version(scene) is not None):
@@ -141,21 +141,21 @@ def sync(
     if not dragging:
         terrain_view.follow_edits(scene)
     wanted = None if names is None else set(names)
-    things = picks.things_of(scene, wanted)
-    if not things and store.SHOWN not in scene:
+    objects = picks.objects_of(scene, wanted)
+    if not objects and store.SHOWN not in scene:
         return done
     parts = trajectories.parts_of(scene, wanted)
     edited: dict[str, str] = {}
     if dragging:
-        things, resample = _originals(things), False
+        objects, resample = _originals(objects), False
     else:
-        _heal(scene, things)
+        _heal(scene, objects)
         again, resample = again or _ground_changed(scene), _rate_changed(scene)
         if (again or resample) and wanted is not None:
-            wanted, things, parts = None, picks.things_of(scene), trajectories.parts_of(scene)
-        edited = _take_edits_of_blocks(scene, things, parts, undone, done)
-        things = picks.things_of(scene, wanted)
-    groups = fingerprints.by_trajectory(things)
+            wanted, objects, parts = None, picks.objects_of(scene), trajectories.parts_of(scene)
+        edited = _take_edits_of_blocks(scene, objects, parts, undone, done)
+        objects = picks.objects_of(scene, wanted)
+    groups = fingerprints.by_trajectory(objects)
     prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
     gone = [name for name in prints if name not in groups and (wanted is None or name in wanted)]
     for name in gone:
@@ -174,7 +174,7 @@ def sync(
     problems.keep_trajectories(scene, said)
     if altered and not dragging:
         _finish(scene)
-    problems.tell(scene)
+    problems.update(scene)
     return done
 
 
@@ -191,26 +191,26 @@ def recompute(scene: bpy.types.Scene) -> None:
         sync(scene, again=True)
 
 
-def retime(thing: bpy.types.Object, text: str) -> None:
+def retime(obj: bpy.types.Object, text: str) -> None:
     """Give a pick the time that a person has typed; what is no number is not taken."""
     try:
         time = float(text.strip().removesuffix("s").replace(",", "."))
     except ValueError:
         return
     if np.isfinite(time):
-        thing[store.TIME] = time
-        for scene in thing.users_scene:
-            touch(scene, [thing[store.TRAJECTORY]])
+        obj[store.TIME] = time
+        for scene in obj.users_scene:
+            touch(scene, [obj[store.TRAJECTORY]])
 
 
-def nudge(scene: bpy.types.Scene, thing: bpy.types.Object, frames: float) -> None:
+def nudge(scene: bpy.types.Scene, obj: bpy.types.Object, frames: float) -> None:
     """Move a pick in time by (parts of) a frame of the scene."""
-    thing[store.TIME] = float(thing[store.TIME]) + frames / timing.frame_rate(scene)
-    sync(scene, [thing[store.TRAJECTORY]])
+    obj[store.TIME] = float(obj[store.TIME]) + frames / timing.frame_rate(scene)
+    sync(scene, [obj[store.TRAJECTORY]])
 
 
 def _take_edits_of_blocks(
-    scene: bpy.types.Scene, things: list[bpy.types.Object], parts: trajectories.Parts, undone: bool, done: Done
+    scene: bpy.types.Scene, objects: list[bpy.types.Object], parts: trajectories.Parts, undone: bool, done: Done
 ) -> dict[str, str]:
     """Do to the picks what a person, or an undo, did to their blocks' keys.
 
@@ -219,7 +219,7 @@ def _take_edits_of_blocks(
     The trajectories whose block was edited → why keys of it come back, empty when they do not.
     """
     edited = {}
-    for name, members in fingerprints.by_trajectory(things).items():
+    for name, members in fingerprints.by_trajectory(objects).items():
         block = parts.get((store.BLOCK_ROLE, name))
         if block is None:
             continue
@@ -229,9 +229,9 @@ def _take_edits_of_blocks(
             states = block_keys.states_of(block)
         written = int(action.get(store.WRITTEN, 0)) if action is not None else 0
         older = [one for one in members if one.get(store.WRITTEN, 0) < written]
-        for thing in members:
-            if thing.get(store.WRITTEN, 0) > written and thing[store.ID] in states:
-                picks.bring_back(thing, states[thing[store.ID]])
+        for obj in members:
+            if obj.get(store.WRITTEN, 0) > written and obj[store.ID] in states:
+                picks.bring_back(obj, states[obj[store.ID]])
         edits = block_keys.edits_of(block)
         if not edits or older:
             continue
@@ -274,7 +274,7 @@ def _has_changed(
 
 def _of_one_version(members: list[bpy.types.Object], block: bpy.types.Object) -> bool:
     """Whether picks, their keys and those of the block were written together; an undo may bring back some of them."""
-    found = {version for thing in members for version in picks.versions(thing)}
+    found = {version for obj in members for version in picks.versions(obj)}
     return found == {picks.versions(block)[1]}
 
 
@@ -315,8 +315,8 @@ def _rebuild(
     block = reconstruction.blocks_of(scene, {name})[name]
     reach = max(LEAST_REACH_M, REACH_RADII * block.radius_m)
     if not dragging:
-        for thing in members:
-            picks.absorb(scene, thing, surface, reach)
+        for obj in members:
+            picks.absorb(scene, obj, surface, reach)
     members = picks.ordered(scene, members, held)
     result = reconstruction.reconstruct_scene(scene, picks.read(scene, members, surface, reach, held))
     offset = timing.offset_of(scene, name, float(result.picks.time_s[0]))
@@ -331,9 +331,9 @@ def _rebuild(
 def _pose(scene: bpy.types.Scene, members: list[bpy.types.Object], result: object, offset: float) -> None:
     rate, radius, version = timing.keyed_rate(scene), scene.rockfall.marker_radius_m, picks.next_version(scene)
     scene[store.KEYED_RATE] = rate
-    for thing, normal in zip(members, trajectories.normals_of(result), strict=True):
-        frame = (float(thing[store.TIME]) - offset) * rate
-        picks.pose(thing, normal, frame, radius, version)
+    for obj, normal in zip(members, trajectories.normals_of(result), strict=True):
+        frame = (float(obj[store.TIME]) - offset) * rate
+        picks.pose(obj, normal, frame, radius, version)
 
 
 def _grey(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:
@@ -356,7 +356,7 @@ def _forget(scene: bpy.types.Scene, name: str) -> None:
 def _finish(scene: bpy.types.Scene) -> None:
     """What concerns all trajectories, once nothing moves: the ends of the colour scales, the twins of the models."""
     scene[store.SCHEMA] = migration.SCHEMA
-    last = max((float(thing.get(store.KEY_FRAME, 0.0)) for thing in picks.things_of(scene)), default=0.0)
+    last = max((float(obj.get(store.KEY_FRAME, 0.0)) for obj in picks.objects_of(scene)), default=0.0)
     if last > scene.frame_end:
         scene.frame_end = int(np.ceil(last + timing.frame_rate(scene)))
     if trails.set_tops(scene):
@@ -390,31 +390,31 @@ def _rate_changed(scene: bpy.types.Scene) -> bool:
     return True
 
 
-def _heal(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:
+def _heal(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
     """Copies of picks become picks of their own; picks from another scene come to this one's origin."""
     shift = georeference.read_shift(scene).vector
     seen: dict[str, bpy.types.Object] = {}
-    for thing in sorted(things, key=lambda one: one.session_uid):
-        identifier = thing.get(store.ID)
+    for obj in sorted(objects, key=lambda one: one.session_uid):
+        identifier = obj.get(store.ID)
         if identifier is None or identifier in seen:
-            thing[store.ID] = uuid.uuid4().hex
+            obj[store.ID] = uuid.uuid4().hex
             if identifier is not None:
-                _begin_copy(scene, thing, seen[identifier])
-        seen[thing[store.ID]] = thing
-        own = thing.get(store.PICK_SHIFT)
+                _begin_copy(scene, obj, seen[identifier])
+        seen[obj[store.ID]] = obj
+        own = obj.get(store.PICK_SHIFT)
         if own is None:
-            thing[store.PICK_SHIFT] = shift.tolist()
+            obj[store.PICK_SHIFT] = shift.tolist()
         elif list(own) != shift.tolist():
-            place = np.array(thing[store.POSITION]) + np.array(own) - shift
-            thing[store.POSITION], thing[store.PICK_SHIFT] = place.tolist(), shift.tolist()
-            thing.location = place
+            place = np.array(obj[store.POSITION]) + np.array(own) - shift
+            obj[store.POSITION], obj[store.PICK_SHIFT] = place.tolist(), shift.tolist()
+            obj.location = place
 
 
-def _originals(things: list[bpy.types.Object]) -> list[bpy.types.Object]:
+def _originals(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
     """Without the copies that a person is just placing: they are picks once they are let go."""
     first: dict[str | None, bpy.types.Object] = {}
-    for thing in sorted(things, key=lambda one: one.session_uid):
-        first.setdefault(thing.get(store.ID), thing)
+    for obj in sorted(objects, key=lambda one: one.session_uid):
+        first.setdefault(obj.get(store.ID), obj)
     return list(first.values())
 
 

@@ -33,26 +33,26 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
         georeference.write_shift(scene, surface.shift)
     values = dict(zip(terrain_mesh.SHADING, (shading.hillshade, shading.eye_dome, shading.thin), strict=True))
     mesh = terrain_mesh.new_mesh(surface.name, surface.vertices, surface.faces, values)
-    thing = bpy.data.objects.new(surface.name, mesh)
-    thing[store.ROLE], thing[store.ID] = store.TERRAIN_ROLE, uuid.uuid4().hex
-    thing[store.TERRAIN_SUMMARY], thing[store.TERRAIN_FILE] = list(surface.summary), surface.name
-    thing[store.THIN_SHARE] = float(np.mean(shading.thin))
-    thing[store.REACH] = float(np.abs(surface.bounds).max())
-    store.collection(scene, "Terrain").objects.link(thing)
-    _surfaces[thing.session_uid] = _key(thing), surface
+    obj = bpy.data.objects.new(surface.name, mesh)
+    obj[store.ROLE], obj[store.ID] = store.TERRAIN_ROLE, uuid.uuid4().hex
+    obj[store.TERRAIN_SUMMARY], obj[store.TERRAIN_FILE] = list(surface.summary), surface.name
+    obj[store.THIN_SHARE] = float(np.mean(shading.thin))
+    obj[store.REACH] = float(np.abs(surface.bounds).max())
+    store.collection(scene, "Terrain").objects.link(obj)
+    _surfaces[obj.session_uid] = _key(obj), surface
     terrain_view.follow(scene)
     terrain_look.apply(scene)
-    return thing
+    return obj
 
 
 def tiles(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The terrain objects that have faces, by name."""
-    return [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if has_faces(thing)]
+    return [obj for obj in store.with_role(scene, store.TERRAIN_ROLE) if has_faces(obj)]
 
 
-def has_faces(thing: bpy.types.Object) -> bool:
+def has_faces(obj: bpy.types.Object) -> bool:
     """Whether an object can be terrain."""
-    return thing.type == "MESH" and len(thing.data.polygons) > 0
+    return obj.type == "MESH" and len(obj.data.polygons) > 0
 
 
 def surface_of_scene(scene: bpy.types.Scene) -> Surface | None:
@@ -77,7 +77,7 @@ def surface_of_scene(scene: bpy.types.Scene) -> Surface | None:
     return _joined[0][1]
 
 
-def surface_of(thing: bpy.types.Object) -> Surface:
+def surface_of(obj: bpy.types.Object) -> Surface:
     """The surface of one terrain object, with its spatial index, in local coordinates.
 
     That of a terrain that was just imported is the file's, in double precision. From a loaded file it is made from the
@@ -87,14 +87,14 @@ def surface_of(thing: bpy.types.Object) -> Surface:
     ------
     RockfallError : the object has no faces.
     """
-    if not has_faces(thing):
-        raise RockfallError(f"{thing.name} has no faces, so it cannot be the terrain. Choose a mesh with faces.")
-    key = _key(thing)
-    known = _surfaces.get(thing.session_uid)
+    if not has_faces(obj):
+        raise RockfallError(f"{obj.name} has no faces, so it cannot be the terrain. Choose a mesh with faces.")
+    key = _key(obj)
+    known = _surfaces.get(obj.session_uid)
     if known is None or known[0] != key:
         for identifier in _surfaces.keys() - {each.session_uid for each in bpy.data.objects}:
             del _surfaces[identifier]
-        known = _surfaces[thing.session_uid] = key, _read(thing)
+        known = _surfaces[obj.session_uid] = key, _read(obj)
     return known[1]
 
 
@@ -158,24 +158,24 @@ def grouped(count: int) -> str:
     return f"{count:,}".replace(",", "\u202f")
 
 
-def _read(thing: bpy.types.Object) -> Surface:
-    vertices, faces = terrain_mesh.mesh_arrays(thing.data)
-    world = np.array(thing.matrix_world)
+def _read(obj: bpy.types.Object) -> Surface:
+    vertices, faces = terrain_mesh.mesh_arrays(obj.data)
+    world = np.array(obj.matrix_world)
     local = vertices.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
     if np.linalg.det(world[:3, :3]) < 0:  # mirrored: the faces would look into the ground
         faces = np.ascontiguousarray(faces[:, ::-1])
-    return Surface(local, faces, georeference.read_shift(_scene_of(thing)), thing.name, ())
+    return Surface(local, faces, georeference.read_shift(_scene_of(obj)), obj.name, ())
 
 
-def _key(thing: bpy.types.Object) -> tuple:
-    mesh = thing.data
-    place = tuple(round(value, 9) for row in thing.matrix_world for value in row)
-    shift = georeference.read_shift(_scene_of(thing))
+def _key(obj: bpy.types.Object) -> tuple:
+    mesh = obj.data
+    place = tuple(round(value, 9) for row in obj.matrix_world for value in row)
+    shift = georeference.read_shift(_scene_of(obj))
     return mesh.session_uid, terrain_mesh.contents_of(mesh), place, shift
 
 
-def _scene_of(thing: bpy.types.Object) -> bpy.types.Scene:
-    return next(iter(thing.users_scene), bpy.context.scene)
+def _scene_of(obj: bpy.types.Object) -> bpy.types.Scene:
+    return next(iter(obj.users_scene), bpy.context.scene)
 
 
 def _differ(one: Surface, other: Surface) -> bool:

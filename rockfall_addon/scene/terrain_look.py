@@ -44,9 +44,9 @@ def apply(scene: bpy.types.Scene) -> None:
 
 def meshes(scene: bpy.types.Scene) -> list[bpy.types.Mesh]:
     """The meshes of the scene's tiles, and those that stand in for them in the 3-D view."""
-    tiles = [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if thing.type == "MESH"]
+    tiles = [obj for obj in store.with_role(scene, store.TERRAIN_ROLE) if obj.type == "MESH"]
     stand_ins = [stand_in for tile in tiles if (stand_in := terrain_mesh.stand_in(tile)) is not None]
-    return list({thing.data.name: thing.data for thing in (*tiles, *stand_ins)}.values())
+    return list({obj.data.name: obj.data for obj in (*tiles, *stand_ins)}.values())
 
 
 def paint(which: Iterable[bpy.types.Mesh], look: Look) -> None:

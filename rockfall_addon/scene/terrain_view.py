@@ -25,7 +25,7 @@ def follow(scene: bpy.types.Scene) -> None:
     All tiles together are drawn with about a third of the limit, each with its share.
     """
     settings = scene.rockfall_terrain
-    tiles = [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if thing.type == "MESH"]
+    tiles = [obj for obj in store.with_role(scene, store.TERRAIN_ROLE) if obj.type == "MESH"]
     total = sum(len(tile.data.polygons) for tile in tiles)
     for tile in tiles:
         if total <= settings.view_limit:
@@ -42,7 +42,7 @@ def follow(scene: bpy.types.Scene) -> None:
 
 def follow_edits(scene: bpy.types.Scene) -> None:
     """Make the coarse views anew of tiles that a person has edited."""
-    tiles = [thing for thing in store.with_role(scene, store.TERRAIN_ROLE) if terrain_mesh.stand_in(thing) is not None]
+    tiles = [obj for obj in store.with_role(scene, store.TERRAIN_ROLE) if terrain_mesh.stand_in(obj) is not None]
     if not all(map(_is_current, tiles)):
         follow(scene)
 

@@ -86,7 +86,7 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
         return False
     factor = rate / keyed
     roles = (store.BLOCK_ROLE, store.PICK_ROLE, store.MODEL_BLOCK_ROLE)
-    objects = [thing for role in roles for thing in store.with_role(scene, role)]
+    objects = [obj for role in roles for obj in store.with_role(scene, role)]
     actions = {o.animation_data.action for o in objects if o.animation_data and o.animation_data.action}
     for action in actions:
         for layer in action.layers:
@@ -94,11 +94,11 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
                 for bag in strip.channelbags:
                     for curve in bag.fcurves:
                         _stretch(curve, factor)
-    for thing in store.with_role(scene, store.PICK_ROLE):
-        if store.KEY_FRAME in thing:
-            thing[store.KEY_FRAME] *= factor
-    for thing in store.with_role(scene, store.BLOCK_ROLE):
-        block_keys.stretch(thing, factor)
+    for obj in store.with_role(scene, store.PICK_ROLE):
+        if store.KEY_FRAME in obj:
+            obj[store.KEY_FRAME] *= factor
+    for obj in store.with_role(scene, store.BLOCK_ROLE):
+        block_keys.stretch(obj, factor)
     scene[store.KEYED_RATE] = rate
     scene.frame_end = max(1, round(scene.frame_end * factor))
     return True

@@ -60,7 +60,7 @@ def trail(
     role: str,
     pieces: Sequence[Piece],
     marks: Marks | None = None,
-    thing: bpy.types.Object | None = None,
+    obj: bpy.types.Object | None = None,
 ) -> bpy.types.Object:
     """An object of the flights, new or brought in line; `paint` gives it its colours, `set_trails` its thickness."""
     counts = np.array([len(time) for time, _, _ in pieces])
@@ -68,10 +68,10 @@ def trail(
     last = np.cumsum(counts) - 1
     first = np.setdiff1d(np.arange(len(time)), last)
     edges = np.column_stack([first, first + 1]).astype(np.int32).ravel()
-    if thing is None:
-        thing = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-        thing[store.ROLE] = role
-    mesh = thing.data
+    if obj is None:
+        obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
+        obj[store.ROLE] = role
+    mesh = obj.data
     if len(mesh.vertices) != len(time) or len(mesh.edges) != len(first) or len(mesh.polygons):
         mesh.clear_geometry()
         mesh.vertices.add(len(time))
@@ -92,10 +92,10 @@ def trail(
         mesh.attributes.new(materials.SPEED_COLOUR, "FLOAT_COLOR", "POINT")
         mesh.attributes.active_color_name = mesh.attributes.default_color_name = materials.SPEED_COLOUR
     mesh.update()
-    modifier = thing.modifiers.get("Trail") or thing.modifiers.new("Trail", "NODES")
+    modifier = obj.modifiers.get("Trail") or obj.modifiers.new("Trail", "NODES")
     if modifier.node_group is None:
         modifier.node_group = materials.trail_group()
-    return thing
+    return obj
 
 
 def paint(mesh: bpy.types.Mesh, colours: Array) -> None:
@@ -106,22 +106,22 @@ def paint(mesh: bpy.types.Mesh, colours: Array) -> None:
     mesh.update()
 
 
-def paint_observed(scene: bpy.types.Scene, things: Sequence[bpy.types.Object] | None = None) -> None:
+def paint_observed(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None) -> None:
     """Colour the real flights as the scene's settings say; all in the real blocks' colour while models are shown.
 
     What passes below the terrain is red in any case, flights that are not up to date are grey.
     """
     models_shown = bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE))
-    for thing in store.with_role(scene, store.FLIGHTS_ROLE) if things is None else things:
-        mesh = thing.data
+    for obj in store.with_role(scene, store.FLIGHTS_ROLE) if objects is None else objects:
+        mesh = obj.data
         if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
             continue
-        if thing.get(store.STALE):
+        if obj.get(store.STALE):
             paint(mesh, np.array(STALE_COLOUR))
         elif models_shown:
             paint(mesh, np.array(OBSERVED_COLOUR))
         else:
-            colours = _colours(scene.rockfall, thing)
+            colours = _colours(scene.rockfall, obj)
             if BELOW_ATTRIBUTE in mesh.attributes:
                 colours[_read(mesh, BELOW_ATTRIBUTE).astype(bool)] = BELOW_COLOUR
             paint(mesh, colours)
@@ -130,10 +130,10 @@ def paint_observed(scene: bpy.types.Scene, things: Sequence[bpy.types.Object] | 
 def set_tops(scene: bpy.types.Scene) -> bool:
     """Set the ends of the colour scales to what is shown; True when they changed."""
     settings, speeds, energies = scene.rockfall, [0.0], [0.0]
-    for thing in store.with_role(scene, store.FLIGHTS_ROLE):
-        top = float(thing.get(store.TOP_SPEED, 0.0))
+    for obj in store.with_role(scene, store.FLIGHTS_ROLE):
+        top = float(obj.get(store.TOP_SPEED, 0.0))
         speeds.append(top)
-        energies.append(0.5 * float(thing.get(store.MASS, 0.0)) * top**2 / 1000)
+        energies.append(0.5 * float(obj.get(store.MASS, 0.0)) * top**2 / 1000)
     tops = rounded_top(max(speeds)), rounded_top(max(energies))
     before = settings.speed_top_mps, settings.energy_top_kj
     settings.speed_top_mps, settings.energy_top_kj = tops
@@ -143,29 +143,29 @@ def set_tops(scene: bpy.types.Scene) -> bool:
 def set_trails(scene: bpy.types.Scene) -> None:
     """Apply the trails' radius, their ticks, and whether they end at the current time."""
     settings = scene.rockfall
-    for thing in store.with_role(scene, store.FLIGHTS_ROLE) + store.with_role(scene, store.MODEL_FLIGHTS_ROLE):
-        set_trail(settings, thing)
+    for obj in store.with_role(scene, store.FLIGHTS_ROLE) + store.with_role(scene, store.MODEL_FLIGHTS_ROLE):
+        set_trail(settings, obj)
 
 
-def set_trail(settings: bpy.types.PropertyGroup, thing: bpy.types.Object) -> None:
+def set_trail(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
     """`set_trails` for one of them."""
-    modifier = thing.modifiers.get("Trail")
+    modifier = obj.modifiers.get("Trail")
     if modifier is not None and modifier.node_group is not None:
         materials.set_input(modifier, "Radius", settings.trail_radius_m)
         materials.set_input(modifier, "Up to now", settings.trail_until_now)
         if "Ticks" in modifier.node_group.interface.items_tree:
             materials.set_input(modifier, "Ticks", settings.show_ticks)
-        thing.update_tag()
+        obj.update_tag()
 
 
-def _colours(settings: bpy.types.PropertyGroup, thing: bpy.types.Object) -> Array:
+def _colours(settings: bpy.types.PropertyGroup, obj: bpy.types.Object) -> Array:
     """(n, 3) sRGB of the points of a trail, by speed, energy or doubt."""
-    mesh = thing.data
+    mesh = obj.data
     if settings.colour_by == "DOUBT" and DOUBT_ATTRIBUTE in mesh.attributes:
         return scale_colours(_read(mesh, DOUBT_ATTRIBUTE), 0.0, 1.0)
     speed = _read(mesh, materials.SPEED_ATTRIBUTE)
-    if settings.colour_by == "ENERGY" and store.MASS in thing:
-        return scale_colours(0.5 * float(thing[store.MASS]) * speed**2 / 1000, 0.0, settings.energy_top_kj)
+    if settings.colour_by == "ENERGY" and store.MASS in obj:
+        return scale_colours(0.5 * float(obj[store.MASS]) * speed**2 / 1000, 0.0, settings.energy_top_kj)
     return scale_colours(speed, 0.0, settings.speed_top_mps)
 
 

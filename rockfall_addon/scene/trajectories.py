@@ -42,15 +42,15 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     if first:
         _choose_sizes(settings, result)
     offsets = timing.offsets_of(scene, result.picks)
-    things = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
+    objects = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
     timing.keep_offsets(scene, offsets)
-    store_results(things, result)
+    store_results(objects, result)
     parts = parts_of(scene)
     names = [name for name in offsets if (result.flights.trajectory == name).any()]
-    store.remove_objects([thing for (_, name), thing in parts.items() if name not in names])
+    store.remove_objects([obj for (_, name), obj in parts.items() if name not in names])
     last = 1.0
     for name in names:
-        show_trajectory(scene, name, result, things, offsets[name], surface, parts)
+        show_trajectory(scene, name, result, objects, offsets[name], surface, parts)
         end = result.flights.end_time_s[result.flights.trajectory == name].max()
         last = max(last, float(end) - offsets[name])
     trails.set_tops(scene)
@@ -70,16 +70,16 @@ def parts_of(scene: bpy.types.Scene, trajectories: Collection[str] | None = None
     trajectories : None for all.
     """
     found: dict[tuple[str, str], bpy.types.Object] = {}
-    for thing in scene.objects:
-        role = thing.get(store.ROLE)
+    for obj in scene.objects:
+        role = obj.get(store.ROLE)
         if role not in (store.FLIGHTS_ROLE, store.BLOCK_ROLE):
             continue
-        name = thing.get(store.TRAJECTORY)
+        name = obj.get(store.TRAJECTORY)
         if name is None or (trajectories is not None and name not in trajectories):
             continue
-        other = found.setdefault((role, name), thing)
-        if other != thing:
-            older, newer = sorted((other, thing), key=lambda each: each.session_uid)
+        other = found.setdefault((role, name), obj)
+        if other != obj:
+            older, newer = sorted((other, obj), key=lambda each: each.session_uid)
             found[role, name] = older
             del newer[store.ROLE]
     return found
@@ -89,7 +89,7 @@ def show_trajectory(
     scene: bpy.types.Scene,
     name: str,
     result: Reconstruction,
-    things: Sequence[bpy.types.Object],
+    objects: Sequence[bpy.types.Object],
     offset: float,
     surface: Surface | None,
     parts: Parts,
@@ -98,16 +98,16 @@ def show_trajectory(
 ) -> None:
     """Bring the flights and the block of one trajectory in line; without a flight there are none.
 
-    things : the object of each of the reconstruction's picks.
+    objects : the object of each of the reconstruction's picks.
     held : a person holds picks or keys; keys of the block that the person holds are left alone.
     """
     which = np.flatnonzero(result.flights.trajectory == name)
     trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
     if not which.size:
-        store.remove_objects([thing for thing in (trail, block) if thing is not None])
+        store.remove_objects([obj for obj in (trail, block) if obj is not None])
         return
     trail = _show_flights(scene, name, result, which, offset, surface, trail)
-    _show_block(scene, name, result, things, which, offset, block, held)
+    _show_block(scene, name, result, objects, which, offset, block, held)
     trails.paint_observed(scene, [trail])
 
 
@@ -132,7 +132,7 @@ def _show_flights(
     which: np.ndarray,
     offset: float,
     surface: Surface | None,
-    thing: bpy.types.Object | None,
+    obj: bpy.types.Object | None,
 ) -> bpy.types.Object:
     flights, rate = result.flights, timing.frame_rate(scene)
     sampled = [
@@ -150,19 +150,19 @@ def _show_flights(
         doubt=np.repeat(_doubt(result, which), counts),
         tick=np.concatenate([tick for _, tick in sampled]),
     )
-    new = thing is None
-    bare = new or "Trail" not in thing.modifiers or thing.modifiers["Trail"].node_group is None
-    thing = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, pieces, marks, thing)
-    thing[store.TRAJECTORY] = name
-    thing[store.MASS] = _block_of(result, name).mass_kg
+    new = obj is None
+    bare = new or "Trail" not in obj.modifiers or obj.modifiers["Trail"].node_group is None
+    obj = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, pieces, marks, obj)
+    obj[store.TRAJECTORY] = name
+    obj[store.MASS] = _block_of(result, name).mass_kg
     ends = np.vstack([flights.start_velocity[which], flights.end_velocity[which]])
-    thing[store.TOP_SPEED] = float(norm(ends).max(initial=0.0))
-    thing.pop(store.STALE, None)
+    obj[store.TOP_SPEED] = float(norm(ends).max(initial=0.0))
+    obj.pop(store.STALE, None)
     if new:
-        store.collection(scene, "Trajectories", name).objects.link(thing)
+        store.collection(scene, "Trajectories", name).objects.link(obj)
     if bare:
-        trails.set_trail(scene.rockfall, thing)
-    return thing
+        trails.set_trail(scene.rockfall, obj)
+    return obj
 
 
 def _below(result: Reconstruction, name: str, position: Array, surface: Surface | None) -> Array:
@@ -207,7 +207,7 @@ def _show_block(
     scene: bpy.types.Scene,
     name: str,
     result: Reconstruction,
-    things: Sequence[bpy.types.Object],
+    objects: Sequence[bpy.types.Object],
     which: np.ndarray,
     offset: float,
     block: bpy.types.Object | None,
@@ -225,12 +225,12 @@ def _show_block(
     keys = keyframes.motion_keys(result.flights, which)
     mine = np.flatnonzero(result.picks.trajectory == name)
     away = np.abs(keys.time_s[:, None] - result.picks.time_s[mine])
-    of = [things[mine[i]] if gap < SAME_TIME_S else None for i, gap in zip(away.argmin(1), away.min(1), strict=True)]
+    of = [objects[mine[i]] if gap < SAME_TIME_S else None for i, gap in zip(away.argmin(1), away.min(1), strict=True)]
     keys.time_s[:] -= offset
     if keyframes.write_location_keys(block, keys, timing.keyed_rate(scene), in_place=held):
         block_keys.remember(block, of)
         if not held:
-            keyframes.action_of(block)[store.WRITTEN] = max(int(thing.get(store.WRITTEN, 0)) for thing in things)
+            keyframes.action_of(block)[store.WRITTEN] = max(int(obj.get(store.WRITTEN, 0)) for obj in objects)
 
 
 def normals_of(result: Reconstruction) -> np.ndarray:
@@ -240,10 +240,10 @@ def normals_of(result: Reconstruction) -> np.ndarray:
     return normals
 
 
-def store_results(things: Sequence[bpy.types.Object], result: Reconstruction) -> None:
+def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -> None:
     """Write each impact's numbers into its object, where panels and exports find them.
 
-    things : the object of each of the reconstruction's picks.
+    objects : the object of each of the reconstruction's picks.
     """
     impacts, flags = result.impacts, result.impacts.flag_text()
     columns = {
@@ -270,11 +270,11 @@ def store_results(things: Sequence[bpy.types.Object], result: Reconstruction) ->
         columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
     rows = {name: [np.atleast_1d(value).tolist() for value in values] for name, values in columns.items()}
     i = 0
-    for thing, kind in zip(things, result.picks.kind.tolist(), strict=True):
+    for obj, kind in zip(objects, result.picks.kind.tolist(), strict=True):
         if kind != "impact":
-            thing.pop(store.RESULT, None)
+            obj.pop(store.RESULT, None)
             continue
-        thing[store.RESULT] = {name: values[i] for name, values in rows.items()} | {
+        obj[store.RESULT] = {name: values[i] for name, values in rows.items()} | {
             "number": int(impacts.impact[i]),
             "flags": flags[i],
         }

@@ -62,7 +62,7 @@ def zero_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     ------
     RockfallError : there are picks, whose times are on the common clock.
     """
-    if picks.things_of(scene):
+    if picks.objects_of(scene):
         raise RockfallError(
             "The picks have their times on the common clock, so it cannot be set to 0 here any more. "
             "Let the scene begin here instead."

@@ -15,16 +15,16 @@ COLLECTION = "Cameras"
 
 def cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The cameras of the scene's videos, by name."""
-    return [thing for thing in store.with_role(scene, store.CAMERA_ROLE) if is_video(thing)]
+    return [obj for obj in store.with_role(scene, store.CAMERA_ROLE) if is_video(obj)]
 
 
-def is_video(thing: bpy.types.Object | None) -> bool:
+def is_video(obj: bpy.types.Object | None) -> bool:
     """Whether an object is the camera of a video."""
     return (
-        thing is not None
-        and thing.type == "CAMERA"
-        and thing.get(store.ROLE) == store.CAMERA_ROLE
-        and store.VIDEO_TIMES in thing
+        obj is not None
+        and obj.type == "CAMERA"
+        and obj.get(store.ROLE) == store.CAMERA_ROLE
+        and store.VIDEO_TIMES in obj
     )
 
 
@@ -37,7 +37,7 @@ def active_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 def by_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
     """The camera of an id."""
-    return next((thing for thing in cameras(scene) if thing.get(store.ID) == identifier), None)
+    return next((obj for obj in cameras(scene) if obj.get(store.ID) == identifier), None)
 
 
 def summary(camera: bpy.types.Object) -> str:
@@ -79,10 +79,10 @@ def row_time_of(camera: bpy.types.Object) -> float:
     return float(camera.get(store.ROW_TIME, 0.0))
 
 
-def remember(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> None:
+def remember(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
     """Remember which cameras there are, beside those that are gone."""
     known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
-    known |= {thing[store.ID]: Path(str(thing[store.VIDEO_FILE])).name for thing in things}
+    known |= {obj[store.ID]: Path(str(obj[store.VIDEO_FILE])).name for obj in objects}
     text = json.dumps(known)
     if scene.get(store.KNOWN_VIDEOS) != text:
         scene[store.KNOWN_VIDEOS] = text
@@ -97,6 +97,6 @@ def forget_id(scene: bpy.types.Scene, identifier: str) -> None:
 
 def deleted(scene: bpy.types.Scene) -> dict[str, str]:
     """Id → name of the video, of cameras that someone deleted."""
-    there = {thing[store.ID] for thing in cameras(scene)}
+    there = {obj[store.ID] for obj in cameras(scene)}
     known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
     return {identifier: name for identifier, name in known.items() if identifier not in there}

@@ -112,8 +112,8 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
     lens, moment = pictures.posed(camera, video_s), pictures.common_time(camera, video_s)
     times = clocks.clock_of(camera).to_common(videos.times_of(camera))
     step = pictures.frame_step_s(camera)
-    things = fingerprints.by_trajectory(picks.things_of(scene))
-    filmed = {name: path for name in things if (path := path_of(scene, name, times)) is not None}
+    objects = fingerprints.by_trajectory(picks.objects_of(scene))
+    filmed = {name: path for name in objects if (path := path_of(scene, name, times)) is not None}
     filmed = {n: p for n, p in filmed.items() if p.time_s[-1] > times[0] - step and p.time_s[0] < times[-1] + step}
     if settings.show_paths:
         for path in filmed.values():
@@ -125,11 +125,11 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
     if settings.show_track:
         for name in sightings.names_in(camera):
             _add_seen(found, scene, camera, lens, name, filmed.get(name), video_s)
-    for members in things.values():
-        for thing in members:
-            near = abs(thing[store.TIME] - moment) <= pictures.SAME_PICTURE * step
-            if near or thing == active or times[0] - step <= thing[store.TIME] <= times[-1] + step:
-                _add_pick(found, lens, thing, near, thing == active)
+    for members in objects.values():
+        for obj in members:
+            near = abs(obj[store.TIME] - moment) <= pictures.SAME_PICTURE * step
+            if near or obj == active or times[0] - step <= obj[store.TIME] <= times[-1] + step:
+                _add_pick(found, lens, obj, near, obj == active)
     if active is not None:
         _add_active(found, scene, camera, lens, active)
     return found
@@ -186,7 +186,7 @@ def sample(
 
 
 def _path(scene: bpy.types.Scene, name: str, frames_s: Array | None) -> Path | None:
-    things = picks.ordered(scene, picks.things_of(scene, [name]))
+    objects = picks.ordered(scene, picks.objects_of(scene, [name]))
     surface, block = reconstruction.ground(scene), places.block_of(scene, name)
     how = reconstruction.project_settings(scene, []).reconstruction
     reach = max(sync.LEAST_REACH_M, sync.REACH_RADII * block.radius_m)
@@ -194,7 +194,7 @@ def _path(scene: bpy.types.Scene, name: str, frames_s: Array | None) -> Path | N
     for ends in dict.fromkeys(("centres" if surface is not None else how.flights, how.flights)):
         try:
             result = reconstruct(
-                picks.trusted(picks.read(scene, things, surface, reach)), surface=surface, block={name: block},
+                picks.trusted(picks.read(scene, objects, surface, reach)), surface=surface, block={name: block},
                 gravity_mps2=how.gravity_mps2, drag=drag, normal_radius_m=how.normal_radius_m, flights=ends,
             )  # fmt: skip
         except RockfallError:
@@ -311,34 +311,34 @@ def _sightings(
     return _seen[place][1]
 
 
-def _add_pick(found: Drawing, lens: Camera, thing: bpy.types.Object, near: bool, active: bool) -> None:
-    place = thing.location if picks.moved(thing) else thing[store.POSITION]
+def _add_pick(found: Drawing, lens: Camera, obj: bpy.types.Object, near: bool, active: bool) -> None:
+    place = obj.location if picks.moved(obj) else obj[store.POSITION]
     pixel = project(lens, [list(place)])[0]
     if np.isnan(pixel[0]):
         return
-    colour = picks.MARKER_COLOURS.get(thing[store.KIND], (1.0, 1.0, 1.0))
+    colour = picks.MARKER_COLOURS.get(obj[store.KIND], (1.0, 1.0, 1.0))
     found.marks.append(Mark(pixel, "ring", (*colour, 1.0 if near else 0.6), 8.0 if near else 5.0))
     if active:
         found.marks.append(Mark(pixel, "ring", (1.0, 0.65, 0.1, 1.0), 12.0))
 
 
 def _add_active(
-    found: Drawing, scene: bpy.types.Scene, camera: bpy.types.Object, lens: Camera, thing: bpy.types.Object
+    found: Drawing, scene: bpy.types.Scene, camera: bpy.types.Object, lens: Camera, obj: bpy.types.Object
 ) -> None:
     """Disc, ellipse and second view of the selected pick."""
-    place = np.array(thing.location if picks.moved(thing) else thing[store.POSITION], dtype=np.float64)
-    radius = places.block_of(scene, thing[store.TRAJECTORY]).radius_m
-    disc = around(place, np.array(thing.matrix_world.col[2].xyz), radius)
+    place = np.array(obj.location if picks.moved(obj) else obj[store.POSITION], dtype=np.float64)
+    radius = places.block_of(scene, obj[store.TRAJECTORY]).radius_m
+    disc = around(place, np.array(obj.matrix_world.col[2].xyz), radius)
     found.lines.append(_closed(project(lens, disc), (1.0, 0.65, 0.1), 1.0, 0.9))
-    clicked = clicks.of(thing)
+    clicked = clicks.of(obj)
     for click in clicked.values():
         axes = click.ellipse
         points = place + np.cos(CIRCLE)[:, None] * axes[0] + np.sin(CIRCLE)[:, None] * axes[1]
         found.lines.append(_closed(project(lens, points), (1.0, 0.3, 0.2), 1.5))
-    curve = clicks.epipolar(scene, thing, camera)
+    curve = clicks.epipolar(scene, obj, camera)
     if curve is not None and len(curve) > 1:
         found.lines.append(_closed(curve, EPIPOLAR, 1.5))
-    met = clicks.triangulated(scene, thing) if len(clicked) > 1 else None
+    met = clicks.triangulated(scene, obj) if len(clicked) > 1 else None
     if met is not None and np.isfinite(met.point).all():
         pixel = project(lens, met.point)[0]
         if np.isfinite(pixel[0]):

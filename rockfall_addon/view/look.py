@@ -51,17 +51,17 @@ def _up_the_slope(scene: bpy.types.Scene) -> Quaternion:
     return towards_viewer.to_track_quat("Z", "Y")
 
 
-def _frame(context: bpy.types.Context, area: bpy.types.Area, things: list[bpy.types.Object]) -> None:
+def _frame(context: bpy.types.Context, area: bpy.types.Area, objects: list[bpy.types.Object]) -> None:
     """Frame objects and leave the selection as it was."""
     selected, active = list(context.selected_objects), context.view_layer.objects.active
-    for thing in context.view_layer.objects:
-        thing.select_set(thing in things)
+    for obj in context.view_layer.objects:
+        obj.select_set(obj in objects)
     region = next(r for r in area.regions if r.type == "WINDOW")
     smooth, context.preferences.view.smooth_view = context.preferences.view.smooth_view, 0
     with context.temp_override(area=area, region=region):
         bpy.ops.view3d.view_selected()
     area.spaces.active.region_3d.view_distance *= AROUND
     context.preferences.view.smooth_view = smooth
-    for thing in context.view_layer.objects:
-        thing.select_set(thing in selected)
+    for obj in context.view_layer.objects:
+        obj.select_set(obj in selected)
     context.view_layer.objects.active = active

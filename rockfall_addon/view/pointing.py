@@ -86,56 +86,56 @@ def on_screen(context: bpy.types.Context, points: Array) -> Array:
 def pick_at(context: bpy.types.Context, xy: Sequence[float], *, any_time: bool = False) -> bpy.types.Object | None:
     """The pick under a place of the region. In the footage those of its picture only, unless any_time."""
     scene, camera = context.scene, solved_camera_of(context)
-    things = picks.things_of(scene)
+    objects = picks.objects_of(scene)
     if camera is not None and not any_time:
-        things = pictures.in_this_picture(scene, camera)
-    things = [thing for thing in things if thing.visible_get()]
-    if not things:
+        objects = pictures.in_this_picture(scene, camera)
+    objects = [obj for obj in objects if obj.visible_get()]
+    if not objects:
         return None
-    spots = on_screen(context, np.array([list(thing[store.POSITION]) for thing in things]))
+    spots = on_screen(context, np.array([list(obj[store.POSITION]) for obj in objects]))
     away = np.hypot(*(spots - np.asarray(xy, dtype=np.float64)).T)
     away[np.isnan(away)] = np.inf
     nearest = int(np.argmin(away))
-    return things[nearest] if away[nearest] <= REACH_PX * context.preferences.system.ui_scale else None
+    return objects[nearest] if away[nearest] <= REACH_PX * context.preferences.system.ui_scale else None
 
 
-def handle_of(context: bpy.types.Context, thing: bpy.types.Object) -> tuple[float, float]:
+def handle_of(context: bpy.types.Context, obj: bpy.types.Object) -> tuple[float, float]:
     """Where a pick is held by the mouse, in the region: by what is clicked in the footage, else by its place."""
-    place, camera = np.array(thing[store.POSITION], dtype=np.float64), solved_camera_of(context)
+    place, camera = np.array(obj[store.POSITION], dtype=np.float64), solved_camera_of(context)
     if camera is not None and context.scene.rockfall_picking.aim == "CENTRE":
-        seen = clicks.of(thing).get(camera[store.ID])
+        seen = clicks.of(obj).get(camera[store.ID])
         rectangle = image_view.image_rectangle(context.region, context.region_data, context.scene, camera)
         if (
             seen is not None
             and seen.centre
             and rectangle is not None
-            and thing in pictures.in_this_picture(context.scene, camera)
+            and obj in pictures.in_this_picture(context.scene, camera)
         ):
             x, y = image_view.to_region(rectangle, videos.size_of(camera), seen.pixel)
             return float(x), float(y)
-        normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
-        radius = places.block_of(context.scene, thing[store.TRAJECTORY]).radius_m
+        normal = np.array(obj.matrix_world.col[2].xyz, dtype=np.float64)
+        radius = places.block_of(context.scene, obj[store.TRAJECTORY]).radius_m
         place = place + radius * normal / max(float(np.linalg.norm(normal)), 1e-9)
     x, y = on_screen(context, place)[0]
     return float(x), float(y)
 
 
-def select(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+def select(context: bpy.types.Context, obj: bpy.types.Object) -> None:
     """Make a pick the active and only selected object."""
     for other in context.selected_objects:
-        if other != thing:
+        if other != obj:
             other.select_set(False)
-    thing.select_set(True)
-    context.view_layer.objects.active = thing
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
 
 
 def active_pick(context: bpy.types.Context) -> bpy.types.Object | None:
     """The selected pick."""
     layer = context.view_layer
-    thing = layer.objects.active if layer is not None else None
-    if thing is None or thing.get(store.ROLE) != store.PICK_ROLE or store.TRAJECTORY not in thing:
+    obj = layer.objects.active if layer is not None else None
+    if obj is None or obj.get(store.ROLE) != store.PICK_ROLE or store.TRAJECTORY not in obj:
         return None
-    return thing
+    return obj
 
 
 def _no_pixel(context: bpy.types.Context, camera: bpy.types.Object) -> str:

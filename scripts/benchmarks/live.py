@@ -102,10 +102,10 @@ def main() -> None:
     )
 
     live = parts["sync"]
-    things = sorted(
-        parts["picks"].things_of(scene, ["run 7" if options.trajectories > 6 else "run 1"]), key=lambda o: o.name
+    objects = sorted(
+        parts["picks"].objects_of(scene, ["run 7" if options.trajectories > 6 else "run 1"]), key=lambda o: o.name
     )
-    pick = things[len(things) // 2]
+    pick = objects[len(objects) // 2]
     place = np.array(pick.location)
     step = [0]
 

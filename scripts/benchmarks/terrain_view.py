@@ -109,7 +109,7 @@ def drawing(gpu: object, bpy: object) -> Callable[[], None]:
     space.overlay.show_overlays = False
     width, height = 1280, 720
     buffer = gpu.types.GPUOffScreen(width, height)
-    terrain = next(thing for thing in bpy.context.scene.objects if thing.type == "MESH")
+    terrain = next(obj for obj in bpy.context.scene.objects if obj.type == "MESH")
     middle = sum((Vector(corner) for corner in terrain.bound_box), Vector()) / 8
     away = 1.2 * max(terrain.dimensions)
     view = Matrix.LocRotScale(

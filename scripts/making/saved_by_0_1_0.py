@@ -103,14 +103,14 @@ def make(demo: Path, work: Path) -> None:
         times.go_to(scene, videos.scene_frame_of(scene, first, frame))
         pixel = track.pixel[np.abs(track.frame - frame).argmin()]
         place = picking.in_picture(scene, first, pixel, "B10", centre=True)
-        thing, _ = picking.put(scene, first, place, "B10", "impact")
-        picking.finish(scene, thing)
+        obj, _ = picking.put(scene, first, place, "B10", "impact")
+        picking.finish(scene, obj)
     scene.camera = second
     times.go_to(scene, videos.scene_frame_of(scene, second, 51))
     place = picking.in_picture(scene, second, track.pixel[np.abs(track.frame - 51).argmin()], "B10", centre=True)
     picking.finish(scene, picking.put(scene, second, place, "B10", "impact")[0])
     scene.camera = first
-    bridge("picks").set_extra(thing, "note", "the last one")
+    bridge("picks").set_extra(obj, "note", "the last one")
     bridge("live").sync(scene)
     bridge("refinement").propose(scene, ["B10"], [])
     settings = scene.rockfall
@@ -124,11 +124,11 @@ def make(demo: Path, work: Path) -> None:
 
 def forget_places(scene: bpy.types.Scene) -> None:
     """No path of this machine stays in the file; the footage is found beside it."""
-    for thing in scene.objects:
-        if "rockfall_video_file" in thing:
-            thing["rockfall_video_file"] = f"{ELSEWHERE}/footage.mp4"
-        if "rockfall_events_file" in thing:
-            thing["rockfall_events_file"] = f"{ELSEWHERE}/events.csv"
+    for obj in scene.objects:
+        if "rockfall_video_file" in obj:
+            obj["rockfall_video_file"] = f"{ELSEWHERE}/footage.mp4"
+        if "rockfall_events_file" in obj:
+            obj["rockfall_events_file"] = f"{ELSEWHERE}/events.csv"
     for clip in bpy.data.movieclips:
         clip.filepath = VIDEO
     for font in bpy.data.fonts:
@@ -159,8 +159,8 @@ def plain(value):
     return value
 
 
-def ours(thing) -> dict:
-    return {name: plain(thing[name]) for name in sorted(thing.keys()) if name.startswith("rockfall_")}
+def ours(obj) -> dict:
+    return {name: plain(obj[name]) for name in sorted(obj.keys()) if name.startswith("rockfall_")}
 
 
 def fields(one) -> dict:
@@ -213,10 +213,10 @@ def content(scene: bpy.types.Scene) -> dict:
         "picking": numbers(scene.rockfall_picking),
         "terrain": [[len(tile.data.vertices), len(tile.data.polygons)] for tile in bridge("terrain").tiles(scene)],
         "reconstruction": fields(project.reconstruction) | {"block": fields(project.block)},
-        "picks": [ours(thing) for thing in picks.ordered(scene, picks.things_of(scene))],
+        "picks": [ours(obj) for obj in picks.ordered(scene, picks.objects_of(scene))],
         "sightings": {
-            thing["rockfall_id"]: {name: fields(each) for name, each in bridge("picking").sightings(thing).items()}
-            for thing in picks.things_of(scene)
+            obj["rockfall_id"]: {name: fields(each) for name, each in bridge("picking").sightings(obj).items()}
+            for obj in picks.objects_of(scene)
         },
         "table": fields(table),
         "impacts": {name: plain(getattr(impacts, name)) for name in
@@ -227,8 +227,8 @@ def content(scene: bpy.types.Scene) -> dict:
         "models": list(bridge("twins").shown_models(scene)),
         "film": part("rockfall_addon.film.remembered").is_set_up(scene),
         "objects": sorted(
-            [thing.name, str(thing.get("rockfall_role", "")), str(thing.get("rockfall_trajectory", ""))]
-            for thing in scene.objects
+            [obj.name, str(obj.get("rockfall_role", "")), str(obj.get("rockfall_trajectory", ""))]
+            for obj in scene.objects
         ),
     }  # fmt: skip
 

@@ -17,13 +17,13 @@ SIZES = ((1920, 1080), (1080, 1920), (640, 640))
 @pytest.fixture
 def camera_object() -> bpy.types.Object:
     data = bpy.data.cameras.new("c")
-    thing = bpy.data.objects.new("c", data)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new("c", data)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
-def set_lens(thing: bpy.types.Object, lens: object, width: int, height: int) -> None:
-    data, render = thing.data, bpy.context.scene.render
+def set_lens(obj: bpy.types.Object, lens: object, width: int, height: int) -> None:
+    data, render = obj.data, bpy.context.scene.render
     data.sensor_fit, data.lens = lens.sensor_fit, lens.lens_mm
     data.sensor_width, data.sensor_height = lens.sensor_width_mm, lens.sensor_height_mm
     data.shift_x, data.shift_y = lens.shift_x, lens.shift_y

@@ -43,11 +43,11 @@ def preset(part):
 
 
 def film_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    return [thing for thing in scene.objects if thing.get("rockfall_role") == "film"]
+    return [obj for obj in scene.objects if obj.get("rockfall_role") == "film"]
 
 
-def shape(thing: bpy.types.Object) -> np.ndarray:
-    mesh = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+def shape(obj: bpy.types.Object) -> np.ndarray:
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.vertices.foreach_get("co", places)
     return places.reshape(-1, 3)
@@ -110,8 +110,8 @@ def test_captions_say_time_and_speed_of_each_frame(scene, preset, part) -> None:
             bpy.data.objects.remove(said)
 
 
-def _inputs(thing: bpy.types.Object) -> dict:
-    modifier = thing.modifiers[0]
+def _inputs(obj: bpy.types.Object) -> dict:
+    modifier = obj.modifiers[0]
     sockets = [item for item in modifier.node_group.interface.items_tree if item.in_out == "INPUT"]
     if not hasattr(modifier, "properties"):
         pytest.skip("reading the values back is written for Blender 5.2")
@@ -164,17 +164,17 @@ def test_set_up_and_removal_leave_the_scene_as_it_was(scene, part) -> None:
         remembered = part("rockfall_addon.steps.film.remembered")
         owners = {name: remembered._owner(scene, name) for name in remembered.SETTINGS}
         values = {name: getattr(*owner) for name, owner in owners.items()}
-        things = {
-            thing.name: (thing.hide_render, tuple(thing.scale), tuple(thing.location), len(thing.modifiers))
-            for thing in scene.objects
+        objects = {
+            obj.name: (obj.hide_render, tuple(obj.scale), tuple(obj.location), len(obj.modifiers))
+            for obj in scene.objects
         }
         curves = sorted(
-            (thing.name, curve.data_path)
-            for thing in scene.objects
-            if thing.get("rockfall_role") == "block"
-            for curve in thing.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
+            (obj.name, curve.data_path)
+            for obj in scene.objects
+            if obj.get("rockfall_role") == "block"
+            for curve in obj.animation_data.action.layers[0].strips[0].channelbags[0].fcurves
         )
-        return {"settings": values, "things": things, "camera": scene.camera, "curves": curves}
+        return {"settings": values, "things": objects, "camera": scene.camera, "curves": curves}
 
     scene.frame_set(3)
     before = state()

@@ -87,14 +87,14 @@ def values(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     return found
 
 
-def key_frames(thing: bpy.types.Object) -> list[list[float]]:
-    (layer,) = thing.animation_data.action.layers
-    bag = layer.strips[0].channelbag(thing.animation_data.action_slot)
+def key_frames(obj: bpy.types.Object) -> list[list[float]]:
+    (layer,) = obj.animation_data.action.layers
+    bag = layer.strips[0].channelbag(obj.animation_data.action_slot)
     return [[point.co[0] for point in bag.fcurves.find("location", index=i).keyframe_points] for i in range(3)]
 
 
-def move_key(thing: bpy.types.Object, frames: float) -> None:
-    bag = thing.animation_data.action.layers[0].strips[0].channelbag(thing.animation_data.action_slot)
+def move_key(obj: bpy.types.Object, frames: float) -> None:
+    bag = obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot)
     for curve in bag.fcurves:
         for point in curve.keyframe_points:
             point.co_ui[0] += frames
@@ -565,8 +565,8 @@ def test_twins_follow_an_edit(slope: bpy.types.Scene, part) -> None:
     assert bpy.ops.rockfall.show_models(models={"noel_2017"}) == {"FINISHED"}
 
     def landing() -> list[float]:
-        thing = next(o for o in slope.objects if o.get("rockfall_role") == "twin_flights")
-        return list(thing.data.vertices[-1].co)
+        obj = next(o for o in slope.objects if o.get("rockfall_role") == "twin_flights")
+        return list(obj.data.vertices[-1].co)
 
     before = landing()
     picks_of(slope, "B")[3].location.x += 0.7
@@ -612,8 +612,8 @@ def block_of(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     return found
 
 
-def curves_of(thing: bpy.types.Object) -> list[bpy.types.FCurve]:
-    bag = thing.animation_data.action.layers[0].strips[0].channelbag(thing.animation_data.action_slot)
+def curves_of(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
+    bag = obj.animation_data.action.layers[0].strips[0].channelbag(obj.animation_data.action_slot)
     return [bag.fcurves.find("location", index=axis) for axis in range(3)]
 
 
@@ -781,8 +781,8 @@ def test_the_picks_own_key_goes_before_the_blocks(scene: bpy.types.Scene, part) 
     """Both in a selection of all keys: moved once, not twice."""
     pick = picks_of(scene, "A")[2]
     time, frame = pick["rockfall_time_s"], pick["rockfall_key_frame"]
-    for thing in (block_of(scene, "A"), pick):
-        for curve in curves_of(thing):
+    for obj in (block_of(scene, "A"), pick):
+        for curve in curves_of(obj):
             nearest(curve, frame).co_ui[0] += 1.5
             curve.update()
     update()

@@ -67,8 +67,8 @@ def camera_of(scene: bpy.types.Scene, part) -> bpy.types.Object:
 
 
 def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    found = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
-    return sorted(found, key=lambda thing: thing["rockfall_time_s"])
+    found = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
+    return sorted(found, key=lambda obj: obj["rockfall_time_s"])
 
 
 def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str = "B10", **how) -> bpy.types.Object:
@@ -76,9 +76,9 @@ def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str 
     scene.frame_set(frame)
     camera = camera_of(scene, part)
     place = places.in_picture(scene, camera, pixel, name, **how)
-    thing, _ = editing.make_or_move(scene, camera, place, name, scene.rockfall_picking.kind)
-    editing.finish(scene, thing)
-    return thing
+    obj, _ = editing.make_or_move(scene, camera, place, name, scene.rockfall_picking.kind)
+    editing.finish(scene, obj)
+    return obj
 
 
 def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -> None:
@@ -126,10 +126,10 @@ def test_clicks_become_picks_and_trajectories(site, part, impacts) -> None:
     for frame in frames:
         pick(site, part, frame, np.array([float(block[frame]["u_px"]), float(block[frame]["v_px"])]))
     made = picks_of(site)
-    assert [thing["rockfall_trajectory"] for thing in made] == ["B10"] * 3
-    assert [thing["rockfall_extra"]["frame"] for thing in made] == [str(frame) for frame in frames]
-    assert all(thing["rockfall_sigma_position_m"][0] > 0 for thing in made)
-    flights = [thing for thing in site.objects if thing.get("rockfall_role") == "flights"]
+    assert [obj["rockfall_trajectory"] for obj in made] == ["B10"] * 3
+    assert [obj["rockfall_extra"]["frame"] for obj in made] == [str(frame) for frame in frames]
+    assert all(obj["rockfall_sigma_position_m"][0] > 0 for obj in made)
+    flights = [obj for obj in site.objects if obj.get("rockfall_role") == "flights"]
     assert len(flights) == 1, "the trajectory follows by itself"
     assert len(site.rockfall_impacts) == 3
     table = part("rockfall_addon.scene.picks").picks_of(site)
@@ -150,26 +150,26 @@ def test_a_second_click_in_one_picture_moves_the_pick(site, part) -> None:
 
 def test_what_was_seen_is_forgotten_when_the_pick_is_moved(site, part) -> None:
     clicks = part("rockfall_addon.scene.clicks")
-    thing = pick(site, part, 60, np.array([700.0, 300.0]))
-    (seen,) = clicks.of(thing).values()
+    obj = pick(site, part, 60, np.array([700.0, 300.0]))
+    (seen,) = clicks.of(obj).values()
     assert (seen.frame, seen.pixel.tolist(), seen.centre) == (60, [700.0, 300.0], True)
     bpy.context.view_layer.update()
-    thing.location.x += 0.5
+    obj.location.x += 0.5
     bpy.context.view_layer.update()
-    assert clicks.of(thing) == {}
+    assert clicks.of(obj) == {}
 
 
 def test_a_cancelled_click_leaves_the_pick_as_it_was(site, part) -> None:
     places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
-    thing = pick(site, part, 60, np.array([700.0, 300.0]))
-    kept = editing.snapshot(thing)
+    obj = pick(site, part, 60, np.array([700.0, 300.0]))
+    kept = editing.snapshot(obj)
     camera = camera_of(site, part)
     place = places.in_picture(site, camera, np.array([500.0, 300.0]), "B10")
     editing.make_or_move(site, camera, place, "B10", "impact")
-    assert editing.snapshot(thing) != kept
-    editing.restore(thing, kept)
-    assert editing.snapshot(thing) == kept
-    assert np.allclose(thing.location, thing["rockfall_position_m"], atol=1e-5)
+    assert editing.snapshot(obj) != kept
+    editing.restore(obj, kept)
+    assert editing.snapshot(obj) == kept
+    assert np.allclose(obj.location, obj["rockfall_position_m"], atol=1e-5)
 
 
 def test_grazing_rays_are_warned_of(part) -> None:
@@ -193,9 +193,9 @@ def test_grazing_rays_are_warned_of(part) -> None:
     along, across = np.linalg.norm(place.ellipse, axis=1)
     assert along == pytest.approx(60**2 / 2 / 1000, rel=0.01), "distance² / (height · focal length) for 1 px"
     assert across == pytest.approx(60 / 1000, rel=0.01)
-    thing, new = editing.make_or_move(scene, camera, place, "B01", "impact")
+    obj, new = editing.make_or_move(scene, camera, place, "B01", "impact")
     assert new
-    assert "grazes" in editing.grazing_warning(thing)
+    assert "grazes" in editing.grazing_warning(obj)
 
 
 def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
@@ -208,8 +208,8 @@ def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
         places.in_picture(site, camera, np.array([640.0, 360.0]), "B10")
     place = places.on_ray(site, np.array([8.0, 60.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
     assert place.time_s == pytest.approx(OFFSET_S + 3.0)
-    thing, _ = editing.make_or_move(site, None, place, "B10", "impact")
-    assert thing["rockfall_position_m"][:2] == pytest.approx([8.0, 60.0])
+    obj, _ = editing.make_or_move(site, None, place, "B10", "impact")
+    assert obj["rockfall_position_m"][:2] == pytest.approx([8.0, 60.0])
     with pytest.raises(errors.RockfallError, match="no terrain under"):
         places.on_ray(site, np.array([9000.0, 0.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
 
@@ -221,11 +221,11 @@ def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
     for frame, y in ((30, 60.0), (60, 55.0)):
         site.frame_set(frame)
         place = places.on_ray(site, np.array([8.0, y, 200.0]), np.array([0.0, 0.0, -1.0]), "B01")
-        thing, _ = editing.make_or_move(site, None, place, "B01", "impact")
-        editing.finish(site, thing)
+        obj, _ = editing.make_or_move(site, None, place, "B01", "impact")
+        editing.finish(site, obj)
     rate = site.render.fps / site.render.fps_base
-    assert [thing["rockfall_time_s"] for thing in picks_of(site)] == pytest.approx([30 / rate, 60 / rate])
-    assert [thing["rockfall_key_frame"] for thing in picks_of(site)] == pytest.approx([30, 60])
+    assert [obj["rockfall_time_s"] for obj in picks_of(site)] == pytest.approx([30 / rate, 60 / rate])
+    assert [obj["rockfall_key_frame"] for obj in picks_of(site)] == pytest.approx([30, 60])
 
 
 def test_two_views_make_one_point(site, part) -> None:
@@ -249,19 +249,19 @@ def test_two_views_make_one_point(site, part) -> None:
         _, video_s = pictures.picture_time(site, camera)
         pixel = model.project(pictures.posed(camera, video_s), truth[None])[0]
         if camera == second:
-            (thing,) = picks_of(site)
-            curve = clicks.epipolar(site, thing, second)
+            (obj,) = picks_of(site)
+            curve = clicks.epipolar(site, obj, second)
             assert np.linalg.norm(curve - pixel, axis=1).min() < 20
-            assert clicks.triangulated(site, thing) is None
+            assert clicks.triangulated(site, obj) is None
         place = places.in_picture(site, camera, pixel, "B10")
-        thing, new = editing.make_or_move(site, camera, place, "B10", "impact")
+        obj, new = editing.make_or_move(site, camera, place, "B10", "impact")
         assert new is (camera == first)
-    found = clicks.triangulated(site, thing)
+    found = clicks.triangulated(site, obj)
     assert np.linalg.norm(found.point[0] - truth) < 1e-3
     assert found.miss_distance[0] < 1e-3
-    assert editing.use_triangulated(site, thing) < 1e-3
-    assert np.linalg.norm(np.array(thing["rockfall_position_m"]) - truth) == pytest.approx(0.195, abs=0.05)
-    assert len(clicks.of(thing)) == 2
+    assert editing.use_triangulated(site, obj) < 1e-3
+    assert np.linalg.norm(np.array(obj["rockfall_position_m"]) - truth) == pytest.approx(0.195, abs=0.05)
+    assert len(clicks.of(obj)) == 2
 
 
 def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part) -> None:
@@ -289,15 +289,15 @@ def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part) 
         _, video_s = pictures.picture_time(site, camera)
         aim = truth if camera == second else truth + np.array([0.5, 0.0, 0.0])  # the first click lies half a metre off
         place = places.in_picture(site, camera, model.project(pictures.posed(camera, video_s), aim[None])[0], "B10")
-        thing, _ = editing.make_or_move(site, camera, place, "B10", "impact")
-    thing["rockfall_normal"] = [0.6, 0.0, 0.8]
-    old = np.array(thing["rockfall_position_m"])
-    editing.use_triangulated(site, thing)
-    here = np.array(thing["rockfall_position_m"])
+        obj, _ = editing.make_or_move(site, camera, place, "B10", "impact")
+    obj["rockfall_normal"] = [0.6, 0.0, 0.8]
+    old = np.array(obj["rockfall_position_m"])
+    editing.use_triangulated(site, obj)
+    here = np.array(obj["rockfall_position_m"])
     assert np.linalg.norm(here - old) > 0.2
     normals = part("core.reconstruction.placement").terrain_normals(surface, here[None], np.array([0.39]), None)
-    (impact,) = [i for i in site.rockfall_impacts if abs(i.time_s - thing["rockfall_time_s"]) < 1e-4]
-    v1, v2 = (np.array(list(thing["rockfall_result"][name])) for name in ("incident_mps", "restituted_mps"))
+    (impact,) = [i for i in site.rockfall_impacts if abs(i.time_s - obj["rockfall_time_s"]) < 1e-4]
+    v1, v2 = (np.array(list(obj["rockfall_result"][name])) for name in ("incident_mps", "restituted_mps"))
     assert impact.rn == pytest.approx(abs(v2 @ normals.normal[0]) / abs(v1 @ normals.normal[0]), rel=1e-4)
 
 
@@ -348,9 +348,9 @@ def test_clicked_and_proposed_observations(site, part) -> None:
     site.frame_set(60)
     places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
     place = places.in_picture(site, camera, np.array([700.0, 300.0]), "B10", centre=True)
-    thing, _ = editing.make_or_move(site, camera, place, "B10", "impact")
+    obj, _ = editing.make_or_move(site, camera, place, "B10", "impact")
     assert (60, 700.0, 300.0) in tracks.clicks_for(site, camera, "B10"), "a pick's click begins a track, too"
-    editing.remove(site, thing)
+    editing.remove(site, obj)
     track = tracking.BlockTrack(frame, time, pixel, 0.1 * one, one, pixel, 9 * one, ("", ""))
     sightings.keep_track(camera, "B10", track)
     seen = sightings.seen_in(camera, "B10")
@@ -361,8 +361,8 @@ def test_clicked_and_proposed_observations(site, part) -> None:
 
     made = tracks.propose(site, camera, "B10")
     truth = np.array([[float(row["time_s"]), float(row["leave_time_s"])] for row in rows("impacts.csv")]).ravel()
-    impacts = [thing for thing in made if thing["rockfall_kind"] == "impact"]
-    times = np.array([thing["rockfall_time_s"] for thing in impacts]) - OFFSET_S
+    impacts = [obj for obj in made if obj["rockfall_kind"] == "impact"]
+    times = np.array([obj["rockfall_time_s"] for obj in impacts]) - OFFSET_S
     assert len(impacts) >= 3
     off = np.abs(truth[:, None] - times[None]).min(axis=0)
     assert off.max() < 0.02, "each proposal is a true impact"

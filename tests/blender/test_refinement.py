@@ -84,13 +84,13 @@ def tracked(site, part, truth) -> bpy.types.Scene:
 
 
 def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    found = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
-    return sorted(found, key=lambda thing: thing["rockfall_time_s"])
+    found = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
+    return sorted(found, key=lambda obj: obj["rockfall_time_s"])
 
 
 def times_off(scene: bpy.types.Scene, truth) -> np.ndarray:
     """How far the times of the inner picks are from when the block truly touched the ground [s]."""
-    time = np.array([thing["rockfall_time_s"] for thing in picks_of(scene)]) - OFFSET_S
+    time = np.array([obj["rockfall_time_s"] for obj in picks_of(scene)]) - OFFSET_S
     begin, end = (np.array([float(row[name]) for row in truth]) for name in ("time_s", "leave_time_s"))
     return np.maximum(np.maximum(begin - time, time - end), 0.0)[1:-1]
 
@@ -99,14 +99,14 @@ def test_what_is_missing_is_said(site, part) -> None:
     proposal = part("rockfall_addon.scene.proposal")
     assert "Track the block" in proposal.lacking(site)
     assert not bpy.ops.rockfall.refine.poll()
-    for thing in picks_of(site):
-        bpy.data.objects.remove(thing)
+    for obj in picks_of(site):
+        bpy.data.objects.remove(obj)
     assert proposal.lacking(site) == "Pick the impacts first."
 
 
 def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) -> None:
     proposal = part("rockfall_addon.scene.proposal")
-    before = [list(thing["rockfall_position_m"]) for thing in picks_of(tracked)]
+    before = [list(obj["rockfall_position_m"]) for obj in picks_of(tracked)]
     off = times_off(tracked, truth)
     assert bpy.ops.rockfall.refine() == {"FINISHED"}
     found = proposal.read(tracked)
@@ -114,7 +114,7 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
     assert found.after_px < 0.6, "0.3 px of noise on each axis are 0.42 px"
     assert len(found.changes) == 5
     assert not found.stale
-    assert [list(thing["rockfall_position_m"]) for thing in picks_of(tracked)] == before
+    assert [list(obj["rockfall_position_m"]) for obj in picks_of(tracked)] == before
     place, colour, joined = proposal.path(tracked)
     assert len(place) == len(colour) == len(joined) > 50
 
@@ -122,11 +122,11 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
     assert proposal.read(tracked) is None
     assert times_off(tracked, truth).max() < 0.004 < off.max()
     far = []
-    for thing, row in zip(picks_of(tracked), truth, strict=True):
+    for obj, row in zip(picks_of(tracked), truth, strict=True):
         contact = local(row, "contact_x_m", "contact_y_m", "contact_z_m")
-        far.append(np.linalg.norm(np.array(thing["rockfall_position_m"]) - contact))
-        assert 0 < thing["rockfall_sigma_position_m"][0] < 0.2
-        assert 0 < thing["rockfall_sigma_time_s"][0] < 0.05
+        far.append(np.linalg.norm(np.array(obj["rockfall_position_m"]) - contact))
+        assert 0 < obj["rockfall_sigma_position_m"][0] < 0.2
+        assert 0 < obj["rockfall_sigma_time_s"][0] < 0.05
     assert np.median(far) < 0.15, "at two of the five the block touches the ground more than once"
     assert tracked.rockfall.flights_join == "centres"
     assert tracked.frame_end >= 299, "the video's length stays"
@@ -175,11 +175,11 @@ def test_pixels_of_pictures_without_a_pose_are_not_used(tracked, part) -> None:
 
 def test_discarding_and_changing(tracked, part) -> None:
     proposal = part("rockfall_addon.scene.proposal")
-    kept = [dict(thing.items()).keys() for thing in picks_of(tracked)]
+    kept = [dict(obj.items()).keys() for obj in picks_of(tracked)]
     bpy.ops.rockfall.refine()
     bpy.ops.rockfall.discard_refinement()
     assert proposal.read(tracked) is None
-    assert [dict(thing.items()).keys() for thing in picks_of(tracked)] == kept
+    assert [dict(obj.items()).keys() for obj in picks_of(tracked)] == kept
     assert not [key for key in tracked.keys() if "proposal" in key]  # noqa: SIM118 - a scene is no dictionary
 
     bpy.ops.rockfall.refine()

@@ -61,13 +61,13 @@ def same(new: object, before: object, rtol: float = 0.0, where: str = "") -> Non
         assert new == before, where
 
 
-def stored(thing: bpy.types.ID) -> dict:
-    return {name: plain(thing[name]) for name in thing.keys() if name.startswith("rockfall_")}  # noqa: SIM118
+def stored(obj: bpy.types.ID) -> dict:
+    return {name: plain(obj[name]) for name in obj.keys() if name.startswith("rockfall_")}  # noqa: SIM118
 
 
 def all_picks(part, scene: bpy.types.Scene) -> list[dict]:
     picks = part("rockfall_addon.scene.picks")
-    return [stored(thing) for thing in picks.ordered(scene, picks.things_of(scene))]
+    return [stored(obj) for obj in picks.ordered(scene, picks.objects_of(scene))]
 
 
 def test_every_pick_is_identical(opened, part, old) -> None:
@@ -80,7 +80,7 @@ def test_every_pick_is_identical(opened, part, old) -> None:
         assert set(new) == set(before)
         same(new.get("rockfall_result"), before.get("rockfall_result"), 1e-9, before["rockfall_trajectory"])
     same(plain(picks.picks_of(opened)), old["table"])
-    seen = {thing["rockfall_id"]: plain(clicks.of(thing)) for thing in picks.things_of(opened)}
+    seen = {obj["rockfall_id"]: plain(clicks.of(obj)) for obj in picks.objects_of(opened)}
     same(seen, old["sightings"])
     assert sum(map(len, seen.values())) == 5
 
@@ -153,7 +153,7 @@ def test_settings_models_and_film_are_as_they_were(opened, part, old) -> None:
 
 def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path) -> None:
     picks, store = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.store")
-    _, second, *_ = picks.ordered(opened, picks.things_of(opened, ["B07"]))
+    _, second, *_ = picks.ordered(opened, picks.objects_of(opened, ["B07"]))
     before = stored(second)
     second[store.TIME] = before["rockfall_time_s"] + 0.02
     part("rockfall_addon.scene.sync").sync(opened)
@@ -177,7 +177,7 @@ def test_keys_of_its_blocks_drive_their_picks(opened, part, old) -> None:
     """0.1.0 did not keep which pick a key is of."""
     picks, store = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.store")
     (block,) = [o for o in store.with_role(opened, store.BLOCK_ROLE) if o[store.TRAJECTORY] == "B10"]
-    moved = picks.ordered(opened, picks.things_of(opened, ["B10"]))[1]
+    moved = picks.ordered(opened, picks.objects_of(opened, ["B10"]))[1]
     before = stored(moved)
     bag = block.animation_data.action.layers[0].strips[0].channelbag(block.animation_data.action_slot)
     for axis in range(3):

@@ -65,7 +65,7 @@ def picks_of(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
     return sorted(found, key=lambda o: o["rockfall_time_s"])
 
 
-def things(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
+def objects(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
     return [o for o in scene.objects if o.get("rockfall_role") == role]
 
 
@@ -81,12 +81,12 @@ def everything(scene: bpy.types.Scene, part, *, ids: bool = True) -> dict[str, o
     found |= {"settings": settings, "models": part("rockfall_addon.scene.models").parameters_of(scene)}
     found |= {"rn": np.round(result.impacts.rn, 9).tolist(), "v1": np.round(result.impacts.v1, 9).tolist()}
     if ids:
-        found["ids"] = sorted(o["rockfall_id"] for o in things(scene, "pick"))
+        found["ids"] = sorted(o["rockfall_id"] for o in objects(scene, "pick"))
     return json.loads(json.dumps(found, default=repr).replace("NaN", "null"))
 
 
 def shown(scene: bpy.types.Scene) -> tuple[int, ...]:
-    return (*(len(things(scene, role)) for role in ("pick", "flights", "block")), len(scene.rockfall_impacts))
+    return (*(len(objects(scene, role)) for role in ("pick", "flights", "block")), len(scene.rockfall_impacts))
 
 
 def edit(scene: bpy.types.Scene) -> None:
@@ -145,11 +145,11 @@ def test_the_command_line_takes_an_exported_project(scene: bpy.types.Scene, part
 @pytest.mark.parametrize("how", ["object", "collection", "data"])
 def test_renamed_things_are_still_ours(scene: bpy.types.Scene, part, how: str) -> None:
     before = everything(scene, part)
-    for i, thing in enumerate(o for o in scene.objects if "rockfall_role" in o):
+    for i, obj in enumerate(o for o in scene.objects if "rockfall_role" in o):
         if how == "object":
-            thing.name = f"mine {i}"
-        elif how == "data" and thing.data.users == 1:
-            thing.data.name = f"mine {i}"
+            obj.name = f"mine {i}"
+        elif how == "data" and obj.data.users == 1:
+            obj.data.name = f"mine {i}"
     if how == "collection":
         for i, each in enumerate(bpy.data.collections):
             each.name = f"mine {i}"
@@ -161,8 +161,8 @@ def test_renamed_things_are_still_ours(scene: bpy.types.Scene, part, how: str) -
 
 @pytest.mark.parametrize("role", ["flights", "block"])
 def test_what_is_deleted_by_hand_comes_again(scene: bpy.types.Scene, part, role: str) -> None:
-    thing = next(o for o in things(scene, role) if o["rockfall_trajectory"] == "A")
-    bpy.data.objects.remove(thing)
+    obj = next(o for o in objects(scene, role) if o["rockfall_trajectory"] == "A")
+    bpy.data.objects.remove(obj)
     bpy.context.view_layer.update()
     assert shown(scene) == (10, 2, 2, 6)
 
@@ -171,7 +171,7 @@ def test_a_deleted_marker_mesh_or_group_comes_again(scene: bpy.types.Scene, part
     bpy.data.node_groups.remove(bpy.data.node_groups["Rockfall trail"])
     edit(scene)
     part("rockfall_addon.scene.sync").sync(scene, again=True)
-    trail = things(scene, "flights")[0]
+    trail = objects(scene, "flights")[0]
     assert trail.modifiers["Trail"].node_group.name == "Rockfall trail"
     bpy.data.meshes["Rockfall impact"].name = "other"
     part("rockfall_addon.scene.sync").sync(scene, again=True)
@@ -181,9 +181,9 @@ def test_a_deleted_marker_mesh_or_group_comes_again(scene: bpy.types.Scene, part
 def test_a_deleted_collection(scene: bpy.types.Scene, part) -> None:
     """As the outliner does it: what was in it goes to the scene; then even that is taken from the flights."""
     folder = next(c for c in bpy.data.collections if c.get("rockfall_name") == "A")
-    for thing in list(folder.objects):
-        if thing["rockfall_role"] != "flights":
-            scene.collection.objects.link(thing)
+    for obj in list(folder.objects):
+        if obj["rockfall_role"] != "flights":
+            scene.collection.objects.link(obj)
     bpy.data.collections.remove(folder)
     bpy.context.view_layer.update()
     assert shown(scene) == (10, 2, 2, 6)
@@ -204,14 +204,14 @@ def test_appended_into_a_scene_with_another_origin_and_rate(part, project: Path,
     part("rockfall_addon.scene.georeference").write_shift(scene, shift)
     with bpy.data.libraries.load(str(tmp_path / "a.blend")) as (source, target):
         target.objects = [name for name in source.objects if name.startswith("A ")]
-    for thing in target.objects:
-        scene.collection.objects.link(thing)
+    for obj in target.objects:
+        scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
     picks = part("rockfall_addon.scene.picks").picks_of(scene)
     np.testing.assert_array_equal(picks.time_s, expected.time_s[:5])
     np.testing.assert_allclose(picks.shift.to_survey(picks.position), survey, atol=1e-9)
     assert shown(scene)[:3] == (5, 1, 1)
-    assert len({o["rockfall_id"] for o in things(scene, "pick")}) == 5
+    assert len({o["rockfall_id"] for o in objects(scene, "pick")}) == 5
     frames = [o["rockfall_key_frame"] for o in picks_of(scene, "A")]
     np.testing.assert_allclose(frames, (picks.time_s - picks.time_s[0]) * 50, atol=1e-3)
 
@@ -240,7 +240,7 @@ def test_edits_while_rockfall_was_disabled_are_found(part, installation, project
     picks_of(scene, "A")[2].location.y += 0.4
     installation.disable()
     scene = bpy.context.scene
-    bpy.data.objects.remove(next(o for o in things(scene, "block") if o["rockfall_trajectory"] == "A"))
+    bpy.data.objects.remove(next(o for o in objects(scene, "block") if o["rockfall_trajectory"] == "A"))
     bpy.context.view_layer.update()
     picks_of(scene, "A")[1].location.y += 0.2  # after the update, in which Blender may put keyed objects back
     installation.enable()
@@ -256,13 +256,13 @@ def make_older(scene: bpy.types.Scene) -> None:
     scene["rockfall_blocks"] = {name[:60]: values for name, values in blocks.items()}
     for key in ("rockfall_schema", "rockfall_shown", "rockfall_offsets_s", "rockfall_ground"):
         del scene[key]
-    for thing in things(scene, "pick"):
+    for obj in objects(scene, "pick"):
         for key in ("rockfall_key_frame", "rockfall_pick_shift_m"):
-            del thing[key]
-    for thing in things(scene, "flights"):
+            del obj[key]
+    for obj in objects(scene, "flights"):
         for name in ("below_terrain", "doubt", "tick"):
-            thing.data.attributes.remove(thing.data.attributes[name])
-        del thing["rockfall_mass_kg"]
+            obj.data.attributes.remove(obj.data.attributes[name])
+        del obj["rockfall_mass_kg"]
     for row in reversed(range(len(scene.rockfall_impacts))):
         scene.rockfall_impacts.remove(row)
     group = bpy.data.node_groups["Rockfall trail"]
@@ -288,8 +288,8 @@ def test_a_file_of_the_version_before_is_brought_up_to_date(scene: bpy.types.Sce
         assert found[name] == before[name], name
     assert found["v1"][:3] == before["v1"][:3]
     assert shown(scene) == (10, 2, 2, 6)
-    assert "Ticks" in things(scene, "flights")[0].modifiers["Trail"].node_group.interface.items_tree
-    assert "tick" in things(scene, "flights")[0].data.attributes
+    assert "Ticks" in objects(scene, "flights")[0].modifiers["Trail"].node_group.interface.items_tree
+    assert "tick" in objects(scene, "flights")[0].data.attributes
     assert [o["rockfall_key_frame"] for o in picks_of(scene, "A")] == pytest.approx(frames, abs=1e-3)
     edit(scene)
     assert picks_of(scene, "A")[2]["rockfall_time_s"] == 11.812345678901234
@@ -298,7 +298,7 @@ def test_a_file_of_the_version_before_is_brought_up_to_date(scene: bpy.types.Sce
 def test_a_newer_file_is_left_alone(scene: bpy.types.Scene, part) -> None:
     problems, picks = part("rockfall_addon.scene.problems"), picks_of(scene, "A")
     scene["rockfall_schema"] = 99
-    trail = next(o for o in things(scene, "flights") if o["rockfall_trajectory"] == "A")
+    trail = next(o for o in objects(scene, "flights") if o["rockfall_trajectory"] == "A")
     before = [tuple(v.co) for v in trail.data.vertices], list(picks[1]["rockfall_position_m"])
     picks[1].location.y += 0.3
     bpy.context.view_layer.update()
@@ -346,7 +346,7 @@ def on_the_parabolas(scene: bpy.types.Scene, part) -> bool:
     offsets = part("rockfall_addon.scene.timing").kept_offsets(scene)
     states, flights = part("core.reconstruction.flight").flight_states, result.flights
     rate, worst = scene.render.fps / scene.render.fps_base, 0.0
-    for block in things(scene, "block"):
+    for block in objects(scene, "block"):
         name = block["rockfall_trajectory"]
         bag = block.animation_data.action.layers[0].strips[0].channelbag(block.animation_data.action_slot)
         for i in np.flatnonzero(flights.trajectory == name):
@@ -373,7 +373,7 @@ def test_another_frame_rate_before_blender_says_so(scene: bpy.types.Scene, part,
     bpy.context.view_layer.update()
     assert scene["rockfall_keyed_rate_hz"] == 60
     assert on_the_parabolas(scene, part)
-    times = sorted(o["rockfall_time_s"] for o in things(scene, "pick"))
+    times = sorted(o["rockfall_time_s"] for o in objects(scene, "pick"))
     assert times == sorted([*before["time_s"], *([13.9] if first == "add_pick" else [])])
     frames = [o["rockfall_key_frame"] for o in picks_of(scene, "A")]
     expected = [(o["rockfall_time_s"] - 10.0) * 60 for o in picks_of(scene, "A")]
@@ -388,7 +388,7 @@ def test_another_frame_rate_keeps_times(scene: bpy.types.Scene, part) -> None:
     frames = [o["rockfall_key_frame"] for o in picks_of(scene, "A")]
     times = np.array([o["rockfall_time_s"] for o in picks_of(scene, "A")])
     np.testing.assert_allclose(frames, (times - times[0]) * 60, atol=1e-3)
-    trail = next(o for o in things(scene, "flights") if o["rockfall_trajectory"] == "A")
+    trail = next(o for o in objects(scene, "flights") if o["rockfall_trajectory"] == "A")
     ticks, clock = (np.empty(len(trail.data.vertices), dtype=kind) for kind in (bool, np.float32))
     trail.data.attributes["tick"].data.foreach_get("value", ticks)
     trail.data.attributes["display_time_s"].data.foreach_get("value", clock)

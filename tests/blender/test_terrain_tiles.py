@@ -153,5 +153,5 @@ def test_a_conflicting_shift_is_refused_in_words(part, demo) -> None:
     same = {"shift_x": repr(shift.x), "shift_y": repr(shift.y), "shift_z": repr(shift.z)}
     assert bpy.ops.rockfall.import_terrain(filepath=demo_file, **same) == {"FINISHED"}
     second = next(o for o in bpy.context.scene.objects if o != ground)
-    low = [[min(c[i] for c in thing.bound_box) for i in range(3)] for thing in (ground, second)]
+    low = [[min(c[i] for c in obj.bound_box) for i in range(3)] for obj in (ground, second)]
     np.testing.assert_allclose(*low, atol=1e-4)

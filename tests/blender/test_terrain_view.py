@@ -28,11 +28,11 @@ def colours(mesh) -> np.ndarray:
     return found.reshape(-1, 4)
 
 
-def drawn(thing) -> int:
+def drawn(obj) -> int:
     """Triangles that the 3-D view draws of an object."""
     graph = bpy.context.evaluated_depsgraph_get()
     graph.update()
-    return len(thing.evaluated_get(graph).data.polygons)
+    return len(obj.evaluated_get(graph).data.polygons)
 
 
 def values() -> dict[str, float]:

@@ -45,7 +45,7 @@ def shown(scene: bpy.types.Scene) -> bpy.types.Scene:
 
 
 def of_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
-    return [thing for thing in scene.objects if thing.get("rockfall_role") == role]
+    return [obj for obj in scene.objects if obj.get("rockfall_role") == role]
 
 
 def expected(part, scene: bpy.types.Scene):
@@ -111,20 +111,20 @@ def test_one_block_for_each_run_and_model_unless_flights_overlap(shown: bpy.type
 def test_curves_land_on_the_terrain_in_the_models_colour(shown: bpy.types.Scene, part) -> None:
     colours = part("core.colours")
     curves = of_role(shown, "twin_flights")
-    assert {thing["rockfall_model"] for thing in curves} == set(MODELS)
-    for thing in curves:
-        heights = [vertex.co.z + SLOPE * vertex.co.x for vertex in thing.data.vertices]
+    assert {obj["rockfall_model"] for obj in curves} == set(MODELS)
+    for obj in curves:
+        heights = [vertex.co.z + SLOPE * vertex.co.x for vertex in obj.data.vertices]
         assert min(heights) > -1e-3
-        ends = [v.index for v in thing.data.vertices if abs(v.co.z + SLOPE * v.co.x) < 1e-3]
+        ends = [v.index for v in obj.data.vertices if abs(v.co.z + SLOPE * v.co.x) < 1e-3]
         assert len(ends) >= 4
-        own = part("core.impact_models.registry").find_model(thing["rockfall_model"]).colour
+        own = part("core.impact_models.registry").find_model(obj["rockfall_model"]).colour
         colour = colours.srgb_to_linear(np.array(own))
-        np.testing.assert_allclose(thing.data.attributes["speed_colour"].data[0].color[:3], colour, atol=1e-6)
+        np.testing.assert_allclose(obj.data.attributes["speed_colour"].data[0].color[:3], colour, atol=1e-6)
     red = colours.srgb_to_linear(np.array(colours.OBSERVED_COLOUR))
     measured = of_role(shown, "flights")
-    assert {thing["rockfall_trajectory"] for thing in measured} == {"A", "B"}
-    for thing in measured:
-        np.testing.assert_allclose(thing.data.attributes["speed_colour"].data[0].color[:3], red, atol=1e-6)
+    assert {obj["rockfall_trajectory"] for obj in measured} == {"A", "B"}
+    for obj in measured:
+        np.testing.assert_allclose(obj.data.attributes["speed_colour"].data[0].color[:3], red, atol=1e-6)
 
 
 def names() -> set[str]:
@@ -149,7 +149,7 @@ def test_removal_leaves_nothing(scene: bpy.types.Scene) -> None:
 
 def test_showing_others_replaces_them_and_none_removes_them(shown: bpy.types.Scene) -> None:
     bpy.ops.rockfall.show_models(models={"dorren_2015"})
-    assert {thing["rockfall_model"] for thing in of_role(shown, "twin")} == {"dorren_2015"}
+    assert {obj["rockfall_model"] for obj in of_role(shown, "twin")} == {"dorren_2015"}
     bpy.ops.rockfall.show_models(models=set())
     assert not of_role(shown, "twin")
 
@@ -158,7 +158,7 @@ def test_they_follow_a_moved_pick_and_a_changed_setting(shown: bpy.types.Scene, 
     shown.rockfall.stagger_s = 1.25
     check_motion(part, shown)
     shown.rockfall.block_scale = 3.0
-    scales = [thing.scale.x for thing in of_role(shown, "twin")]
+    scales = [obj.scale.x for obj in of_role(shown, "twin")]
     assert len(scales) >= 4
     assert scales == pytest.approx([3 * 0.35 / 2] * len(scales), rel=1e-5)
     shown.rockfall.use_drag = True
@@ -195,8 +195,8 @@ def test_bad_parameters_are_told(scene: bpy.types.Scene, tmp_path: Path) -> None
 
 
 def test_without_terrain_there_are_none(scene: bpy.types.Scene) -> None:
-    for thing in of_role(scene, "terrain"):
-        bpy.data.objects.remove(thing)
+    for obj in of_role(scene, "terrain"):
+        bpy.data.objects.remove(obj)
     with pytest.raises(RuntimeError, match="poll"):
         bpy.ops.rockfall.show_models(models=set(MODELS))
 
@@ -205,7 +205,7 @@ def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None
     preset = part("core.exchange.project").RenderPreset("tiny", width=64, height=36, fps=25.0, engine="cycles")
     film = part("rockfall_addon.steps.film.dressing")
     film.set_up_film(shown, preset, "cycles")
-    captions = {thing.name for thing in of_role(shown, "film")}
+    captions = {obj.name for obj in of_role(shown, "film")}
     assert {"Film source observed", "Film source Noël et al. 2017", "Film source Wyllie 2014"} <= captions
     assert "Film legend" not in captions
     film.remove_film(shown)

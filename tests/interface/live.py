@@ -14,8 +14,8 @@ def picks_of(name):
 
 
 def trail_of(name):
-    things = (o for o in bpy.context.scene.objects if o.get("rockfall_role") == "flights")
-    return next(o for o in things if o["rockfall_trajectory"] == name)
+    objects = (o for o in bpy.context.scene.objects if o.get("rockfall_role") == "flights")
+    return next(o for o in objects if o["rockfall_trajectory"] == name)
 
 
 def distance(place, name):
@@ -164,8 +164,8 @@ def case_live_key_in_the_dope_sheet(window):
 
 
 def block_of(name):
-    things = (o for o in bpy.context.scene.objects if o.get("rockfall_role") == "block")
-    return next(o for o in things if o["rockfall_trajectory"] == name)
+    objects = (o for o in bpy.context.scene.objects if o.get("rockfall_role") == "block")
+    return next(o for o in objects if o["rockfall_trajectory"] == name)
 
 
 def choose_keys(block, frames):

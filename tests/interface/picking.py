@@ -77,8 +77,8 @@ def on_screen(window, pixel):
 
 
 def picks():
-    found = [thing for thing in bpy.context.scene.objects if thing.get("rockfall_role") == "pick"]
-    return sorted(found, key=lambda thing: thing["rockfall_time_s"])
+    found = [obj for obj in bpy.context.scene.objects if obj.get("rockfall_role") == "pick"]
+    return sorted(found, key=lambda obj: obj["rockfall_time_s"])
 
 
 def no_trouble(window):
@@ -104,16 +104,16 @@ def case_pick_impacts_in_the_footage(window):
     scene = bpy.context.scene
     frames, impacts = yield from pick_impacts(window, 3)
     window.screenshot("three")
-    assert [thing["rockfall_extra"]["frame"] for thing in picks()] == [str(frame) for frame in frames]
-    for thing, row in zip(picks(), impacts, strict=True):
+    assert [obj["rockfall_extra"]["frame"] for obj in picks()] == [str(frame) for frame in frames]
+    for obj, row in zip(picks(), impacts, strict=True):
         contact = local(row, "contact_x_m", "contact_y_m", "contact_z_m")
-        off = float(np.linalg.norm(np.array(thing["rockfall_position_m"]) - contact))
-        assert off < 0.5, (thing.name, off)
+        off = float(np.linalg.norm(np.array(obj["rockfall_position_m"]) - contact))
+        assert off < 0.5, (obj.name, off)
     no_trouble(window)
 
     # drag the last one, in its picture
-    thing = picks()[-1]
-    before, identifier = list(thing["rockfall_position_m"]), thing["rockfall_id"]
+    obj = picks()[-1]
+    before, identifier = list(obj["rockfall_position_m"]), obj["rockfall_id"]
     with window.override():
         pointing = window.part("rockfall_addon.view.pointing")
         spot = pointing.on_screen(bpy.context, [before])[0]
@@ -239,10 +239,10 @@ def case_pick_fine_and_cancelled(window):
     yield from open_site(window)
     yield from pick_impacts(window, 1, 2)
     ways = []
-    (thing,) = picks()
-    before = list(thing["rockfall_position_m"])
+    (obj,) = picks()
+    before = list(obj["rockfall_position_m"])
     with window.override():
-        x, y = window.part("rockfall_addon.view.pointing").handle_of(bpy.context, thing)
+        x, y = window.part("rockfall_addon.view.pointing").handle_of(bpy.context, obj)
     x, y = window.region().x + x, window.region().y + y
     yield from window.move(x + 3, y)
     for value, to in (("PRESS", x + 3), ("NOTHING", x + 6), ("NOTHING", x + 3), ("RELEASE", x + 3)):
@@ -340,10 +340,10 @@ def case_pick_track_the_block(window):
     window.redraw()
     yield 1.0
     window.screenshot("proposed")
-    times = np.array([thing["rockfall_time_s"] for thing in picks() if thing["rockfall_kind"] == "impact"]) - OFFSET_S
+    times = np.array([obj["rockfall_time_s"] for obj in picks() if obj["rockfall_kind"] == "impact"]) - OFFSET_S
     truth = np.array([[float(row["time_s"]), float(row["leave_time_s"])] for row in rows("impacts.csv")]).ravel()
     assert len(times)
-    ends = np.array([thing["rockfall_time_s"] for thing in picks() if thing["rockfall_kind"] == "pass"]) - OFFSET_S
+    ends = np.array([obj["rockfall_time_s"] for obj in picks() if obj["rockfall_kind"] == "pass"]) - OFFSET_S
     np.testing.assert_allclose(ends, seen.time_s[[0, -1]], atol=1e-6)
     assert np.abs(times[:, None] - truth).min(axis=1).max() < 0.02, times
     no_trouble(window)
@@ -380,10 +380,10 @@ def case_pick_in_two_views(window):
     yield from window.click(region.x + x + 4, region.y + y + 2)  # on the pick's own ring
     yield 1.0
     window.screenshot("diamond")
-    (thing,) = picks()
-    assert list(thing["rockfall_position_m"]) == held, "the pick stays until it is told to move"
+    (obj,) = picks()
+    assert list(obj["rockfall_position_m"]) == held, "the pick stays until it is told to move"
     clicks = window.part("rockfall_addon.scene.clicks")
-    found = clicks.triangulated(scene, thing)
+    found = clicks.triangulated(scene, obj)
     assert 0.001 < found.miss_distance[0] < 2.0, found.miss_distance
     with window.override():
         assert bpy.ops.rockfall.use_triangulated() == {"FINISHED"}

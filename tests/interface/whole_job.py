@@ -143,7 +143,7 @@ def misses(window):
     shift = window.part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene).vector
     axes = ("contact_x_m", "contact_y_m", "contact_z_m")
     truth = np.array([[float(row[name]) for name in axes] for row in impacts()]) - shift
-    return np.linalg.norm([list(thing["rockfall_position_m"]) for thing in picking.picks()] - truth, axis=1)
+    return np.linalg.norm([list(obj["rockfall_position_m"]) for obj in picking.picks()] - truth, axis=1)
 
 
 def pick(window):
@@ -166,7 +166,7 @@ def pick(window):
 
 
 def places():
-    return [list(thing["rockfall_position_m"]) for thing in picking.picks()]
+    return [list(obj["rockfall_position_m"]) for obj in picking.picks()]
 
 
 def drag_undo_redo(window):
@@ -242,8 +242,8 @@ def speed_errors(window):
 
 def path():
     """Vertices of the trajectory that is shown."""
-    (thing,) = [one for one in bpy.context.scene.objects if one.get("rockfall_role") == "flights"]
-    return [tuple(vertex.co) for vertex in thing.data.vertices]
+    (obj,) = [one for one in bpy.context.scene.objects if one.get("rockfall_role") == "flights"]
+    return [tuple(vertex.co) for vertex in obj.data.vertices]
 
 
 def remembered(window):

@@ -100,9 +100,9 @@ def case_tutorial_of_the_manual(window):
     press("rockfall.propose_impacts")
     yield 3.0
     window.screenshot("2-proposed")
-    picks = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
+    picks = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
     assert len(picks) >= 7
-    assert [thing for thing in scene.objects if thing.get("rockfall_role") == "flights"]
+    assert [obj for obj in scene.objects if obj.get("rockfall_role") == "flights"]
     press("rockfall.refine")
     yield 3.0
     window.screenshot("3-refined")
@@ -142,7 +142,7 @@ def case_first_clicks_of_the_manual(window):
         yield 1.0
     yield 2.0
     window.screenshot("by-hand")
-    picks = [thing for thing in scene.objects if thing.get("rockfall_role") == "pick"]
+    picks = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
     assert len(picks) == 2
     assert scene.frame_current == 89
-    assert [thing for thing in scene.objects if thing.get("rockfall_role") == "flights"]
+    assert [obj for obj in scene.objects if obj.get("rockfall_role") == "flights"]

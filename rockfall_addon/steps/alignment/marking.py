@@ -170,9 +170,9 @@ def restore(scene: bpy.types.Scene, camera: bpy.types.Object, before: Before) ->
         camera_paths.write_lens(camera, camera_paths.camera_path(camera).reference)
         camera_paths.write_keys(scene, camera)
     else:
-        for thing, values in ((camera, before.place), (camera.data, before.lens)):
+        for obj, values in ((camera, before.place), (camera.data, before.lens)):
             for name, value in values.items():
-                setattr(thing, name, value)
+                setattr(obj, name, value)
     fill_rows(camera)
     camera.rockfall_alignment.active = before.active
 

@@ -63,10 +63,10 @@ def add_camera(scene: bpy.types.Scene, view: View, points: Array) -> bpy.types.O
     depth = view.project(points)[:, 2]
     camera.clip_start = max(0.05, float(np.median(depth)) / 200)
     camera.clip_end = 1.3 * float(depth.max()) + 50.0
-    thing = bpy.data.objects.new("Film camera", camera)
+    obj = bpy.data.objects.new("Film camera", camera)
     axes = np.column_stack([view.right, view.up, -view.forward])
-    thing.matrix_world = Matrix.Translation(Vector(view.position)) @ Matrix(axes.tolist()).to_4x4()
-    return thing
+    obj.matrix_world = Matrix.Translation(Vector(view.position)) @ Matrix(axes.tolist()).to_4x4()
+    return obj
 
 
 def scene_points(scene: bpy.types.Scene, motions: list[Motion]) -> Array:

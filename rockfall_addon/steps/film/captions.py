@@ -45,9 +45,9 @@ def caption(
     mesh.vertices.add(len(series))
     mesh.attributes.new(VALUE_ATTRIBUTE, "FLOAT", "POINT").data.foreach_set("value", series.astype(np.float32))
     mark_colour(mesh, np.tile(materials.linear_colour(colour), (len(series), 1)))
-    thing = bpy.data.objects.new(name, mesh)
-    thing.location = (*place, 0.0)
-    modifier = thing.modifiers.new("Caption", "NODES")
+    obj = bpy.data.objects.new(name, mesh)
+    obj.location = (*place, 0.0)
+    modifier = obj.modifiers.new("Caption", "NODES")
     modifier.node_group = caption_group(align, values is not None)
     inputs = {
         "Text": text, "Unit": unit, "Decimals": decimals, "Rate": float(rate),
@@ -55,7 +55,7 @@ def caption(
     }  # fmt: skip
     for key, value in inputs.items():
         materials.set_input(modifier, key, value)
-    return thing
+    return obj
 
 
 def mark_colour(mesh: bpy.types.Mesh, colours: Array) -> None:

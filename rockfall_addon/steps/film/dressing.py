@@ -83,8 +83,8 @@ def set_up_picture(
     _size_things(scene, motions, view)
     scene.rockfall.trail_until_now = False
     motions = motions_of(scene)
-    for thing in store.with_role(scene, store.BLOCK_ROLE):
-        thing.hide_render = True
+    for obj in store.with_role(scene, store.BLOCK_ROLE):
+        obj.hide_render = True
     words = layout.Words(
         title=title or _title(scene),
         subtitle=subtitle or _count(motions),
@@ -101,8 +101,8 @@ def remove_film(scene: bpy.types.Scene) -> None:
     """Take the set-up away: the scene is as it was."""
     _remove_furniture(scene)
     presence.show_always(scene)
-    for thing in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
-        thing.hide_render = False
+    for obj in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
+        obj.hide_render = False
     if remembered.is_set_up(scene):
         remembered.put_back(scene)
 
@@ -129,7 +129,7 @@ def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> N
         return
     settings = scene.rockfall
     pixel = _pixel_m(scene, view, motions)
-    diameter = float(np.median([2 * np.mean(thing.scale) for thing in blocks])) / settings.block_scale
+    diameter = float(np.median([2 * np.mean(obj.scale) for obj in blocks])) / settings.block_scale
     before = remembered.value(scene, "rockfall.block_scale")
     scale = max(before, rounded_scale(BLOCK_PX * pixel / diameter))
     if abs(settings.block_scale - scale) > 1e-6:
@@ -141,8 +141,8 @@ def _furnish(
     scene: bpy.types.Scene, view: View, motions: list[Motion], words: layout.Words, preset: RenderPreset
 ) -> None:
     """Camera, backdrop and captions, all moving with the camera; rings in place of the marks of the picks."""
-    for thing in store.with_role(scene, store.PICK_ROLE):
-        thing.hide_render = True
+    for obj in store.with_role(scene, store.PICK_ROLE):
+        obj.hide_render = True
     if motions:
         radius = max(scene.rockfall.marker_radius_m, MARK_PX * _pixel_m(scene, view, motions))
         rings = marks.impact_marks(scene, radius)
@@ -153,9 +153,9 @@ def _furnish(
     _add(scene, eye)
     scene.camera = eye
     front = _sheet(scene, "Film captions", eye, 2.5 * eye.data.clip_start, aspect)
-    for thing in layout.lay_out(words, aspect, preset.height):
-        _add(scene, thing)
-        thing.parent = front
+    for obj in layout.lay_out(words, aspect, preset.height):
+        _add(scene, obj)
+        obj.parent = front
     behind = _sheet(scene, "Film background", eye, 0.98 * eye.data.clip_end, aspect)
     curtain = layout.backdrop(1.02 * aspect)
     curtain.scale.y = 1.02
@@ -198,16 +198,16 @@ def _sheet(
     return sheet
 
 
-def _add(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
-    thing[store.ROLE] = FILM_ROLE
-    thing.hide_select = thing.type != "CAMERA"
-    store.collection(scene, "Film").objects.link(thing)
+def _add(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    obj[store.ROLE] = FILM_ROLE
+    obj.hide_select = obj.type != "CAMERA"
+    store.collection(scene, "Film").objects.link(obj)
 
 
 def _remove_furniture(scene: bpy.types.Scene) -> None:
-    things = store.with_role(scene, FILM_ROLE)
-    cameras = [thing.data for thing in things if thing.type == "CAMERA"]
-    store.remove_objects(things)
+    objects = store.with_role(scene, FILM_ROLE)
+    cameras = [obj.data for obj in objects if obj.type == "CAMERA"]
+    store.remove_objects(objects)
     for each in cameras:
         if not each.users:
             bpy.data.cameras.remove(each)

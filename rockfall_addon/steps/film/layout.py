@@ -51,23 +51,23 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
     make = partial(captions.caption, weight=_weight(height_px))
     room = 0.62 * aspect / (0.58 * max(len(words.title), 1))  # a letter is about 0.58 of its height wide
     title = min(large, room)
-    things = [make("Film title", words.title, (left, high - 0.75 * large), title)]
+    objects = [make("Film title", words.title, (left, high - 0.75 * large), title)]
     remarks = [(f"Film note{f' {i + 1}' if i else ''}", text) for i, text in enumerate(words.note.split("\n"))]
     for i, (name, text) in enumerate((("Film subtitle", words.subtitle), *remarks)):
         line = high - 0.75 * large - 1.45 * small * (i + 1)
-        things.append(make(name, text, (left, line), small, colour=captions.GREY))
+        objects.append(make(name, text, (left, line), small, colour=captions.GREY))
     if words.time_s is not None and words.fastest_mps is not None:
-        things += [
+        objects += [
             make("Film time", "", (right, high - 0.75 * large), large, align="RIGHT", values=words.time_s,
                  rate=words.rate, unit=" s"),
             make("Film fastest block", "fastest block  ", (right, high - 0.75 * large - 1.45 * small), small,
                  align="RIGHT", values=words.fastest_mps, rate=words.rate, unit=" m/s"),
         ]  # fmt: skip
     if words.speed_top_mps is not None:
-        things += _legend(make, words.speed_top_mps, left, low, small)
-    things += _sources(make, words.sources, left, low, small)
-    things.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
-    return things
+        objects += _legend(make, words.speed_top_mps, left, low, small)
+    objects += _sources(make, words.sources, left, low, small)
+    objects.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
+    return objects
 
 
 def backdrop(aspect: float) -> bpy.types.Object:
@@ -112,7 +112,7 @@ def _sources(
     make: Callable[..., bpy.types.Object], sources: tuple[Source, ...], left: float, low: float, size: float
 ) -> list[bpy.types.Object]:
     """A swatch and a name for each, the first on top."""
-    things = []
+    objects = []
     for i, (name, colour) in enumerate(reversed(sources)):
         bottom, side = low + 1.5 * size * i, 0.8 * size
         mesh = bpy.data.meshes.new("Film source")
@@ -125,8 +125,8 @@ def _sources(
         mesh.from_pydata([(*corner, 0.0) for corner in corners], [], [(0, 1, 2, 3)])
         captions.mark_colour(mesh, _opaque(srgb_to_linear(np.tile(colour, (4, 1)))))
         place = (left + 2.1 * side, bottom)
-        things += [_shown(f"Film swatch {name}", mesh), make(f"Film source {name}", name, place, size)]
-    return things
+        objects += [_shown(f"Film swatch {name}", mesh), make(f"Film source {name}", name, place, size)]
+    return objects
 
 
 def _shown(name: str, mesh: bpy.types.Mesh) -> bpy.types.Object:

@@ -14,8 +14,8 @@ COLOUR = (0.96, 0.96, 0.96)
 
 def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | None:
     """One mesh of a ring for each impact; None when there is none."""
-    things = [o for o in store.with_role(scene, store.PICK_ROLE) if o[store.KIND] == "impact"]
-    if not things:
+    objects = [o for o in store.with_role(scene, store.PICK_ROLE) if o[store.KIND] == "impact"]
+    if not objects:
         return None
     angles = np.linspace(0.0, 2 * np.pi, CORNERS, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(CORNERS)])
@@ -24,11 +24,11 @@ def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | 
     faces = np.column_stack([np.arange(CORNERS), following, CORNERS + following, CORNERS + np.arange(CORNERS)])
     rate = timing.frame_rate(scene)
     corners, times = [], []
-    for thing in things:
-        corners.append(ring @ np.array(thing.rotation_quaternion.to_matrix()).T + np.array(thing.location))
-        times.append(np.full(len(ring), thing.animation_data.action.frame_range[0] / rate))
+    for obj in objects:
+        corners.append(ring @ np.array(obj.rotation_quaternion.to_matrix()).T + np.array(obj.location))
+        times.append(np.full(len(ring), obj.animation_data.action.frame_range[0] / rate))
     mesh = bpy.data.meshes.new("Film impacts")
-    steps = len(ring) * np.arange(len(things))
+    steps = len(ring) * np.arange(len(objects))
     mesh.from_pydata(np.vstack(corners).tolist(), [], (faces[None] + steps[:, None, None]).reshape(-1, 4).tolist())
     attribute = mesh.attributes.new(materials.TIME_ATTRIBUTE, "FLOAT", "POINT")
     attribute.data.foreach_set("value", np.concatenate(times).astype(np.float32))

@@ -22,16 +22,16 @@ class Motion:
 
 def motions_of(scene: bpy.types.Scene) -> list[Motion]:
     """The motions of all blocks in the scene, by the names of their trajectories."""
-    return [_read(thing) for thing in store.with_role(scene, store.FLIGHTS_ROLE)]
+    return [_read(obj) for obj in store.with_role(scene, store.FLIGHTS_ROLE)]
 
 
-def _read(thing: bpy.types.Object) -> Motion:
-    mesh = thing.data
+def _read(obj: bpy.types.Object) -> Motion:
+    mesh = obj.data
     count = len(mesh.vertices)
     places = np.empty(3 * count, dtype=np.float32)
     mesh.vertices.foreach_get("co", places)
     time, speed = (_values(mesh, name, count) for name in (materials.TIME_ATTRIBUTE, materials.SPEED_ATTRIBUTE))
-    return Motion(str(thing[store.TRAJECTORY]), time, places.reshape(-1, 3).astype(np.float64), speed)
+    return Motion(str(obj[store.TRAJECTORY]), time, places.reshape(-1, 3).astype(np.float64), speed)
 
 
 def _values(mesh: bpy.types.Mesh, name: str, count: int) -> Array:

@@ -14,8 +14,8 @@ def show_while_moving(scene: bpy.types.Scene, motions: list[Motion]) -> None:
     """Key the visibility of the blocks."""
     rate = timing.frame_rate(scene)
     resting = _resting(scene)
-    for thing in store.with_role(scene, store.BLOCK_ROLE):
-        motion = next((each for each in motions if each.name == thing[store.TRAJECTORY]), None)
+    for obj in store.with_role(scene, store.BLOCK_ROLE):
+        motion = next((each for each in motions if each.name == obj[store.TRAJECTORY]), None)
         if motion is None:
             continue
         start, end = float(motion.time_s[0]) * rate, float(motion.time_s[-1] + LINGER_S) * rate
@@ -24,30 +24,30 @@ def show_while_moving(scene: bpy.types.Scene, motions: list[Motion]) -> None:
             keys.append((end, True))
         for name in HIDING:
             for frame, hidden in keys:
-                setattr(thing, name, hidden)
-                thing.keyframe_insert(name, frame=frame)
+                setattr(obj, name, hidden)
+                obj.keyframe_insert(name, frame=frame)
 
 
 def show_always(scene: bpy.types.Scene) -> None:
     """Take the keys away."""
-    for thing in store.with_role(scene, store.BLOCK_ROLE):
+    for obj in store.with_role(scene, store.BLOCK_ROLE):
         for name in HIDING:
-            _remove_curve(thing, name)
-            setattr(thing, name, False)
+            _remove_curve(obj, name)
+            setattr(obj, name, False)
 
 
 def _resting(scene: bpy.types.Scene) -> set[str]:
     """Trajectories whose last pick is a stop."""
     last: dict[str, bpy.types.Object] = {}
-    for thing in store.with_role(scene, store.PICK_ROLE):
-        name = thing[store.TRAJECTORY]
-        if name not in last or thing[store.TIME] > last[name][store.TIME]:
-            last[name] = thing
-    return {name for name, thing in last.items() if thing[store.KIND] == "stop"}
+    for obj in store.with_role(scene, store.PICK_ROLE):
+        name = obj[store.TRAJECTORY]
+        if name not in last or obj[store.TIME] > last[name][store.TIME]:
+            last[name] = obj
+    return {name for name, obj in last.items() if obj[store.KIND] == "stop"}
 
 
-def _remove_curve(thing: bpy.types.Object, name: str) -> None:
-    action = thing.animation_data.action if thing.animation_data else None
+def _remove_curve(obj: bpy.types.Object, name: str) -> None:
+    action = obj.animation_data.action if obj.animation_data else None
     for layer in action.layers if action else ():
         for strip in layer.strips:
             for bag in strip.channelbags:

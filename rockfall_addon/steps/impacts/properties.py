@@ -13,10 +13,10 @@ from ...scene import store
 CONFIDENCES = ("", "1", "2", "3")
 
 
-def _edited(thing: bpy.types.Object) -> None:
+def _edited(obj: bpy.types.Object) -> None:
     from ...scene import sync
 
-    for scene in thing.users_scene:
+    for scene in obj.users_scene:
         sync.touch(scene)
 
 

@@ -22,100 +22,100 @@ def make_or_move(
     -------
     The pick, and whether it is new.
     """
-    thing = pictures.of_this_picture(scene, camera, name, place.time_s)
-    if thing is not None:
-        if camera is not None and clicks.elsewhere(thing, camera):
-            clicks.keep(scene, thing, camera, place)  # the same event in a second video: the place stays
+    obj = pictures.of_this_picture(scene, camera, name, place.time_s)
+    if obj is not None:
+        if camera is not None and clicks.elsewhere(obj, camera):
+            clicks.keep(scene, obj, camera, place)  # the same event in a second video: the place stays
         else:
-            move(scene, thing, camera, place)
-        return thing, False
+            move(scene, obj, camera, place)
+        return obj, False
     if not videos.cameras(scene) and name not in timing.kept_offsets(scene):
         _begin_clock(scene, name)
-    thing = picks.add_pick(scene, name, place.time_s, place.position, kind=kind)
+    obj = picks.add_pick(scene, name, place.time_s, place.position, kind=kind)
     if np.isfinite(place.sigma_time_s):
-        thing[store.SIGMA_TIME] = [place.sigma_time_s]
-    move(scene, thing, camera, place)
-    return thing, True
+        obj[store.SIGMA_TIME] = [place.sigma_time_s]
+    move(scene, obj, camera, place)
+    return obj, True
 
 
-def move(scene: bpy.types.Scene, thing: bpy.types.Object, camera: bpy.types.Object | None, place: Place) -> None:
+def move(scene: bpy.types.Scene, obj: bpy.types.Object, camera: bpy.types.Object | None, place: Place) -> None:
     """Move a pick along the terrain; its time stays. A click in its own picture also gives its deviation."""
-    thing[store.POSITION] = place.position.tolist()
-    thing.location = place.position
+    obj[store.POSITION] = place.position.tolist()
+    obj.location = place.position
     for key in (store.NORMAL, store.SEEN):
-        if key in thing:
-            del thing[key]
+        if key in obj:
+            del obj[key]
     if camera is None:
         return
     _, video_s = pictures.picture_time(scene, camera)
-    away = abs(thing[store.TIME] - pictures.common_time(camera, video_s))
+    away = abs(obj[store.TIME] - pictures.common_time(camera, video_s))
     if away <= pictures.SAME_PICTURE * pictures.frame_step_s(camera):
-        thing[store.SIGMA_POSITION] = [place.sigma_m]
-        clicks.keep(scene, thing, camera, place)
+        obj[store.SIGMA_POSITION] = [place.sigma_m]
+        clicks.keep(scene, obj, camera, place)
         for column, text in (
             ("video", camera.name),
             ("frame", str(place.frame)),
             ("u_px", repr(float(place.pixel[0]))),
             ("v_px", repr(float(place.pixel[1]))),
         ):
-            picks.set_extra(thing, column, text)
+            picks.set_extra(obj, column, text)
 
 
-def finish(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+def finish(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
     """The person has let go: the trajectory follows."""
-    sync.sync(scene, [thing[store.TRAJECTORY]])
+    sync.sync(scene, [obj[store.TRAJECTORY]])
 
 
-def remove(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+def remove(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
     """Remove a pick; its trajectory follows."""
-    name = thing[store.TRAJECTORY]
-    store.remove_objects([thing])
+    name = obj[store.TRAJECTORY]
+    store.remove_objects([obj])
     sync.sync(scene, [name])
 
 
-def set_kind(scene: bpy.types.Scene, thing: bpy.types.Object, kind: str) -> None:
+def set_kind(scene: bpy.types.Scene, obj: bpy.types.Object, kind: str) -> None:
     """Make a pick one of another kind; its trajectory follows."""
-    thing[store.KIND] = kind
-    sync.sync(scene, [thing[store.TRAJECTORY]])
+    obj[store.KIND] = kind
+    sync.sync(scene, [obj[store.TRAJECTORY]])
 
 
-def use_triangulated(scene: bpy.types.Scene, thing: bpy.types.Object) -> float:
+def use_triangulated(scene: bpy.types.Scene, obj: bpy.types.Object) -> float:
     """Move a pick to where its rays from several videos meet; returns by how much they miss each other [m].
 
     Raises
     ------
     RockfallError : it was not clicked in two aligned videos.
     """
-    found = clicks.triangulated(scene, thing)
+    found = clicks.triangulated(scene, obj)
     if found is None or not np.isfinite(found.point).all():
         raise RockfallError("Click the same event in a second aligned video first, while this pick is selected.")
-    point, seen = found.point[0], thing[store.SEEN].to_dict()
-    if thing[store.KIND] != "pass" and any(click.centre for click in clicks.of(thing).values()):
+    point, seen = found.point[0], obj[store.SEEN].to_dict()
+    if obj[store.KIND] != "pass" and any(click.centre for click in clicks.of(obj).values()):
         point = closest_points(places.surface_of(scene), point).point[0]
-    thing[store.POSITION], thing.location = point.tolist(), point
-    thing[store.SIGMA_POSITION] = [float(np.sqrt(np.trace(found.covariance[0]) / 3))]
-    thing[store.SEEN] = seen | {"position": point.tolist()}
-    if store.NORMAL in thing and reconstruction.ground(scene) is not None:
-        del thing[store.NORMAL]  # it was that of the old place
-    finish(scene, thing)
+    obj[store.POSITION], obj.location = point.tolist(), point
+    obj[store.SIGMA_POSITION] = [float(np.sqrt(np.trace(found.covariance[0]) / 3))]
+    obj[store.SEEN] = seen | {"position": point.tolist()}
+    if store.NORMAL in obj and reconstruction.ground(scene) is not None:
+        del obj[store.NORMAL]  # it was that of the old place
+    finish(scene, obj)
     return float(found.miss_distance[0])
 
 
-def second_view(scene: bpy.types.Scene, thing: bpy.types.Object) -> str:
+def second_view(scene: bpy.types.Scene, obj: bpy.types.Object) -> str:
     """What a second video says about a pick, in a sentence."""
-    found = clicks.triangulated(scene, thing)
+    found = clicks.triangulated(scene, obj)
     if found is None or not np.isfinite(found.point).all():
         return "Kept as this event's pixel in a second video."
-    away = float(np.linalg.norm(found.point[0] - np.array(thing[store.POSITION])))
+    away = float(np.linalg.norm(found.point[0] - np.array(obj[store.POSITION])))
     return (
         f"Seen in a second video: the rays miss each other by {100 * found.miss_distance[0]:.1f} cm, {away:.2f} m from "
         "the pick. The pick stays; Use Triangulated Point moves it there."
     )
 
 
-def grazing_warning(thing: bpy.types.Object) -> str:
+def grazing_warning(obj: bpy.types.Object) -> str:
     """A sentence on a pick whose ray grazes the terrain; empty where all is well."""
-    for seen in clicks.of(thing).values():
+    for seen in clicks.of(obj).values():
         if seen.grazing_deg < GRAZING_DEG:
             reach = float(np.linalg.norm(seen.ellipse[0]))
             return (
@@ -125,35 +125,35 @@ def grazing_warning(thing: bpy.types.Object) -> str:
     return ""
 
 
-def described(thing: bpy.types.Object) -> str:
+def described(obj: bpy.types.Object) -> str:
     """A pick in a sentence."""
-    sigma = thing.get(store.SIGMA_POSITION)
+    sigma = obj.get(store.SIGMA_POSITION)
     known = "" if sigma is None else f", its place known to {100 * sigma[0]:.0f} cm"
-    return f"{thing[store.TRAJECTORY]}: {thing[store.KIND]} at {thing[store.TIME]:.3f} s{known}."
+    return f"{obj[store.TRAJECTORY]}: {obj[store.KIND]} at {obj[store.TIME]:.3f} s{known}."
 
 
-def snapshot(thing: bpy.types.Object) -> dict[str, object]:
+def snapshot(obj: bpy.types.Object) -> dict[str, object]:
     """What a click changes of a pick, as plain values."""
-    kept = {key: list(thing[key]) for key in _VECTORS if key in thing}
+    kept = {key: list(obj[key]) for key in _VECTORS if key in obj}
     for key in (store.SEEN, store.EXTRA):
-        if key in thing:
-            kept[key] = thing[key].to_dict()
+        if key in obj:
+            kept[key] = obj[key].to_dict()
     return kept
 
 
-def restore(thing: bpy.types.Object, kept: dict[str, object]) -> None:
+def restore(obj: bpy.types.Object, kept: dict[str, object]) -> None:
     """Take back what was changed since the snapshot."""
     for key in (*_VECTORS, store.SEEN, store.EXTRA):
         if key in kept:
-            thing[key] = kept[key]
-        elif key in thing:
-            del thing[key]
-    thing.location = kept[store.POSITION]
+            obj[key] = kept[key]
+        elif key in obj:
+            del obj[key]
+    obj.location = kept[store.POSITION]
 
 
 def _begin_clock(scene: bpy.types.Scene, name: str) -> None:
     """Without videos, the first trajectory of a scene lives on the scene's own clock: frame 0 is 0 s."""
-    if not picks.things_of(scene):
+    if not picks.objects_of(scene):
         scene[store.TIME_ORIGIN] = 0.0
         scene.rockfall.playback = "REAL"
     elif timing.origin_s(scene) is None or scene.rockfall.playback != "REAL":

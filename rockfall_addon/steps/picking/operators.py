@@ -54,16 +54,16 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        thing = picks.with_id(context.scene, self._identifier)
-        if thing is None or event.type in {"ESC", "RIGHTMOUSE"}:
-            return self._cancel(context, thing)
+        obj = picks.with_id(context.scene, self._identifier)
+        if obj is None or event.type in {"ESC", "RIGHTMOUSE"}:
+            return self._cancel(context, obj)
         if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
             part = FINE if event.shift else 1.0
             mouse = (event.mouse_region_x, event.mouse_region_y)
             self._xy = tuple(a + part * (b - c) for a, b, c in zip(self._xy, mouse, self._mouse, strict=True))
             self._moved, self._mouse = self._moved or mouse != self._mouse, mouse
             if self._moved:
-                self._follow(context, thing)
+                self._follow(context, obj)
         elif event.type == self._button and event.value == "RELEASE":
             return self._end(context)
         return {"RUNNING_MODAL"}
@@ -71,8 +71,8 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
     def _begin(self, context: bpy.types.Context, *, any_time: bool) -> bool:
         """Take the pick under the mouse, or make one; False when the click was all: nothing is to be dragged."""
         scene = context.scene
-        thing = pointing.pick_at(context, self._xy, any_time=any_time)
-        if thing is None:
+        obj = pointing.pick_at(context, self._xy, any_time=any_time)
+        if obj is None:
             name, kind = places.trajectory(scene), scene.rockfall_picking.kind
             if kind == "pass" and pointing.camera_of(context) is not None:
                 self._observe(context, name)
@@ -82,19 +82,19 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
             there = pictures.of_this_picture(scene, camera, name, place.time_s)
             self._kept = None if there is None else editing.snapshot(there)
             second = there is not None and camera is not None and clicks.elsewhere(there, camera)
-            thing, self._new = editing.make_or_move(scene, camera, place, name, kind)
+            obj, self._new = editing.make_or_move(scene, camera, place, name, kind)
             scene.rockfall_picking.trajectory = name
             if second:
-                pointing.select(context, thing)
-                self.report({"INFO"}, editing.second_view(scene, thing))
+                pointing.select(context, obj)
+                self.report({"INFO"}, editing.second_view(scene, obj))
                 return False
             self._moved, self._place = True, place
         else:
-            self._kept, self._moved, self._place = editing.snapshot(thing), False, None
-            self._xy = pointing.handle_of(context, thing)  # held by its middle: it does not jump
-            scene.rockfall_picking.trajectory = thing[store.TRAJECTORY]
-        pointing.select(context, thing)
-        self._identifier = thing[store.ID]
+            self._kept, self._moved, self._place = editing.snapshot(obj), False, None
+            self._xy = pointing.handle_of(context, obj)  # held by its middle: it does not jump
+            scene.rockfall_picking.trajectory = obj[store.TRAJECTORY]
+        pointing.select(context, obj)
+        self._identifier = obj[store.ID]
         return True
 
     def _observe(self, context: bpy.types.Context, name: str) -> None:
@@ -108,53 +108,53 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         self.report({"INFO"}, f"{name}: the block is at ({pixel[0]:.1f}, {pixel[1]:.1f}) in picture {frame}.")
         context.area.tag_redraw()
 
-    def _follow(self, context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    def _follow(self, context: bpy.types.Context, obj: bpy.types.Object) -> None:
         try:
-            self._place = pointing.place_at(context, self._xy, thing[store.TRAJECTORY])
+            self._place = pointing.place_at(context, self._xy, obj[store.TRAJECTORY])
         except RockfallError:
             return  # off the terrain: it waits where it is
-        thing.location = self._place.position
+        obj.location = self._place.position
 
     def _end(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         context.workspace.status_text_set(None)
-        thing = picks.with_id(scene, self._identifier)
+        obj = picks.with_id(scene, self._identifier)
         camera = pointing.solved_camera_of(context)
         if not self._moved:
-            self._look_again(context, thing, camera)
+            self._look_again(context, obj, camera)
             return {"FINISHED"}  # a click on a pick selects it
         if self._place is not None:
-            editing.move(scene, thing, camera, self._place)
-        editing.finish(scene, thing)
+            editing.move(scene, obj, camera, self._place)
+        editing.finish(scene, obj)
         warning = self._place.warning if self._place is not None else ""
         if warning:
             self.report({"WARNING"}, warning)
         else:
-            self.report({"INFO"}, editing.described(thing))
+            self.report({"INFO"}, editing.described(obj))
         return {"FINISHED"}
 
-    def _look_again(self, context: bpy.types.Context, thing: bpy.types.Object, camera: bpy.types.Object | None) -> None:
+    def _look_again(self, context: bpy.types.Context, obj: bpy.types.Object, camera: bpy.types.Object | None) -> None:
         """A click on a pick that was made in another video is its second view."""
         scene = context.scene
-        if camera is None or not clicks.elsewhere(thing, camera):
+        if camera is None or not clicks.elsewhere(obj, camera):
             return
-        if thing not in pictures.in_this_picture(scene, camera):
+        if obj not in pictures.in_this_picture(scene, camera):
             return
         try:
-            place = pointing.place_at(context, self._press, thing[store.TRAJECTORY])
+            place = pointing.place_at(context, self._press, obj[store.TRAJECTORY])
         except RockfallError as error:
             self.report({"WARNING"}, str(error))
             return
-        clicks.keep(scene, thing, camera, place)
-        self.report({"INFO"}, editing.second_view(scene, thing))
+        clicks.keep(scene, obj, camera, place)
+        self.report({"INFO"}, editing.second_view(scene, obj))
 
-    def _cancel(self, context: bpy.types.Context, thing: bpy.types.Object | None) -> set[str]:
+    def _cancel(self, context: bpy.types.Context, obj: bpy.types.Object | None) -> set[str]:
         context.workspace.status_text_set(None)
-        if thing is not None:
+        if obj is not None:
             if self._new:
-                editing.remove(context.scene, thing)
+                editing.remove(context.scene, obj)
             elif self._kept is not None:
-                editing.restore(thing, self._kept)
+                editing.restore(obj, self._kept)
         return {"CANCELLED"}
 
 
@@ -173,11 +173,11 @@ class ROCKFALL_OT_pick_kind(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         scene = context.scene
-        thing = pointing.pick_at(context, (event.mouse_region_x, event.mouse_region_y))
-        if thing is None:
+        obj = pointing.pick_at(context, (event.mouse_region_x, event.mouse_region_y))
+        if obj is None:
             return self.execute(context)
-        editing.set_kind(scene, thing, self.kind)
-        pointing.select(context, thing)
+        editing.set_kind(scene, obj, self.kind)
+        pointing.select(context, obj)
         return {"FINISHED"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -212,10 +212,10 @@ class ROCKFALL_OT_use_triangulated(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        thing = pointing.active_pick(context)
+        obj = pointing.active_pick(context)
         return possible(
             cls,
-            thing is not None and len(clicks.of(thing)) > 1,
+            obj is not None and len(clicks.of(obj)) > 1,
             "Select a pick, and click the same event in a second aligned video",
         )
 

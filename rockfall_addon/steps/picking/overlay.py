@@ -70,25 +70,25 @@ def _draw_view() -> None:
         first = np.flatnonzero(joined[:-1])
         pairs = np.stack([first, first + 1], axis=1)
         drawing.segments(place[pairs], np.c_[colour, np.ones(len(colour))][pairs], 2 * scale)
-    thing = pointing.active_pick(context)
-    if thing is not None:
-        for points, colour in _solid(scene, thing):
+    obj = pointing.active_pick(context)
+    if obj is not None:
+        for points, colour in _solid(scene, obj):
             segments = np.stack([points[:-1], points[1:]], axis=1)
             drawing.segments(segments, np.broadcast_to([*colour, 0.9], (*segments.shape[:2], 4)), 1.5 * scale)
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")
 
 
-def _solid(scene: bpy.types.Scene, thing: bpy.types.Object) -> list[tuple[np.ndarray, tuple[float, float, float]]]:
-    place = np.array(thing.location if picks.moved(thing) else thing[store.POSITION], dtype=np.float64)
-    normal = np.array(thing.matrix_world.col[2].xyz, dtype=np.float64)
+def _solid(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[tuple[np.ndarray, tuple[float, float, float]]]:
+    place = np.array(obj.location if picks.moved(obj) else obj[store.POSITION], dtype=np.float64)
+    normal = np.array(obj.matrix_world.col[2].xyz, dtype=np.float64)
     normal /= np.linalg.norm(normal)
-    radius = places.block_of(scene, thing[store.TRAJECTORY]).radius_m
+    radius = places.block_of(scene, obj[store.TRAJECTORY]).radius_m
     found = []
-    if thing[store.KIND] != "pass":
+    if obj[store.KIND] != "pass":
         for axis in np.eye(3):  # the block's ball, tangent to the terrain
             found.append((footage_view.around(place + radius * normal, axis, radius), footage_view.OUTLINE))
-    for seen in clicks.of(thing).values():
+    for seen in clicks.of(obj).values():
         circle = footage_view.CIRCLE[:, None]
         ellipse = place + 0.02 * normal + np.cos(circle) * seen.ellipse[0] + np.sin(circle) * seen.ellipse[1]
         found.append((ellipse, (1.0, 0.3, 0.2)))

@@ -80,7 +80,7 @@ class ROCKFALL_OT_propose_impacts(_OfTrack, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera, name = _solved_name(context)
         made = tracks.propose(context.scene, camera, name)
-        passes = sum(thing[store.KIND] == "pass" for thing in made)
+        passes = sum(obj[store.KIND] == "pass" for obj in made)
         count = f"{len(made) - passes} impacts are" if len(made) - passes != 1 else "One impact is"
         ends = f", and {passes} points in flight where the track begins or ends" if passes else ""
         self.report({"INFO"}, f"{count} proposed for {name}{ends}. Look at each, and move or remove it.")

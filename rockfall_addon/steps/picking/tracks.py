@@ -21,8 +21,8 @@ def clicks_for(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> l
     seen = sightings.seen_in(camera, name)
     clicked = zip(seen.frame[seen.by_hand].tolist(), seen.pixel[seen.by_hand].tolist(), strict=True)
     found = {frame: (u, v) for frame, (u, v) in clicked}
-    for thing in picks.things_of(scene, [name]):
-        click = clicks.of(thing).get(camera[store.ID])
+    for obj in picks.objects_of(scene, [name]):
+        click = clicks.of(obj).get(camera[store.ID])
         if click is not None and click.centre:
             found.setdefault(click.frame, (float(click.pixel[0]), float(click.pixel[1])))
     if not found:
@@ -56,8 +56,8 @@ def propose(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> list
     for i in range(len(found)):
         extra = {column: str(values[i]) for column, values in found.extra.items()} | {"note": NOTE}
         kind = str(found.kind[i])
-        thing = picks.add_pick(scene, name, float(found.time_s[i]), found.position[i], kind=kind, extra=extra)
-        thing[store.SIGMA_TIME] = [float(found.sigma_time_s[i])]
-        made.append(thing)
+        obj = picks.add_pick(scene, name, float(found.time_s[i]), found.position[i], kind=kind, extra=extra)
+        obj[store.SIGMA_TIME] = [float(found.sigma_time_s[i])]
+        made.append(obj)
     sync.sync(scene, [name])
     return made

@@ -28,8 +28,8 @@ class ROCKFALL_OT_refine(bpy.types.Operator):
         scene, settings = context.scene, context.scene.rockfall_picking
         names = None
         if settings.scope == "ACTIVE":
-            thing = pointing.active_pick(context)
-            names = [places.trajectory(scene) if thing is None else thing[store.TRAJECTORY]]
+            obj = pointing.active_pick(context)
+            names = [places.trajectory(scene) if obj is None else obj[store.TRAJECTORY]]
         fitting.propose(scene, names, sorted(settings.free))
         found = proposal.read(scene)
         self.report({"INFO"}, f"{found.before_px:.2f} px before, {found.after_px:.2f} px after.")

@@ -97,9 +97,9 @@ class ROCKFALL_OT_open_project(_IntoEmptyScene, FromFile, bpy.types.Operator):
 
 def _hide_start_up(scene: bpy.types.Scene) -> None:
     """Put away what Blender's own start-up scene holds."""
-    for thing in [o for o in scene.objects if o.name in ("Cube", "Light")]:
-        thing.hide_set(True)
-        thing.hide_render = True
+    for obj in [o for o in scene.objects if o.name in ("Cube", "Light")]:
+        obj.hide_set(True)
+        obj.hide_render = True
 
 
 CLASSES = (ROCKFALL_OT_load_demo, ROCKFALL_OT_load_footage_demo, ROCKFALL_OT_open_project)

@@ -9,10 +9,10 @@ from ...scene import store
 MICRO = 1e-6
 
 
-def _is_video(thing: bpy.types.Object) -> bool:
+def _is_video(obj: bpy.types.Object) -> bool:
     from ...scene import videos
 
-    return videos.is_video(thing)
+    return videos.is_video(obj)
 
 
 def _clock(name: str, unit: float = 1.0) -> dict:

@@ -26,6 +26,7 @@ STEPS = (
 """In the order of the sidebar."""
 
 _registered: list[ModuleType] = []
+_registered_tools: list[type] = []
 
 
 def parts() -> list[ModuleType]:
@@ -47,26 +48,29 @@ def tools() -> list[type]:
 
 
 def register() -> None:
-    """Register what each part lists in ``CLASSES`` and ``TOOLS``, then call its own ``register()``."""
-    first = tools()[0]
+    """Register what each part lists in ``CLASSES`` and what it does itself; then all tools.
+
+    The keys of a tool set properties of operators, which may belong to another step: these must be there before.
+    """
     for part in parts():
         _registered.append(part)
         for cls in getattr(part, "CLASSES", ()):
             leave_newer_alone(cls)
             bpy.utils.register_class(cls)
-        for tool in getattr(part, "TOOLS", ()):
-            bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=tool is first)
         if hasattr(part, "register"):
             part.register()
+    for number, tool in enumerate(tools()):
+        bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=number == 0)
+        _registered_tools.append(tool)
 
 
 def unregister() -> None:
     """The same backwards."""
+    while _registered_tools:
+        bpy.utils.unregister_tool(_registered_tools.pop())
     while _registered:
         part = _registered.pop()
         if hasattr(part, "unregister"):
             part.unregister()
-        for tool in reversed(getattr(part, "TOOLS", ())):
-            bpy.utils.unregister_tool(tool)
         for cls in reversed(getattr(part, "CLASSES", ())):
             bpy.utils.unregister_class(cls)

@@ -21,6 +21,14 @@ def test_enable_disable_and_enable_again(clean_blender: None, installation) -> N
     assert registered[0] == registered[1] == registered[2]
 
 
+def test_the_keys_of_tools_find_their_operators(clean_blender: None, installation, capfd) -> None:
+    """A tool whose keys are made before the operators of another step loses their properties, with a warning."""
+    installation.enable()
+    installation.disable()
+    printed = capfd.readouterr()
+    assert "not found in item" not in printed.out + printed.err
+
+
 def test_every_module_is_registered(rockfall: ModuleType, part) -> None:
     addon = part("rockfall_addon")
     assert part("rockfall_addon.preferences").problem == ""

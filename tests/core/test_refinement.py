@@ -571,3 +571,17 @@ def test_a_refinement_can_be_stopped():
 
     with pytest.raises(CancelledError):
         run(views, both, picks, progress=stop)
+
+
+@pytest.mark.parametrize("turn", [[0.9, -0.4, 0.7], [2e-5, 1e-5, -3e-5]])
+def test_derivative_of_a_turn_is_that_of_differences(turn: list[float]) -> None:
+    """exp(w + δ) exp(w)⁻¹ ≈ exp(J δ), by central differences of Rodrigues' formula."""
+    from rockfall.core.camera.model import rotation_from_vector, vector_from_rotation
+    from rockfall.core.reconstruction.refinement.problem import _left_jacobian
+
+    w, step = np.array(turn), 1e-5
+    for axis in range(3):
+        delta = step * np.eye(3)[axis]
+        ahead, behind = rotation_from_vector(w + delta), rotation_from_vector(w - delta)
+        expected = vector_from_rotation(ahead @ behind.T) / (2 * step)
+        np.testing.assert_allclose(_left_jacobian(w)[:, axis], expected, atol=1e-8)

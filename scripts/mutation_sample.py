@@ -282,8 +282,9 @@ def tests_for(change: Change, known: dict, tree: Path) -> list[int]:
     """Numbers of the tests that run the changed line, the quickest first."""
     lines, inner = known["lines"], functions_lines((tree / change.file).read_text(encoding="utf-8"))
     found = set(lines.get(change.file, {}).get(str(change.line), ())) if change.line in inner else set()
-    if not found:
-        # Compiled functions leave no trace in the map, nor do modules that are imported by name.
+    is_compiled = "kernels" in change.file or "impact_models" in change.file
+    if is_compiled or not found:
+        # What numba compiles leaves no trace in the map, nor do modules that are imported by name.
         near = {file for file in lines if word_of(change.file).search((tree / file).read_text(encoding="utf-8"))}
         found = {test for file in (*near, change.file) for tests in lines.get(file, {}).values() for test in tests}
         found |= set(named_after(change.file, known, tree))

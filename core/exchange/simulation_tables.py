@@ -25,6 +25,8 @@ RELEASES_REQUIRED = ("x_m", "y_m")
 RELEASES_KNOWN = (
     *RELEASES_REQUIRED, "z_m", "release", *VELOCITY, *SPIN, *DIAMETERS, "diameter_m", "density_kgpm3", "number",
 )  # fmt: skip
+MOST_BLOCKS = 10_000_000
+"""More would fill the memory before the first of them has fallen."""
 DEEP = 0.01
 """A release may be in the ground by this part of its radius, as rounded tables put it there."""
 
@@ -70,6 +72,12 @@ def read_releases(
     ):  # fmt: skip
         for i in np.flatnonzero(~good)[:1].tolist():
             raise table.error(i, f"The {what} is {values[i]:g}", "Give a number above zero")
+    if counts.sum() > MOST_BLOCKS:
+        raise InputError(
+            f"{counts.sum():.0f} blocks are too many for one run, which takes up to {MOST_BLOCKS}",
+            file=path,
+            advice="Release fewer, or divide them into several runs with seeds of their own",
+        )
     if placed.any():
         position[placed] = placed_on(ground, position[placed, :2], diameter[placed])
         for i in np.flatnonzero(np.isnan(position[:, 2]))[:1].tolist():

@@ -108,6 +108,7 @@ class Simulation:
     position : (n, 3) of the centre at the end, local [m].
     records : all moments if they were asked for, else releases and ends.
     wanted : how many blocks were asked for; more than n after a cancel.
+    recorded : whether `records` has all moments; without them nothing is known of single flights.
     """
 
     settings: Settings
@@ -121,6 +122,7 @@ class Simulation:
     position: Array
     records: Records
     wanted: int
+    recorded: bool
 
     def __len__(self) -> int:
         return self.end.size
@@ -191,7 +193,7 @@ def simulate(
     last = np.flatnonzero(records.what == ENDED)
     return Simulation(
         settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
-        results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n,
+        results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,
     )  # fmt: skip
 
 

@@ -26,7 +26,8 @@ class RunFigures:
     Attributes
     ----------
     kinetic_max_j : (n,) ½mv² at the greatest speed [J].
-    height_max_m : (n,) of the centre above the terrain, vertically [m]; NaN for a run without a flight.
+    height_max_m : (n,) of the centre above the terrain, vertically [m]; NaN for a run without a flight, and
+        for all where the moments between were not recorded.
     energy_line : (n,) angle below the horizontal of the line from the release to the end [rad]; NaN where both have one
         place in plan.
     """
@@ -164,6 +165,8 @@ def _on_flight(simulation: Simulation, start: Indices, elapsed: Array) -> tuple[
 
 
 def _greatest_heights(simulation: Simulation) -> Array:
+    if not simulation.recorded:
+        return np.full(len(simulation), np.nan)
     rows, duration = flights_of(simulation)
     run = simulation.records.run[rows]
     order = np.lexsort((-duration, run))

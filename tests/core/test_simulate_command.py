@@ -85,6 +85,18 @@ def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: P
         assert (again / name).read_bytes() == (out / name).read_bytes()
 
 
+def test_without_records_the_greatest_height_is_not_known(terrain: Path, releases: Path, tmp_path: Path) -> None:
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "noel_2017", "--seed", "3"]
+    tables = {}
+    for record in ("none", "impacts"):
+        assert main([*argv, "--record", record, "--out", str(tmp_path / record)]) == 0
+        tables[record] = rows_of(tmp_path / record / "runs.csv")
+    assert [row["height_max_m"] for row in tables["none"]] == [""] * 5
+    assert all(0.2 < float(row["height_max_m"]) < 20 for row in tables["impacts"])
+    for row, other in zip(tables["none"], tables["impacts"], strict=True):
+        assert row | {"height_max_m": ""} == other | {"height_max_m": ""}
+
+
 def test_hits_of_a_wall(terrain: Path, releases: Path, tmp_path: Path) -> None:
     corners = np.array([[55.0, 0, 455], [55.0, 118, 455], [55.0, 118, 470], [55.0, 0, 470]])
     wall = tmp_path / "wall.ply"
@@ -116,6 +128,7 @@ def test_hits_of_a_wall(terrain: Path, releases: Path, tmp_path: Path) -> None:
         (f"{EAST + 10},{NORTH + 40},,0.4,0", "row 2: The number of blocks is 0"),
         (f"{EAST + 10},{NORTH + 40},,0.4,1.5", "row 2: The number of blocks is 1.5"),
         (f"{EAST + 10},wide,,0.4,1", "row 2: .*wide"),
+        (f"{EAST + 10},{NORTH + 40},,0.4,1000000000", "1000000000 blocks are too many for one run"),
     ],
 )
 def test_bad_releases(terrain: Path, tmp_path: Path, capsys, row: str, problem: str) -> None:

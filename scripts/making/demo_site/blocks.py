@@ -2,8 +2,8 @@
 """Blocks bounce down a gully: exact parabolas between a sphere's contacts, and the rebound of Noël et al. 2017.
 
 This simulation is on purpose independent of `rockfall.core`: what it writes is the truth against which the
-reconstruction is measured, and the first contacts of `rockfall simulate` are held to it (`tests/core/test_demo_engine`).
-Everything is in the gully's own frame, z up.
+reconstruction is measured, and the first contacts of `rockfall simulate` are compared with it. Everything is in the
+gully's own frame, z up.
 """
 
 from collections.abc import Iterator

@@ -12,9 +12,9 @@ import numpy as np
 from ..errors import InputError
 from ..simulation.engine import ENDS, Simulation
 from ..simulation.ground import Ground
-from ..simulation.release import Releases, overlapping, placed_on
+from ..simulation.release import Releases, make_releases, overlapping, placed_on
 from ..simulation.results import hits_of, release_names, run_figures
-from ..vectors import norm
+from ..vectors import Mask, norm
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
 
@@ -83,22 +83,22 @@ def read_releases(
         for i in np.flatnonzero(np.isnan(position[:, 2]))[:1].tolist():
             raise table.error(i, "There is no terrain under this release", "Correct it, or give a larger terrain")
     velocity, spin = table.vectors(VELOCITY), table.vectors(SPIN)
-    volume = np.pi / 6 * np.where(np.isnan(three).any(axis=1), diameter**3, three.prod(axis=1))
-    releases = Releases(
-        np.array(table.text("release"), dtype=np.str_),
+    given: Mask = np.asarray(np.isfinite(three).all(axis=1))
+    releases = make_releases(
         position,
-        np.where(np.isnan(velocity), 0.0, velocity),
-        np.where(np.isnan(spin), 0.0, spin),
-        diameter,
-        density * volume,
+        name=np.array(table.text("release"), dtype=np.str_),
+        velocity=np.where(np.isnan(velocity), 0.0, velocity),
+        angular_velocity=np.where(np.isnan(spin), 0.0, spin),
+        axes_m=np.where(given[:, None], three, diameter[:, None]),
+        shape=np.where(given, "ellipsoid", "sphere"),
+        density_kgpm3=density,
     )
     depth = overlapping(ground, releases)
     for i in np.flatnonzero(depth > DEEP * releases.radius_m)[:1].tolist():
         raise table.error(
             i, f"This release is {depth[i]:.3g} m deep in the ground", "Raise z_m, or leave it empty to put it there"
         )
-    times = counts.astype(np.intp)
-    return Releases(*(np.repeat(getattr(releases, name), times, axis=0) for name in Releases.__dataclass_fields__))
+    return releases.take(np.repeat(np.arange(n), counts.astype(np.intp)))
 
 
 def write_runs(simulation: Simulation, path: str | Path) -> None:
@@ -132,7 +132,7 @@ def write_hits(simulation: Simulation, path: str | Path) -> None:
     run = records.run[rows]
     v1, radius = records.v1[rows], releases.radius_m[run]
     place = simulation.ground.terrain.shift.to_survey(records.position[rows])
-    inertia = simulation.settings.inertia * releases.mass_kg[run] * radius**2
+    inertia = releases.inertia[run] * releases.mass_kg[run] * radius**2
     speed = norm(v1)
     towards = -(v1 * records.normal[rows]).sum(axis=1)
     names = np.array(["", *simulation.ground.structures])

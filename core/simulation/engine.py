@@ -17,7 +17,7 @@ from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
 from ..vectors import Array, Indices
 from .ground import Ground
-from .release import SPHERE_INERTIA, Releases
+from .release import Releases
 
 Rolling = Literal["azzoni_1995", "coulomb", "none"]
 ROLLING: tuple[Rolling, ...] = ("none", "azzoni_1995", "coulomb")
@@ -44,7 +44,6 @@ class Settings:
     zones : zone → parameters of its own there.
     rolling : how a block moves on the ground: Azzoni et al. 1995, Coulomb's sliding, or none, which stops it there.
     friction : coefficient μ of either; `zone_friction` where a zone has its own.
-    inertia : c of the block's c m r²: 2/5 for a sphere, 2/3 for a cube.
     drag : None for none.
     seed : of all random numbers.
     most_impacts, most_s : a run that is longer ends with "limit".
@@ -56,7 +55,6 @@ class Settings:
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     zone_friction: Mapping[str, float] = field(default_factory=dict)
-    inertia: float = SPHERE_INERTIA
     gravity_mps2: float = GRAVITY_MPS2
     drag: Drag | None = None
     seed: int = 0
@@ -169,7 +167,7 @@ def simulate(
         rows[start] = run_blocks(
             index.tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
             releases.position[part], releases.velocity[part], releases.angular_velocity[part],
-            releases.radius_m[part], releases.mass_kg[part], settings.inertia, drag[part], settings.gravity_mps2,
+            releases.radius_m[part], releases.mass_kg[part], releases.inertia[part], drag[part], settings.gravity_mps2,
             ROLLING.index(settings.rolling), settings.most_impacts, settings.most_s, record, results[part],
         )  # fmt: skip
         return part.stop - part.start
@@ -202,9 +200,10 @@ def _parameters(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     if settings.rolling not in ROLLING:
         raise InputError(f"There is no rolling law {settings.rolling!r}", advice=f"There are {', '.join(ROLLING)}")
     for what, value in (
-        ("gravity", settings.gravity_mps2), ("inertia", settings.inertia), ("limit of time", settings.most_s),
+        ("gravity", settings.gravity_mps2),
+        ("limit of time", settings.most_s),
         ("limit of impacts", settings.most_impacts),
-    ):  # fmt: skip
+    ):
         if not (np.isfinite(value) and value > 0):
             raise InputError(f"The {what} is {value}", advice="Give a number above zero")
     for name in (*settings.zones, *settings.zone_friction):

@@ -430,7 +430,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
         rows, count, end, time, impacts, length, v_max = run_block(
             tree, zone, rebound, parameters, friction, draws, stack, times, near, around, rows, count, runs[i], seed,
             (place[i, 0], place[i, 1], place[i, 2]), (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
-            (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia, drag[i], gravity, law,
+            (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i], drag[i], gravity, law,
             most_impacts, most_s, record,
         )  # fmt: skip
         results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4] = end, time, impacts, length, v_max

@@ -2,23 +2,25 @@
 """Where blocks start, and as what: n releases, one a block."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
+from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.drag import Drag
-from ..vectors import Array, Mask, Names
+from ..vectors import Array, Indices, Mask, Names
+from .block_shapes import ROUND, SHAPES, Shape, mean_inertia, principal_moments, volumes
 from .ground import Ground
 
 ABOVE_M = 1e-6
 """A block that is placed on the terrain starts so much above it."""
-SPHERE_INERTIA = 2.0 / 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Releases:
-    """n blocks before they fall.
+    """n blocks before they fall. `make_releases` fills what is not said.
 
     Attributes
     ----------
@@ -26,26 +28,36 @@ class Releases:
     position : (n, 3) of the centre, local [m].
     velocity : (n, 3) [m/s].
     angular_velocity : (n, 3) [rad/s].
-    diameter_m : (n,) of the sphere that meets the ground.
+    shape : (n,) of `SHAPES`.
+    axes_m : (n, 3) the diameters d1, d2, d3 of the solid.
     mass_kg : (n,).
 
     Raises
     ------
-    InputError : a number that is not finite, a size or mass that is not positive, with the release.
+    InputError : a number that is not finite, a size or mass that is not positive, an unknown shape, with the release.
+
+    Notes
+    -----
+    The inertia is that of the block in motion: rolling, free rotation and the rotational energy of tables. An impact
+    model that has an inertia of its own (a sphere's or a cube's) keeps it.
     """
 
     name: Names
     position: Array
     velocity: Array
     angular_velocity: Array
-    diameter_m: Array
+    shape: Names
+    axes_m: Array
     mass_kg: Array
 
     def __post_init__(self) -> None:
         for what, values in (("position", self.position), ("velocity", self.velocity), ("spin", self.angular_velocity)):
             self._refuse(np.asarray(~np.isfinite(values).all(axis=1)), f"The {what} is not a finite number")
-        for what, sizes in (("diameter", self.diameter_m), ("mass", self.mass_kg)):
-            self._refuse(~(np.isfinite(sizes) & (sizes > 0)), f"The {what} is not a number above zero")
+        for what, sizes in (("diameter", self.axes_m), ("mass", self.mass_kg[:, None])):
+            self._refuse(
+                np.asarray(~(np.isfinite(sizes) & (sizes > 0)).all(axis=1)), f"The {what} is not a number above zero"
+            )
+        self._refuse(~np.isin(self.shape, SHAPES), f"The shape is none of {', '.join(SHAPES)}")
 
     def _refuse(self, wrong: Mask, problem: str) -> None:
         for i in np.flatnonzero(wrong)[:1].tolist():
@@ -54,10 +66,26 @@ class Releases:
     def __len__(self) -> int:
         return len(self.position)
 
+    @cached_property
+    def diameter_m(self) -> Array:
+        """(n,) of the sphere that meets the ground: the mean of the three."""
+        first = self.axes_m[:, 0]
+        return first + ((self.axes_m[:, 1] - first) + (self.axes_m[:, 2] - first)) / 3  # exact for a round block
+
     @property
     def radius_m(self) -> Array:
         """(n,) [m]."""
         return self.diameter_m / 2
+
+    @cached_property
+    def inertia(self) -> Array:
+        """(n,) c of c m r², the mean of the three moments: 2/5 for a sphere, 2/3 for a cube."""
+        return mean_inertia(self.shape, self.axes_m)
+
+    @cached_property
+    def principal_kgm2(self) -> Array:
+        """(n, 3) moments of inertia about the axes of d1, d2 and d3."""
+        return principal_moments(self.shape, self.axes_m, self.mass_kg)
 
     def drag_per_m(self, drag: Drag | None) -> Array:
         """(n,) ½ρC_D A/m [1/m], zeros without drag."""
@@ -65,12 +93,9 @@ class Releases:
             return np.zeros(len(self))
         return 0.5 * drag.air_density * drag.coefficient * np.pi / 4 * self.diameter_m**2 / self.mass_kg
 
-    def take(self, rows: slice) -> "Releases":
+    def take(self, rows: slice | Indices) -> "Releases":
         """Some of them."""
-        return Releases(
-            self.name[rows], self.position[rows], self.velocity[rows], self.angular_velocity[rows],
-            self.diameter_m[rows], self.mass_kg[rows],
-        )  # fmt: skip
+        return Releases(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 def make_releases(
@@ -80,10 +105,16 @@ def make_releases(
     velocity: Array | None = None,
     angular_velocity: Array | None = None,
     diameter_m: Array | float = 0.35,
+    axes_m: Array | None = None,
+    shape: Names | Shape = "sphere",
     density_kgpm3: Array | float = ROCK_DENSITY_KGPM3,
     number: int = 1,
 ) -> Releases:
-    """Releases of spheres, each `number` times.
+    """Releases, each `number` times.
+
+    Parameters
+    ----------
+    diameter_m : (n,) or a number, of blocks without `axes_m` (n, 3). A sphere and a cube take the mean of three.
 
     Raises
     ------
@@ -93,15 +124,22 @@ def make_releases(
         raise InputError(f"{number} blocks cannot be released", advice="Release at least one from each place")
     n = len(position)
     zeros = np.zeros((n, 3))
-    diameter = np.broadcast_to(np.asarray(diameter_m, dtype=np.float64), n)
-    density = np.broadcast_to(np.asarray(density_kgpm3, dtype=np.float64), n)
+    shapes = np.broadcast_to(np.asarray(shape, dtype=np.str_), n)
+    for unknown in shapes[~np.isin(shapes, SHAPES)][:1].tolist():
+        raise InputError(f"There is no shape {unknown!r}", advice=suggestion(unknown, SHAPES))
+    if axes_m is None:
+        axes = np.broadcast_to(np.asarray(diameter_m, dtype=np.float64)[..., None], (n, 3))
+    else:
+        even = np.isin(shapes, ROUND) & (axes_m != axes_m[:, :1]).any(axis=1)
+        axes = np.where(even[:, None], axes_m.mean(axis=1, keepdims=True), axes_m)
     columns = (
         np.full(n, "") if name is None else name,
         position,
         zeros if velocity is None else velocity,
         zeros if angular_velocity is None else angular_velocity,
-        diameter,
-        density * np.pi / 6 * diameter**3,
+        shapes,
+        axes,
+        np.broadcast_to(np.asarray(density_kgpm3, dtype=np.float64), n) * volumes(shapes, axes),
     )
     return Releases(*(np.repeat(column, number, axis=0) for column in columns))
 

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Progress on standard error, for work that takes more than a second."""
 
+import signal
 import sys
 import time
-from threading import Timer
-from types import TracebackType
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Timer, current_thread, main_thread
+from types import FrameType, TracebackType
 from typing import TextIO
+
+from ..progress import CancelledError, Progress
 
 QUIET_S = 1.0
 """Before the first line."""
@@ -71,3 +76,30 @@ class PrintedProgress:
         if self._is_open:
             print(file=self._stream, flush=True)
         self._is_open = False
+
+
+@contextmanager
+def stopped_by_interrupt(progress: Progress) -> Iterator[Progress]:
+    """Progress in which Ctrl+C asks the work to end, so that it can keep what is finished; a second one ends it."""
+    asked = False
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        asked = True
+        signal.signal(signal.SIGINT, before)
+
+    def told(text: str, done: int = 0, total: int = 0) -> None:
+        if asked:
+            raise CancelledError
+        progress(text, done, total)
+
+    if current_thread() is not main_thread():  # only there can signals be handled
+        yield progress
+        return
+    before = signal.signal(signal.SIGINT, ask)
+    try:
+        yield told
+    except CancelledError as error:
+        raise KeyboardInterrupt from error
+    finally:
+        signal.signal(signal.SIGINT, before)

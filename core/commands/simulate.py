@@ -2,9 +2,8 @@
 """``rockfall simulate``: blocks that fall down the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv."""
 
 import argparse
-import time
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
@@ -19,10 +18,7 @@ from .options import (
     terrain_as_asked,
     whole,
 )
-from .progress import PrintedProgress
-
-if TYPE_CHECKING:
-    from ..simulation.engine import Simulation
+from .progress import PrintedProgress, stopped_by_interrupt
 
 RECORDS = ("impacts", "trajectories")
 LARGE = 20_000
@@ -34,7 +30,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("releases", metavar="RELEASES", help="releases.csv: x_m, y_m and, if not on the terrain, z_m")
     add_out(parser)
     parser.add_argument("--terrain", metavar="FILE", required=True, help="mesh, grid or cloud")
-    parser.add_argument("--model", metavar="NAME", required=True, help="impact model; `rockfall models` lists all")
+    parser.add_argument(
+        "--model",
+        action="append",
+        metavar="NAME",
+        required=True,
+        help="impact model; may be given several times: each gets the same blocks. `rockfall models` lists all",
+    )
     add_parameter_options(parser)
     parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
     parser.add_argument(
@@ -79,58 +81,64 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.tables import write_impacts, write_trajectories
     from ..impact_models.registry import find_model
     from ..reconstruction.drag import Drag
-    from ..simulation.engine import Settings, simulate
-    from ..simulation.ground import make_ground
     from ..simulation.results import impacts_of, sample_runs
+    from ..workflow.simulation import Scenario, ground_of, remarks_of, run_models
 
-    model = find_model(arguments.model)
-    parameters = model_parameters(arguments, [model.name])
+    models = [find_model(name).name for name in arguments.model]
+    parameters = model_parameters(arguments, models)
     files = _structures(arguments.structure)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         terrain = terrain_as_asked(arguments, arguments.terrain, progress)
-        structures = {name: terrain_as_asked(arguments, file, progress) for name, file in files.items()}
-        ground = make_ground(terrain, structures)
-        progress(f"Reading {arguments.releases}")
-        releases = read_releases(
-            arguments.releases,
-            ground,
-            diameter_m=arguments.diameter,
-            density_kgpm3=arguments.density,
-            number=arguments.number,
-        )
-        asked = ("impacts", "trajectories")[: 1 if len(releases) >= LARGE else 2]
-        record = known_names(arguments.record, RECORDS, "--record") if arguments.record is not None else asked
-        settings = Settings(
-            model.name,
-            parameters.get(model.name, {}),
+        scenario = Scenario(
+            terrain,
+            partial(
+                read_releases,
+                arguments.releases,
+                diameter_m=arguments.diameter,
+                density_kgpm3=arguments.density,
+                number=arguments.number,
+            ),
+            {name: parameters.get(name, {}) for name in models},
+            structures={name: terrain_as_asked(arguments, file, progress) for name, file in files.items()},
             rolling=arguments.rolling,
             friction=arguments.friction,
-            gravity_mps2=arguments.gravity,
             drag=Drag() if arguments.drag else None,
+            gravity_mps2=arguments.gravity,
             seed=arguments.seed,
         )
-        started = time.perf_counter()
-        simulation = simulate(
-            ground, releases, settings, record=bool(record or files), threads=arguments.threads, progress=progress
-        )
-        seconds = time.perf_counter() - started
+        ground = ground_of(scenario)
+        progress(f"Reading {arguments.releases}")
+        releases = scenario.releases(ground)
+        asked = RECORDS[: 1 if len(releases) >= LARGE else 2]
+        record = known_names(arguments.record, RECORDS, "--record") if arguments.record is not None else asked
+        with stopped_by_interrupt(progress) as counted:
+            simulations = run_models(
+                ground,
+                releases,
+                scenario.settings,
+                record=bool(record or files),
+                threads=arguments.threads,
+                progress=counted,
+            )
+        remarks = remarks_of(simulations, models)
         progress("Writing the tables")
-        write_runs(simulation, folder / "runs.csv")
+        write_runs(simulations, folder / "runs.csv")
         written = ["runs.csv"]
         if "impacts" in record:
-            write_impacts(impacts_of(simulation), folder / "impacts.csv")
+            write_impacts([impacts_of(one) for one in simulations], folder / "impacts.csv")
             written.append("impacts.csv")
         if "trajectories" in record:
-            write_trajectories(sample_runs(simulation, progress=progress), folder / "trajectories.csv")
+            samples = [sample_runs(one, progress=progress) for one in simulations]
+            write_trajectories(samples, folder / "trajectories.csv")
             written.append("trajectories.csv")
         if files:
-            write_hits(simulation, folder / "hits.csv")
+            write_hits(simulations, folder / "hits.csv")
             written.append("hits.csv")
         inputs = {"releases": Path(arguments.releases), "terrain": Path(arguments.terrain)}
         inputs |= {name: Path(file) for name, file in files.items()}
-        write_summary(summary(simulation, inputs, seconds), folder / "summary.json")
+        write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
         written.append("summary.json")
-    for sentence in (*terrain.summary, *_sentences(simulation, seconds)):
+    for sentence in (*terrain.summary, *remarks):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
@@ -147,32 +155,3 @@ def _structures(texts: list[str]) -> dict[str, str]:
             raise InputError(f"--structure {name} is given twice", advice="Give each structure a name of its own")
         found[name.strip()] = file
     return found
-
-
-def _sentences(simulation: "Simulation", seconds: float) -> list[str]:
-    """How the runs ended, the unusual first."""
-    import numpy as np
-
-    from ..simulation.engine import ENDS, LIMIT, STOPPED
-
-    n, counts = len(simulation), np.bincount(simulation.end, minlength=len(ENDS))
-    words = {
-        STOPPED: "stopped",
-        "left_terrain": "left the terrain",
-        LIMIT: "were cut off at the limit of time or impacts",
-    }
-    sentences = []
-    if n < simulation.wanted:
-        sentences.append(f"Stopped by you: {n} of {simulation.wanted} blocks are finished and written.")
-    if counts[ENDS.index(LIMIT)]:
-        sentences.append(f"{counts[ENDS.index(LIMIT)]} of {n} blocks {words[LIMIT]}: they are not at rest.")
-    ended = ", ".join(f"{count} {words[name]}" for name, count in zip(ENDS, counts.tolist(), strict=True) if count)
-    sentences.append(f"{n} blocks with {simulation.settings.model}, {simulation.impacts.sum()} impacts: {ended}.")
-    flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
-    sentences.append(
-        f"Run-out in plan {np.median(flat):.1f} m (median), {flat.max():.1f} m at most; speeds up to "
-        f"{simulation.v_max_mps.max():.1f} m/s. It took {seconds:.1f} s."
-    )
-    if simulation.ground.flat:
-        sentences.append(f"{simulation.ground.flat} triangles without area were left out.")
-    return sentences

@@ -3,6 +3,7 @@
 
 import hashlib
 import json
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..remarks import Remark, to_plain
 from ..simulation.engine import ENDS, Simulation
 from ..simulation.ground import Ground
 from ..simulation.release import Releases, make_releases, overlapping, placed_on
@@ -101,11 +103,15 @@ def read_releases(
     return releases.take(np.repeat(np.arange(n), counts.astype(np.intp)))
 
 
-def write_runs(simulation: Simulation, path: str | Path) -> None:
-    """Write runs.csv: one row per block."""
+def write_runs(simulations: Sequence[Simulation], path: str | Path) -> None:
+    """Write runs.csv: one row per block and model."""
+    write_columns(path, *map(_run_cells, simulations))
+
+
+def _run_cells(simulation: Simulation) -> Columns:
     releases, figures = simulation.releases, run_figures(simulation)
     shift = simulation.ground.terrain.shift
-    columns: Columns = {
+    return {
         "run": [str(number + 1) for number in range(len(simulation))],
         "release": release_names(simulation).tolist(),
         "model": [simulation.settings.model] * len(simulation),
@@ -122,11 +128,14 @@ def write_runs(simulation: Simulation, path: str | Path) -> None:
         "height_max_m": figures.height_max_m,
         "energy_line_deg": np.degrees(figures.energy_line),
     }
-    write_columns(path, columns)
 
 
-def write_hits(simulation: Simulation, path: str | Path) -> None:
+def write_hits(simulations: Sequence[Simulation], path: str | Path) -> None:
     """Write hits.csv: each time that a block meets a structure."""
+    write_columns(path, *map(_hit_cells, simulations))
+
+
+def _hit_cells(simulation: Simulation) -> Columns:
     records, releases = simulation.records, simulation.releases
     rows = hits_of(simulation)
     run = records.run[rows]
@@ -136,9 +145,10 @@ def write_hits(simulation: Simulation, path: str | Path) -> None:
     speed = norm(v1)
     towards = -(v1 * records.normal[rows]).sum(axis=1)
     names = np.array(["", *simulation.ground.structures])
-    columns: Columns = {
+    return {
         "structure": names[simulation.ground.owner[records.face[rows]]].tolist(),
         "run": (run + 1).astype(np.str_).tolist(),
+        "model": [simulation.settings.model] * rows.size,
         "time_s": records.time_s[rows],
         **vector_columns(POSITION, place),
         "v_mps": speed,
@@ -146,30 +156,40 @@ def write_hits(simulation: Simulation, path: str | Path) -> None:
         "kinetic_J": 0.5 * releases.mass_kg[run] * speed**2,
         "rotational_J": 0.5 * inertia * (records.omega1[rows] ** 2).sum(axis=1),
     }
-    write_columns(path, columns)
 
 
-def summary(simulation: Simulation, inputs: dict[str, Path], seconds: float) -> dict[str, Any]:
-    """What summary.json says: inputs with their hashes, settings, counts of each end, rate."""
-    settings = simulation.settings
-    ends = np.bincount(simulation.end, minlength=len(ENDS))
+def summary(
+    simulations: Sequence[Simulation], inputs: Mapping[str, Path], remarks: Sequence[Remark] = ()
+) -> dict[str, Any]:
+    """What summary.json says: inputs with their hashes, what all models share, then of each its counts and rate."""
+    first = simulations[0]
+    settings = first.settings
     return {
         "version": str(import_module((__package__ or "").partition(".core")[0]).__version__),
         "inputs": {name: {"file": path.name, "sha256": _digest(path)} for name, path in inputs.items()},
-        "model": settings.model,
-        "parameters": dict(settings.parameters),
-        "zones": {name: dict(values) for name, values in settings.zones.items()},
         "rolling": settings.rolling,
         "friction": settings.friction,
         "gravity_mps2": settings.gravity_mps2,
         "drag": settings.drag is not None,
         "seed": settings.seed,
-        "blocks": len(simulation),
-        "blocks_wanted": simulation.wanted,
+        "blocks_wanted": first.wanted,
+        "triangles_without_area": first.ground.flat,
+        "models": {simulation.settings.model: _model_summary(simulation) for simulation in simulations},
+        "remarks": to_plain(remarks),
+    }
+
+
+def _model_summary(simulation: Simulation) -> dict[str, Any]:
+    settings, n = simulation.settings, len(simulation)
+    ends = np.bincount(simulation.end, minlength=len(ENDS))
+    return {
+        "parameters": dict(settings.parameters),
+        "zones": {name: dict(values) for name, values in settings.zones.items()},
+        "blocks": n,
         "ends": {name: int(count) for name, count in zip(ENDS, ends, strict=True)},
         "impacts": int(simulation.impacts.sum()),
-        "triangles_without_area": simulation.ground.flat,
-        "seconds": round(seconds, 3),
+        "seconds": round(simulation.seconds, 3),
+        "blocks_per_s": round(n / simulation.seconds, 1),
     }
 
 

@@ -120,8 +120,16 @@ def write_picks(picks: Picks, path: str | Path) -> None:
     write_columns(path, columns)
 
 
-def write_impacts(impacts: Impacts, path: str | Path) -> None:
-    """Write impacts.csv: the fixed columns, then deviations, spin, normal's spread, energies and heights, if any."""
+def write_impacts(impacts: Impacts | Sequence[Impacts], path: str | Path) -> None:
+    """Write impacts.csv: the fixed columns, then deviations, spin, normal's spread, energies and heights, if any.
+
+    Several tables stand one below the other; they have the same columns, but for those without a row.
+    """
+    tables = [impacts] if isinstance(impacts, Impacts) else impacts
+    write_columns(path, *([_impact_cells(table) for table in tables if len(table)] or [_impact_cells(tables[0])]))
+
+
+def _impact_cells(impacts: Impacts) -> Columns:
     columns: Columns = {"site": impacts.site, "trajectory": impacts.trajectory, "impact": impacts.impact}
     columns |= {column[0]: _of(impacts, column) for column in _NUMBERS}
     columns["flags"] = impacts.flag_text()
@@ -134,8 +142,7 @@ def write_impacts(impacts: Impacts, path: str | Path) -> None:
         values = _of(impacts, column)
         if np.isfinite(values).any():
             columns[column[0]] = values
-    columns |= impacts.extra
-    write_columns(path, columns)
+    return {**columns, **impacts.extra}
 
 
 def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
@@ -203,8 +210,13 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     )
 
 
-def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
-    """Write trajectories.csv, to the micrometre and microsecond."""
+def write_trajectories(samples: TrajectorySamples | Sequence[TrajectorySamples], path: str | Path) -> None:
+    """Write trajectories.csv, to the micrometre and microsecond; several tables one below the other."""
+    tables = [samples] if isinstance(samples, TrajectorySamples) else samples
+    write_columns(path, *map(_trajectory_cells, tables))
+
+
+def _trajectory_cells(samples: TrajectorySamples) -> Columns:
     survey = samples.shift.to_survey(samples.position)
     columns: Columns = {
         "source": samples.source.tolist(),
@@ -215,7 +227,7 @@ def write_trajectories(samples: TrajectorySamples, path: str | Path) -> None:
     columns |= {name: _rounded(survey[:, i]) for i, name in enumerate(POSITION)}
     columns |= {name: _rounded(samples.velocity[:, i]) for i, name in enumerate(("vx_mps", "vy_mps", "vz_mps"))}
     columns |= {"height_m": _rounded(samples.height_m), "kinetic_J": _rounded(samples.kinetic_j)}
-    write_columns(path, columns)
+    return columns
 
 
 def impact_columns(impacts: Impacts) -> tuple[str, ...]:
@@ -268,19 +280,19 @@ def vector_columns(names: Iterable[str], values: Array) -> Columns:
     return {name: values[:, i] for i, name in enumerate(names)}
 
 
-def write_columns(path: str | Path, columns: Columns) -> None:
-    """Write a table: a header, and undefined numbers as empty cells.
+def write_columns(path: str | Path, *tables: Columns) -> None:
+    """Write tables of the same columns, one below the other: a header, and undefined numbers as empty cells.
 
     Some rows at a time: their text takes many times the memory of the numbers.
     """
-    rows = min(map(len, columns.values()))
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        for start in range(0, rows, WRITTEN_ROWS):
-            part = [_texts(cells[start : start + WRITTEN_ROWS]) for cells in columns.values()]
-            lines = zip(*part, strict=True)
-            if any(QUOTED.search("".join(cells)) for cells in part):
-                writer.writerows(lines)
-            else:  # six times quicker
-                stream.writelines(f"{line}\n" for line in map(",".join, lines))
+        writer.writerow(tables[0])
+        for columns in tables:
+            for start in range(0, min(map(len, columns.values())), WRITTEN_ROWS):
+                part = [_texts(cells[start : start + WRITTEN_ROWS]) for cells in columns.values()]
+                lines = zip(*part, strict=True)
+                if any(QUOTED.search("".join(cells)) for cells in part):
+                    writer.writerows(lines)
+                else:  # six times quicker
+                    stream.writelines(f"{line}\n" for line in map(",".join, lines))

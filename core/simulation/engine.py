@@ -2,6 +2,7 @@
 """Blocks on the ground, all at once: each its own run, the same bits for any number of threads and batches."""
 
 import os
+import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
@@ -107,6 +108,7 @@ class Simulation:
     records : all moments if they were asked for, else releases and ends.
     wanted : how many blocks were asked for; more than n after a cancel.
     recorded : whether `records` has all moments; without them nothing is known of single flights.
+    seconds : how long it took.
     """
 
     settings: Settings
@@ -121,6 +123,7 @@ class Simulation:
     records: Records
     wanted: int
     recorded: bool
+    seconds: float
 
     def __len__(self) -> int:
         return self.end.size
@@ -149,7 +152,7 @@ def simulate(
     InputError : settings that cannot be.
     """
     n = len(releases)
-    numbers, friction = _parameters(ground, settings)
+    numbers, friction = check_settings(ground, settings)
     model = find_model(settings.model)
     if not n:
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
@@ -172,7 +175,7 @@ def simulate(
         )  # fmt: skip
         return part.stop - part.start
 
-    finished = 0
+    finished, started = 0, time.perf_counter()
     progress("Simulating", 0, n)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         waiting = [pool.submit(batch, start) for start in starts]
@@ -192,11 +195,17 @@ def simulate(
     return Simulation(
         settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
         results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,
+        time.perf_counter() - started,
     )  # fmt: skip
 
 
-def _parameters(ground: Ground, settings: Settings) -> tuple[Array, Array]:
-    """(z, k) the model's numbers in each zone, and (z,) the friction."""
+def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
+    """(z, k) the model's numbers in each zone, and (z,) the friction.
+
+    Raises
+    ------
+    InputError : settings that cannot be.
+    """
     if settings.rolling not in ROLLING:
         raise InputError(f"There is no rolling law {settings.rolling!r}", advice=f"There are {', '.join(ROLLING)}")
     for what, value in (

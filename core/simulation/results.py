@@ -61,9 +61,10 @@ def flights_of(simulation: Simulation) -> tuple[Indices, Array]:
 
 
 def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
-    """The impacts of all runs, as those that were measured; ``run`` and ``structure`` are further columns.
+    """The impacts of all runs, as those that were measured.
 
-    The position is that of the contact, the normal that from the contact to the centre.
+    ``run``, ``structure`` and ``source`` (the model) are further columns. The position is that of the contact, the
+    normal that from the contact to the centre.
     """
     records, releases, ground = simulation.records, simulation.releases, simulation.ground
     rows = np.flatnonzero(records.what == IMPACT)
@@ -107,7 +108,11 @@ def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
         rotational2_j=0.5 * inertia * dot(records.omega2[rows], records.omega2[rows]),
         bounce_height_m=nothing,
         chord_height_m=nothing,
-        extra={"run": (run + 1).astype(np.str_), "structure": structure},
+        extra={
+            "run": (run + 1).astype(np.str_),
+            "structure": structure,
+            "source": np.full(rows.size, simulation.settings.model),
+        },
         shift=ground.terrain.shift,
     )
 

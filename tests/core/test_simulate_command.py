@@ -75,7 +75,7 @@ def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: P
         flat = np.hypot(float(row["x_m"]) - float(row["x0_m"]), float(row["y_m"]) - float(row["y0_m"]))
         assert float(row["energy_line_deg"]) == pytest.approx(np.degrees(np.arctan2(fall, flat)), abs=1e-9)
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert summary["ends"] == {"stopped": 5, "left_terrain": 0, "limit": 0}
+    assert summary["models"]["noel_2017"]["ends"] == {"stopped": 5, "left_terrain": 0, "limit": 0}
     assert summary["seed"] == 3
     assert len(summary["inputs"]["terrain"]["sha256"]) == 64
     assert "5 blocks with noel_2017" in capsys.readouterr().out
@@ -83,6 +83,18 @@ def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: P
     assert main([*argv, "--threads", "1", "--out", str(again)]) == 0
     for name in ("runs.csv", "impacts.csv", "trajectories.csv"):
         assert (again / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_several_models_get_the_same_blocks(terrain: Path, releases: Path, tmp_path: Path) -> None:
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--seed", "3"]
+    for models in (["noel_2017"], ["stevens_1998"], ["noel_2017", "stevens_1998"]):
+        chosen = [word for name in models for word in ("--model", name)]
+        assert main([*argv, *chosen, "--out", str(tmp_path / "_".join(models))]) == 0
+    for table, column in (("runs.csv", "model"), ("impacts.csv", "source"), ("trajectories.csv", "source")):
+        alone = [rows_of(tmp_path / name / table) for name in ("noel_2017", "stevens_1998")]
+        together = rows_of(tmp_path / "noel_2017_stevens_1998" / table)
+        assert together == [*alone[0], *alone[1]]
+        assert list(dict.fromkeys(row[column] for row in together)) == ["noel_2017", "stevens_1998"]
 
 
 def test_without_records_the_greatest_height_is_not_known(terrain: Path, releases: Path, tmp_path: Path) -> None:

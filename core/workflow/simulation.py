@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whole rockfalls: what is stated of them becomes a ground and releases, and the models run one after the other."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..constants import GRAVITY_MPS2
+from ..errors import InputError
+from ..progress import CancelledError, Progress, silent
+from ..reconstruction.drag import Drag
+from ..remarks import Remark, gravest_first
+from ..simulation.engine import (
+    ENDS,
+    FRICTION,
+    LEFT_TERRAIN,
+    LIMIT,
+    STOPPED,
+    Rolling,
+    Settings,
+    Simulation,
+    check_settings,
+    simulate,
+)
+from ..simulation.ground import Ground, make_ground
+from ..simulation.release import SPHERE_INERTIA, Releases
+from ..terrain.surface import Surface
+
+type ReleaseSource = Callable[[Ground], Releases]
+"""Puts the blocks on a ground: points, a line, a polygon, steep faces, measured releases, a table."""
+
+END_WORDS = {
+    STOPPED: "stopped",
+    LEFT_TERRAIN: "left the terrain",
+    LIMIT: "were cut off at the limit of time or impacts",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Zones:
+    """Parts of the terrain with parameters of their own.
+
+    Attributes
+    ----------
+    names : the first is what no other zone covers.
+    of_face : (m,) place in `names` of each of the terrain's faces.
+    parameters : zone → model → parameters that differ there.
+    friction : zone → μ that differs there.
+    """
+
+    names: tuple[str, ...]
+    of_face: NDArray[np.int32]
+    parameters: Mapping[str, Mapping[str, Mapping[str, object]]] = field(default_factory=dict)
+    friction: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Everything that decides a simulation: the same scenario gives the same bits.
+
+    Attributes
+    ----------
+    terrain : the surface.
+    releases : puts the blocks on the ground, with their sizes, densities, number and velocities.
+    models : name → the parameters that are not to have their default, for all zones; in the order in which they run.
+    structures : name → walls, fences, roads, houses that stand on the terrain.
+    zones : None for one that is everywhere.
+    rolling, friction, drag, inertia, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
+    record : keep every impact and step of the runs; without them only how each begins and ends.
+    """
+
+    terrain: Surface
+    releases: ReleaseSource
+    models: Mapping[str, Mapping[str, object]]
+    structures: Mapping[str, Surface] = field(default_factory=dict)
+    zones: Zones | None = None
+    rolling: Rolling = "azzoni_1995"
+    friction: float = FRICTION
+    drag: Drag | None = None
+    inertia: float = SPHERE_INERTIA
+    gravity_mps2: float = GRAVITY_MPS2
+    seed: int = 0
+    most_impacts: int = Settings.most_impacts
+    most_s: float = Settings.most_s
+    record: bool = True
+
+    @property
+    def settings(self) -> tuple[Settings, ...]:
+        """One for each model."""
+        zones = {} if self.zones is None else self.zones.parameters
+        return tuple(
+            Settings(
+                model,
+                parameters,
+                zones={zone: models[model] for zone, models in zones.items() if model in models},
+                rolling=self.rolling,
+                friction=self.friction,
+                zone_friction={} if self.zones is None else self.zones.friction,
+                inertia=self.inertia,
+                gravity_mps2=self.gravity_mps2,
+                drag=self.drag,
+                seed=self.seed,
+                most_impacts=self.most_impacts,
+                most_s=self.most_s,
+            )
+            for model, parameters in self.models.items()
+        )
+
+
+def ground_of(scenario: Scenario) -> Ground:
+    """The terrain with its structures and zones.
+
+    Raises
+    ------
+    InputError : see `make_ground`.
+    """
+    zones = scenario.zones
+    if zones is None:
+        return make_ground(scenario.terrain, scenario.structures)
+    return make_ground(scenario.terrain, scenario.structures, zones.of_face, zones.names)
+
+
+def run_scenario(
+    scenario: Scenario, *, threads: int | None = None, progress: Progress = silent
+) -> tuple[Simulation, ...]:
+    """Prepare the ground, release the blocks and run all models; see `run_models`.
+
+    Raises
+    ------
+    InputError : anything in the scenario that cannot be.
+    CancelledError : the work was ended before the first blocks were finished.
+    """
+    progress("Preparing the ground", 0, 0)
+    ground = ground_of(scenario)
+    progress("Releasing the blocks", 0, 0)
+    releases = scenario.releases(ground)
+    return run_models(ground, releases, scenario.settings, record=scenario.record, threads=threads, progress=progress)
+
+
+def run_models(
+    ground: Ground,
+    releases: Releases,
+    settings: Sequence[Settings],
+    *,
+    record: bool = True,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> tuple[Simulation, ...]:
+    """Let the same blocks fall once for each of the settings.
+
+    Parameters
+    ----------
+    settings : one for each model. With the same seed, run i has the same random numbers in all.
+    record, threads : see `simulate`.
+    progress : counts the blocks of all models. A `CancelledError` raised in it ends the work: models that are finished
+        are kept, and of the one in progress the runs that are; `remarks_of` says so.
+
+    Raises
+    ------
+    InputError : no model, one that is given twice, or settings that cannot be: before anything falls.
+    CancelledError : the work was ended before the first blocks were finished.
+    """
+    models = [one.model for one in settings]
+    if not models:
+        raise InputError("There is no model to simulate with", advice="Give at least one impact model")
+    for model in models:
+        if models.count(model) > 1:
+            raise InputError(f"The model {model} is given twice", advice="Give each model once")
+    for one in settings:
+        check_settings(ground, one)
+    n = len(releases)
+    finished: list[Simulation] = []
+    for place, one in enumerate(settings):
+
+        def all_models(
+            text: str, done: int = 0, total: int = 0, before: int = place * n, model: str = one.model
+        ) -> None:
+            progress(f"{text} {model}", before + done, n * len(settings))
+
+        try:
+            simulation = simulate(ground, releases, one, record=record, threads=threads, progress=all_models)
+        except CancelledError:
+            if not finished:
+                raise
+            break
+        finished.append(simulation)
+        if len(simulation) < simulation.wanted:
+            break
+    return tuple(finished)
+
+
+def _among(progress: Progress, model: str, before: int, total: int) -> Progress:
+    """The progress of one model among all."""
+
+    def counted(text: str, done: int = 0, _: int = 0) -> None:
+        progress(f"{text} {model}", before + done, total)
+
+    return counted
+
+
+def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) -> tuple[Remark, ...]:
+    """What a user should know of simulations on one ground from the same releases, the gravest first.
+
+    Parameters
+    ----------
+    models : all that were to run, so that those are named which did not begin.
+    """
+    remarks = []
+    begun = [simulation.settings.model for simulation in simulations]
+    idle = [model for model in models if model not in begun]
+    short = [simulation for simulation in simulations if len(simulation) < simulation.wanted]
+    if short or idle:
+        parts = [f"{len(one)} of {one.wanted} blocks with {one.settings.model} are finished and kept" for one in short]
+        parts += [f"not begun: {', '.join(idle)}"] if idle else []
+        remarks.append(Remark(f"Stopped by you: {'; '.join(parts)}.", "warning", "cancelled"))
+    for simulation in simulations:
+        remarks += _remarks_of_one(simulation)
+    ground = simulations[0].ground
+    if ground.flat:
+        remarks.append(Remark(f"{ground.flat} triangles without area were left out.", "note", "terrain"))
+    return tuple(gravest_first(remarks))
+
+
+def _remarks_of_one(simulation: Simulation) -> list[Remark]:
+    """How the runs with one model ended."""
+    remarks, model = [], simulation.settings.model
+    n, counts = len(simulation), np.bincount(simulation.end, minlength=len(ENDS))
+    limited = counts[ENDS.index(LIMIT)]
+    if limited:
+        text = f"{limited} of {n} blocks with {model} {END_WORDS[LIMIT]}: they are not at rest."
+        remarks.append(Remark(text, "warning", model))
+    ended = ", ".join(f"{count} {END_WORDS[name]}" for name, count in zip(ENDS, counts.tolist(), strict=True) if count)
+    text = f"{n} blocks with {model}, {simulation.impacts.sum()} impacts: {ended}."
+    remarks.append(Remark(text, "note", model))
+    flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
+    text = (
+        f"Run-out in plan {np.median(flat):.1f} m (median), {flat.max():.1f} m at most; speeds up to "
+        f"{simulation.v_max_mps.max():.1f} m/s. It took {simulation.seconds:.1f} s."
+    )
+    remarks.append(Remark(text, "note", model))
+    return remarks

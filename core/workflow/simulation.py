@@ -25,7 +25,7 @@ from ..simulation.engine import (
     simulate,
 )
 from ..simulation.ground import Ground, make_ground
-from ..simulation.release import SPHERE_INERTIA, Releases
+from ..simulation.release import Releases
 from ..terrain.surface import Surface
 
 type ReleaseSource = Callable[[Ground], Releases]
@@ -67,7 +67,7 @@ class Scenario:
     models : name → the parameters that are not to have their default, for all zones; in the order in which they run.
     structures : name → walls, fences, roads, houses that stand on the terrain.
     zones : None for one that is everywhere.
-    rolling, friction, drag, inertia, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
+    rolling, friction, drag, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
     record : keep every impact and step of the runs; without them only how each begins and ends.
     """
 
@@ -79,7 +79,6 @@ class Scenario:
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     drag: Drag | None = None
-    inertia: float = SPHERE_INERTIA
     gravity_mps2: float = GRAVITY_MPS2
     seed: int = 0
     most_impacts: int = Settings.most_impacts
@@ -98,7 +97,6 @@ class Scenario:
                 rolling=self.rolling,
                 friction=self.friction,
                 zone_friction={} if self.zones is None else self.zones.friction,
-                inertia=self.inertia,
                 gravity_mps2=self.gravity_mps2,
                 drag=self.drag,
                 seed=self.seed,

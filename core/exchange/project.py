@@ -14,6 +14,7 @@ from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
+from .simulation_entry import SimulationEntry, read_simulation, simulation_content
 from .toml_text import TomlTable, Vector3, read_toml
 
 SCHEMA = 1
@@ -181,6 +182,7 @@ class Project:
     Attributes
     ----------
     block : what holds for every trajectory that ``blocks`` does not name.
+    simulation : None where nothing is said of one.
     """
 
     site: Site = field(default_factory=Site)
@@ -192,6 +194,7 @@ class Project:
     render: tuple[RenderPreset, ...] = ()
     videos: tuple[VideoEntry, ...] = ()
     refinement: RefinementSettings = field(default_factory=RefinementSettings)
+    simulation: SimulationEntry | None = None
     extra: Extra = field(default_factory=dict)
 
     def block_of(self, trajectory: str) -> BlockEntry:
@@ -224,6 +227,7 @@ def read_project(path: str | Path) -> Project:
     top = TomlTable(read_toml(path, "project"), "", path)
     _check_schema(top)
     site, terrain, picks = top.table("site"), top.table("terrain"), top.table("picks")
+    simulation = top.table("simulation")
     block = _block(top.table("block"), BlockEntry(), named=False)
     blocks = tuple(_block(table, block, named=True) for table in top.tables("blocks"))
     render = tuple(_preset(table) for table in top.tables("render"))
@@ -243,6 +247,7 @@ def read_project(path: str | Path) -> Project:
         render=render,
         videos=videos,
         refinement=_refinement(top.table("refinement")),
+        simulation=None if simulation.absent else read_simulation(simulation),
         extra=top.rest() | ({"picks": picks.rest()} if picks.rest() else {}),
     )
 
@@ -273,6 +278,8 @@ def write_project(project: Project, path: str | Path) -> None:
     content["videos"] = [_files_as(relative, _plain(video)) for video in project.videos]
     if project.videos or project.refinement != RefinementSettings():
         content["refinement"] = _plain(project.refinement)
+    if project.simulation is not None:
+        content["simulation"] = simulation_content(project.simulation, relative)
     content["render"] = [_plain(preset) for preset in project.render]
     content = {key: value for key, value in content.items() if value not in ({}, [])} | extra
     path.write_text(tomli_w.dumps(content), encoding="utf-8", newline="\n")

@@ -83,14 +83,18 @@ class TomlTable:
             raise self.wrong(key, f"is {value!r}", f"Choose one of {', '.join(known)}")
         return value
 
-    def choices(self, key: str, known: tuple[str, ...]) -> tuple[str, ...]:
+    def texts(self, key: str, such_as: str) -> tuple[str, ...]:
         value = self._taken(key, [], "a list")
         if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self.wrong(key, f"is {value!r}, not a list of texts", f'Write a list, such as ["{known[0]}"]')
+            raise self.wrong(key, f"is {value!r}, not a list of texts", f'Write a list, such as ["{such_as}"]')
+        return tuple(dict.fromkeys(value))
+
+    def choices(self, key: str, known: tuple[str, ...]) -> tuple[str, ...]:
+        value = self.texts(key, known[0])
         for item in value:
             if item not in known:
                 raise self.wrong(key, f"has {item!r}", f"Choose from {', '.join(known)}")
-        return tuple(dict.fromkeys(value))
+        return value
 
     def flag(self, key: str, default: bool) -> bool:
         value = self._taken(key, default, "true or false")
@@ -119,10 +123,12 @@ class TomlTable:
     def optional_number(self, key: str, zero_allowed: bool = False) -> float | None:
         return self.number(key, REQUIRED, zero_allowed) if key in self._content else None
 
-    def whole(self, key: str, default: int = REQUIRED) -> int:
+    def whole(self, key: str, default: int = REQUIRED, zero_allowed: bool = False) -> int:
         value = self._taken(key, default, "a whole number")
-        if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-            raise self.wrong(key, f"is {value!r}", "Give a whole number above zero")
+        if not isinstance(value, int) or isinstance(value, bool) or value < (0 if zero_allowed else 1):
+            raise self.wrong(
+                key, f"is {value!r}", f"Give a whole number {'not below' if zero_allowed else 'above'} zero"
+            )
         return value
 
     def vector(self, key: str) -> Vector3:
@@ -131,6 +137,15 @@ class TomlTable:
             raise self.wrong(key, f"is {value!r}", "Give three numbers, [x, y, z]")
         x, y, z = (float(item) for item in value)
         return x, y, z
+
+    def points(self, key: str) -> tuple[tuple[float, ...], ...]:
+        """A list of points [x, y] or [x, y, z]; empty when it is missing."""
+        value = self._taken(key, [], "a list of points")
+        rows = value if isinstance(value, list) else [value]
+        for row in rows:
+            if not (isinstance(row, list) and len(row) in (2, 3) and all(map(is_number, row))):
+                raise self.wrong(key, "is not a list of points", "Write [[x, y], [x, y, z]]; without z on the terrain")
+        return tuple(tuple(map(float, row)) for row in rows)
 
     def numbers(self, key: str, shape: tuple[int, ...]) -> Array:
         """An array of this shape; its rows are the inner lists."""

@@ -20,6 +20,7 @@ from rockfall.core.exchange.project import (
     read_project,
     write_project,
 )
+from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, StructureEntry
 
 FULL = """
 schema = 1
@@ -251,3 +252,91 @@ def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
 def test_a_project_cannot_be_changed_in_place(folder: Path) -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         read(folder, FULL).picks = None  # type: ignore[misc]
+
+
+SIMULATED = """
+schema = 1
+[simulation]
+models = ["noel_2017", "stevens_1998"]
+seed = 3
+rolling = "coulomb"
+friction = 0.4
+drag = true
+record = []
+kept = 1
+[simulation.releases]
+from = "polygon"
+points_m = [[2600010.25, 1200040.0], [2600030.0, 1200040.0, 512.5], [2600030.0, 1200060.0]]
+number = 1000
+shape = "cube"
+diameter_m = 0.5
+kept = 2
+[[simulation.structures]]
+name = "fence"
+file = "fence.ply"
+kept = 3
+"""
+
+
+def test_a_simulation_round_trips(tmp_path: Path) -> None:
+    path, again = tmp_path / "project.toml", tmp_path / "again.toml"
+    (tmp_path / "fence.ply").touch()
+    path.write_text(SIMULATED, encoding="utf-8")
+    project = read_project(path)
+    assert project.simulation == SimulationEntry(
+        models=("noel_2017", "stevens_1998"),
+        releases=ReleaseEntry(
+            source="polygon",
+            points_m=((2600010.25, 1200040.0), (2600030.0, 1200040.0, 512.5), (2600030.0, 1200060.0)),
+            number=1000,
+            shape="cube",
+            diameter_m=0.5,
+            extra={"kept": 2},
+        ),
+        structures=(StructureEntry("fence", tmp_path / "fence.ply", {"kept": 3}),),
+        rolling="coulomb",
+        friction=0.4,
+        drag=True,
+        seed=3,
+        record=(),
+        extra={"kept": 1},
+    )
+    write_project(project, again)
+    assert read_project(again) == project
+    for source in (
+        ReleaseEntry(),
+        ReleaseEntry("table", file=tmp_path / "fence.ply"),
+        ReleaseEntry("steep", steeper_than_deg=61.5, density_kgpm3=2500.0),
+    ):
+        project = Project(simulation=SimulationEntry(releases=source))
+        write_project(project, again)
+        assert read_project(again) == project
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('"stevens_1998"', '"stevens"', "simulation.models has 'stevens', which is no impact model"),
+        ("seed = 3", "seed = -1", "simulation.seed is -1"),
+        ('"coulomb"', '"sliding"', "simulation.rolling is 'sliding'"),
+        ("record = []", 'record = ["films"]', "simulation.record has 'films'"),
+        ('"polygon"', '"air"', "simulation.releases.from is 'air'"),
+        ('"polygon"', '"table"', "simulation.releases.file is missing"),
+        (", [2600030.0, 1200060.0]", "", "simulation.releases.points_m has 2 points"),
+        ("[2600030.0, 1200060.0]", "[2600030.0]", "simulation.releases.points_m is not a list of points"),
+        ("number = 1000", "number = 0", "simulation.releases.number is 0"),
+        ("diameter_m = 0.5", "diameter_m = -0.5", "simulation.releases.diameter_m is -0.5"),
+        ("kept = 2", "steeper_than_deg = 180", "simulation.releases.steeper_than_deg is 180"),
+        ('"fence.ply"', '"wall.ply"', "structures 1: file names a file that is not there"),
+        ("kept = 3", '[[simulation.structures]]\nname = "fence"\nfile = "fence.ply"', "names 'fence' twice"),
+    ],
+)
+def test_bad_simulations_are_located(tmp_path: Path, old: str, new: str, problem: str) -> None:
+    path = tmp_path / "project.toml"
+    (tmp_path / "fence.ply").touch()
+    assert SIMULATED.count(old) == 1
+    path.write_text(SIMULATED.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        read_project(path)
+    assert problem in error.value.problem
+    assert error.value.file == path

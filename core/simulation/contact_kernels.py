@@ -12,16 +12,20 @@ and a step to the first root of that bound, less the radius, never passes the co
 face, and converges quadratically on edges and corners.
 """
 
+from functools import partial
 from math import inf, sqrt
 
 from ..compiled import kernel
-from ..terrain.kernels import closest_on_triangle
+from ..terrain.kernels import closest_on_triangle, inverse
+
+inlined = partial(kernel, inline=True)
 
 TOUCHING_M = 1e-8
 """A sphere this near to the terrain touches it."""
 RESTING_S = 1e-9
 """A sphere that touches, and comes back within this time, has not left."""
 STEPS = 100
+FOREVER_S = 1e12
 
 
 @kernel
@@ -67,38 +71,78 @@ def slab(p, v, a, low, high):  # type: ignore[no-untyped-def]
     return entry, last_root(p - low, v, a) if a < 0.0 else last_root(p - high, v, a)
 
 
-@kernel
-def enter_node(bounds, node, p, v, a, grown, limit):  # type: ignore[no-untyped-def]
-    """When the sphere can first touch what is in a node, inf when not before `limit`."""
-    near, far = 0.0, limit
-    for axis in range(3):
-        entry, leave = slab(p[axis], v[axis], a[axis], bounds[node, axis] - grown, bounds[node, axis + 3] + grown)
-        near, far = max(near, entry), min(far, leave)
-        if near > far:
-            return inf
-    return near
+@inlined
+def enter_box(low_x, low_y, low_z, high_x, high_y, high_z, p, v, a, path, limit):  # type: ignore[no-untyped-def]
+    """Between which times the sphere can touch what is in a box: (inf, …) when not before `limit`.
+
+    path : of `prepared`. In x and y the box is met between two planes; then the height on that part of the path is
+    between those at its ends and at the apex, without a root.
+    """
+    grown_x, grown_y, grown, over_x, over_y, apex = path
+    one, other = (low_x - grown_x - p[0]) * over_x, (high_x + grown_x - p[0]) * over_x
+    near, far = max(min(one, other), 0.0), min(max(one, other), limit)
+    one, other = (low_y - grown_y - p[1]) * over_y, (high_y + grown_y - p[1]) * over_y
+    near, far = max(min(one, other), near), min(max(one, other), far)
+    if near > far:
+        return inf, far
+    half = 0.5 * a[2]
+    top = min(max(apex, near), far)
+    z0, z1, z2 = (v[2] + half * near) * near, (v[2] + half * far) * far, (v[2] + half * top) * top
+    low, high = p[2] + min(min(z0, z1), z2), p[2] + max(max(z0, z1), z2)
+    return near if high >= low_z - grown and low <= high_z + grown else inf, far
+
+
+@inlined
+def enter_node(bounds, node, p, v, a, path, limit):  # type: ignore[no-untyped-def]
+    """`enter_box` of a node."""
+    return enter_box(
+        bounds[node, 0], bounds[node, 1], bounds[node, 2], bounds[node, 3], bounds[node, 4], bounds[node, 5],
+        p, v, a, path, limit,
+    )  # fmt: skip
 
 
 @kernel
-def touch(corners, i, p, v, a, radius, start, limit):  # type: ignore[no-untyped-def]
-    """First time in start…limit at which the sphere touches triangle i and comes nearer: (t, e), t inf when not."""
+def prepared(p, v, a, radius, limit):  # type: ignore[no-untyped-def]
+    """What `enter_box` needs of a path: how much boxes grow, 1/v, the time of the apex.
+
+    Along x and y only drag accelerates: boxes grow by how far that takes the block from its straight line.
+    """
+    grown = radius + 2.0 * TOUCHING_M
+    bent_x = 0.5 * abs(a[0]) * limit * limit if a[0] != 0.0 else 0.0
+    bent_y = 0.5 * abs(a[1]) * limit * limit if a[1] != 0.0 else 0.0
+    return grown + bent_x, grown + bent_y, grown, inverse(v[0]), inverse(v[1]), -v[2] / a[2] if a[2] != 0.0 else 0.0
+
+
+@kernel
+def touch(corners, i, p, v, a, radius, path, limit):  # type: ignore[no-untyped-def]
+    """First time before `limit` at which the sphere touches triangle i and comes nearer: (t, e), t inf when not."""
+    nowhere = (0.0, 0.0, 0.0)
     ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
-    bx, by, bz = corners[i, 1, 0] - ax, corners[i, 1, 1] - ay, corners[i, 1, 2] - az
-    cx, cy, cz = corners[i, 2, 0] - ax, corners[i, 2, 1] - ay, corners[i, 2, 2] - az
+    bx, by, bz = corners[i, 1, 0], corners[i, 1, 1], corners[i, 1, 2]
+    cx, cy, cz = corners[i, 2, 0], corners[i, 2, 1], corners[i, 2, 2]
+    t, limit = enter_box(
+        min(min(ax, bx), cx), min(min(ay, by), cy), min(min(az, bz), cz),
+        max(max(ax, bx), cx), max(max(ay, by), cy), max(max(az, bz), cz),
+        p, v, a, path, limit,
+    )  # fmt: skip
+    if t == inf:
+        return inf, nowhere
+    bx, by, bz, cx, cy, cz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
     mx, my, mz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
     size = sqrt(mx * mx + my * my + mz * mz)
-    t = start
-    nowhere = (0.0, 0.0, 0.0)
     if size > 0.0:
-        mx, my, mz = mx / size, my / size, mz / size
         s = mx * (p[0] - ax) + my * (p[1] - ay) + mz * (p[2] - az)
         s1 = mx * v[0] + my * v[1] + mz * v[2]
         s2 = mx * a[0] + my * a[1] + mz * a[2]
-        here = s + (s1 + 0.5 * s2 * t) * t
-        reach = radius + TOUCHING_M
-        if abs(here) > reach:
-            side = reach if here > 0.0 else -reach
-            t += first_root(here - side, s1 + s2 * t, s2)
+        here, slope = s + (s1 + 0.5 * s2 * t) * t, s1 + s2 * t
+        if here < 0.0:
+            s, s1, s2, here, slope = -s, -s1, -s2, -here, -slope
+        reach = (radius + TOUCHING_M) * size
+        away = here > reach or (here > reach - 2.0 * TOUCHING_M * size and slope > 0.0)
+        if away and s2 <= 0.0 and s + (s1 + 0.5 * s2 * limit) * limit > reach:
+            return inf, nowhere  # off the plane at both ends of a path that is bent towards it
+        if here > reach:
+            t += first_root(here - reach, slope, s2)
             if t > limit or t == inf:
                 return inf, nowhere
     for _ in range(STEPS):
@@ -112,7 +156,7 @@ def touch(corners, i, p, v, a, radius, start, limit):  # type: ignore[no-untyped
         if d > 0.0:
             ex, ey, ez = ex / d, ey / d, ez / d
         else:
-            side = -1.0 if mx * vx + my * vy + mz * vz > 0.0 else 1.0
+            side = -1.0 / size if mx * vx + my * vy + mz * vz > 0.0 else 1.0 / size
             ex, ey, ez = side * mx, side * my, side * mz
         gap = d - radius
         speed = vx * ex + vy * ey + vz * ez
@@ -146,14 +190,11 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
     time, normal, place : [s], from the contact to the centre, in the order of the leaves; (inf, zeros, −1) for none.
     """
     bounds, first, count, corners = tree
-    grown = radius + 2.0 * TOUCHING_M
-    best, found = limit, -1
-    normal = (0.0, 0.0, 0.0)
-    near = enter_node(bounds, 0, p, v, a, grown, best)
-    top = 0
-    if near < inf:
-        stack[0], times[0] = 0, near
-        top = 1
+    found, normal = -1, (0.0, 0.0, 0.0)
+    best = min(limit, last_inside(bounds, p, v, a, radius + 2.0 * TOUCHING_M))
+    path = prepared(p, v, a, radius, best)
+    stack[0], times[0] = 0, 0.0
+    top = 1 if best >= 0.0 else 0
     while top:
         top -= 1
         node = stack[top]
@@ -161,24 +202,32 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
             continue
         if count[node]:
             for i in range(first[node], first[node] + count[node]):
-                t, e = touch(corners, i, p, v, a, radius, times[top], best)
-                if t < best or (t == best < inf and found < 0):
+                t, e = touch(corners, i, p, v, a, radius, path, best)
+                if t < best or (t == best and found < 0):
                     best, found, normal = t, i, e
             continue
         left = first[node]
-        near_left = enter_node(bounds, left, p, v, a, grown, best)
-        near_right = enter_node(bounds, left + 1, p, v, a, grown, best)
-        if near_left <= near_right:
-            if near_right < inf:
-                stack[top], times[top] = left + 1, near_right
-                top += 1
-            if near_left < inf:
-                stack[top], times[top] = left, near_left
-                top += 1
-        else:
-            if near_left < inf:
-                stack[top], times[top] = left, near_left
-                top += 1
-            stack[top], times[top] = left + 1, near_right
+        near_left, _ = enter_node(bounds, left, p, v, a, path, best)
+        near_right, _ = enter_node(bounds, left + 1, p, v, a, path, best)
+        right = left + 1
+        if near_left > near_right:
+            left, right, near_left, near_right = right, left, near_right, near_left
+        if near_right < inf:
+            stack[top], times[top] = right, near_right
+            top += 1
+        if near_left < inf:
+            stack[top], times[top] = left, near_left
             top += 1
     return (best, normal, found) if found >= 0 else (inf, normal, -1)
+
+
+@kernel
+def last_inside(bounds, p, v, a, grown):  # type: ignore[no-untyped-def]
+    """When the path is in the box of the terrain for the last time, a finite number; −1 when it never is."""
+    far = FOREVER_S
+    for axis in range(3):
+        entry, leave = slab(p[axis], v[axis], a[axis], bounds[0, axis] - grown, bounds[0, axis + 3] + grown)
+        if entry > leave:
+            return -1.0
+        far = min(far, leave)
+    return far

@@ -71,7 +71,7 @@ def shaded_material(name: str, attribute: str) -> bpy.types.Material:
         towards.operation = "DOT_PRODUCT"
         towards.inputs[1].default_value = SUN_DIRECTION
         tree.links.new(geometry.outputs["Normal"], towards.inputs[0])
-        light = _math(tree, "MULTIPLY_ADD", towards.outputs["Value"], 0.45)
+        light = math_node(tree, "MULTIPLY_ADD", towards.outputs["Value"], 0.45)
         light.node.inputs[2].default_value = 0.6
         _emit(tree, output, colour.outputs["Color"], light)
 
@@ -239,32 +239,35 @@ def _build_terrain(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> No
 
     def lit(name: str) -> bpy.types.NodeSocket:
         """1 - strength · (1 - value)."""
-        dark = _math(tree, "SUBTRACT", attribute(name), 1.0)
-        result = _math(tree, "MULTIPLY_ADD", dark, slider(name))
+        dark = math_node(tree, "SUBTRACT", attribute(name), 1.0)
+        result = math_node(tree, "MULTIPLY_ADD", dark, slider(name))
         result.node.inputs[2].default_value = 1.0
         return result
 
     # hatches: stripes of one metre across the diagonal, where data are thin
     place, split = new("ShaderNodeTexCoord"), new("ShaderNodeSeparateXYZ")
     link(place.outputs["Object"], split.inputs[0])
-    diagonal = _math(tree, "ADD", split.outputs["X"], _math(tree, "ADD", split.outputs["Y"], split.outputs["Z"]))
-    stripe = _math(tree, "GREATER_THAN", _math(tree, "FRACT", diagonal, 0.0), 0.5)
-    hatch = _math(tree, "MULTIPLY", stripe, _math(tree, "MULTIPLY", attribute("thin"), slider("thin")))
+    diagonal = math_node(
+        tree, "ADD", split.outputs["X"], math_node(tree, "ADD", split.outputs["Y"], split.outputs["Z"])
+    )
+    stripe = math_node(tree, "GREATER_THAN", math_node(tree, "FRACT", diagonal, 0.0), 0.5)
+    hatch = math_node(tree, "MULTIPLY", stripe, math_node(tree, "MULTIPLY", attribute("thin"), slider("thin")))
 
     rock = new("ShaderNodeMix")
     rock.data_type = "RGBA"
     rock.inputs["A"].default_value = (*ROCK_COLOUR, 1.0)
     rock.inputs["B"].default_value = (*THIN_COLOUR, 1.0)
     link(hatch, rock.inputs["Factor"])
-    light = _math(tree, "MULTIPLY", lit("hillshade"), lit("eye_dome"))
-    even = _math(tree, "POWER", _math(tree, "DIVIDE", light, RELIEF_MIDDLE), slider("contrast"))
-    bright = _math(tree, "MULTIPLY", even, RELIEF_MIDDLE * RELIEF_BRIGHTNESS)
-    _emit(tree, output, rock.outputs["Result"], _math(tree, "MULTIPLY", bright, slider("brightness")))
+    light = math_node(tree, "MULTIPLY", lit("hillshade"), lit("eye_dome"))
+    even = math_node(tree, "POWER", math_node(tree, "DIVIDE", light, RELIEF_MIDDLE), slider("contrast"))
+    bright = math_node(tree, "MULTIPLY", even, RELIEF_MIDDLE * RELIEF_BRIGHTNESS)
+    _emit(tree, output, rock.outputs["Result"], math_node(tree, "MULTIPLY", bright, slider("brightness")))
 
 
-def _math(
-    tree: bpy.types.ShaderNodeTree, operation: str, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket | float
+def math_node(
+    tree: bpy.types.NodeTree, operation: str, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket | float
 ) -> bpy.types.NodeSocket:
+    """The output of a new node that does one thing to two numbers."""
     node = tree.nodes.new("ShaderNodeMath")
     node.operation = operation
     tree.links.new(a, node.inputs[0])

@@ -12,6 +12,8 @@ ROLE, ID = "rockfall_role", "rockfall_id"
 TERRAIN_ROLE, COARSE_VIEW_ROLE = "terrain", "terrain_view"
 PICK_ROLE, BLOCK_ROLE, FLIGHTS_ROLE = "pick", "block", "flights"
 MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
+SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"
+SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
 CAMERA_ROLE = "camera"
 COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
 
@@ -39,6 +41,9 @@ PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems
 SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
 MODEL = "rockfall_model"  # of what a model predicts
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
+
+# of simulated blocks and paths
+RELEASES = "rockfall_releases"  # name, trajectory and clock time of each, as text
 
 # of a pick; blocks and flights have the trajectory, too
 TRAJECTORY, TIME, POSITION = "rockfall_trajectory", "rockfall_time_s", "rockfall_position_m"
@@ -130,5 +135,7 @@ def remove_objects(objects: list[bpy.types.Object]) -> None:
         bpy.data.objects.remove(obj)
         if isinstance(data, bpy.types.Mesh) and not data.users:
             bpy.data.meshes.remove(data)
+        elif isinstance(data, bpy.types.Curves) and not data.users:
+            bpy.data.hair_curves.remove(data)
         if action is not None and not action.users:
             bpy.data.actions.remove(action)

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simulated rockfalls in the scene: their blocks beside the real ones, and their paths.
+
+Of each model two objects: a mesh with a vertex for each parabola of the motion, which geometry nodes make blocks of, and
+curves, one for each run, with the run's numbers. Both hold all that is shown, so that it is saved and undone with them.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...core.impact_models.registry import find_model
+from ...core.simulation.engine import Simulation
+from ...core.simulation.parabolas import Parabolas, parabolas_of
+from ...core.simulation.results import release_names
+from ...core.vectors import Array
+from . import materials, simulated_nodes, simulated_paths, store, timing, trajectories
+
+COLLECTION = "Simulation"
+SINCE, LASTS, RUN, RELEASE = "since_release_s", "lasts_s", "run", "release"
+"""Attributes of a parabola beside those that the nodes read."""
+FOREVER_S = 1e9
+"""How long a block lies where it has stopped."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """When the blocks of a release start in the scene.
+
+    Attributes
+    ----------
+    trajectory : whose block is measured, empty for a release that nobody has filmed.
+    time_s : on the common clock, as long as there is a trajectory.
+    """
+
+    trajectory: str = ""
+    time_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What the scene holds of a simulation, as arrays: it is computed without Blender, and so in the background.
+
+    Attributes
+    ----------
+    model : its name.
+    releases : names of the releases, in the order of their numbers.
+    position : (k, 3) starts of the parabolas, local [m].
+    attributes : name → type of Blender's attribute and values, of the parabolas.
+    paths : see `simulated_paths`.
+    """
+
+    model: str
+    releases: list[str]
+    position: Array
+    attributes: dict[str, tuple[str, Array]]
+    paths: simulated_paths.Paths
+
+
+def prepare(simulation: Simulation) -> Prepared:
+    """What will be shown of a simulation with recorded moments; nothing of Blender is touched."""
+    names = release_names(simulation)
+    releases = list(dict.fromkeys(names.tolist()))
+    number = {name: place for place, name in enumerate(releases)}
+    release = np.array([number[name] for name in names.tolist()])
+    parabolas = parabolas_of(simulation)
+    radius = simulation.releases.radius_m[parabolas.run]
+    nowhere = np.full(len(parabolas), np.nan)
+    attributes = {
+        RUN: ("INT", parabolas.run),
+        RELEASE: ("INT", release[parabolas.run]),
+        SINCE: ("FLOAT", parabolas.start_s),
+        LASTS: ("FLOAT", np.minimum(parabolas.duration_s, FOREVER_S)),
+        simulated_nodes.BEGIN: ("FLOAT", nowhere),
+        simulated_nodes.END: ("FLOAT", nowhere),
+        simulated_nodes.VELOCITY: ("FLOAT_VECTOR", parabolas.velocity),
+        simulated_nodes.ACCELERATION: ("FLOAT_VECTOR", parabolas.acceleration),
+        simulated_nodes.SPIN: ("FLOAT_VECTOR", parabolas.spin),
+        simulated_nodes.TURN: ("QUATERNION", _turns(parabolas)),
+        simulated_nodes.HALF_AXES: ("FLOAT_VECTOR", np.repeat(radius[:, None], 3, axis=1)),
+    }
+    paths = simulated_paths.prepare(simulation, parabolas, release)
+    return Prepared(simulation.settings.model, releases, parabolas.position, attributes, paths)
+
+
+def show(
+    scene: bpy.types.Scene, simulations: Sequence[Simulation], origins: Mapping[str, Origin] | None = None
+) -> list[bpy.types.Object]:
+    """Show the blocks and paths of these simulations, and of no others; returns the blocks' objects.
+
+    Parameters
+    ----------
+    simulations : one of each model, with recorded moments.
+    origins : release → when its blocks start; the others start with the scene.
+    """
+    return show_prepared(scene, [prepare(simulation) for simulation in simulations], origins)
+
+
+def show_prepared(
+    scene: bpy.types.Scene, prepared: Sequence[Prepared], origins: Mapping[str, Origin] | None = None
+) -> list[bpy.types.Object]:
+    """`show` what was prepared before."""
+    remove(scene)
+    shown = []
+    for each in prepared:
+        place = store.collection(scene, COLLECTION, find_model(each.model).title)
+        begins = [(name, (origins or {}).get(name, Origin())) for name in each.releases]
+        blocks, paths = _blocks(each), simulated_paths.make(each.model, each.paths)
+        for obj in (blocks, paths):
+            obj[store.MODEL] = each.model
+            obj[store.RELEASES] = json.dumps([[name, origin.trajectory, origin.time_s] for name, origin in begins])
+            place.objects.link(obj)
+        place.objects.link(_pattern(blocks, each.model))
+        shown.append(blocks)
+    follow(scene)
+    return shown
+
+
+def remove(scene: bpy.types.Scene) -> None:
+    """Show no simulated blocks."""
+    roles = (store.SIMULATED_BLOCKS_ROLE, store.SIMULATED_PATHS_ROLE, store.SIMULATED_PATTERN_ROLE)
+    store.remove_objects([obj for role in roles for obj in store.with_role(scene, role)])
+    store.remove_collection(scene, COLLECTION)
+
+
+def blocks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The objects of the simulated blocks, one of each model."""
+    return store.with_role(scene, store.SIMULATED_BLOCKS_ROLE)
+
+
+def follow(scene: bpy.types.Scene) -> None:
+    """Bring what is shown in line with the scene's playback and the size at which it draws blocks."""
+    for obj in blocks_of(scene):
+        materials.set_input(obj.modifiers["Blocks"], simulated_nodes.SIZE, scene.rockfall.block_scale)
+        mesh = obj.data
+        begin = release_begins(scene, obj)[_read(mesh, RELEASE, np.int32)] + _read(mesh, SINCE)
+        if np.array_equal(begin.astype(np.float32), _read(mesh, simulated_nodes.BEGIN)):
+            continue
+        _write(mesh, simulated_nodes.BEGIN, "FLOAT", begin)
+        _write(mesh, simulated_nodes.END, "FLOAT", begin + _read(mesh, LASTS))
+        mesh.update()
+
+
+def release_begins(scene: bpy.types.Scene, obj: bpy.types.Object) -> Array:
+    """(r,) display time at which the blocks of each release start [s]."""
+    offsets = timing.kept_offsets(scene)
+    rows = json.loads(obj[store.RELEASES])
+    return np.array([time_s - offsets[name] if name in offsets else 0.0 for _, name, time_s in rows])
+
+
+def last_moment(scene: bpy.types.Scene) -> float:
+    """Display time at which the last simulated block has ended [s]."""
+    last = 0.0
+    for obj in blocks_of(scene):
+        begin, lasts = _read(obj.data, simulated_nodes.BEGIN), _read(obj.data, LASTS)
+        last = max(last, float(np.where(lasts < FOREVER_S, begin + lasts, begin).max(initial=0.0)))
+    return last
+
+
+def _blocks(prepared: Prepared) -> bpy.types.Object:
+    mesh = bpy.data.meshes.new(f"{prepared.model} simulated blocks")
+    mesh.vertices.add(len(prepared.position))
+    mesh.attributes["position"].data.foreach_set("vector", prepared.position.astype(np.float32).ravel())
+    for name, (kind, values) in prepared.attributes.items():
+        _write(mesh, name, kind, values)
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    obj[store.ROLE] = store.SIMULATED_BLOCKS_ROLE
+    obj.hide_select = True
+    modifier = obj.modifiers.new("Blocks", "NODES")
+    modifier.node_group = simulated_nodes.blocks_group()
+    return obj
+
+
+def _pattern(blocks: bpy.types.Object, model: str) -> bpy.types.Object:
+    """The block that is shown at every place; it is not seen itself."""
+    mesh = trajectories.block_mesh(f"Rockfall twin {model}", find_model(model).colour)
+    obj = bpy.data.objects.new(f"{model} simulated block", mesh)
+    obj[store.ROLE], obj[store.MODEL] = store.SIMULATED_PATTERN_ROLE, model
+    obj.hide_viewport = obj.hide_render = True
+    materials.set_input(blocks.modifiers["Blocks"], simulated_nodes.BLOCK, obj)
+    return obj
+
+
+def _turns(parabolas: Parabolas) -> Array:
+    """(k, 4) how the blocks are turned at the start of each piece, from any turn on: w, x, y, z."""
+    k = len(parabolas)
+    turn = np.zeros((k, 4))
+    first = np.searchsorted(parabolas.run, parabolas.run)
+    number = np.arange(k) - first
+    turn[number == 0] = Rotation.random(np.count_nonzero(number == 0), rng=0).as_quat()
+    order = np.argsort(number, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(number[order])) + 1)[1:]:
+        before = rows - 1
+        step = Rotation.from_rotvec(parabolas.spin[before] * parabolas.duration_s[before, None])
+        turn[rows] = (step * Rotation.from_quat(turn[before])).as_quat()
+    return np.roll(turn, 1, axis=1)
+
+
+def _write(mesh: bpy.types.Mesh, name: str, kind: str, values: Array) -> None:
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
+    field = "vector" if kind == "FLOAT_VECTOR" else "value"
+    attribute.data.foreach_set(field, np.ascontiguousarray(values, np.int32 if kind == "INT" else np.float32).ravel())
+
+
+def _read(mesh: bpy.types.Mesh, name: str, kind: type = np.float32) -> Array:
+    values = np.empty(len(mesh.vertices), dtype=kind)
+    mesh.attributes[name].data.foreach_get("value", values)
+    return values

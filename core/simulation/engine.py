@@ -76,7 +76,7 @@ class Records:
     v2, omega2 : (k, 3) just after [m/s], [rad/s].
     v1, omega1 : (k, 3) just before.
     normal : (k, 3) from the contact to the centre.
-    face : (k,) of the ground, −1 for none.
+    face : (k,) element of the ground: a triangle or, behind the last of them, a point; −1 for none.
     """
 
     run: Indices
@@ -156,8 +156,8 @@ def simulate(
     model = find_model(settings.model)
     if not n:
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
-    index = ground.index
-    zone = ground.zone[index.face]
+    ground.refuse_small(releases.radius_m)
+    tree, zone = ground.tree, ground.zone[ground.element]
     drag = releases.drag_per_m(settings.drag)
     results, starts = np.empty((n, 5)), range(0, n, BATCH)
     rows: dict[int, Array] = {}
@@ -168,7 +168,7 @@ def simulate(
         part = slice(start, min(start + BATCH, n))
         runs = np.arange(part.start, part.stop)
         rows[start] = run_blocks(
-            index.tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
+            tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
             releases.position[part], releases.velocity[part], releases.angular_velocity[part],
             releases.radius_m[part], releases.mass_kg[part], releases.inertia[part], drag[part], settings.gravity_mps2,
             ROLLING.index(settings.rolling), settings.most_impacts, settings.most_s, record, results[part],
@@ -189,7 +189,7 @@ def simulate(
     whole = next((start for start in starts if start not in rows), n)
     if not whole:
         raise CancelledError
-    records = _records(np.concatenate([rows[start] for start in starts if start < whole]), index.face)
+    records = _records(np.concatenate([rows[start] for start in starts if start < whole]), ground.element)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
     return Simulation(
@@ -226,7 +226,7 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     return np.array(rows), friction
 
 
-def _records(rows: Array, face: NDArray[np.int32]) -> Records:
+def _records(rows: Array, element: NDArray[np.int32]) -> Records:
     place = rows[:, 21].astype(np.intp)
     return Records(
         run=rows[:, 0].astype(np.intp),
@@ -238,5 +238,5 @@ def _records(rows: Array, face: NDArray[np.int32]) -> Records:
         v1=rows[:, 12:15],
         omega1=rows[:, 15:18],
         normal=rows[:, 18:21],
-        face=np.where(place >= 0, face[place], -1),
+        face=np.where(place >= 0, element[place], -1),
     )

@@ -2,101 +2,221 @@
 """What blocks fall on: the terrain, structures that stand on it, and zones with parameters of their own."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..georeference import GlobalShift
+from ..terrain.cloud import Cloud, PointIndex, build_point_index, heights_above_points, nearest_points
 from ..terrain.index import TriangleIndex, build_index
 from ..terrain.joining import moved
+from ..terrain.raycast import closest_points, heights_above
 from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
 
 TERRAIN = 0
-"""The owner of the terrain's faces; structures follow from 1."""
+"""The owner of the terrain's elements; structures follow from 1."""
+THINNEST = 0.75
+"""A block whose radius is less than this part of the spacing of points falls between them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """m triangles that a block can meet.
+    """m triangles and k points that a block can meet: the elements of the ground, triangles first.
 
     Attributes
     ----------
-    terrain : the surface without structures, for heights.
+    terrain : without structures, for heights.
     vertices, faces : (n, 3) local [m] and (m, 3) of terrain and structures together.
-    owner : (m,) `TERRAIN`, or 1 + the place in `structures`.
-    zone : (m,) place in `zones`.
+    points : (k, 3) local [m] of the terrain and the structures that are clouds.
+    owner : (m + k,) `TERRAIN`, or 1 + the place in `structures`.
+    zone : (m + k,) place in `zones`.
     structures, zones : names.
     flat : how many triangles without area were left out.
+    spacing_m : of the points, of each cloud among the terrain and the structures by name.
     """
 
-    terrain: Surface
+    terrain: Surface | Cloud
     vertices: Array
     faces: NDArray[np.int32]
+    points: Array
     owner: NDArray[np.int32]
     zone: NDArray[np.int32]
     structures: tuple[str, ...] = ()
     zones: tuple[str, ...] = ("terrain",)
     flat: int = 0
+    spacing_m: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def shift(self) -> GlobalShift:
+        """From local to survey coordinates."""
+        return self.terrain.shift
+
+    @property
+    def surface(self) -> Surface:
+        """The terrain, where triangles of it are needed.
+
+        Raises
+        ------
+        InputError : the terrain is a cloud of points.
+        """
+        if isinstance(self.terrain, Surface):
+            return self.terrain
+        raise InputError(
+            "The terrain is a cloud of points, where a surface is needed",
+            file=self.terrain.name,
+            advice="Let blocks meet the meshed terrain: --contact mesh",
+        )
 
     @cached_property
     def index(self) -> TriangleIndex:
         """The spatial index of all triangles; the terrain's own where nothing was added."""
-        if self.faces is self.terrain.faces:
+        if isinstance(self.terrain, Surface) and self.faces is self.terrain.faces:
             return self.terrain.index
         return build_index(self.vertices, self.faces)
 
+    @cached_property
+    def point_index(self) -> PointIndex:
+        """The spatial index of all points; the terrain's own where nothing was added."""
+        if isinstance(self.terrain, Cloud) and self.points is self.terrain.points:
+            return self.terrain.index
+        return build_point_index(self.points)
+
+    @property
+    def tree(self) -> Any:
+        """What the kernels take: see `ground_kernels`."""
+        if not len(self.points):
+            return self.index.tree
+        return (self.index.tree, self.point_index.tree) if len(self.faces) else self.point_index.tree
+
+    @cached_property
+    def element(self) -> NDArray[np.int32]:
+        """(m + k,) the element behind each place in the tree."""
+        triangles = self.index.face if len(self.faces) else np.empty(0, np.int32)
+        if not len(self.points):
+            return triangles
+        return np.concatenate([triangles, self.point_index.number + np.int32(len(self.faces))])
+
+    @property
+    def highest_m(self) -> float:
+        """Height of the highest vertex or point [m]."""
+        return float(max((part[:, 2].max() for part in (self.vertices, self.points) if len(part))))
+
+    def heights_above(self, places: Array) -> Array:
+        """Vertical clearance of (n, 3) places [m] over the terrain, negative in the ground, NaN beside it.
+
+        See `heights_above` for triangles, `heights_above_points` for points.
+        """
+        if isinstance(self.terrain, Cloud):
+            return heights_above_points(self.terrain, places)
+        return heights_above(self.terrain, places)
+
+    def distance(self, places: Array) -> Array:
+        """(n,) [m] from the terrain's nearest triangle or point."""
+        if isinstance(self.terrain, Cloud):
+            return nearest_points(self.terrain, places)[0]
+        return closest_points(self.terrain, places).distance
+
+    def refuse_small(self, radius_m: Array) -> None:
+        """Blocks that would fall between the points are no blocks for this ground.
+
+        Raises
+        ------
+        InputError : a radius below `THINNEST` of the spacing of a cloud.
+        """
+        for name, spacing in self.spacing_m.items():
+            if radius_m.size and radius_m.min() < THINNEST * spacing:
+                raise InputError(
+                    f"{int((radius_m < THINNEST * spacing).sum())} of {radius_m.size} blocks would fall between the "
+                    f"points of {name}: the smallest is {2 * radius_m.min():.3g} m in diameter, the points are "
+                    f"{spacing:.3g} m apart",
+                    advice=f"Blocks need {2 * THINNEST * spacing:.3g} m there; or let them meet the meshed cloud: "
+                    "--contact mesh",
+                )
+
+
+def element_places(terrain: Surface | Cloud) -> Array:
+    """(m, 3) local [m]: the middle of each triangle, or each point."""
+    if isinstance(terrain, Cloud):
+        return terrain.points
+    middles: Array = terrain.vertices[terrain.faces].mean(axis=1)
+    return middles
+
 
 def make_ground(
-    terrain: Surface,
-    structures: Mapping[str, Surface] | None = None,
+    terrain: Surface | Cloud,
+    structures: Mapping[str, Surface | Cloud] | None = None,
     zone: NDArray[np.integer] | None = None,
     zones: Sequence[str] = ("terrain",),
 ) -> Ground:
-    """Terrain and structures as one set of triangles.
+    """Terrain and structures as one ground.
 
     Parameters
     ----------
-    structures : name → surface; they take part in the first zone.
-    zone : (m,) place in `zones` of each of the terrain's faces; None puts all in the first.
+    structures : name → surface or cloud; they take part in the first zone.
+    zone : (m,) place in `zones` of each of the terrain's triangles or points; None puts all in the first.
 
     Raises
     ------
-    InputError : zones that do not cover the faces, a structure that is nowhere near the terrain.
+    InputError : zones that do not cover the terrain, a structure that is nowhere near the terrain.
 
     Notes
     -----
     Both sides of a triangle stop a block, whatever its winding. Triangles without area are left out, since their
     neighbours cover the same ground. A border is an edge over which blocks fall.
     """
-    structures = structures or {}
+    names = tuple(structures or {})
+    size = len(element_places(terrain))
     if zone is None:
-        zone = np.zeros(len(terrain.faces), np.int32)
-    if zone.shape != (len(terrain.faces),) or (zone.size and not 0 <= zone.min() <= zone.max() < len(zones)):
-        raise InputError("The zones do not fit the terrain", advice="Give each face the number of one of the zones")
-    names = tuple(structures)
-    parts = [moved(structures[name], terrain.shift) for name in names]
+        zone = np.zeros(size, np.int32)
+    if zone.shape != (size,) or (zone.size and not 0 <= zone.min() <= zone.max() < len(zones)):
+        raise InputError(
+            "The zones do not fit the terrain", advice="Give each triangle or point the number of one of the zones"
+        )
+    parts = [terrain, *(moved(part, terrain.shift) for part in (structures or {}).values())]
     low, high = terrain.bounds
-    for name, part in zip(names, parts, strict=True):
+    for name, part in zip(names, parts[1:], strict=True):
         if (part.bounds[1] < low).any() or (part.bounds[0][:2] > high[:2]).any():
             raise InputError(
                 f"The structure {name} stands nowhere near the terrain",
                 file=part.name,
                 advice="Give it in the coordinates of the terrain",
             )
-    vertices, faces, owner, whole = terrain.vertices, terrain.faces, np.zeros(len(zone), np.int32), zone
-    if parts:
-        starts = np.cumsum([len(terrain.vertices), *(len(part.vertices) for part in parts)])
-        vertices = np.concatenate([terrain.vertices, *(part.vertices for part in parts)])
-        shifted = [part.faces + np.int32(start) for part, start in zip(parts, starts[:-1], strict=True)]
-        faces = np.concatenate([terrain.faces, *shifted])
-        owner = np.repeat(np.arange(len(parts) + 1, dtype=np.int32), [len(zone), *(len(part.faces) for part in parts)])
-        whole = np.concatenate([zone, np.zeros(len(faces) - len(zone), zone.dtype)])
+    zone_of = [zone.astype(np.int32)] + [np.zeros(len(element_places(part)), np.int32) for part in parts[1:]]
+    meshes = [(i, part) for i, part in enumerate(parts) if isinstance(part, Surface)]
+    clouds = [(i, part) for i, part in enumerate(parts) if isinstance(part, Cloud)]
+    owner = np.repeat([i for i, _ in meshes], [len(part.faces) for _, part in meshes])
+    whole = _joined([zone_of[i] for i, _ in meshes], np.empty(0, np.int32))
+    if len(meshes) == 1:
+        vertices, faces = meshes[0][1].vertices, meshes[0][1].faces
+    else:
+        vertices = _joined([part.vertices for _, part in meshes], np.empty((0, 3)))
+        starts = np.cumsum([0, *(len(part.vertices) for _, part in meshes)])
+        shifted = [part.faces + np.int32(start) for (_, part), start in zip(meshes, starts, strict=False)]
+        faces = _joined(shifted, np.empty((0, 3), np.int32))
     solid: Mask = np.asarray(face_cross_products(vertices, faces).any(axis=1))
     if not solid.all():
         faces, owner, whole = faces[solid], owner[solid], whole[solid]
     return Ground(
-        terrain, vertices, faces, owner, whole.astype(np.int32), names, tuple(zones), int(solid.size - solid.sum())
+        terrain,
+        vertices,
+        faces,
+        _joined([part.points for _, part in clouds], np.empty((0, 3))),
+        np.concatenate([owner, *(np.full(len(part.points), i) for i, part in clouds)]).astype(np.int32),
+        np.concatenate([whole, *(zone_of[i] for i, _ in clouds)]),
+        names,
+        tuple(zones),
+        int(solid.size - solid.sum()),
+        {("the terrain", *names)[i]: part.spacing_m for i, part in clouds},
     )
+
+
+def _joined[T: np.ndarray](parts: Sequence[T], none: T) -> T:
+    """The rows of all parts; of one part the part itself."""
+    if len(parts) == 1:
+        return parts[0]
+    return np.concatenate(parts) if parts else none  # type: ignore[return-value]

@@ -21,7 +21,9 @@ import numpy as np
 from ..compiled import kernel
 from ..terrain.kernels import STACK_SIZE, box_distance2, closest_on_triangle, nearest_point
 from .chance_kernels import fill_uniform
-from .contact_kernels import TOUCHING_M, first_contact, last_root
+from .contact_kernels import TOUCHING_M, last_root
+from .ground_kernels import box, first_contact
+from .point_kernels import closest
 
 STOPPED, LEFT, LIMIT = 0, 1, 2
 """How a run ends."""
@@ -163,6 +165,20 @@ def _collect(tree, stack, p, reach, near):  # type: ignore[no-untyped-def]
 
 @kernel
 def _closest(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
+    """The closest of the ground to a block: see `_closest_triangle` and `point_kernels.closest`."""
+    if len(tree) == 5:
+        return closest(tree, stack, p, radius)
+    if len(tree) == 4:
+        return _closest_triangle(tree, stack, p, radius, near, around)
+    x, y, z, square, place = _closest_triangle(tree[0], stack, p, radius, near, around)
+    qx, qy, qz, other, found = closest(tree[1], stack, p, radius)
+    if found >= 0 and other < square:
+        return qx, qy, qz, other, tree[0][3].shape[0] + found
+    return x, y, z, square, place
+
+
+@kernel
+def _closest_triangle(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
     """The closest point of the terrain within twice the radius: (x, y, z, squared distance, place).
 
     near, around : the triangles about a place that was passed before, how many they are, its coordinates and how far
@@ -227,14 +243,14 @@ def _touching(tree, stack, p, v, radius, near, around):  # type: ignore[no-untyp
 def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
     """When a flight that meets nothing is gone from the box of the terrain."""
     leave = 0.0
-    low = bounds[0, 2] - radius
+    low = bounds[2] - radius
     if a[2] < 0.0 and p[2] > low:
         leave = max(last_root(p[2] - low, v[2], a[2]), 0.0)
     for axis in range(2):
         if v[axis] > 0.0:
-            leave = min(leave, max((bounds[0, axis + 3] + radius - p[axis]) / v[axis], 0.0))
+            leave = min(leave, max((bounds[axis + 3] + radius - p[axis]) / v[axis], 0.0))
         elif v[axis] < 0.0:
-            leave = min(leave, max((bounds[0, axis] - radius - p[axis]) / v[axis], 0.0))
+            leave = min(leave, max((bounds[axis] - radius - p[axis]) / v[axis], 0.0))
     return leave
 
 
@@ -253,7 +269,7 @@ def run_block(  # type: ignore[no-untyped-def]
     inertia : c of c m r². drag : ½ρC_D A/m [1/m]. law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
     """
     zero = (0.0, 0.0, 0.0)
-    bounds = tree[0]
+    bounds = box(tree)
     factor = 1.0 / (1.0 + inertia) if law == AZZONI else 1.0
     shortest = sqrt(2.0 * FALL * radius / gravity)
     time, length, impacts, at_once, held, end = 0.0, 0.0, 0, 0, 0, -1

@@ -150,16 +150,16 @@ def placed_on(ground: Ground, releases_xy: Array, diameter_m: Array) -> Array:
     NaN where there is no ground below or above the place.
     """
     from ..terrain.kernels import STACK_SIZE
-    from .contact_kernels import first_contact
+    from .ground_kernels import first_contact
 
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
-    top = float(ground.vertices[:, 2].max())
+    tree, top = ground.tree, ground.highest_m
     result = np.full((len(releases_xy), 3), np.nan)
     for i, (x, y) in enumerate(releases_xy.tolist()):
         radius = float(diameter_m[i]) / 2
         start = top + 2 * radius
         drop, _, place = first_contact(
-            ground.index.tree, stack, times, (x, y, start), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0), radius, np.inf
+            tree, stack, times, (x, y, start), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0), radius, np.inf
         )
         if place >= 0:
             result[i] = x, y, start - drop + ABOVE_M
@@ -173,15 +173,13 @@ def overlapping(ground: Ground, releases: Releases) -> Array:
     ------
     InputError : a release is beside the terrain, in plan.
     """
-    from ..terrain.raycast import closest_points, heights_above
-
-    height = heights_above(ground.terrain, releases.position)
+    height = ground.heights_above(releases.position)
     for i in np.flatnonzero(np.isnan(height))[:1].tolist():
         x, y, z = ground.terrain.shift.to_survey(releases.position[i : i + 1])[0]
         raise InputError(
             f"The release at {x:.2f}, {y:.2f}, {z:.2f} is beside the terrain",
             advice="Correct its place, or give a terrain that reaches so far",
         )
-    away = closest_points(ground.terrain, releases.position).distance
+    away = ground.distance(releases.position)
     depth: Array = np.where(height < 0, releases.radius_m + away, np.maximum(releases.radius_m - away, 0.0))
     return depth

@@ -9,7 +9,6 @@ from ..progress import Progress, silent
 from ..reconstruction.free_flight import fly
 from ..reconstruction.impact import FLAGS, Impacts, apparent
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
-from ..terrain.raycast import heights_above
 from ..vectors import Array, Indices, Mask, Names, dot
 from .engine import FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
 
@@ -156,7 +155,7 @@ def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progre
         time_s=time,
         position=position,
         velocity=speed,
-        height_m=heights_above(simulation.ground.terrain, position),
+        height_m=simulation.ground.heights_above(position),
         kinetic_j=0.5 * mass * dot(speed, speed),
         shift=simulation.ground.terrain.shift,
     )
@@ -182,6 +181,6 @@ def _greatest_heights(simulation: Simulation) -> Array:
         parts = np.tile(np.linspace(0.0, 1.0, MOMENTS), longest.size)
         start, whole = np.repeat(rows[longest], MOMENTS), np.repeat(duration[longest], MOMENTS)
         place, _ = _on_flight(simulation, start, parts * whole)
-        above = heights_above(simulation.ground.terrain, place)
+        above = simulation.ground.heights_above(place)
         np.maximum.at(heights, simulation.records.run[start], np.where(np.isnan(above), -np.inf, above))
     return np.where(np.isfinite(heights), heights, np.nan)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array, Mask
+from .cloud import Cloud
 from .surface import Surface
 
 SAME_M = 1e-3
@@ -18,12 +19,14 @@ SAME_PART = 1e-5
 """They are never further apart than this part of the whole terrain, so that a small model is not welded shut."""
 
 
-def moved(surface: Surface, shift: GlobalShift) -> Surface:
+def moved[T: (Surface, Cloud)](terrain: T, shift: GlobalShift) -> T:
     """The same terrain in local coordinates of another shift."""
-    offset = surface.shift.vector - shift.vector
+    offset = terrain.shift.vector - shift.vector
     if not offset.any():
-        return surface if surface.shift == shift else replace(surface, shift=shift)
-    return replace(surface, vertices=surface.vertices + offset, shift=shift)
+        return terrain if terrain.shift == shift else replace(terrain, shift=shift)
+    if isinstance(terrain, Cloud):
+        return replace(terrain, points=terrain.points + offset, shift=shift)
+    return replace(terrain, vertices=terrain.vertices + offset, shift=shift)
 
 
 def join(surfaces: Sequence[Surface]) -> Surface:

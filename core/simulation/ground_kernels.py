@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One door for the motion to what blocks fall on: triangles, points, or both. Compiled kernels.
+
+A tree of triangles has four members, one of points five, and a pair of them two: numba leaves out the branches that the
+length rules out, so that each ground has code of its own. Places in the points of a pair follow those in its triangles.
+"""
+
+from math import inf
+
+from ..compiled import kernel
+from . import contact_kernels, point_kernels
+
+
+@kernel
+def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[no-untyped-def]
+    """The first contact of a sphere with the ground before `limit`: see `contact_kernels.first_contact`."""
+    if len(tree) == 5:
+        return point_kernels.first_contact(tree, stack, times, p, v, a, radius, limit)
+    if len(tree) == 4:
+        return contact_kernels.first_contact(tree, stack, times, p, v, a, radius, limit)
+    t, n, place = contact_kernels.first_contact(tree[0], stack, times, p, v, a, radius, limit)
+    u, m, other = point_kernels.first_contact(tree[1], stack, times, p, v, a, radius, min(t, limit))
+    if other >= 0 and u < t:
+        return u, m, tree[0][3].shape[0] + other
+    return t, n, place
+
+
+@kernel
+def box(tree):  # type: ignore[no-untyped-def]
+    """(6,) low and high corners of the ground [m]."""
+    if len(tree) > 2:
+        return tree[0][0].copy()
+    whole = tree[0][0][0].copy()
+    for a in range(3):
+        whole[a] = min(whole[a], tree[1][0][0, a])
+        whole[a + 3] = max(whole[a + 3], tree[1][0][0, a + 3])
+    return whole

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The terrain as points alone: a cloud in local coordinates, its spatial index, its spacing, heights above it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import as_rows, in_chunks
+from ..errors import InputError, RockfallError
+from ..georeference import GlobalShift
+from ..vectors import Array
+
+type PointTree = tuple[Array, NDArray[np.int32], NDArray[np.int32], Array, int]
+
+SAMPLES, ENOUGH = 2000, 12
+"""The spacing is taken about so many points, from discs that hold so many."""
+COLUMN = 2.0
+"""The points below a place are those within so many spacings in plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointIndex:
+    """Bounding volume hierarchy over k points.
+
+    Attributes
+    ----------
+    bounds : (n, 6) low and high corners of the nodes' boxes [m].
+    first, count : (n,) points of a leaf; or the first of two children and 0.
+    points : (k, 3) in the order of the leaves [m].
+    number : (k,) the cloud's point behind each of them.
+    """
+
+    bounds: Array
+    first: NDArray[np.int32]
+    count: NDArray[np.int32]
+    points: Array
+    number: NDArray[np.int32]
+
+    @property
+    def tree(self) -> PointTree:
+        """What the kernels take."""
+        return self.bounds, self.first, self.count, self.points, 0
+
+
+def build_point_index(points: Array) -> PointIndex:
+    """Build the index of points.
+
+    Raises
+    ------
+    RockfallError : there are no points.
+    """
+    from . import point_kernels
+
+    k = len(points)
+    if not k:
+        raise RockfallError("A cloud without points has no spatial index.")
+    nodes = 2 * max(1, -(-k // (point_kernels.LEAF_POINTS // 2)))
+    bounds = np.empty((nodes, 6))
+    first, count, order = (np.empty(size, np.int32) for size in (nodes, nodes, k))
+    ordered = np.array(points, dtype=np.float64, order="C")
+    used = point_kernels.build_point_tree(ordered, bounds, first, count, order)
+    return PointIndex(bounds[:used].copy(), first[:used].copy(), count[:used].copy(), ordered, order)
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """A terrain of points without a surface between them.
+
+    Attributes
+    ----------
+    points : (k, 3) local coordinates [m].
+    shift : from local to survey coordinates.
+    name : of the file, for people.
+    summary : what the reader did, in sentences.
+    """
+
+    points: Array
+    shift: GlobalShift
+    name: str
+    summary: tuple[str, ...] = ()
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3) lowest and highest coordinates [m]."""
+        return np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+
+    @cached_property
+    def index(self) -> PointIndex:
+        """The spatial index; built when first needed."""
+        return build_point_index(self.points)
+
+    @cached_property
+    def spacing_m(self) -> float:
+        """Side of the square that a point has to itself on the surface [m]: the median over the cloud.
+
+        Notes
+        -----
+        About points spread over the cloud, √(π R²/n) with the radius R of a ball that holds n ≥ `ENOUGH` points, so
+        that steep faces count as level ground does.
+        """
+        from . import point_kernels
+
+        k = len(self.points)
+        if k < 2:
+            return float("inf")
+        places = self.points[:: max(1, k // SAMPLES)]
+        result = np.empty(len(places))
+        size = self.bounds[1] - self.bounds[0]
+        reach = max(float(np.sqrt(max(size[0] * size[1], size.max() ** 2 * 1e-3) / k)), 1e-9)
+        point_kernels.spacings(self.index.tree, places, min(ENOUGH, k), reach, result)
+        return float(np.median(result))
+
+
+def heights_above_points(cloud: Cloud, places: Any) -> Array:
+    """Vertical clearance of (n, 3) places [m] over the points, (n,): NaN beside them in plan.
+
+    Notes
+    -----
+    The next point below a place, within `COLUMN` spacings in plan (three times as far where there is none), tells which
+    surface is meant; the height is counted from the plane fitted to the points of that column. A cloud does not
+    tell what is inside: a place with points above it and none below is taken to be in the ground, and its height is
+    negative, how far it has to rise to get out. Under an overhang the points of the floor are below, so it is in the
+    open.
+
+    Raises
+    ------
+    InputError : a coordinate that is not finite.
+    """
+    from . import point_kernels
+
+    rows = _finite(places)
+    result, reach = np.empty(len(rows)), COLUMN * cloud.spacing_m
+    tree = cloud.index.tree
+    in_chunks(lambda i, j: point_kernels.heights_many(tree, rows, reach, result, i, j), len(rows))
+    return result
+
+
+def nearest_points(cloud: Cloud, places: Any) -> tuple[Array, NDArray[np.int64]]:
+    """(n,) distance [m] of places (n, 3) from the nearest point, and (n,) which.
+
+    Raises
+    ------
+    InputError : a coordinate that is not finite.
+    """
+    from . import point_kernels
+
+    rows = _finite(places)
+    distance, place = np.empty(len(rows)), np.empty(len(rows), np.int64)
+    tree = cloud.index.tree
+    in_chunks(lambda i, j: point_kernels.nearest_many(tree, rows, distance, place, i, j), len(rows))
+    return distance, cloud.index.number[place].astype(np.int64)
+
+
+def _finite(places: Any) -> Array:
+    rows = as_rows(places)
+    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if wrong.size:
+        raise InputError(f"The place {wrong[0]} is not finite: {rows[wrong[0]].tolist()}", advice="Leave it out")
+    return rows

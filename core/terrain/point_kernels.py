@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compiled kernels over points: their spatial index, the nearest point, how dense they are, heights above them.
+
+A tree is the plain tuple ``(bounds, first, count, points, 0)`` of `cloud.PointIndex.tree`: nodes as in `kernels`, and
+``points`` (k, 3) in the order of the leaves. It has one member more than a tree of triangles, so that compiled code can
+tell them apart by their type.
+"""
+
+import numpy as np
+
+from ..compiled import kernel
+from .kernels import STACK_SIZE, box_distance2
+
+LEAF_POINTS = 8
+FARTHER = 3.0
+STEEP = 4.0
+"""A column of points belongs to one surface as far as this slope."""
+
+
+@kernel
+def build_point_tree(points, bounds, first, count, order):  # type: ignore[no-untyped-def]
+    """Sort points into the nodes of a tree, halved by count along their longest side; returns the number of nodes."""
+    for i in range(points.shape[0]):
+        order[i] = i
+    todo = np.zeros((STACK_SIZE, 3), np.int64)
+    todo[0, 2] = points.shape[0]
+    pending, nodes = 1, 1
+    while pending:
+        pending -= 1
+        node, start, stop = todo[pending, 0], todo[pending, 1], todo[pending, 2]
+        for a in range(3):
+            low, high = np.inf, -np.inf
+            for i in range(start, stop):
+                low, high = min(low, points[i, a]), max(high, points[i, a])
+            bounds[node, a], bounds[node, a + 3] = low, high
+        if stop - start <= LEAF_POINTS:
+            first[node], count[node] = start, stop - start
+            continue
+        axis = 0
+        for a in range(1, 3):
+            if bounds[node, a + 3] - bounds[node, a] > bounds[node, axis + 3] - bounds[node, axis]:
+                axis = a
+        middle = (start + stop) // 2
+        _divide(points, order, start, stop - 1, middle, axis)
+        first[node], count[node] = nodes, 0
+        todo[pending, 0], todo[pending, 1], todo[pending, 2] = nodes, start, middle
+        todo[pending + 1, 0], todo[pending + 1, 1], todo[pending + 1, 2] = nodes + 1, middle, stop
+        pending += 2
+        nodes += 2
+    return nodes
+
+
+@kernel
+def _divide(points, order, low, high, middle, axis):  # type: ignore[no-untyped-def]
+    """Hoare's selection: what is before `middle` is not above it along the axis, what follows not below."""
+    while low < high:
+        pivot = points[(low + high) // 2, axis]
+        i, j = low, high
+        while i <= j:
+            while points[i, axis] < pivot:
+                i += 1
+            while points[j, axis] > pivot:
+                j -= 1
+            if i <= j:
+                for a in range(3):
+                    points[i, a], points[j, a] = points[j, a], points[i, a]
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            return
+
+
+@kernel
+def nearest(tree, stack, p, limit):  # type: ignore[no-untyped-def]
+    """The nearest point nearer than ``limit``: (squared distance, place), place −1 when none."""
+    bounds, first, count, points, _ = tree
+    best, found = limit * limit, -1
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if box_distance2(bounds, node, p[0], p[1], p[2]) >= best:
+            continue
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                x, y, z = points[i, 0] - p[0], points[i, 1] - p[1], points[i, 2] - p[2]
+                square = x * x + y * y + z * z
+                if square < best:
+                    best, found = square, i
+            continue
+        left = first[node]
+        one = box_distance2(bounds, left, p[0], p[1], p[2])
+        other = box_distance2(bounds, left + 1, p[0], p[1], p[2])
+        nearer = left if one <= other else left + 1
+        if max(one, other) < best:
+            stack[top] = 2 * left + 1 - nearer
+            top += 1
+        if min(one, other) < best:
+            stack[top] = nearer
+            top += 1
+    return best, found
+
+
+@kernel
+def within(tree, stack, p, reach):  # type: ignore[no-untyped-def]
+    """How many points are within `reach` of a place."""
+    bounds, first, count, points, _ = tree
+    square, found = reach * reach, 0
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if box_distance2(bounds, node, p[0], p[1], p[2]) > square:
+            continue
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                x, y, z = points[i, 0] - p[0], points[i, 1] - p[1], points[i, 2] - p[2]
+                if x * x + y * y + z * z <= square:
+                    found += 1
+            continue
+        stack[top], stack[top + 1] = first[node], first[node] + 1
+        top += 2
+    return found
+
+
+@kernel
+def spacings(tree, places, enough, reach, result):  # type: ignore[no-untyped-def]
+    """√(area of a disc / points in it) about each place, the disc grown until it holds `enough`."""
+    stack = np.empty(STACK_SIZE, np.int64)
+    for k in range(places.shape[0]):
+        radius = reach
+        p = (places[k, 0], places[k, 1], places[k, 2])
+        found = within(tree, stack, p, radius)
+        while found < enough and found < tree[3].shape[0]:
+            radius *= 1.3
+            found = within(tree, stack, p, radius)
+        while found > 4 * enough:
+            radius *= 0.7
+            found = within(tree, stack, p, radius)
+        result[k] = radius * np.sqrt(np.pi / found)
+
+
+@kernel
+def _plan_distance2(bounds, node, x, y):  # type: ignore[no-untyped-def]
+    dx = max(bounds[node, 0] - x, 0.0, x - bounds[node, 3])
+    dy = max(bounds[node, 1] - y, 0.0, y - bounds[node, 4])
+    return dx * dx + dy * dy
+
+
+@kernel
+def next_height(tree, stack, p, reach, side):  # type: ignore[no-untyped-def]
+    """Height of the next point below (`side` −1) or above (1) a place, within `reach` in plan; NaN when none."""
+    bounds, first, count, points, _ = tree
+    best = np.inf
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        low = side * ((bounds[node, 5] if side < 0.0 else bounds[node, 2]) - p[2])
+        high = side * ((bounds[node, 2] if side < 0.0 else bounds[node, 5]) - p[2])
+        if low >= best or high < 0.0 or _plan_distance2(bounds, node, p[0], p[1]) > reach * reach:
+            continue
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                away = side * (points[i, 2] - p[2])
+                if 0.0 <= away < best:
+                    x, y = points[i, 0] - p[0], points[i, 1] - p[1]
+                    if x * x + y * y <= reach * reach:
+                        best = away
+            continue
+        stack[top], stack[top + 1] = first[node], first[node] + 1
+        top += 2
+    return p[2] + side * best if best < np.inf else np.nan
+
+
+@kernel
+def plane_height(tree, stack, p, reach, low, high):  # type: ignore[no-untyped-def]
+    """At a place, the height of the plane fitted to the points within `reach` in plan, between two heights.
+
+    The fit is held level by a part of the reach, so that it is the mean height where points are few or in a line.
+    """
+    bounds, first, count, points, _ = tree
+    n, x, y, z, xx, xy, yy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if bounds[node, 5] < low or bounds[node, 2] > high:
+            continue
+        if _plan_distance2(bounds, node, p[0], p[1]) > reach * reach:
+            continue
+        if count[node]:
+            for i in range(first[node], first[node] + count[node]):
+                u, v, w = points[i, 0] - p[0], points[i, 1] - p[1], points[i, 2] - p[2]
+                if u * u + v * v <= reach * reach and low <= points[i, 2] <= high:
+                    n += 1.0
+                    x, y, z = x + u, y + v, z + w
+                    xx, xy, yy = xx + u * u, xy + u * v, yy + v * v
+                    xz, yz = xz + u * w, yz + v * w
+            continue
+        stack[top], stack[top + 1] = first[node], first[node] + 1
+        top += 2
+    x, y, z = x / n, y / n, z / n
+    held = (0.05 * reach) ** 2
+    xx, xy, yy = xx / n - x * x + held, xy / n - x * y, yy / n - y * y + held
+    xz, yz = xz / n - x * z, yz / n - y * z
+    det = xx * yy - xy * xy
+    slope_x, slope_y = (xz * yy - yz * xy) / det, (yz * xx - xz * xy) / det
+    return p[2] + z - slope_x * x - slope_y * y
+
+
+@kernel
+def heights_many(tree, places, reach, result, start, stop):  # type: ignore[no-untyped-def]
+    """Clearance of places over the points below, negative under points with none below, NaN beside them.
+
+    Points are looked for within `reach` in plan, and where there are none within `FARTHER` times that.
+    """
+    stack = np.empty(STACK_SIZE, np.int64)
+    for k in range(start, stop):
+        p = (places[k, 0], places[k, 1], places[k, 2])
+        result[k] = np.nan
+        for far in (reach, FARTHER * reach):
+            below = next_height(tree, stack, p, far, -1.0)
+            if not np.isnan(below):
+                result[k] = p[2] - plane_height(tree, stack, p, far, below - STEEP * far, p[2] + far)
+                break
+            above = next_height(tree, stack, p, far, 1.0)
+            if not np.isnan(above):
+                result[k] = p[2] - plane_height(tree, stack, p, far, p[2], above + STEEP * far)
+                break
+
+
+@kernel
+def nearest_many(tree, places, distance, place, start, stop):  # type: ignore[no-untyped-def]
+    stack = np.empty(STACK_SIZE, np.int64)
+    for k in range(start, stop):
+        square, place[k] = nearest(tree, stack, (places[k, 0], places[k, 1], places[k, 2]), np.inf)
+        distance[k] = np.sqrt(square)

@@ -27,6 +27,7 @@ HELD_LEVEL = 0.03
 """Points that spread less than this part of the radius about their middle do not tilt the plane."""
 CORE = 0.975
 """No point comes nearer to the centre than this part of the radius."""
+BOX_STEPS = 3
 MOST_PASSED = 1000
 """A flight may brush past so many contacts."""
 
@@ -85,6 +86,28 @@ def touch_point(q, p, v, a, radius, core, start, limit, passed):  # type: ignore
 
 
 @kernel
+def touch_box(bounds, node, p, v, a, radius, start, limit):  # type: ignore[no-untyped-def]
+    """A time in start…limit before which the sphere does not touch a node's box, inf when it does not at all."""
+    t = start
+    for _ in range(BOX_STEPS):
+        x = p[0] + (v[0] + 0.5 * a[0] * t) * t
+        y = p[1] + (v[1] + 0.5 * a[1] * t) * t
+        z = p[2] + (v[2] + 0.5 * a[2] * t) * t
+        x -= min(max(x, bounds[node, 0]), bounds[node, 3])
+        y -= min(max(y, bounds[node, 1]), bounds[node, 4])
+        z -= min(max(z, bounds[node, 2]), bounds[node, 5])
+        square = x * x + y * y + z * z
+        if square <= radius * radius:
+            return t
+        d = sqrt(square)
+        speed = ((v[0] + a[0] * t) * x + (v[1] + a[1] * t) * y + (v[2] + a[2] * t) * z) / d
+        t += first_root(d - radius, speed, (a[0] * x + a[1] * y + a[2] * z) / d)
+        if t > limit or t == inf:
+            return inf
+    return t
+
+
+@kernel
 def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type: ignore[no-untyped-def]
     """The next point that the sphere touches: (time, direction, place, whether its core), place −1 for none.
 
@@ -106,6 +129,9 @@ def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type
         if begin > best:
             continue
         if count[node]:
+            begin = touch_box(bounds, node, p, v, a, grown, begin, best)
+            if begin > best:
+                continue
             for i in range(first[node], first[node] + count[node]):
                 q = (points[i, 0], points[i, 1], points[i, 2])
                 core, passed = radius, False

@@ -104,7 +104,7 @@ class Ground:
     @property
     def highest_m(self) -> float:
         """Height of the highest vertex or point [m]."""
-        return float(max((part[:, 2].max() for part in (self.vertices, self.points) if len(part))))
+        return float(max(part[:, 2].max() for part in (self.vertices, self.points) if len(part)))
 
     def heights_above(self, places: Array) -> Array:
         """Vertical clearance of (n, 3) places [m] over the terrain, negative in the ground, NaN beside it.
@@ -219,4 +219,4 @@ def _joined[T: np.ndarray](parts: Sequence[T], none: T) -> T:
     """The rows of all parts; of one part the part itself."""
     if len(parts) == 1:
         return parts[0]
-    return np.concatenate(parts) if parts else none  # type: ignore[return-value]
+    return np.concatenate(parts) if parts else none

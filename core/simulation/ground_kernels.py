@@ -5,8 +5,6 @@ A tree of triangles has four members, one of points five, and a pair of them two
 length rules out, so that each ground has code of its own. Places in the points of a pair follow those in its triangles.
 """
 
-from math import inf
-
 from ..compiled import kernel
 from . import contact_kernels, point_kernels
 

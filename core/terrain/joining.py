@@ -19,7 +19,7 @@ SAME_PART = 1e-5
 """They are never further apart than this part of the whole terrain, so that a small model is not welded shut."""
 
 
-def moved[T: (Surface, Cloud)](terrain: T, shift: GlobalShift) -> T:
+def moved[T: Surface | Cloud](terrain: T, shift: GlobalShift) -> T:
     """The same terrain in local coordinates of another shift."""
     offset = terrain.shift.vector - shift.vector
     if not offset.any():

@@ -26,6 +26,7 @@ from ..simulation.engine import (
 )
 from ..simulation.ground import Ground, make_ground
 from ..simulation.release import Releases
+from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 
 type ReleaseSource = Callable[[Ground], Releases]
@@ -45,7 +46,7 @@ class Zones:
     Attributes
     ----------
     names : the first is what no other zone covers.
-    of_face : (m,) place in `names` of each of the terrain's faces.
+    of_face : (m,) place in `names` of each of the terrain's faces, of a cloud's points.
     parameters : zone → model → parameters that differ there.
     friction : zone → μ that differs there.
     """
@@ -62,7 +63,7 @@ class Scenario:
 
     Attributes
     ----------
-    terrain : the surface.
+    terrain : the surface, or the cloud whose points the blocks meet.
     releases : puts the blocks on the ground, with their sizes, densities, number and velocities.
     models : name → the parameters that are not to have their default, for all zones; in the order in which they run.
     structures : name → walls, fences, roads, houses that stand on the terrain.
@@ -71,10 +72,10 @@ class Scenario:
     record : keep every impact and step of the runs; without them only how each begins and ends.
     """
 
-    terrain: Surface
+    terrain: Surface | Cloud
     releases: ReleaseSource
     models: Mapping[str, Mapping[str, object]]
-    structures: Mapping[str, Surface] = field(default_factory=dict)
+    structures: Mapping[str, Surface | Cloud] = field(default_factory=dict)
     zones: Zones | None = None
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION

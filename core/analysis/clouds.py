@@ -20,6 +20,7 @@ import numpy as np
 from ..constants import IQR_PER_SD
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
+from ..impact_models.registry import FORMULAS
 from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices, Mask
 from .comparison import random_numbers
@@ -164,7 +165,17 @@ class Contest:
 
 
 def make_contest(model: ImpactModel, impacts: Impacts, target: Target, replicates: int, seed: int) -> Contest:
-    """A model against a target, its random numbers those of `compare` with the same seed."""
+    """A model against a target, its random numbers those of `compare` with the same seed.
+
+    Raises
+    ------
+    InputError : the model draws from measured impacts.
+    """
+    if model.draws_from_impacts:
+        raise InputError(
+            f"{model.name} has no coefficients to fit: its rebounds are the measured ones",
+            advice=f"Choose one of {', '.join(FORMULAS)}; compare {model.name} with other bandwidths by --set",
+        )
     courses = target.courses
     site, trajectory = impacts.site[courses.row], impacts.trajectory[courses.row]
     draws = random_numbers(model, courses, site, trajectory, replicates if model.is_random else 0, seed)

@@ -9,11 +9,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
+from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import COMPARED, find_model
 from ..reconstruction.impact import Impacts, apparent
 from ..vectors import Array, Indices, Mask, Names
 from .courses import Courses, Spin, find_courses
+from .measured_rebounds import chain_from_others, measured_rebounds
 
 Parameters = Mapping[str, Mapping[str, object]]
 """Model → parameter → value, for those that are not to have their default."""
@@ -39,6 +41,9 @@ class Predictions:
     settings : model → all its parameters; empty when read from a table.
     spin, seed : what they were computed with.
     skipped : (row, reason) of the impacts that could not be compared.
+    measured : what the models that draw from measured impacts drew from; None without such a model. No impact is
+        predicted from its own trajectory.
+    beyond : (m,) whether an impact is beyond the conditions that these were measured under; None without such a model.
     """
 
     models: tuple[str, ...]
@@ -60,6 +65,8 @@ class Predictions:
     spin: str = ""
     seed: int = 0
     skipped: tuple[tuple[int, str], ...] = ()
+    measured: MeasuredRebounds | None = None
+    beyond: Mask | None = None
 
     @property
     def replicates(self) -> int:
@@ -87,6 +94,7 @@ def compare(
     seed: int = 0,
     spin: Spin = "rolling",
     radius_m: float | None = None,
+    measured: MeasuredRebounds | None = None,
 ) -> Predictions:
     """All models on all measured impacts.
 
@@ -98,12 +106,16 @@ def compare(
         trajectory: not on the other models and trajectories, nor on their order, and with more replicates the first
         ones stay.
     spin, radius_m : see `find_courses`.
+    measured : what a model that draws from measured impacts draws from, None for the compared impacts themselves. The
+        impacts of a trajectory are always drawn from those of the others.
 
     Raises
     ------
-    InputError : unknown model or parameter, value out of range, and what `find_courses` refuses.
+    InputError : unknown model or parameter, value out of range, too few measured impacts to draw from, and what
+        `find_courses` refuses.
     """
-    return predict(impacts, find_courses(impacts, spin, radius_m), models, parameters, replicates=replicates, seed=seed)
+    courses = find_courses(impacts, spin, radius_m)
+    return predict(impacts, courses, models, parameters, replicates=replicates, seed=seed, measured=measured)
 
 
 def predict(
@@ -114,6 +126,7 @@ def predict(
     *,
     replicates: int = 0,
     seed: int = 0,
+    measured: MeasuredRebounds | None = None,
 ) -> Predictions:
     """As `compare`, for courses that were found once: what a slider or a calibration calls again and again."""
     if replicates < 0 or seed < 0:
@@ -132,10 +145,19 @@ def predict(
     site, trajectory = impacts.site[courses.row], impacts.trajectory[courses.row]
     shape = (len(models), 1 + replicates, len(courses))
     omega1, v2, omega2 = (np.empty((*shape, 3)) for _ in range(3))
+    beyond = None
+    if any(model.draws_from_impacts for model in chosen):
+        measured = measured_rebounds(impacts) if measured is None else measured
+    else:
+        measured = None
     for i, model in enumerate(chosen):
         draws = random_numbers(model, courses, site, trajectory, replicates if model.is_random else 0, seed)
-        numbers = model.numbers(settings[model.name])
-        omega1[i], v2[i], omega2[i] = model.chain(courses.incident, courses.follows, numbers, draws)
+        if measured is not None and model.draws_from_impacts:
+            found = chain_from_others(model, settings[model.name], measured, courses, site, trajectory, draws)
+            omega1[i], v2[i], omega2[i], beyond = found
+        else:
+            numbers = model.numbers(settings[model.name])
+            omega1[i], v2[i], omega2[i] = model.chain(courses.incident, courses.follows, numbers, draws)
 
     state = courses.incident
     v1, normal = (
@@ -162,6 +184,8 @@ def predict(
         spin=courses.spin,
         seed=seed,
         skipped=courses.skipped,
+        measured=measured,
+        beyond=beyond,
     )
 
 

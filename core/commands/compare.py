@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 from ..constants import GRAVITY_MPS2
 from .options import (
     add_incident_options,
+    add_observed_option,
     add_out,
     add_parameter_options,
     add_terrain_options,
+    measured_as_asked,
     model_parameters,
     naming,
     not_negative,
@@ -42,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="models to compare (default: the six of Noël et al. 2018; `rockfall models` lists all)",
     )
     add_parameter_options(parser)
+    add_observed_option(parser, "default: IMPACTS; a trajectory's impacts are always drawn from those of the others")
     parser.add_argument(
         "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
     )
@@ -70,6 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     models = [find_model(name).name for name in arguments.model or COMPARED]
     parameters = model_parameters(arguments, models)
+    measured = measured_as_asked(arguments, models)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
@@ -82,6 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
             seed=arguments.seed,
             spin=arguments.spin,
             radius_m=arguments.radius,
+            measured=measured,
         )
         marks = scores(impacts, predictions)
         flights = _fly(arguments, impacts, predictions, progress) if arguments.terrain else None
@@ -153,11 +158,16 @@ def _draw(
 
 
 def _counts(predictions: "Predictions", impacts: int) -> list[str]:
+    from ..analysis.measured_rebounds import beyond_sentence, measured_sentence
+
     n, replicates = predictions.row.size, predictions.replicates
     chance = f" and {replicates} replicates with seed {predictions.seed}" if replicates else ""
     lines = [f"{n} of {impacts} impacts compared: the mean{chance} of {len(predictions.models)} models."]
     skipped = Counter(reason for _, reason in predictions.skipped)
-    return [*lines, *(f"Skipped: {number} with {reason}." for reason, number in skipped.items())]
+    lines += [f"Skipped: {number} with {reason}." for reason, number in skipped.items()]
+    if predictions.measured is not None and predictions.beyond is not None:
+        lines += [measured_sentence(predictions.measured), beyond_sentence(predictions.beyond)]
+    return lines
 
 
 def _table(marks: "tuple[Score, ...]") -> list[str]:

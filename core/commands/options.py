@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..impact_models.machinery.measured import MeasuredRebounds
     from ..impact_models.machinery.parameters import Value
     from ..progress import Progress
     from ..terrain.surface import Surface
@@ -145,6 +146,34 @@ def add_incident_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
     )
+
+
+def add_observed_option(parser: argparse.ArgumentParser, default: str) -> None:
+    """``--observed FILE``."""
+    parser.add_argument(
+        "--observed",
+        metavar="FILE",
+        help=f"impacts.csv, of this site or merged, that the model observed draws from ({default})",
+    )
+
+
+def measured_as_asked(arguments: argparse.Namespace, models: Sequence[str]) -> "MeasuredRebounds | None":
+    """What ``--observed`` gives to draw from; None without it.
+
+    Raises
+    ------
+    InputError : the table is wrong or has too few impacts, or no model draws from it.
+    """
+    from ..analysis.measured_rebounds import measured_rebounds
+    from ..exchange.tables import read_impacts
+    from ..impact_models.registry import find_model
+
+    if arguments.observed is None:
+        return None
+    if not any(find_model(name).draws_from_impacts for name in models):
+        raise InputError("--observed gives measured impacts, which no model draws from", advice="Add --model observed")
+    with naming(arguments.observed):
+        return measured_rebounds(read_impacts(arguments.observed))
 
 
 def add_parameter_options(parser: argparse.ArgumentParser) -> None:

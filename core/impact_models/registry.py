@@ -30,6 +30,9 @@ MODELS: Mapping[str, ImpactModel] = MappingProxyType(_found())
 COMPARED = tuple(model.name for model in MODELS.values() if model.compared)
 """The models that are compared when none are chosen, by name: the six that Noël et al. 2018 compare, in their order."""
 
+FORMULAS = tuple(model.name for model in MODELS.values() if not model.draws_from_impacts)
+"""The models that need no measured impacts, by name."""
+
 
 def find_model(name: str) -> ImpactModel:
     """The model of a name.

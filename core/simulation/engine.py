@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
+from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
@@ -42,6 +43,7 @@ class Settings:
     ----------
     model : name of the impact model.
     parameters : those of the model that are not to have their default, for all zones.
+    measured : what a model that draws from measured impacts draws from; others do not look at it.
     zones : zone → parameters of its own there.
     rolling : how a block moves on the ground: Azzoni et al. 1995, Coulomb's sliding, or none, which stops it there.
     friction : coefficient μ of either; `zone_friction` where a zone has its own.
@@ -52,6 +54,7 @@ class Settings:
 
     model: str
     parameters: Mapping[str, object] = field(default_factory=dict)
+    measured: MeasuredRebounds | None = None
     zones: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
@@ -219,7 +222,10 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
         if name not in ground.zones:
             raise InputError(f"There is no zone {name!r}", advice=f"There are {', '.join(ground.zones)}")
     model = find_model(settings.model)
-    rows = [model.numbers({**settings.parameters, **settings.zones.get(name, {})}) for name in ground.zones]
+    rows = [
+        model.numbers({**settings.parameters, **settings.zones.get(name, {})}, settings.measured)
+        for name in ground.zones
+    ]
     friction = np.array([settings.zone_friction.get(name, settings.friction) for name in ground.zones])
     if not (np.isfinite(friction) & (friction >= 0)).all():
         raise InputError(f"The friction is {friction.min()}", advice="Give a number of zero or more")

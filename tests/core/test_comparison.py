@@ -12,7 +12,7 @@ from rockfall.core.analysis.scores import ABSCISSA, energy_distance, scores
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.comparison_tables import read_predictions, write_predictions, write_scores
 from rockfall.core.impact_models.machinery.base import Incident
-from rockfall.core.impact_models.registry import COMPARED, MODELS
+from rockfall.core.impact_models.registry import COMPARED, FORMULAS, MODELS
 from rockfall.core.reconstruction.impact import Impacts
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -66,7 +66,7 @@ def test_impacts_without_a_state_are_skipped_and_listed():
     assert np.isfinite(predictions.r).all()
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", FORMULAS)
 def test_the_spin_goes_from_impact_to_impact(name):
     """As computed one by one: what a model leaves at one impact it meets at the next."""
     impacts = bounces(("a",))

@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rockfall.core.impact_models.dorren_2015 import lowered
 from rockfall.core.impact_models.machinery.base import Incident
-from rockfall.core.impact_models.registry import COMPARED, MODELS
+from rockfall.core.impact_models.registry import COMPARED, FORMULAS, MODELS
 from rockfall.core.reconstruction.impact import apparent
 from rockfall.core.vectors import dot, norm, unit
 
 N = 300
 SEED = st.integers(0, 2**32 - 1)
 INERTIA = {"noel_2017": 2 / 3, "dorren_2015": 2 / 3}
-TURN_ABOUT_ANY = [name for name, model in MODELS.items() if model.turns_with_the_frame]
+TURN_ABOUT_ANY = [name for name in FORMULAS if MODELS[name].turns_with_the_frame]
 
 
 def random_incident(rng, mass=None):

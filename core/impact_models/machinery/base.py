@@ -11,12 +11,14 @@ import numpy as np
 from ...errors import InputError
 from ...vectors import Array, Indices, dot
 from .compilation import compiled_driver, compiled_model
+from .measured import MeasuredRebounds
 from .parameters import ParameterSpec, Value, declared, suggestion
-from .triples import Motion, Vector
+from .triples import Motion
 
-Rebound = Callable[[Vector, Vector, Vector, float, float, Any, Any], Motion]
+Rebound = Callable[..., Motion]
 """``rebound(v1, n, omega1, radius, mass, p, u) -> (v2, omega2)``: triples of floats, floats, the model's parameters as
-numbers by name, and its uniform random numbers by name (NaN for the mean)."""
+numbers by name, and its uniform random numbers by name (NaN for the mean). A model that draws from measured impacts
+takes them, as `MeasuredRebounds.numbers`, after these."""
 
 UNIT_TOLERANCE = 1e-6
 
@@ -96,6 +98,7 @@ class ImpactModel:
     compared : whether it is compared when no models are chosen.
     energy_never_grows : whether ½m(v² + c·r²ω²) after the impact is never above that before, whatever the parameters.
     turns_with_the_frame : whether the result turns with the frame about any axis; else the vertical (z) is special.
+    draws_from_impacts : whether it is no formula but needs measured impacts.
     """
 
     name: str
@@ -108,6 +111,7 @@ class ImpactModel:
     compared: bool = False
     energy_never_grows: bool = True
     turns_with_the_frame: bool = True
+    draws_from_impacts: bool = False
 
     @cached_property
     def parameters(self) -> tuple[ParameterSpec, ...]:
@@ -127,7 +131,7 @@ class ImpactModel:
     @cached_property
     def compiled(self) -> Any:
         """`function` for compiled callers, which give it all numbers as two arrays; compiled by numba when needed."""
-        return compiled_model(self.function, self.parameter_type, self.draw_type)
+        return compiled_model(self.function, self.parameter_type, self.draw_type, self.draws_from_impacts)
 
     def parameter(self, name: str) -> ParameterSpec:
         """The specification of one parameter.
@@ -165,10 +169,28 @@ class ImpactModel:
             result[spec.name] = spec.checked(value, self.name)
         return result
 
-    def numbers(self, given: Mapping[str, object] | None = None) -> Array:
-        """(k,) all parameters as the numbers that the compiled model takes; `given` as in `settings`."""
+    def numbers(self, given: Mapping[str, object] | None = None, measured: MeasuredRebounds | None = None) -> Array:
+        """(k,) all parameters as the numbers that the compiled model takes, then the measured impacts' if it needs any.
+
+        Parameters
+        ----------
+        given : as in `settings`.
+        measured : what a model that `draws_from_impacts` draws from; others do not look at it.
+
+        Raises
+        ------
+        InputError : see `settings`; no measured impacts for a model that needs them.
+        """
         settings = self.settings(given)
-        return np.array([spec.code(settings[spec.name]) for spec in self.parameters], dtype=np.float64)
+        own = np.array([spec.code(settings[spec.name]) for spec in self.parameters], dtype=np.float64)
+        if not self.draws_from_impacts:
+            return own
+        if measured is None:
+            raise InputError(
+                f"{self.name} draws from measured impacts, and there are none",
+                advice="Give a table of measured impacts, such as reconstruct or merge writes",
+            )
+        return np.concatenate([own, measured.numbers])
 
     def rebound(
         self,
@@ -177,6 +199,7 @@ class ImpactModel:
         rng: np.random.Generator | None = None,
         *,
         draws: Array | None = None,
+        measured: MeasuredRebounds | None = None,
     ) -> Outgoing:
         """What the model makes of n impacts.
 
@@ -185,10 +208,11 @@ class ImpactModel:
         parameters : those that are not to have their default.
         rng : None for the model at the mean of its random parameters.
         draws : (n, `draws`) uniform numbers to be used instead of those of `rng`; NaN for the mean of a law.
+        measured : see `numbers`.
 
         Raises
         ------
-        InputError : see `settings`.
+        InputError : see `numbers`.
         """
         n = len(incident)
         if draws is None:
@@ -197,7 +221,7 @@ class ImpactModel:
         if draws.shape != (n, self.draws):
             raise InputError(f"The draws have the shape {draws.shape}, not ({n}, {self.draws})")
         follows = np.full(n, -1, dtype=np.intp)
-        _, v2, omega2 = self.chain(incident, follows, self.numbers(parameters), draws[None])
+        _, v2, omega2 = self.chain(incident, follows, self.numbers(parameters, measured), draws[None])
         return Outgoing(v2[0], omega2[0])
 
     def chain(self, incident: Incident, follows: Indices, numbers: Array, draws: Array) -> tuple[Array, Array, Array]:

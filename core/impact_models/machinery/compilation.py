@@ -16,16 +16,20 @@ from ...compiled import kernel
 
 ENTRY = """
 def enter(v1, n, omega1, radius, mass, numbers, uniform):
-    return rebound(v1, n, omega1, radius, mass, parameters({parameters}), draws({draws}))
+    return rebound(v1, n, omega1, radius, mass, parameters({parameters}), draws({draws}){measured})
 """
-"""A model behind the signature that all models share: its numbers come in two arrays and are handed on by name."""
+"""A model behind the signature that all models share: its numbers come in two arrays and are handed on by name; those
+of measured impacts come after the parameters, and stay an array."""
 
 
-def compiled_model(rebound: Callable[..., Any], parameter_type: type[Any], draw_type: type[Any]) -> Any:
+def compiled_model(
+    rebound: Callable[..., Any], parameter_type: type[Any], draw_type: type[Any], draws_from_impacts: bool = False
+) -> Any:
     """The compiled function of a model; other compiled functions can call it or take it as an argument."""
     text = ENTRY.format(
         parameters=", ".join(f"numbers[{i}]" for i in range(len(parameter_type._fields))),
         draws=", ".join(f"uniform[{i}]" for i in range(len(draw_type._fields))),
+        measured=f", numbers[{len(parameter_type._fields)}:]" if draws_from_impacts else "",
     )
     own = {"__name__": rebound.__module__, "rebound": rebound, "parameters": parameter_type, "draws": draw_type}
     exec(compile(text, __file__, "exec"), own)  # in the name of this file, beside which numba keeps the compiled code

@@ -17,7 +17,7 @@ from math import inf, sqrt
 from ..compiled import kernel
 from ..terrain.kernels import box_distance2
 from ..terrain.point_kernels import nearest
-from .contact_kernels import RESTING_S, STEPS, TOUCHING_M, enter_node, first_root
+from .contact_kernels import RESTING_S, STEPS, TOUCHING_M, enter_node, first_root, last_inside, prepared
 
 BAND = 0.1
 """Points within this part of the radius of the sphere make the normal."""
@@ -116,13 +116,11 @@ def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type
     bounds, first, count, points, _ = tree
     grown = radius + 2.0 * TOUCHING_M
     inner, outer = (radius + TOUCHING_M) ** 2, (radius + band) ** 2
-    best, found, hard = limit, -1, False
+    best, found, hard = min(limit, last_inside(bounds, p, v, a, grown)), -1, False
     direction = (0.0, 0.0, 0.0)
-    near = enter_node(bounds, 0, p, v, a, grown, best)
-    top = 0
-    if near < inf:
-        stack[0], times[0] = 0, near
-        top = 1
+    path = prepared(p, v, a, radius, best)
+    stack[0], times[0] = 0, 0.0
+    top = 1 if best >= 0.0 else 0
     while top:
         top -= 1
         node, begin = stack[top], times[top]
@@ -143,24 +141,20 @@ def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type
                         passed = square < inner or x * axis[0] + y * axis[1] + z * axis[2] > FACING * d
                         core = min(CORE * radius, d)
                 t, e, deep = touch_point(q, p, v, a, radius, core, 0.0 if passed else begin, best, passed)
-                if t < best or (t == best < inf and found < 0):
+                if t < best or (t == best and found < 0):
                     best, found, direction, hard = t, i, e, deep
             continue
         left = first[node]
-        near_left = enter_node(bounds, left, p, v, a, grown, best)
-        near_right = enter_node(bounds, left + 1, p, v, a, grown, best)
-        if near_left <= near_right:
-            if near_right < inf:
-                stack[top], times[top] = left + 1, near_right
-                top += 1
-            if near_left < inf:
-                stack[top], times[top] = left, near_left
-                top += 1
-        else:
-            if near_left < inf:
-                stack[top], times[top] = left, near_left
-                top += 1
-            stack[top], times[top] = left + 1, near_right
+        near_left, _ = enter_node(bounds, left, p, v, a, path, best)
+        near_right, _ = enter_node(bounds, left + 1, p, v, a, path, best)
+        right = left + 1
+        if near_left > near_right:
+            left, right, near_left, near_right = right, left, near_right, near_left
+        if near_right < inf:
+            stack[top], times[top] = right, near_right
+            top += 1
+        if near_left < inf:
+            stack[top], times[top] = left, near_left
             top += 1
     return best, direction, found, hard
 

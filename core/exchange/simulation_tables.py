@@ -12,10 +12,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..remarks import Remark, to_plain
-from ..simulation.engine import ENDS, Simulation
+from ..simulation.engine import Simulation
 from ..simulation.ground import Ground
+from ..simulation.hits import hits_of
 from ..simulation.release import Releases, make_releases, overlapping, placed_on
-from ..simulation.results import hits_of, release_names, run_figures
+from ..simulation.results import release_names, run_figures
 from ..vectors import Mask, norm
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
@@ -122,7 +123,7 @@ def _run_cells(simulation: Simulation) -> Columns:
         "time_s": simulation.time_s,
         "length_m": simulation.length_m,
         "impacts": simulation.impacts,
-        "end": [ENDS[end] for end in simulation.end.tolist()],
+        "end": [simulation.ends[end] for end in simulation.end.tolist()],
         "v_max_mps": simulation.v_max_mps,
         "kinetic_max_J": figures.kinetic_max_j,
         "height_max_m": figures.height_max_m,
@@ -136,25 +137,22 @@ def write_hits(simulations: Sequence[Simulation], path: str | Path) -> None:
 
 
 def _hit_cells(simulation: Simulation) -> Columns:
-    records, releases = simulation.records, simulation.releases
-    rows = hits_of(simulation)
-    run = records.run[rows]
-    v1, radius = records.v1[rows], releases.radius_m[run]
-    place = simulation.ground.terrain.shift.to_survey(records.position[rows])
-    inertia = releases.inertia[run] * releases.mass_kg[run] * radius**2
-    speed = norm(v1)
-    towards = -(v1 * records.normal[rows]).sum(axis=1)
-    names = np.array(["", *simulation.ground.structures])
+    records, hits = simulation.records, hits_of(simulation)
+    run = records.run[hits.record]
+    names = np.array(simulation.ground.structures)
     return {
-        "structure": names[simulation.ground.owner[records.face[rows]]].tolist(),
+        "structure": names[hits.structure].tolist(),
         "run": (run + 1).astype(np.str_).tolist(),
-        "model": [simulation.settings.model] * rows.size,
-        "time_s": records.time_s[rows],
-        **vector_columns(POSITION, place),
-        "v_mps": speed,
-        "angle_deg": np.degrees(np.arccos(np.clip(towards / speed, -1.0, 1.0))),
-        "kinetic_J": 0.5 * releases.mass_kg[run] * speed**2,
-        "rotational_J": 0.5 * inertia * (records.omega1[rows] ** 2).sum(axis=1),
+        "model": [simulation.settings.model] * len(hits),
+        "time_s": records.time_s[hits.record],
+        **vector_columns(POSITION, simulation.ground.terrain.shift.to_survey(records.position[hits.record])),
+        "along_m": hits.along_m,
+        "up_m": hits.up_m,
+        "v_mps": norm(records.v1[hits.record]),
+        "angle_deg": np.degrees(hits.angle),
+        "kinetic_J": hits.kinetic_j,
+        "rotational_J": hits.rotational_j,
+        "passes": np.where(hits.passes, "1", "0").tolist(),
     }
 
 
@@ -181,12 +179,12 @@ def summary(
 
 def _model_summary(simulation: Simulation) -> dict[str, Any]:
     settings, n = simulation.settings, len(simulation)
-    ends = np.bincount(simulation.end, minlength=len(ENDS))
+    ends = np.bincount(simulation.end, minlength=len(simulation.ends))
     return {
         "parameters": dict(settings.parameters),
         "zones": {name: dict(values) for name, values in settings.zones.items()},
         "blocks": n,
-        "ends": {name: int(count) for name, count in zip(ENDS, ends, strict=True)},
+        "ends": {name: int(count) for name, count in zip(simulation.ends, ends, strict=True)},
         "impacts": int(simulation.impacts.sum()),
         "seconds": round(simulation.seconds, 3),
         "blocks_per_s": round(n / simulation.seconds, 1),

@@ -17,9 +17,10 @@ from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
-from ..vectors import Array, Indices
+from ..vectors import Array, Indices, Mask
 from .ground import Ground
 from .release import Releases
+from .structures import held_by
 
 Rolling = Literal["azzoni_1995", "coulomb", "none"]
 ROLLING: tuple[Rolling, ...] = ("none", "azzoni_1995", "coulomb")
@@ -104,7 +105,7 @@ class Simulation:
     Attributes
     ----------
     settings, releases, ground : what was simulated; of the releases those that were finished.
-    end : (n,) place in `ENDS`.
+    end : (n,) place in `ends`.
     time_s, length_m, v_max_mps : (n,) until the end, of the path, the greatest speed.
     impacts : (n,) how many.
     position : (n, 3) of the centre at the end, local [m].
@@ -130,6 +131,17 @@ class Simulation:
 
     def __len__(self) -> int:
         return self.end.size
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """All ways to end: those of `ENDS`, and to be held by each of the structures."""
+        return (*ENDS, *(f"structure:{name}" for name in self.ground.structures))
+
+    @property
+    def at_rest(self) -> Mask:
+        """(n,) whether the block has stopped, on the ground or at a structure."""
+        stopped: Mask = (self.end == ENDS.index(STOPPED)) | (self.end >= len(ENDS))
+        return stopped
 
 
 def simulate(
@@ -195,6 +207,10 @@ def simulate(
     records = _records(np.concatenate([rows[start] for start in starts if start < whole]), ground.element)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
+    if ground.structures:
+        stopped = np.flatnonzero(end == ENDS.index(STOPPED))
+        held = held_by(ground, records.position[last[stopped]], releases.radius_m[stopped])
+        end[stopped[held >= 0]] = len(ENDS) + held[held >= 0]
     return Simulation(
         settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
         results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,

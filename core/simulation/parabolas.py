@@ -7,7 +7,7 @@ import numpy as np
 
 from ..reconstruction.free_flight import fly
 from ..vectors import Array, Indices, Mask, norm
-from .engine import ENDED, ENDS, FLIES_OFF, IMPACT, ON_GROUND, RELEASED, STOPPED, Simulation
+from .engine import ENDED, FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
 
 TOLERANCE_M = 0.01
 """A leg on the ground, or a flight with drag, is followed as near as this."""
@@ -78,7 +78,7 @@ def parabolas_of(simulation: Simulation, tolerance_m: float = TOLERANCE_M) -> Pa
     arrival, _ = fly(records.position[begin], records.v2[begin], duration, settings.gravity_mps2, drag[begin])
     flies &= norm(arrival - records.position[begin + 1]) <= tolerance_m
     free = flies & (drag[begin] == 0)
-    rest = np.flatnonzero((records.what == ENDED) & (simulation.end[records.run] == ENDS.index(STOPPED)))
+    rest = np.flatnonzero((records.what == ENDED) & simulation.at_rest[records.run])
     zero, still = np.zeros(3), np.zeros((rest.size, 3))
     leg, ends = _joined(*_moments(simulation, begin[~free], duration[~free], flies[~free], drag), tolerance_m)
     row = np.concatenate([begin[free], ends.row, rest])

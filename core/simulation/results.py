@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is read off a simulation: its runs, its impacts, its motion in time, and hits of structures."""
+"""What is read off a simulation: its runs, its impacts, and its motion in time."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from ..progress import Progress, silent
 from ..reconstruction.free_flight import fly
 from ..reconstruction.impact import FLAGS, Impacts, apparent
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
-from ..vectors import Array, Indices, Mask, Names, dot
+from ..vectors import Array, Indices, Names, dot
 from .engine import FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
 
 HIGHEST_FLIGHTS = 3
@@ -114,14 +114,6 @@ def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
         },
         shift=ground.terrain.shift,
     )
-
-
-def hits_of(simulation: Simulation) -> Indices:
-    """Rows of the records at which a block hits a structure."""
-    records = simulation.records
-    rows = np.flatnonzero(records.what == IMPACT)
-    hit: Mask = simulation.ground.owner[records.face[rows]] > 0
-    return rows[hit]
 
 
 def release_names(simulation: Simulation) -> Names:

@@ -225,12 +225,15 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
 def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     """How the runs with one model ended."""
     remarks, model = [], simulation.settings.model
-    n, counts = len(simulation), np.bincount(simulation.end, minlength=len(ENDS))
+    n, counts = len(simulation), np.bincount(simulation.end, minlength=len(simulation.ends))
     limited = counts[ENDS.index(LIMIT)]
     if limited:
         text = f"{limited} of {n} blocks with {model} {END_WORDS[LIMIT]}: they are not at rest."
         remarks.append(Remark(text, "warning", model))
-    ended = ", ".join(f"{count} {END_WORDS[name]}" for name, count in zip(ENDS, counts.tolist(), strict=True) if count)
+    held = {f"structure:{name}": f"held by {name}" for name in simulation.ground.structures}
+    words = END_WORDS | held
+    ends = zip(simulation.ends, counts.tolist(), strict=True)
+    ended = ", ".join(f"{count} {words[name]}" for name, count in ends if count)
     text = f"{n} blocks with {model}, {simulation.impacts.sum()} impacts: {ended}."
     remarks.append(Remark(text, "note", model))
     flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)

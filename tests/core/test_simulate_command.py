@@ -127,7 +127,14 @@ def test_hits_of_a_wall(terrain: Path, releases: Path, tmp_path: Path) -> None:
         speed = float(row["v_mps"])
         mass = float(runs[int(row["run"]) - 1]["mass_kg"])
         assert float(row["kinetic_J"]) == pytest.approx(0.5 * mass * speed**2, rel=1e-9)
-    assert all(float(row["x_m"]) < EAST + 55 and row["end"] == "stopped" for row in runs)
+        assert float(row["along_m"]) == pytest.approx(float(row["y_m"]) - NORTH, abs=0.3)
+        assert 0 < float(row["up_m"]) < 8
+        assert row["passes"] == "0"
+    assert all(float(row["x_m"]) < EAST + 55 and row["end"] == "structure:wall" for row in runs)
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["models"]["azimi_desvarreux_1977"]["ends"] == {
+        "stopped": 0, "left_terrain": 0, "limit": 0, "structure:wall": 5,
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(

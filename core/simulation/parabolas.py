@@ -84,7 +84,7 @@ def parabolas_of(simulation: Simulation, tolerance_m: float = TOLERANCE_M) -> Pa
     row = np.concatenate([begin[free], ends.row, rest])
     start = np.concatenate([records.time_s[begin[free]], ends.time_s, records.time_s[rest]])
     order = np.lexsort((start, records.run[row]))
-    weight = np.broadcast_to(zero - [0.0, 0.0, settings.gravity_mps2], (np.count_nonzero(free), 3))
+    weight = np.broadcast_to(zero - [0.0, 0.0, settings.gravity_mps2], (int(free.sum()), 3))
     return Parabolas(
         run=records.run[row][order],
         start_s=start[order],

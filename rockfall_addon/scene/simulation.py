@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated rockfalls in the scene: their blocks beside the real ones, and their paths.
 
-Of each model two objects: a mesh with a vertex for each parabola of the motion, which geometry nodes make blocks of, and
-curves, one for each run, with the run's numbers. Both hold all that is shown, so that it is saved and undone with them.
+Of each model two objects: a mesh with a vertex for each parabola of the motion, which geometry nodes make blocks of,
+and curves, one for each run, with the run's numbers. Both hold all that is shown, so that it is saved and undone with
+them.
 """
 
 import json

@@ -90,14 +90,13 @@ class Paths:
         size = np.diff(first)[runs]
         begins = np.cumsum(size) - size
         pieces = np.arange(size.sum()) - np.repeat(begins - first[runs], size)
-        kept = np.full(self.run.size, -1, dtype=np.intp)
-        kept[pieces] = np.arange(pieces.size)
-        impact = kept[self.impact_piece]
+        struck = np.zeros(self.run.size, dtype=np.bool_)
+        struck[self.impact_piece] = True
         return Paths(
             self.name[runs], self.mass_kg[runs], self.stop[runs], self.beyond[runs], self.whole[runs],
             np.repeat(np.arange(len(runs)), size), self.flies[pieces], self.time_s[pieces], self.duration_s[pieces],
             self.start[pieces], self.end[pieces], self.start_velocity[pieces], self.end_velocity[pieces],
-            self.drag_per_m[pieces], np.sort(impact[impact >= 0]), self.gravity_mps2,
+            self.drag_per_m[pieces], np.flatnonzero(struck[pieces]), self.gravity_mps2,
         )  # fmt: skip
 
     def states(self, piece: Indices, elapsed_s: Array) -> tuple[Array, Array]:

@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import InputError
-from ..terrain.raycast import heights_above
-from ..terrain.surface import Surface
+from ..simulation.ground import Ground
 from ..vectors import Array, Indices, Mask, norm
 from .paths import HIGHEST_FLIGHTS, MOMENTS, Paths
 
@@ -18,7 +17,7 @@ DEFAULT_PARTS = (0.25, 0.5, 0.75)
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """The straight line in plan from the mean start of runs to the mean of their ends.
+    """The straight line in plan from the mean start of runs to the mean of their stops, or of what is seen last.
 
     Attributes
     ----------
@@ -87,7 +86,8 @@ def axis_of(paths: Paths) -> Axis:
     InputError : the runs end where they start, in plan.
     """
     first = paths.first_piece
-    start, end = paths.start[first[:-1]].mean(axis=0), paths.end[first[1:] - 1].mean(axis=0)
+    start = paths.start[first[:-1]].mean(axis=0)
+    end = np.where(np.isnan(paths.stop), paths.end[first[1:] - 1], paths.stop).mean(axis=0)
     way = (end - start)[:2]
     if not (length := float(np.hypot(*way))) > 0:
         raise InputError("The observed runs go nowhere, in plan", advice="Give picks of blocks that move")
@@ -117,8 +117,8 @@ def crossings(paths: Paths, section: Section, axis: Axis) -> Crossings:
     """The first crossing of each run, exact on its flights.
 
     A run that starts below a level does not cross it. Else its first crossing is where it ends below it for the first
-    time, since a flight that has both ends above a level has no part below. A crossing before the first impact says nothing of a model, since
-    the first flight is given: it does not count, and neither do later ones of that run.
+    time, since a flight that has both ends above a level has no part below. A crossing before the first impact says
+    nothing of a model, since the first flight is given: it does not count, and neither do later ones of that run.
     """
     n, starts = len(paths), paths.start[paths.first_piece[:-1], 2]
     given = np.zeros(n, dtype=np.bool_)
@@ -176,12 +176,14 @@ def _across(paths: Paths, line: Array) -> tuple[Indices, Array, Array]:
     return piece[order], share[order], place[order]
 
 
-def heights_at(surface: Surface, places: Sequence[Array]) -> list[Array]:
+def heights_at(ground: Ground, places: Sequence[Array]) -> list[Array]:
     """Heights above the terrain of several arrays of places (n, 3), in one look-up; NaN where a place is."""
-    together = np.concatenate(places) if places else np.zeros((0, 3))
+    if not places:
+        return []
+    together = np.concatenate(places)
     known = np.isfinite(together).all(axis=1)
     heights = np.full(len(together), np.nan)
-    heights[known] = heights_above(surface, together[known])
+    heights[known] = ground.heights_above(together[known])
     return np.split(heights, np.cumsum([len(part) for part in places])[:-1])
 
 
@@ -199,7 +201,7 @@ class Extremes:
     height_max_m: Array
 
 
-def extremes(paths: Paths, length_m: Array, surface: Surface) -> Extremes:
+def extremes(paths: Paths, length_m: Array, ground: Ground) -> Extremes:
     """The greatest speed and height of each run on its first (n,) metres in plan."""
     n, plan, travelled = len(paths), paths.plan_m, paths.travelled_m
     reach = length_m[paths.run]
@@ -219,7 +221,7 @@ def extremes(paths: Paths, length_m: Array, surface: Surface) -> Extremes:
     parts = np.tile(np.linspace(0.0, 1.0, MOMENTS), longest.size)
     piece = np.repeat(rows[longest], MOMENTS)
     place, _ = paths.states(piece, parts * np.repeat(lasts[longest], MOMENTS))
-    (above,) = heights_at(surface, [place])
+    (above,) = heights_at(ground, [place])
     height = np.full(n, -np.inf)
     np.maximum.at(height, paths.run[piece], np.where(np.isnan(above), -np.inf, above))
     return Extremes(v_max, np.where(np.isfinite(height), height, np.nan))

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..reconstruction.block import per_pick
 from ..reconstruction.chains import find_segments
 from ..reconstruction.flight import solve_flights
-from ..terrain.surface import Surface
+from ..simulation.ground import Ground
 from ..vectors import Array, Indices, Mask, Names, dot
 from .paths import Paths, first_flights, observed_paths
 from .ranks import FEWEST, RankTest, holm, rank_test, reach_test
@@ -166,9 +166,7 @@ class WholeRuns:
         return next(one for one in self.of(model) if (one.section, one.quantity.name) == (section, quantity))
 
 
-def observe_runs(
-    reconstruction: "Reconstruction", surface: Surface, draws: int = ERROR_DRAWS, seed: int = 0
-) -> Observed:
+def observe_runs(reconstruction: "Reconstruction", ground: Ground, draws: int = ERROR_DRAWS, seed: int = 0) -> Observed:
     """The reconstructed trajectories, and what they would be had the picks' errors been others.
 
     Raises
@@ -183,7 +181,7 @@ def observe_runs(
     from_impact = np.asarray(kinds == "impact")
     if not (np.isfinite(picks.sigma_position_m) | np.isfinite(picks.sigma_time_s)).any():
         return Observed(paths, from_impact)
-    nodes = _nodes(reconstruction, surface)
+    nodes = _nodes(reconstruction, ground)
     drag = reconstruction.drag
     drag_per_m = None if drag is None else per_pick(picks, reconstruction.block, drag.per_metre)
     rng = np.random.default_rng(seed)
@@ -211,7 +209,7 @@ def observe_stops(name: Names, start: Array, stop: Array, mass_kg: Array) -> Obs
 def compare_runs(
     observed: Observed,
     simulated: Mapping[str, Paths],
-    surface: Surface,
+    ground: Ground,
     sections: Sequence[Section],
     axis: Axis | None = None,
     seed: int = 0,
@@ -235,14 +233,14 @@ def compare_runs(
     axis = axis or axis_of(paths)
     shortest = _shortest(paths)
     limits = _Limits(np.bincount(paths.run[paths.impact_piece], minlength=len(paths)), paths.length_m, shortest)
-    values = _measure(paths, sections, axis, surface, limits)
-    sigma = _sigma(observed, values, sections, axis, surface, limits)
+    values = _measure(paths, sections, axis, ground, limits)
+    sigma = _sigma(observed, values, sections, axis, ground, limits)
     compared: list[Compared] = []
     for model, runs in simulated.items():
         own = [np.flatnonzero(runs.name == name) for name in paths.name]
         place = np.repeat(np.arange(len(paths)), [part.size for part in own])
         runs = runs.take(np.concatenate(own))
-        their = _measure(runs, sections, axis, surface, limits.take(place))
+        their = _measure(runs, sections, axis, ground, limits.take(place))
         reach = [_reach(model, section, paths, runs, axis, place) for section in sections]
         found = [
             _compare(model, section, quantity, values[section, quantity], sigma[section, quantity], part, place, seed)
@@ -267,18 +265,18 @@ class _Limits:
 
 
 def _measure(
-    paths: Paths, sections: Sequence[Section], axis: Axis, surface: Surface, limits: _Limits
+    paths: Paths, sections: Sequence[Section], axis: Axis, ground: Ground, limits: _Limits
 ) -> dict[tuple[str, str], Array]:
     """Everything that is compared: (section, quantity) → (n,), NaN where there is none."""
     crossed = [crossings(paths, section, axis) for section in sections]
-    heights = heights_at(surface, [one.position for one in crossed])
+    heights = heights_at(ground, [one.position for one in crossed])
     values: dict[tuple[str, str], Array] = {}
     for section, one, height in zip(sections, crossed, heights, strict=True):
         square = dot(one.velocity, one.velocity)
         columns = (one.time_s, one.along_m, np.sqrt(square), height, 0.5 * paths.mass_kg * square)
         for quantity, column in zip(AT_SECTIONS, columns, strict=True):
             values[section.name, quantity.name] = column
-    greatest = extremes(paths, limits.length_m, surface)
+    greatest = extremes(paths, limits.length_m, ground)
     seen: Mask = limits.impacts > 0
     way = paths.stop - paths.start[paths.first_piece[:-1]]
     flat = np.hypot(*way[:, :2].T)
@@ -301,13 +299,13 @@ def _sigma(
     values: Mapping[tuple[str, str], Array],
     sections: Sequence[Section],
     axis: Axis,
-    surface: Surface,
+    ground: Ground,
     limits: _Limits,
 ) -> dict[tuple[str, str], Array]:
     """(n,) standard deviations of the observed values, NaN where less than half of the moved runs have one."""
     if not observed.moved:
         return {key: np.full(column.size, np.nan) for key, column in values.items()}
-    draws = [_measure(paths, sections, axis, surface, limits) for paths in observed.moved]
+    draws = [_measure(paths, sections, axis, ground, limits) for paths in observed.moved]
     sigma = {}
     for key, column in values.items():
         drawn = np.stack([draw[key] for draw in draws])
@@ -366,7 +364,7 @@ def _shortest(paths: Paths) -> float:
     return float(gaps.min()) if gaps.size else SHORTEST_S
 
 
-def _nodes(reconstruction: "Reconstruction", surface: Surface) -> "Picks":
+def _nodes(reconstruction: "Reconstruction", ground: Ground) -> "Picks":
     """The picks at the places that the flights join."""
     from ..reconstruction.motion import GROUNDED, block_centres
     from ..reconstruction.placement import pick_normals
@@ -375,7 +373,7 @@ def _nodes(reconstruction: "Reconstruction", surface: Surface) -> "Picks":
     if reconstruction.ends == "contacts":
         return picks
     radius = per_pick(picks, reconstruction.block, lambda one: one.radius_m)
-    normals = pick_normals(picks, surface, 2 * radius, None, np.isin(picks.kind, GROUNDED))
+    normals = pick_normals(picks, ground.surface, 2 * radius, None, np.isin(picks.kind, GROUNDED))
     return block_centres(picks, normals, radius)
 
 

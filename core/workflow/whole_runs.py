@@ -13,13 +13,14 @@ from ..analysis.ranks import FEWEST
 from ..analysis.sections import Section, default_sections
 from ..analysis.whole_runs import Observed, WholeRuns, compare_runs
 from ..errors import InputError
-from ..progress import Progress, silent
+from ..progress import CancelledError, Progress, silent
 from ..reconstruction.block import Block
-from ..simulation.engine import Settings, Simulation, simulate
+from ..simulation.engine import Settings, Simulation
 from ..simulation.ground import Ground
 from ..simulation.release import Releases, make_releases, overlapping
 from ..terrain.raycast import closest_points
 from ..vectors import Array, Names, cross
+from .simulation import run_models
 
 NUMBER = 100
 """Blocks for each observed run."""
@@ -55,19 +56,20 @@ def compare_whole_runs(
     Raises
     ------
     InputError : settings that cannot be, observed runs without a release.
+    CancelledError : the work was ended before the first model was finished. Later, the finished ones are compared.
     """
     for name in observed.paths.name.tolist():
         if name not in releases.name:
             raise InputError("No block is released for this run", trajectory=name, advice="Give its release")
-    simulations = tuple(
-        simulate(ground, releases, one, record=True, threads=threads, progress=progress) for one in settings
-    )
+    simulations = run_models(ground, releases, settings, record=True, threads=threads, progress=progress)
+    finished = tuple(one for one in simulations if len(one) == one.wanted)
+    if not finished:
+        raise CancelledError
     progress("Comparing", 0, 0)
-    paths = {one.settings.model: simulated_paths(one) for one in simulations}
-    surface = ground.terrain
+    paths = {one.settings.model: simulated_paths(one) for one in finished}
     if not sections and observed.paths.impact_piece.size:
-        sections = default_sections(observed.paths, FEWEST, surface.shift.z)
-    return ComparedSimulations(compare_runs(observed, paths, surface, sections, seed=seed), simulations)
+        sections = default_sections(observed.paths, FEWEST, ground.shift.z)
+    return ComparedSimulations(compare_runs(observed, paths, ground, sections, seed=seed), finished)
 
 
 def released_as_observed(
@@ -81,7 +83,7 @@ def released_as_observed(
 
     Raises
     ------
-    InputError : a number of zero; a start beside the terrain.
+    InputError : a number of zero; a start beside the terrain; a terrain that is a cloud of points.
 
     Notes
     -----
@@ -121,8 +123,8 @@ def _starts(paths: Paths) -> tuple[Array, Array]:
 
 def _placed(ground: Ground, start: Array, radius: Array, name: Names) -> tuple[Array, Array]:
     """Centres (m, 3) of blocks whose undersides start at places (m, 3), clear of the ground, and its normals there."""
-    near = closest_points(ground.terrain, start)
-    normal = ground.terrain.face_normals[near.face]
+    near = closest_points(ground.surface, start)
+    normal = ground.surface.face_normals[near.face]
     on_ground = (near.distance < radius)[:, None]
     centre = np.where(on_ground, near.point + radius[:, None] * normal, start + radius[:, None] * [0.0, 0.0, 1.0])
     for _ in range(LIFTS):
@@ -131,5 +133,3 @@ def _placed(ground: Ground, start: Array, radius: Array, name: Names) -> tuple[A
             break
         centre[:, 2] += np.where(deep, depth + CLEAR_M, 0.0)
     return centre, normal
-
-

@@ -14,7 +14,7 @@ from ..compiled import kernel
 
 LEVELS = 40
 NEAR = 2e-3
-"""Arguments of a symmetric integral that are so near to each other serve its series: what is left out is below 1e-16."""
+"""Arguments of a symmetric integral that are so near to each other serve its series, to 1e-16."""
 
 
 @kernel

@@ -16,6 +16,10 @@ HALF = np.uint64(32)
 TOP, BOTTOM = np.uint64(5), np.uint64(6)
 SCALE = 1.0 / 9007199254740992.0
 
+BLOCK, ATTITUDE, PLACE = 0xFFFF0000, 0xFFFF0001, 0xFFFF1000
+"""In place of the number of an impact, which never reaches them: chance of a run before it begins. Of its block, of its
+attitude, and of its place at the first, second, … attempt."""
+
 
 @kernel
 def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
@@ -36,3 +40,10 @@ def fill_uniform(seed, run, impact, values):  # type: ignore[no-untyped-def]
         values[2 * block] = ((a >> TOP) * 67108864.0 + (b >> BOTTOM)) * SCALE
         if 2 * block + 1 < values.size:
             values[2 * block + 1] = ((c >> TOP) * 67108864.0 + (d >> BOTTOM)) * SCALE
+
+
+@kernel
+def fill_runs(seed, first, impact, values):  # type: ignore[no-untyped-def]
+    """Fill the rows of `values` (n, k): the uniform numbers of one impact of each run from `first` on."""
+    for i in range(values.shape[0]):
+        fill_uniform(seed, first + i, impact, values[i])

@@ -1,21 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where blocks start, and as what: n releases, one a block."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
 
+from ..compiled import in_chunks
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.drag import Drag
+from ..remarks import Remark
 from ..vectors import Array, Indices, Mask, Names
 from .block_shapes import ROUND, SHAPES, Shape, mean_inertia, principal_moments, volumes
 from .ground import Ground
-
-ABOVE_M = 1e-6
-"""A block that is placed on the terrain starts so much above it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +30,7 @@ class Releases:
     shape : (n,) of `SHAPES`.
     axes_m : (n, 3) the diameters d1, d2, d3 of the solid.
     mass_kg : (n,).
+    remarks : what a user should know of how they were placed.
 
     Raises
     ------
@@ -49,6 +49,7 @@ class Releases:
     shape: Names
     axes_m: Array
     mass_kg: Array
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         for what, values in (("position", self.position), ("velocity", self.velocity), ("spin", self.angular_velocity)):
@@ -95,7 +96,8 @@ class Releases:
 
     def take(self, rows: slice | Indices) -> "Releases":
         """Some of them."""
-        return Releases(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+        columns = {one.name: getattr(self, one.name)[rows] for one in fields(self) if one.name != "remarks"}
+        return replace(self, **columns)
 
 
 def make_releases(
@@ -132,7 +134,7 @@ def make_releases(
     else:
         even = np.isin(shapes, ROUND) & (axes_m != axes_m[:, :1]).any(axis=1)
         axes = np.where(even[:, None], axes_m.mean(axis=1, keepdims=True), axes_m)
-    columns = (
+    releases = Releases(
         np.full(n, "") if name is None else name,
         position,
         zeros if velocity is None else velocity,
@@ -141,7 +143,7 @@ def make_releases(
         axes,
         np.broadcast_to(np.asarray(density_kgpm3, dtype=np.float64), n) * volumes(shapes, axes),
     )
-    return Releases(*(np.repeat(column, number, axis=0) for column in columns))
+    return releases if number == 1 else releases.take(np.repeat(np.arange(n), number))
 
 
 def placed_on(ground: Ground, releases_xy: Array, diameter_m: Array) -> Array:
@@ -149,21 +151,30 @@ def placed_on(ground: Ground, releases_xy: Array, diameter_m: Array) -> Array:
 
     NaN where there is no ground below or above the place.
     """
-    from ..terrain.kernels import STACK_SIZE
-    from .ground_kernels import first_contact
+    from .placing_kernels import drop_many
 
-    stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
     tree, top = ground.tree, ground.highest_m
-    result = np.full((len(releases_xy), 3), np.nan)
-    for i, (x, y) in enumerate(releases_xy.tolist()):
-        radius = float(diameter_m[i]) / 2
-        start = top + 2 * radius
-        drop, _, place = first_contact(
-            tree, stack, times, (x, y, start), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0), radius, np.inf
-        )
-        if place >= 0:
-            result[i] = x, y, start - drop + ABOVE_M
-    return result
+    places, radius = np.ascontiguousarray(releases_xy), np.ascontiguousarray(diameter_m / 2)
+    heights = np.empty(len(places))
+    in_chunks(lambda i, j: drop_many(tree, places, radius, top, heights, i, j), len(places))
+    return np.column_stack([np.where(np.isnan(heights)[:, None], np.nan, places), heights])
+
+
+def standing_on(ground: Ground, points: Array, normals: Array, diameter_m: Array) -> tuple[Array, Mask]:
+    """Centres (n, 3) of spheres that touch the ground at points (n, 3) on it, on the side of the normals (n, 3).
+
+    Returns
+    -------
+    centres : moved on, where the ground is too narrow for the sphere, until it touches and is nowhere in the ground.
+    fits : (n,) false where there is no such place.
+    """
+    from .placing_kernels import stand_many
+
+    tree, radius = ground.index.tree, np.ascontiguousarray(diameter_m / 2)
+    at, along = np.ascontiguousarray(points), np.ascontiguousarray(normals)
+    centres, fits = np.empty((len(at), 3)), np.empty(len(at), np.bool_)
+    in_chunks(lambda i, j: stand_many(tree, at, along, radius, centres, fits, i, j), len(at))
+    return centres, fits
 
 
 def overlapping(ground: Ground, releases: Releases) -> Array:

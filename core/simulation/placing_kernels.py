@@ -12,7 +12,7 @@ from .ground_kernels import first_contact
 ABOVE_M = 1e-6
 """A block that is placed on the terrain starts so much above it."""
 STEPS, PARTS = 40, 32
-"""So often a sphere is moved out of another part of the ground before it does not fit; in a furrow it grows by parts."""
+"""So often a sphere is moved out of another part of the ground before it does not fit; in a furrow it grows."""
 
 
 @kernel
@@ -79,8 +79,8 @@ def _stood(tree, stack, point, normal, radius, parts):  # type: ignore[no-untype
 def stand_many(tree, points, normals, radius, centres, fits, start, stop):  # type: ignore[no-untyped-def]
     """Fill centres (n, 3) of spheres that touch the ground, near points (n, 3) on it, on the side of the normals.
 
-    A sphere that would be in another part of the ground is moved out of it, from a furrow while it grows. It does not fit
-    where that does not end, or only through the ground.
+    A sphere that would be in another part of the ground is moved out of it, from a furrow while it grows. It does not
+    fit where that does not end, or only through the ground.
     """
     stack = np.empty(STACK_SIZE, np.int64)
     for i in range(start, stop):

@@ -99,6 +99,10 @@ class Releases:
         columns = {one.name: getattr(self, one.name)[rows] for one in fields(self) if one.name != "remarks"}
         return replace(self, **columns)
 
+    def with_remarks(self, *remarks: Remark) -> "Releases":
+        """The same with more to say."""
+        return replace(self, remarks=(*self.remarks, *remarks))
+
 
 def make_releases(
     position: Array,

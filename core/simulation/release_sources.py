@@ -1,0 +1,323 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where blocks come from: points, lines, areas, everything that is steep. Each gives blocks that touch the terrain.
+
+A block lies against the face that it comes from, along that face's normal: on a wall beside it, under an overhang below
+it. Where the ground is too narrow for it, it is moved on until it touches and is nowhere in the ground. Places, sizes
+and densities are functions of the seed and of the run alone: one more block changes no other.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InputError
+from ..reconstruction.placement import FAR_M
+from ..remarks import Remark
+from ..terrain.raycast import cast_rays, closest_points
+from ..terrain.surface import Surface, face_cross_products
+from ..vectors import Array, Indices, Mask, Names, norm, unit
+from .blocks import Blocks, draw_blocks
+from .ground import Ground
+from .polygons import Polygon
+from .release import Releases, make_releases, placed_on, standing_on
+
+MOST_BLOCKS = 10_000_000
+"""More would fill the memory before the first of them has fallen."""
+ATTEMPTS = 64
+"""So many places are drawn for a block before it is taken as too large for all."""
+
+
+def on_points(
+    ground: Ground,
+    points: Array,
+    blocks: Blocks,
+    number: int = 1,
+    seed: int = 0,
+    names: Names | None = None,
+) -> Releases:
+    """Blocks at points (k, 3) of the terrain, local [m], `number` at each.
+
+    Raises
+    ------
+    InputError : a point beside the terrain, or further from it than `FAR_M`; a block that is too large for its place.
+
+    Notes
+    -----
+    A point is put on the nearest terrain; without z (NaN) it is the highest terrain there, and a block that is wider than
+    a slot lies over it.
+    """
+    check_number(number, len(points))
+    place, face = _on_terrain(ground.terrain, points)
+    which = np.repeat(np.arange(len(points)), number)
+    name = np.full(len(points), "") if names is None else names
+    return _fixed(ground, points[which], place[which], face[which], name[which], blocks, seed)
+
+
+def on_line(
+    ground: Ground,
+    lines: Sequence[Array],
+    blocks: Blocks,
+    number: int,
+    seed: int = 0,
+    *,
+    evenly: bool = False,
+    names: Sequence[str] = (),
+) -> Releases:
+    """`number` blocks along lines, each (k, 3) local [m].
+
+    Parameters
+    ----------
+    evenly : each in the middle of its part of the whole length; else anywhere, all places alike.
+    names : of the lines, for the releases.
+
+    Raises
+    ------
+    InputError : a line of one point, or without length, beside the terrain or far from it; see `on_points`.
+
+    Notes
+    -----
+    Lengths are those of the line as it is drawn, in plan where it has no heights (NaN).
+    """
+    check_number(number)
+    names = names or [""] * len(lines)
+    starts, ends, owner = [], [], []
+    for i, line in enumerate(lines):
+        what = f"The line {names[i]}" if names[i] else "The line"
+        if not np.isfinite(line[:, :2]).all():
+            raise InputError(f"{what} has a coordinate that is not finite", advice="Correct it")
+        if len(line) < 2 or not np.nan_to_num(np.ptp(line, axis=0)).any():
+            raise InputError(f"{what} has no length", advice="Give at least two different points")
+        starts.append(line[:-1])
+        ends.append(line[1:])
+        owner += [i] * (len(line) - 1)
+    if not starts:
+        raise InputError("There is no line to release blocks from", advice="Give at least one")
+    start, end = np.concatenate(starts), np.concatenate(ends)
+    way = end - start
+    cumulated = np.cumsum(norm(np.where(np.isnan(way), 0.0, way)))
+    part = (np.arange(number) + 0.5) / number if evenly else _uniform(seed, number, 1, 0)[:, 0]
+    at, within = _chosen(cumulated, part)
+    points = start[at] + within[:, None] * way[at]
+    place, face = _on_terrain(ground.terrain, points)
+    return _fixed(ground, points, place, face, np.array(names, dtype=np.str_)[np.array(owner)[at]], blocks, seed)
+
+
+def in_polygon(
+    ground: Ground,
+    polygons: Sequence[Polygon],
+    blocks: Blocks,
+    number: int,
+    seed: int = 0,
+    *,
+    steeper_than: float | None = None,
+) -> Releases:
+    """`number` blocks on the terrain within polygons in plan, as many on each square metre of the terrain itself.
+
+    Parameters
+    ----------
+    steeper_than : only on faces that dip more than this [rad].
+
+    Raises
+    ------
+    InputError : no terrain within, or none so steep; a block that is too large for all places; an impossible angle.
+    """
+    check_number(number)
+    corners, normals = _terrain_faces(ground)
+    if steeper_than is not None:
+        steep = _steeper(normals, steeper_than)
+        corners, normals = corners[steep], normals[steep]
+    parts, sources, owner = [], [], []
+    for i, polygon in enumerate(polygons):
+        part, source = polygon.clipped(corners)
+        parts.append(part)
+        sources.append(source)
+        owner.append(np.full(len(part), i))
+    pieces = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+    if not len(pieces):
+        steep_too = "" if steeper_than is None else f" that is steeper than {np.degrees(steeper_than):g}°"
+        raise InputError(
+            f"There is no terrain within the polygon{steep_too}",
+            advice="Check its coordinates" if steeper_than is None else "Give a smaller angle, or another polygon",
+        )
+    which = np.concatenate(owner)
+    name = np.array([polygon.name for polygon in polygons], dtype=np.str_)[which]
+    return _anywhere(ground, pieces, normals[np.concatenate(sources)], name, blocks, number, seed)
+
+
+def steeper_than(ground: Ground, angle: float, blocks: Blocks, number: int, seed: int = 0) -> Releases:
+    """`number` blocks on all terrain that dips more than an angle [rad], as many on each square metre of it.
+
+    Raises
+    ------
+    InputError : nothing is so steep; an impossible angle; a block that is too large for all places.
+
+    Notes
+    -----
+    90° is a vertical wall, more is an overhang.
+    """
+    check_number(number)
+    corners, normals = _terrain_faces(ground)
+    steep = _steeper(normals, angle)
+    if not steep.any():
+        raise InputError(
+            f"No terrain is steeper than {np.degrees(angle):g}°",
+            advice=f"Give a smaller angle; the steepest is {np.degrees(np.arccos(normals[:, 2].min())):.1f}°",
+        )
+    name = np.full(int(steep.sum()), "")
+    return _anywhere(ground, corners[steep], normals[steep], name, blocks, number, seed)
+
+
+def check_number(number: int, places: int = 1) -> None:
+    """Raises `InputError` for no blocks, and for more than fit into the memory."""
+    if number < 1:
+        raise InputError(f"{number} blocks cannot be released", advice="Release at least one")
+    if number * places > MOST_BLOCKS:
+        raise InputError(
+            f"{number * places} blocks are too many for one run, which takes up to {MOST_BLOCKS}",
+            advice="Release fewer, or divide them into several runs with seeds of their own",
+        )
+
+
+def check_size(ground: Ground, diameter_m: Array) -> None:
+    """Raises `InputError` for a block that is larger than the terrain is wide."""
+    low, high = ground.terrain.bounds
+    size, largest = float((high - low)[:2].max()), float(diameter_m.max())
+    if largest > size:
+        raise InputError(
+            f"A block of {largest:g} m is larger than the terrain, which is {size:.3g} m wide",
+            advice="Check the unit of the diameter and of the terrain",
+        )
+
+
+def _steeper(normals: Array, angle: float) -> Mask:
+    if not (np.isfinite(angle) and 0 <= angle < np.pi):
+        raise InputError(
+            f"{np.degrees(angle):g}° is no angle of a slope", advice="Give one from 0 to 180: 90 is vertical"
+        )
+    steep: Mask = normals[:, 2] < np.cos(angle)
+    return steep
+
+
+def _terrain_faces(ground: Ground) -> tuple[Array, Array]:
+    """Corners (m, 3, 3) and unit normals (m, 3) of the terrain's faces that have an area."""
+    terrain = ground.terrain
+    normals = terrain.face_normals
+    good = np.isfinite(normals[:, 0])
+    if good.all():
+        return terrain.vertices[terrain.faces], normals
+    return terrain.vertices[terrain.faces[good]], normals[good]
+
+
+def _on_terrain(terrain: Surface, points: Array) -> tuple[Array, Indices]:
+    """Places (n, 3) on the terrain, and the faces (n,) that they are on."""
+    given = np.isfinite(points[:, 2])
+    place, face = np.empty(points.shape), np.empty(len(points), np.intp)
+    if given.any():
+        nearest = closest_points(terrain, points[given])
+        place[given], face[given] = nearest.point, nearest.face
+        far = np.zeros(len(points))
+        far[given] = nearest.distance
+        for i in np.flatnonzero(far > FAR_M)[:1].tolist():
+            raise InputError(
+                f"{_place_text(terrain, points[i])} is {far[i]:.1f} m from the terrain",
+                advice="Correct its coordinates, or leave out the height to take the terrain's",
+            )
+    if not given.all():
+        above = np.column_stack([points[~given, :2], np.full(int((~given).sum()), terrain.bounds[1, 2] + 1.0)])
+        hits = cast_rays(terrain, above, (0.0, 0.0, -1.0))
+        place[~given], face[~given] = hits.point, hits.face
+        for i in np.flatnonzero(np.isnan(place[:, 2]))[:1].tolist():
+            raise InputError(
+                f"There is no terrain at {_place_text(terrain, points[i])}",
+                advice="Correct the coordinates, or give a terrain that reaches so far",
+            )
+    return place, face
+
+
+def _place_text(terrain: Surface, point: Array) -> str:
+    x, y, z = terrain.shift.to_survey(point)
+    return f"{x:.2f}, {y:.2f}" + ("" if np.isnan(z) else f", {z:.2f}")
+
+
+def _uniform(seed: int, number: int, columns: int, attempt: int) -> Array:
+    """(n, columns) uniform numbers of the places of runs."""
+    from .chance_kernels import PLACE, fill_runs
+
+    u = np.empty((number, columns))
+    fill_runs(seed, 0, PLACE + attempt, u)
+    return u
+
+
+def _chosen(cumulated: Array, part: Array) -> tuple[Indices, Array]:
+    """Which piece a part 0…1 of all lengths or areas is in, and how far into it, 0…1."""
+    value = part * cumulated[-1]
+    at = np.minimum(np.searchsorted(cumulated, value, side="right"), len(cumulated) - 1)
+    size = np.diff(cumulated, prepend=0.0)[at]
+    return at, 1.0 - (cumulated[at] - value) / np.where(size > 0, size, 1.0)
+
+
+def _anywhere(
+    ground: Ground, pieces: Array, normals: Array, name: Names, blocks: Blocks, number: int, seed: int
+) -> Releases:
+    """Blocks on triangles (p, 3, 3), all areas alike; a place that is too narrow for its block is drawn again."""
+    axes, density = draw_blocks(blocks, number, seed)
+    diameter = axes.mean(axis=1)
+    check_size(ground, diameter)
+    areas = norm(face_cross_products(pieces.reshape(-1, 3), np.arange(3 * len(pieces), dtype=np.int32).reshape(-1, 3)))
+    cumulated = np.cumsum(areas)
+    centre, chosen = np.empty((number, 3)), np.empty(number, np.intp)
+    left = np.arange(number)
+    drawn_again = 0
+    for attempt in range(ATTEMPTS):
+        u = _uniform(seed, number, 3, attempt)[left]
+        at, _ = _chosen(cumulated, u[:, 0])
+        root = np.sqrt(u[:, 1])
+        weights = np.column_stack([1 - root, root * (1 - u[:, 2]), root * u[:, 2]])
+        points = np.einsum("ij,ijk->ik", weights, pieces[at])
+        centre[left], fits = standing_on(ground, points, normals[at], diameter[left])
+        chosen[left] = at
+        left = left[~fits]
+        if not left.size:
+            break
+        drawn_again += left.size
+    if left.size:
+        raise InputError(
+            f"A block of {diameter[left].max():.3g} m finds no place that is wide enough for it",
+            advice="Give smaller blocks, or a larger area",
+        )
+    remarks: tuple[Remark, ...] = ()
+    if drawn_again:
+        text = f"{drawn_again} places were too narrow for their block and were drawn again."
+        remarks = (Remark(text, "note", "releases"),)
+    return _made(centre, name[chosen], blocks, axes, density, remarks)
+
+
+def _fixed(
+    ground: Ground, points: Array, place: Array, face: Indices, name: Names, blocks: Blocks, seed: int
+) -> Releases:
+    """Blocks at places that are given."""
+    axes, density = draw_blocks(blocks, len(place), seed)
+    diameter = axes.mean(axis=1)
+    check_size(ground, diameter)
+    terrain = ground.terrain
+    centre, fits = standing_on(ground, place, terrain.face_normals[face], diameter)
+    if not fits.all():  # in a corner, where the normal of one face is in the other
+        rounded = unit(terrain.vertex_normals[terrain.faces[face[~fits]]].sum(axis=1))
+        centre[~fits], fits[~fits] = standing_on(ground, place[~fits], rounded, diameter[~fits])
+    bridged = np.flatnonzero(~fits & np.isnan(points[:, 2]))
+    if bridged.size:  # a slot that is narrower than the block, which lies over it
+        centre[bridged] = placed_on(ground, place[bridged, :2], diameter[bridged])
+        fits[bridged] = True
+    for i in np.flatnonzero(~fits)[:1].tolist():
+        raise InputError(
+            f"A block of {diameter[i]:.3g} m is too large for the ground at {_place_text(terrain, place[i])}",
+            advice="Give smaller blocks, or another place",
+        )
+    return _made(centre, name, blocks, axes, density, ())
+
+
+def _made(
+    centre: Array, name: Names, blocks: Blocks, axes: Array, density: Array, remarks: tuple[Remark, ...]
+) -> Releases:
+    made = make_releases(centre, name=name, shape=blocks.shape, axes_m=axes, density_kgpm3=density)
+    return made.with_remarks(*remarks)

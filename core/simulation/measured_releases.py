@@ -80,7 +80,7 @@ def from_impacts(
     name = np.array(
         [f"{trajectory} {impact}" for trajectory, impact in zip(impacts.trajectory, impacts.impact, strict=True)]
     )
-    position = ground.terrain.shift.to_local(impacts.shift.to_survey(impacts.position[rows]))
+    position = ground.shift.to_local(impacts.shift.to_survey(impacts.position[rows]))
     start = _Start(name[rows], position, impacts.v2[rows], _spin_after(impacts)[rows], np.full(rows.size, FAR_M))
     sizes = None
     if blocks is None:
@@ -144,7 +144,7 @@ def from_reconstruction(
         if own.size:
             first = int(own[0])
             names.append(trajectory)
-            position.append(ground.terrain.shift.to_local(impacts.shift.to_survey(impacts.position[first])))
+            position.append(ground.shift.to_local(impacts.shift.to_survey(impacts.position[first])))
             velocity.append(impacts.v2[first])
             omega.append(after[first])
             reach.append(FAR_M)
@@ -211,13 +211,13 @@ def _released(
         axes, shape, density = sizes[0][which], sizes[1][which], sizes[2][which]
     diameter = axes.mean(axis=1)
     check_size(ground, diameter)
-    nearest = closest_points(ground.terrain, start.position)
+    nearest = closest_points(ground.surface, start.position)
     for i in np.flatnonzero(nearest.distance > start.reach)[:1].tolist():
         raise InputError(
             f"The start {start.name[i]} is {nearest.distance[i]:.1f} m from the terrain",
             advice="Give the terrain on which it was measured",
         )
-    normal = ground.terrain.face_normals[nearest.face]
+    normal = ground.surface.face_normals[nearest.face]
     centre = start.position[which]
     lies: Mask = nearest.distance[which] <= np.where(start.reach[which] > FAR_M, diameter, np.inf)
     placed, fits = standing_on(ground, nearest.point[which][lies], normal[which][lies], diameter[lies])

@@ -13,8 +13,9 @@ import numpy as np
 from ..errors import InputError
 from ..reconstruction.placement import FAR_M
 from ..remarks import Remark
+from ..terrain.cloud import Cloud
 from ..terrain.raycast import cast_rays, closest_points
-from ..terrain.surface import Surface, face_cross_products
+from ..terrain.surface import face_cross_products
 from ..vectors import Array, Indices, Mask, Names, norm, unit
 from .blocks import Blocks, draw_blocks
 from .ground import Ground
@@ -43,14 +44,13 @@ def on_points(
 
     Notes
     -----
-    A point is put on the nearest terrain; without z (NaN) it is the highest terrain there, and a block that is wider than
-    a slot lies over it.
+    A point is put on the nearest terrain; without z (NaN) it is the highest terrain there, and a block that is wider
+    than a slot lies over it. On a terrain of points, blocks are put down from above.
     """
     check_number(number, len(points))
-    place, face = _on_terrain(ground.terrain, points)
     which = np.repeat(np.arange(len(points)), number)
     name = np.full(len(points), "") if names is None else names
-    return _fixed(ground, points[which], place[which], face[which], name[which], blocks, seed)
+    return _fixed(ground, points[which], name[which], blocks, seed)
 
 
 def on_line(
@@ -98,8 +98,7 @@ def on_line(
     part = (np.arange(number) + 0.5) / number if evenly else _uniform(seed, number, 1, 0)[:, 0]
     at, within = _chosen(cumulated, part)
     points = start[at] + within[:, None] * way[at]
-    place, face = _on_terrain(ground.terrain, points)
-    return _fixed(ground, points, place, face, np.array(names, dtype=np.str_)[np.array(owner)[at]], blocks, seed)
+    return _fixed(ground, points, np.array(names, dtype=np.str_)[np.array(owner)[at]], blocks, seed)
 
 
 def in_polygon(
@@ -200,7 +199,7 @@ def _steeper(normals: Array, angle: float) -> Mask:
 
 def _terrain_faces(ground: Ground) -> tuple[Array, Array]:
     """Corners (m, 3, 3) and unit normals (m, 3) of the terrain's faces that have an area."""
-    terrain = ground.terrain
+    terrain = ground.surface
     normals = terrain.face_normals
     good = np.isfinite(normals[:, 0])
     if good.all():
@@ -208,8 +207,9 @@ def _terrain_faces(ground: Ground) -> tuple[Array, Array]:
     return terrain.vertices[terrain.faces[good]], normals[good]
 
 
-def _on_terrain(terrain: Surface, points: Array) -> tuple[Array, Indices]:
+def _on_terrain(ground: Ground, points: Array) -> tuple[Array, Indices]:
     """Places (n, 3) on the terrain, and the faces (n,) that they are on."""
+    terrain = ground.surface
     given = np.isfinite(points[:, 2])
     place, face = np.empty(points.shape), np.empty(len(points), np.intp)
     if given.any():
@@ -219,7 +219,7 @@ def _on_terrain(terrain: Surface, points: Array) -> tuple[Array, Indices]:
         far[given] = nearest.distance
         for i in np.flatnonzero(far > FAR_M)[:1].tolist():
             raise InputError(
-                f"{_place_text(terrain, points[i])} is {far[i]:.1f} m from the terrain",
+                f"{_place_text(ground, points[i])} is {far[i]:.1f} m from the terrain",
                 advice="Correct its coordinates, or leave out the height to take the terrain's",
             )
     if not given.all():
@@ -227,15 +227,19 @@ def _on_terrain(terrain: Surface, points: Array) -> tuple[Array, Indices]:
         hits = cast_rays(terrain, above, (0.0, 0.0, -1.0))
         place[~given], face[~given] = hits.point, hits.face
         for i in np.flatnonzero(np.isnan(place[:, 2]))[:1].tolist():
-            raise InputError(
-                f"There is no terrain at {_place_text(terrain, points[i])}",
-                advice="Correct the coordinates, or give a terrain that reaches so far",
-            )
+            raise _no_terrain(ground, points[i])
     return place, face
 
 
-def _place_text(terrain: Surface, point: Array) -> str:
-    x, y, z = terrain.shift.to_survey(point)
+def _no_terrain(ground: Ground, point: Array) -> InputError:
+    return InputError(
+        f"There is no terrain at {_place_text(ground, point)}",
+        advice="Correct the coordinates, or give a terrain that reaches so far",
+    )
+
+
+def _place_text(ground: Ground, point: Array) -> str:
+    x, y, z = ground.shift.to_survey(point)
     return f"{x:.2f}, {y:.2f}" + ("" if np.isnan(z) else f", {z:.2f}")
 
 
@@ -292,14 +296,18 @@ def _anywhere(
     return _made(centre, name[chosen], blocks, axes, density, remarks)
 
 
-def _fixed(
-    ground: Ground, points: Array, place: Array, face: Indices, name: Names, blocks: Blocks, seed: int
-) -> Releases:
+def _fixed(ground: Ground, points: Array, name: Names, blocks: Blocks, seed: int) -> Releases:
     """Blocks at places that are given."""
-    axes, density = draw_blocks(blocks, len(place), seed)
+    axes, density = draw_blocks(blocks, len(points), seed)
     diameter = axes.mean(axis=1)
     check_size(ground, diameter)
-    terrain = ground.terrain
+    if isinstance(ground.terrain, Cloud):
+        centre = placed_on(ground, points[:, :2], diameter)
+        for i in np.flatnonzero(np.isnan(centre[:, 2]))[:1].tolist():
+            raise _no_terrain(ground, points[i])
+        return _made(centre, name, blocks, axes, density, ())
+    terrain = ground.surface
+    place, face = _on_terrain(ground, points)
     centre, fits = standing_on(ground, place, terrain.face_normals[face], diameter)
     if not fits.all():  # in a corner, where the normal of one face is in the other
         rounded = unit(terrain.vertex_normals[terrain.faces[face[~fits]]].sum(axis=1))
@@ -310,7 +318,7 @@ def _fixed(
         fits[bridged] = True
     for i in np.flatnonzero(~fits)[:1].tolist():
         raise InputError(
-            f"A block of {diameter[i]:.3g} m is too large for the ground at {_place_text(terrain, place[i])}",
+            f"A block of {diameter[i]:.3g} m is too large for the ground at {_place_text(ground, place[i])}",
             advice="Give smaller blocks, or another place",
         )
     return _made(centre, name, blocks, axes, density, ())

@@ -42,6 +42,14 @@ def whole(text: str) -> int:
     return int(text)
 
 
+def whole_range(text: str) -> tuple[int, int]:
+    """Two whole numbers above zero, the second not below the first: "51-100"."""
+    first, dash, last = text.partition("-")
+    if not (dash and first.isdecimal() and last.isdecimal() and 1 <= int(first) <= int(last)):
+        raise argparse.ArgumentTypeError(f"{text} is not a range of whole numbers such as 51-100")
+    return int(first), int(last)
+
+
 def unit(text: str) -> float:
     """A unit's name, or its length in metres."""
     if text in UNITS_M:

@@ -4,6 +4,7 @@
 import argparse
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
@@ -17,8 +18,12 @@ from .options import (
     positive,
     terrain_as_asked,
     whole,
+    whole_range,
 )
 from .progress import PrintedProgress, stopped_by_interrupt
+
+if TYPE_CHECKING:
+    from ..simulation.release import Releases
 
 RECORDS = ("impacts", "trajectories")
 LARGE = 20_000
@@ -70,6 +75,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="tables beside runs.csv: impacts, trajectories, or none (default both; impacts alone from "
         f"{LARGE} blocks on)",
     )
+    parser.add_argument(
+        "--runs",
+        type=whole_range,
+        metavar="FIRST-LAST",
+        help="only these of all blocks, as a part of the same simulation (default all)",
+    )
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
     add_terrain_options(parser)
 
@@ -108,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         ground = ground_of(scenario)
         progress(f"Reading {arguments.releases}")
-        releases = scenario.releases(ground)
+        releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
         asked = RECORDS[: 1 if len(releases) >= LARGE else 2]
         record = known_names(arguments.record, RECORDS, "--record") if arguments.record is not None else asked
         with stopped_by_interrupt(progress) as counted:
@@ -117,6 +128,7 @@ def run(arguments: argparse.Namespace) -> int:
                 releases,
                 scenario.settings,
                 record=bool(record or files),
+                first_run=first_run,
                 threads=arguments.threads,
                 progress=counted,
             )
@@ -142,6 +154,16 @@ def run(arguments: argparse.Namespace) -> int:
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _asked_runs(releases: "Releases", runs: tuple[int, int] | None) -> tuple["Releases", int]:
+    """The releases of the runs that were asked for, and the place of the first."""
+    if runs is None:
+        return releases, 0
+    first, last = runs
+    if last > len(releases):
+        raise InputError(f"--runs asks for run {last} of {len(releases)}", advice="Choose among these")
+    return releases.take(slice(first - 1, last)), first - 1
 
 
 def _structures(texts: list[str]) -> dict[str, str]:

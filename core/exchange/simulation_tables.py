@@ -4,6 +4,7 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..remarks import Remark, to_plain
+from ..simulation.convergence import Convergence, convergence
 from ..simulation.engine import Simulation
 from ..simulation.ground import Ground
 from ..simulation.hits import hits_of
@@ -113,7 +115,7 @@ def _run_cells(simulation: Simulation) -> Columns:
     releases, figures = simulation.releases, run_figures(simulation)
     shift = simulation.ground.terrain.shift
     return {
-        "run": [str(number + 1) for number in range(len(simulation))],
+        "run": simulation.number,
         "release": release_names(simulation).tolist(),
         "model": [simulation.settings.model] * len(simulation),
         "diameter_m": releases.diameter_m,
@@ -142,7 +144,7 @@ def _hit_cells(simulation: Simulation) -> Columns:
     names = np.array(simulation.ground.structures)
     return {
         "structure": names[hits.structure].tolist(),
-        "run": (run + 1).astype(np.str_).tolist(),
+        "run": simulation.number[run],
         "model": [simulation.settings.model] * len(hits),
         "time_s": records.time_s[hits.record],
         **vector_columns(POSITION, simulation.ground.terrain.shift.to_survey(records.position[hits.record])),
@@ -170,6 +172,7 @@ def summary(
         "gravity_mps2": settings.gravity_mps2,
         "drag": settings.drag is not None,
         "seed": settings.seed,
+        "first_run": first.first_run + 1,
         "blocks_wanted": first.wanted,
         "triangles_without_area": first.ground.flat,
         "models": {simulation.settings.model: _model_summary(simulation) for simulation in simulations},
@@ -179,6 +182,7 @@ def summary(
 
 def _model_summary(simulation: Simulation) -> dict[str, Any]:
     settings, n = simulation.settings, len(simulation)
+    run_out = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
     ends = np.bincount(simulation.end, minlength=len(simulation.ends))
     return {
         "parameters": dict(settings.parameters),
@@ -188,7 +192,14 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
         "impacts": int(simulation.impacts.sum()),
         "seconds": round(simulation.seconds, 3),
         "blocks_per_s": round(n / simulation.seconds, 1),
+        "run_out_m": _known(convergence(run_out)),
+        "v_max_mps": _known(convergence(simulation.v_max_mps)),
     }
+
+
+def _known(values: Convergence) -> dict[str, float | None]:
+    """For JSON, which has no NaN."""
+    return {name: None if np.isnan(value) else round(value, 6) for name, value in asdict(values).items()}
 
 
 def write_summary(values: dict[str, Any], path: str | Path) -> None:

@@ -173,3 +173,88 @@ class Impacts:
         for i in np.flatnonzero(marked.any(axis=0)):
             texts[i] = ";".join(name for name, here in zip(FLAGS, marked[:, i], strict=True) if here)
         return texts
+
+
+JUDGED = ("rn", "rt", "r", "theta1", "theta_dev")
+"""What a block that does not come nearer has none of."""
+
+
+def make_impacts(
+    values: Apparent,
+    v1: Array,
+    v2: Array,
+    normal: Array,
+    *,
+    site: str,
+    trajectory: Names,
+    impact: Indices,
+    time_s: Array,
+    position: Array,
+    diameter_m: Array,
+    mass_kg: Array,
+    angular_velocity: Array,
+    rotational1_j: Array,
+    rotational2_j: Array,
+    flags: Mapping[str, Mask] | None = None,
+    normal_radius_m: Array | None = None,
+    normal_spread: Array | None = None,
+    bounce_height_m: Array | None = None,
+    chord_height_m: Array | None = None,
+    sigma: Mapping[str, Array] | None = None,
+    extra: Mapping[str, Names] | None = None,
+    shift: GlobalShift,
+) -> Impacts:
+    """The rows of impacts with these velocities, measured or simulated.
+
+    Parameters
+    ----------
+    values : `apparent` of the velocities.
+    flags : without "departing" and "into_ground", which follow from the velocities; those left out are not set.
+    Others : see `Impacts`; None is unknown everywhere.
+
+    Notes
+    -----
+    A departing block has neither coefficients nor angles, nor their deviations.
+    """
+    n = time_s.size
+    nothing, never = np.full(n, np.nan), np.zeros(n, np.bool_)
+    departing = values.approach >= 0
+    follow = {"departing": departing, "into_ground": values.escape < 0}
+    known = dict(sigma or {})
+    leaving = np.flatnonzero(departing)
+    for column in (*(getattr(values, name) for name in JUDGED), *(known[name] for name in JUDGED if known)):
+        column[leaving] = np.nan
+    return Impacts(
+        site=np.full(n, site),
+        trajectory=trajectory,
+        impact=impact,
+        time_s=time_s,
+        position=position,
+        normal=normal,
+        normal_radius_m=nothing if normal_radius_m is None else normal_radius_m,
+        normal_spread=nothing if normal_spread is None else normal_spread,
+        v1=v1,
+        v2=v2,
+        vn1=values.vn1,
+        vt1=values.vt1,
+        vn2=values.vn2,
+        vt2=values.vt2,
+        rn=values.rn,
+        rt=values.rt,
+        r=values.r,
+        theta1=values.theta1,
+        theta_dev=values.theta_dev,
+        diameter_m=diameter_m,
+        mass_kg=mass_kg,
+        flags={name: {**(flags or {}), **follow}.get(name, never) for name in FLAGS},
+        angular_velocity=angular_velocity,
+        kinetic1_j=0.5 * mass_kg * dot(v1, v1),
+        kinetic2_j=0.5 * mass_kg * dot(v2, v2),
+        rotational1_j=rotational1_j,
+        rotational2_j=rotational2_j,
+        bounce_height_m=nothing if bounce_height_m is None else bounce_height_m,
+        chord_height_m=nothing if chord_height_m is None else chord_height_m,
+        sigma=known,
+        extra=extra or {},
+        shift=shift,
+    )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..vectors import Array, Indices, Mask, dot, norm
 from .block import per_pick
-from .impact import DeviationForm, Impacts, apparent
+from .impact import DeviationForm, Impacts, apparent, make_impacts
 from .motion import Motion
 from .picks import Picks
 from .uncertainty import propagate
@@ -35,14 +35,11 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
     ground = motion.normals.take(own)
     normal = ground.normal
     values = apparent(v1, v2, normal, eq10)
-    departing = values.approach >= 0
     deep = clearance.below_terrain_m > diameter[flights.first_pick] / 2
     status = here(picks.status)
     flags = {
         "first": incident < 0,
         "last": restituted < 0,
-        "departing": departing,
-        "into_ground": values.escape < 0,
         "below_terrain": _value(deep, incident, False) | _value(deep, restituted, False),
         "gap": motion.segments.cut_before[own] | motion.segments.cut_after[own],
         "contact": rolls_in | rolls_out,
@@ -55,42 +52,28 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
         sigma = propagate(picks, flights, incident, restituted, own, values, normal)
         sigma["kinetic1_j"] = mass * norm(v1) * sigma.pop("speed1")
         sigma["kinetic2_j"] = mass * norm(v2) * sigma.pop("speed2")
-    judged = ("rn", "rt", "r", "theta1", "theta_dev")
-    leaving = np.flatnonzero(departing)
-    for column in (*(getattr(values, name) for name in judged), *(sigma[name] for name in judged if sigma)):
-        column[leaving] = np.nan
 
     spin_energy = np.full(len(picks), np.nan)
     spinning = np.flatnonzero(np.isfinite(picks.angular_velocity[:, 0]))
     spin = picks.angular_velocity[spinning]
     spin_energy[spinning] = 0.5 * inertia[spinning] * dot(spin, spin)
     next_pick = _value(flights.last_pick, restituted, -1)
-    return Impacts(
-        site=np.full(own.size, site),
+    return make_impacts(
+        values,
+        v1,
+        v2,
+        normal,
+        site=site,
         trajectory=here(picks.trajectory),
         impact=_numbers(picks, own),
         time_s=here(picks.time_s),
         position=here(picks.position),
-        normal=normal,
         normal_radius_m=ground.radius_m,
         normal_spread=ground.spread,
-        v1=v1,
-        v2=v2,
-        vn1=values.vn1,
-        vt1=values.vt1,
-        vn2=values.vn2,
-        vt2=values.vt2,
-        rn=values.rn,
-        rt=values.rt,
-        r=values.r,
-        theta1=values.theta1,
-        theta_dev=values.theta_dev,
         diameter_m=here(diameter),
         mass_kg=mass,
         flags=flags,
         angular_velocity=here(picks.angular_velocity),
-        kinetic1_j=0.5 * mass * dot(v1, v1),
-        kinetic2_j=0.5 * mass * dot(v2, v2),
         rotational1_j=here(spin_energy),
         rotational2_j=_value(spin_energy, next_pick, np.nan),  # nothing turns a block in flight
         bounce_height_m=_value(clearance.above_terrain_m, restituted, np.nan),

@@ -5,7 +5,7 @@ import os
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -73,7 +73,7 @@ class Records:
 
     Attributes
     ----------
-    run : (k,) number of the run, from 0.
+    run : (k,) place of the run in the simulation, from 0.
     what : (k,) `RELEASED`, `IMPACT`, `ON_GROUND` (a step on the ground ends), `FLIES_OFF` or `ENDED`.
     time_s : (k,) since the release.
     position : (k, 3) of the centre, local [m].
@@ -113,6 +113,7 @@ class Simulation:
     wanted : how many blocks were asked for; more than n after a cancel.
     recorded : whether `records` has all moments; without them nothing is known of single flights.
     seconds : how long it took.
+    first_run : number of the first run, from 0, where these are a part of the runs.
     """
 
     settings: Settings
@@ -128,9 +129,15 @@ class Simulation:
     wanted: int
     recorded: bool
     seconds: float
+    first_run: int = 0
 
     def __len__(self) -> int:
         return self.end.size
+
+    @property
+    def number(self) -> Indices:
+        """(n,) of each run, from 1, as tables say it."""
+        return np.arange(self.first_run + 1, self.first_run + len(self) + 1)
 
     @property
     def ends(self) -> tuple[str, ...]:
@@ -143,6 +150,23 @@ class Simulation:
         stopped: Mask = (self.end == ENDS.index(STOPPED)) | (self.end >= len(ENDS))
         return stopped
 
+    def part(self, start: int, stop: int) -> "Simulation":
+        """The runs from one place to another, as if they alone had been simulated."""
+        rows = slice(*np.searchsorted(self.records.run, [start, stop]).tolist())
+        columns = {name: getattr(self.records, name)[rows] for name in Records.__dataclass_fields__}
+        own = {name: getattr(self, name)[start:stop] for name in _OF_RUNS}
+        return replace(
+            self,
+            **own,
+            releases=self.releases.take(slice(start, stop)),
+            records=Records(**columns | {"run": columns["run"] - start}),
+            wanted=len(own["end"]),
+            first_run=self.first_run + start,
+        )
+
+
+_OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position")
+
 
 def simulate(
     ground: Ground,
@@ -150,6 +174,7 @@ def simulate(
     settings: Settings,
     *,
     record: bool = True,
+    first_run: int = 0,
     threads: int | None = None,
     progress: Progress = silent,
 ) -> Simulation:
@@ -157,6 +182,8 @@ def simulate(
 
     Parameters
     ----------
+    first_run : number of the first of these runs, from 0. A run depends on its number and the seed, not on the others:
+        runs 50 to 99 of a hundred blocks are those of the blocks 50 to 99 with the first run 50.
     record : keep every impact and step; else only how each run begins and ends.
     threads : None takes all cores. The result does not depend on it.
     progress : called with the number of finished blocks. A `CancelledError` raised in it ends the simulation with the
@@ -181,7 +208,7 @@ def simulate(
 
     def batch(start: int) -> int:
         part = slice(start, min(start + BATCH, n))
-        runs = np.arange(part.start, part.stop)
+        runs = np.arange(first_run + part.start, first_run + part.stop)
         rows[start] = run_blocks(
             tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
             releases.position[part], releases.velocity[part], releases.angular_velocity[part],
@@ -204,7 +231,7 @@ def simulate(
     whole = next((start for start in starts if start not in rows), n)
     if not whole:
         raise CancelledError
-    records = _records(np.concatenate([rows[start] for start in starts if start < whole]), ground.element)
+    records = _records(np.concatenate([rows[start] for start in starts if start < whole]), ground.element, first_run)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
     if ground.structures:
@@ -214,7 +241,7 @@ def simulate(
     return Simulation(
         settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
         results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,
-        time.perf_counter() - started,
+        time.perf_counter() - started, first_run,
     )  # fmt: skip
 
 
@@ -248,10 +275,10 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     return np.array(rows), friction
 
 
-def _records(rows: Array, element: NDArray[np.int32]) -> Records:
+def _records(rows: Array, element: NDArray[np.int32], first_run: int) -> Records:
     place = rows[:, 21].astype(np.intp)
     return Records(
-        run=rows[:, 0].astype(np.intp),
+        run=rows[:, 0].astype(np.intp) - first_run,
         what=rows[:, 1].astype(np.int8),
         time_s=rows[:, 2],
         position=rows[:, 3:6],

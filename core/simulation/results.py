@@ -7,7 +7,7 @@ import numpy as np
 
 from ..progress import Progress, silent
 from ..reconstruction.free_flight import fly
-from ..reconstruction.impact import FLAGS, Impacts, apparent
+from ..reconstruction.impact import Impacts, apparent, make_impacts
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
 from ..vectors import Array, Indices, Names, dot
 from .engine import FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
@@ -69,57 +69,39 @@ def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
     rows = np.flatnonzero(records.what == IMPACT)
     run = records.run[rows]
     v1, v2, normal = records.v1[rows], records.v2[rows], records.normal[rows]
-    values = apparent(v1, v2, normal)
     mass, radius = releases.mass_kg[run], releases.radius_m[run]
     inertia = releases.inertia[run] * mass * radius**2
     first = np.searchsorted(run, run)
-    nothing = np.full(rows.size, np.nan)
-    flags = {name: np.zeros(rows.size, np.bool_) for name in FLAGS}
-    flags["into_ground"] = values.escape < 0
     structure = np.array(["", *ground.structures])[ground.owner[records.face[rows]]]
-    return Impacts(
-        site=np.full(rows.size, site),
+    spin1, spin2 = records.omega1[rows], records.omega2[rows]
+    return make_impacts(
+        apparent(v1, v2, normal),
+        v1,
+        v2,
+        normal,
+        site=site,
         trajectory=release_names(simulation)[run],
         impact=np.arange(rows.size) - first + 1,
         time_s=records.time_s[rows],
         position=records.position[rows] - radius[:, None] * normal,
-        normal=normal,
-        normal_radius_m=nothing,
-        normal_spread=nothing,
-        v1=v1,
-        v2=v2,
-        vn1=values.vn1,
-        vt1=values.vt1,
-        vn2=values.vn2,
-        vt2=values.vt2,
-        rn=values.rn,
-        rt=values.rt,
-        r=values.r,
-        theta1=values.theta1,
-        theta_dev=values.theta_dev,
         diameter_m=2 * radius,
         mass_kg=mass,
-        flags=flags,
-        angular_velocity=records.omega1[rows],
-        kinetic1_j=0.5 * mass * dot(v1, v1),
-        kinetic2_j=0.5 * mass * dot(v2, v2),
-        rotational1_j=0.5 * inertia * dot(records.omega1[rows], records.omega1[rows]),
-        rotational2_j=0.5 * inertia * dot(records.omega2[rows], records.omega2[rows]),
-        bounce_height_m=nothing,
-        chord_height_m=nothing,
+        angular_velocity=spin1,
+        rotational1_j=0.5 * inertia * dot(spin1, spin1),
+        rotational2_j=0.5 * inertia * dot(spin2, spin2),
         extra={
-            "run": (run + 1).astype(np.str_),
+            "run": simulation.number[run].astype(np.str_),
             "structure": structure,
             "source": np.full(rows.size, simulation.settings.model),
         },
-        shift=ground.terrain.shift,
+        shift=ground.shift,
     )
 
 
 def release_names(simulation: Simulation) -> Names:
     """(n,) the release of each run; its number where it has no name."""
     names = simulation.releases.name
-    return np.where(names == "", (np.arange(len(names)) + 1).astype(np.str_), names)
+    return np.where(names == "", simulation.number.astype(np.str_), names)
 
 
 def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progress = silent) -> TrajectorySamples:
@@ -143,7 +125,7 @@ def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progre
     return TrajectorySamples(
         source=np.full(time.size, simulation.settings.model),
         trajectory=release_names(simulation)[run],
-        run=run + 1,
+        run=simulation.number[run],
         time_s=time,
         position=position,
         velocity=speed,

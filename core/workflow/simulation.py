@@ -144,6 +144,7 @@ def run_models(
     settings: Sequence[Settings],
     *,
     record: bool = True,
+    first_run: int = 0,
     threads: int | None = None,
     progress: Progress = silent,
 ) -> tuple[Simulation, ...]:
@@ -152,7 +153,7 @@ def run_models(
     Parameters
     ----------
     settings : one for each model. With the same seed, run i has the same random numbers in all.
-    record, threads : see `simulate`.
+    record, first_run, threads : see `simulate`.
     progress : counts the blocks of all models. A `CancelledError` raised in it ends the work: models that are finished
         are kept, and of the one in progress the runs that are; `remarks_of` says so.
 
@@ -172,14 +173,11 @@ def run_models(
     n = len(releases)
     finished: list[Simulation] = []
     for place, one in enumerate(settings):
-
-        def all_models(
-            text: str, done: int = 0, total: int = 0, before: int = place * n, model: str = one.model
-        ) -> None:
-            progress(f"{text} {model}", before + done, n * len(settings))
-
+        counted = _among(progress, one.model, place * n, len(settings) * n)
         try:
-            simulation = simulate(ground, releases, one, record=record, threads=threads, progress=all_models)
+            simulation = simulate(
+                ground, releases, one, record=record, first_run=first_run, threads=threads, progress=counted
+            )
         except CancelledError:
             if not finished:
                 raise

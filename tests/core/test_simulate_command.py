@@ -97,6 +97,23 @@ def test_several_models_get_the_same_blocks(terrain: Path, releases: Path, tmp_p
         assert list(dict.fromkeys(row[column] for row in together)) == ["noel_2017", "stevens_1998"]
 
 
+def test_parts_of_a_simulation_are_the_whole(terrain: Path, releases: Path, tmp_path: Path, capsys) -> None:
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "stevens_1998", "--seed", "3"]
+    for runs, threads in (("1-5", "2"), ("1-1", "1"), ("2-5", "7")):
+        assert main([*argv, "--runs", runs, "--threads", threads, "--out", str(tmp_path / runs)]) == 0
+    assert json.loads((tmp_path / "2-5" / "summary.json").read_text(encoding="utf-8"))["first_run"] == 2
+    assert main([*argv, "--out", str(tmp_path / "all")]) == 0
+    for name in ("runs.csv", "impacts.csv", "trajectories.csv"):
+        assert (tmp_path / "1-5" / name).read_bytes() == (tmp_path / "all" / name).read_bytes()
+        first, rest = ((tmp_path / runs / name).read_bytes() for runs in ("1-1", "2-5"))
+        assert first + rest.split(b"\n", 1)[1] == (tmp_path / "all" / name).read_bytes()
+    capsys.readouterr()
+    assert main([*argv, "--runs", "4-6", "--out", str(tmp_path / "out")]) == 1
+    assert "--runs asks for run 6 of 5" in capsys.readouterr().err
+    for wrong in ("0-3", "4", "4-3", "4-x"):
+        assert main([*argv, "--runs", wrong, "--out", str(tmp_path / "out")]) == 2
+
+
 def test_without_records_the_greatest_height_is_not_known(terrain: Path, releases: Path, tmp_path: Path) -> None:
     argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "noel_2017", "--seed", "3"]
     tables = {}

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.simulation.convergence import convergence
 from rockfall.core.simulation.engine import Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.hits import hits_of
@@ -115,3 +116,18 @@ def test_a_block_that_comes_to_rest_against_a_wall_is_held_by_it() -> None:
         Settings(AZIMI),
     )
     assert [beside.ends[end] for end in beside.end] == ["stopped"]
+
+
+def test_intervals_hold_what_they_are_for() -> None:
+    """Of 2 000 samples of 200 exponential numbers, 95 % of the intervals contain the true 95 % quantile, ln 20."""
+    rng = np.random.default_rng(3)
+    found = [convergence(rng.exponential(size=200)) for _ in range(2000)]
+    share = np.mean([one.q95_low <= np.log(20) <= one.q95_high for one in found])
+    assert 0.945 < share < 0.985
+    inside = np.mean([abs(one.mean - 1) < 1.96 * one.standard_error for one in found])
+    assert 0.92 < inside < 0.97
+    assert np.std([one.q95 for one in found]) == pytest.approx(np.sqrt(0.05 * 0.95 / 200) / 0.05, rel=0.1)
+    few = convergence(np.array([1.0, 2.0, 3.0]))
+    assert (few.mean, few.standard_error) == (2.0, pytest.approx(1 / np.sqrt(3)))
+    assert np.isnan(few.q95_high)
+    assert np.isnan(convergence(np.array([4.0])).standard_error)

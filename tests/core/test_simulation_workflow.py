@@ -115,3 +115,18 @@ def test_what_cannot_be_is_refused_before_anything_falls(settings, problem: str)
     ground = make_ground(sheet())
     with pytest.raises(InputError, match=problem):
         run_models(ground, drops(ground), settings, progress=partial(stop, after=-1))
+
+
+def test_runs_computed_in_parts_are_those_computed_together(scenario: Scenario) -> None:
+    ground = ground_of(scenario)
+    releases = drops(ground)
+    settings = Settings("stevens_1998", seed=5)
+    whole = simulate(ground, releases, settings)
+    for start, stop, threads in ((0, 50, 1), (50, 100, 2), (100, 200, 7)):
+        part = simulate(ground, releases.take(slice(start, stop)), settings, first_run=start, threads=threads)
+        cut = whole.part(start, stop)
+        assert part.number.tolist() == cut.number.tolist() == list(range(start + 1, stop + 1))
+        for name in ("end", "time_s", "length_m", "v_max_mps", "impacts", "position"):
+            np.testing.assert_array_equal(getattr(part, name), getattr(cut, name))
+        for name in ("run", "what", "time_s", "position", "v2", "omega2", "v1", "omega1", "normal", "face"):
+            np.testing.assert_array_equal(getattr(part.records, name), getattr(cut.records, name))

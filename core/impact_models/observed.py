@@ -62,6 +62,18 @@ class Draws(NamedTuple):
     side: float
 
 
+def first_within(measured: Any, k: int, angle: float) -> int:
+    """The first of the measured impacts, which are in the order of their angles, whose ln θ1 is not below `angle`."""
+    low, high = 0, k
+    while low < high:
+        middle = (low + high) // 2
+        if measured[HEADER + LN_ANGLE * k + middle] < angle:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
 def distance2(measured: Any, i: int, k: int, angle: float, speed: float, per_angle: float, per_speed: float) -> float:
     """d_i² of the measured impact i from given conditions."""
     a = (measured[HEADER + LN_ANGLE * k + i] - angle) * per_angle
@@ -71,16 +83,15 @@ def distance2(measured: Any, i: int, k: int, angle: float, speed: float, per_ang
 
 def fifth_nearest2(measured: Any, k: int, angle: float, speed: float, per_angle: float, per_speed: float) -> float:
     """d² of the measured impact that is the fifth nearest."""
-    nearest = -1.0
-    for _ in range(FEWEST_NEAR):
-        following = inf
-        for i in range(k):
-            d2 = distance2(measured, i, k, angle, speed, per_angle, per_speed)
-            if nearest < d2 < following:
-                following = d2
-        if following < inf:
-            nearest = following
-    return nearest
+    first, second, third, fourth, fifth = inf, inf, inf, inf, inf
+    for i in range(k):
+        d2 = distance2(measured, i, k, angle, speed, per_angle, per_speed)
+        if d2 < fifth:
+            first, d2 = min(first, d2), max(first, d2)
+            second, d2 = min(second, d2), max(second, d2)
+            third, d2 = min(third, d2), max(third, d2)
+            fourth, fifth = min(fourth, d2), max(fourth, d2)
+    return fifth
 
 
 def rebound(
@@ -89,39 +100,42 @@ def rebound(
     """v2 [m/s] and ω2 [rad/s]; see the module."""
     approach, tangential, tangential_speed = split(v1, n)
     k = int(measured[0])
-    per_angle = 1.0 / (measured[1] * p.angle_bandwidth)
-    per_speed = 1.0 / (measured[2] * p.speed_bandwidth)
     angle = log(max(atan2(approach, tangential_speed), SMALLEST))
     speed = log(max(approach, SMALLEST))
-    reach2, near, total = REACH2, 0, 0.0
-    for i in range(k):
-        d2 = distance2(measured, i, k, angle, speed, per_angle, per_speed)
-        if d2 < reach2:
-            near += 1
-            total += measured[HEADER + WEIGHT * k + i] * (1.0 - d2 / reach2)
+    width = measured[1] * p.angle_bandwidth
+    per_angle, per_speed = 1.0 / width, 1.0 / (measured[2] * p.speed_bandwidth)
+
+    per_reach2, near, total = 1.0 / REACH2, 0, 0.0
+    start = first_within(measured, k, angle - sqrt(REACH2) * width)
+    stop = first_within(measured, k, angle + sqrt(REACH2) * width)
+    for i in range(start, stop):
+        share = 1.0 - distance2(measured, i, k, angle, speed, per_angle, per_speed) * per_reach2
+        near += 1 if share > 0.0 else 0
+        total += measured[HEADER + WEIGHT * k + i] * (share if share > 0.0 else 0.0)
     if near < FEWEST_NEAR:
         reach = 1.0 + sqrt(fifth_nearest2(measured, k, angle, speed, per_angle, per_speed))
-        reach2, total = reach * reach, 0.0
+        per_reach2, total, start, stop = 1.0 / (reach * reach), 0.0, 0, k
         for i in range(k):
-            d2 = distance2(measured, i, k, angle, speed, per_angle, per_speed)
-            total += measured[HEADER + WEIGHT * k + i] * max(0.0, 1.0 - d2 / reach2)
-    left, drawn = u.impact * total, -1
+            share = 1.0 - distance2(measured, i, k, angle, speed, per_angle, per_speed) * per_reach2
+            total += measured[HEADER + WEIGHT * k + i] * (share if share > 0.0 else 0.0)
+
     rn, along, across, most = 0.0, 0.0, 0.0, 0.0
-    for i in range(k):
-        d2 = distance2(measured, i, k, angle, speed, per_angle, per_speed)
-        if d2 < reach2:
-            part = measured[HEADER + WEIGHT * k + i] * (1.0 - d2 / reach2)
-            drawn = i
-            if isnan(left):
-                ahead, aside = measured[HEADER + ALONG * k + i], measured[HEADER + ACROSS * k + i]
-                rn += part / total * measured[HEADER + NORMAL * k + i]
-                along += part / total * sqrt(ahead * ahead + aside * aside)
-                most += part / total * measured[HEADER + TOTAL * k + i]
-            else:
-                left -= part
-                if left < 0.0:
-                    break
-    if not isnan(left):
+    if isnan(u.impact):
+        for i in range(start, stop):
+            share = 1.0 - distance2(measured, i, k, angle, speed, per_angle, per_speed) * per_reach2
+            part = measured[HEADER + WEIGHT * k + i] * (share if share > 0.0 else 0.0) / total
+            ahead, aside = measured[HEADER + ALONG * k + i], measured[HEADER + ACROSS * k + i]
+            rn += part * measured[HEADER + NORMAL * k + i]
+            along += part * sqrt(ahead * ahead + aside * aside)
+            most += part * measured[HEADER + TOTAL * k + i]
+    else:
+        left, drawn = u.impact * total, start
+        for i in range(start, stop):
+            share = 1.0 - distance2(measured, i, k, angle, speed, per_angle, per_speed) * per_reach2
+            drawn = i if share > 0.0 else drawn
+            left -= measured[HEADER + WEIGHT * k + i] * (share if share > 0.0 else 0.0)
+            if left < 0.0:
+                break
         rn = measured[HEADER + NORMAL * k + drawn]
         along = measured[HEADER + ALONG * k + drawn]
         across = measured[HEADER + ACROSS * k + drawn]

@@ -81,7 +81,7 @@ class MeasuredRebounds:
 
     @cached_property
     def numbers(self) -> Array:
-        """(`HEADER` + 7 k,) as the compiled model takes them: the header, then column after column."""
+        """(`HEADER` + 7 k,) as the compiled model takes them: the header, then the columns, rows in the order of θ1."""
         columns = (
             np.log(self.theta1),
             np.log(self.vn1),
@@ -91,7 +91,8 @@ class MeasuredRebounds:
             self.rt * np.sin(self.turn),
             np.hypot(self.rn * np.sin(self.theta1), self.rt * np.cos(self.theta1)),
         )
-        return np.concatenate([[len(self), *self.bandwidths], *columns])
+        order = np.argsort(self.theta1, kind="stable")
+        return np.concatenate([[len(self), *self.bandwidths], *(column[order] for column in columns)])
 
     def without(self, rows: Mask) -> "MeasuredRebounds":
         """Those that are not among (k,) rows."""

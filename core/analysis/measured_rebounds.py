@@ -109,11 +109,10 @@ def chain_from_others(
     shape = (draws.shape[0], len(courses), 3)
     omega1, v2, omega2 = np.empty(shape), np.empty(shape), np.empty(shape)
     beyond = np.zeros(len(courses), dtype=np.bool_)
-    approach = -dot(state.velocity, state.normal)
-    theta1 = np.arctan2(approach, norm(state.velocity + approach[:, None] * state.normal))
+    theta1, vn1 = _conditions(state.velocity, state.normal)
     for start, stop in zip(courses.first[:-1].tolist(), courses.first[1:].tolist(), strict=True):
         own = slice(start, stop)
-        others = without_own(measured, str(site[start]), str(trajectory[start]), theta1[own], approach[own])
+        others = without_own(measured, str(site[start]), str(trajectory[start]), theta1[own], vn1[own])
         incident = Incident(
             state.velocity[own],
             state.normal[own],
@@ -125,13 +124,20 @@ def chain_from_others(
         numbers = model.numbers(settings, others)
         part = model.chain(incident, follows, numbers, np.ascontiguousarray(draws[:, own]))
         omega1[:, own], v2[:, own], omega2[:, own] = part
-        beyond[own] = beyond_measured(others, settings, theta1[own], approach[own])
+        beyond[own] = beyond_measured(others, settings, state.velocity[own], state.normal[own])
     return omega1, v2, omega2, beyond
 
 
-def beyond_measured(measured: MeasuredRebounds, settings: Mapping[str, Value], theta1: Array, vn1: Array) -> Mask:
-    """(m,) whether incident conditions are beyond the measured ones, with the bandwidths of these settings."""
+def beyond_measured(measured: MeasuredRebounds, settings: Mapping[str, Value], v1: Array, normal: Array) -> Mask:
+    """(m,) whether impacts (m, 3) are beyond the measured conditions, with the bandwidths of these settings."""
+    theta1, vn1 = _conditions(v1, normal)
     return measured.beyond(theta1, vn1, float(settings["angle_bandwidth"]), float(settings["speed_bandwidth"]))
+
+
+def _conditions(v1: Array, normal: Array) -> tuple[Array, Array]:
+    """(m,) incident angle [rad] and normal speed [m/s]."""
+    vn1 = -dot(v1, normal)
+    return np.arctan2(vn1, norm(v1 + vn1[:, None] * normal)), vn1
 
 
 def measured_sentence(measured: MeasuredRebounds) -> str:
@@ -150,8 +156,8 @@ def measured_sentence(measured: MeasuredRebounds) -> str:
 def beyond_sentence(beyond: Mask) -> str:
     """How many impacts are beyond the measured conditions."""
     return (
-        f"{beyond.sum()} of {beyond.size} impacts ({100 * beyond.mean():.0f} %) are beyond the measured conditions, "
-        f"with fewer than {FEWEST_NEAR} measured impacts near: there the nearest ones stand for them."
+        f"{beyond.sum()} of {beyond.size} impacts looked at ({100 * beyond.mean():.0f} %) are beyond the measured "
+        f"conditions, with fewer than {FEWEST_NEAR} measured impacts near: there the nearest ones stand for them."
     )
 
 

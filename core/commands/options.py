@@ -165,20 +165,32 @@ def add_observed_option(parser: argparse.ArgumentParser, default: str) -> None:
     )
 
 
-def measured_as_asked(arguments: argparse.Namespace, models: Sequence[str]) -> "MeasuredRebounds | None":
+def measured_as_asked(
+    arguments: argparse.Namespace, models: Sequence[str], *, needed: bool = False
+) -> "MeasuredRebounds | None":
     """What ``--observed`` gives to draw from; None without it.
+
+    Parameters
+    ----------
+    needed : whether a model that draws from measured impacts cannot do without.
 
     Raises
     ------
-    InputError : the table is wrong or has too few impacts, or no model draws from it.
+    InputError : the table is wrong or has too few impacts, or no model draws from it; there is none where it is needed.
     """
     from ..analysis.measured_rebounds import measured_rebounds
     from ..exchange.tables import read_impacts
     from ..impact_models.registry import find_model
 
+    drawing = [name for name in models if find_model(name).draws_from_impacts]
     if arguments.observed is None:
+        if drawing and needed:
+            raise InputError(
+                f"The model {drawing[0]} draws from measured impacts, and there are none",
+                advice="Give the site's impacts.csv, or a merged one: --observed impacts.csv",
+            )
         return None
-    if not any(find_model(name).draws_from_impacts for name in models):
+    if not drawing:
         raise InputError("--observed gives measured impacts, which no model draws from", advice="Add --model observed")
     with naming(arguments.observed):
         return measured_rebounds(read_impacts(arguments.observed))

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from .options import (
+    add_observed_option,
     add_out,
     add_parameter_options,
     add_terrain_options,
     known_names,
+    measured_as_asked,
     model_parameters,
     not_negative,
     positive,
@@ -43,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="impact model; may be given several times: each gets the same blocks. `rockfall models` lists all",
     )
     add_parameter_options(parser)
+    add_observed_option(parser, "needed by that model")
     parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
     parser.add_argument(
         "--number", type=whole, default=1, metavar="N", help="blocks from each release without a number (default 1)"
@@ -97,6 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     models = [find_model(name).name for name in arguments.model]
     parameters = model_parameters(arguments, models)
+    measured = measured_as_asked(arguments, models, needed=True)
     files = _structures(arguments.structure)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         terrain = terrain_as_asked(arguments, arguments.terrain, progress)
@@ -110,6 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
                 number=arguments.number,
             ),
             {name: parameters.get(name, {}) for name in models},
+            measured,
             structures={name: terrain_as_asked(arguments, file, progress) for name, file in files.items()},
             rolling=arguments.rolling,
             friction=arguments.friction,
@@ -147,6 +152,8 @@ def run(arguments: argparse.Namespace) -> int:
             write_hits(simulations, folder / "hits.csv")
             written.append("hits.csv")
         inputs = {"releases": Path(arguments.releases), "terrain": Path(arguments.terrain)}
+        if measured is not None:
+            inputs["observed"] = Path(arguments.observed)
         inputs |= {name: Path(file) for name, file in files.items()}
         write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
         written.append("summary.json")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..impact_models.registry import find_model
 from ..remarks import Remark, to_plain
 from ..simulation.convergence import Convergence, convergence
 from ..simulation.engine import Simulation
@@ -184,8 +185,11 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
     settings, n = simulation.settings, len(simulation)
     run_out = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
     ends = np.bincount(simulation.end, minlength=len(simulation.ends))
+    measured = settings.measured if find_model(settings.model).draws_from_impacts else None
+    drawn = {} if measured is None else {"measured_impacts": len(measured), "left_out": dict(measured.left_out)}
     return {
         "parameters": dict(settings.parameters),
+        **drawn,
         "zones": {name: dict(values) for name, values in settings.zones.items()},
         "blocks": n,
         "ends": {name: int(count) for name, count in zip(simulation.ends, ends, strict=True)},

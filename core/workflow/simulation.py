@@ -7,14 +7,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.measured_rebounds import beyond_measured, beyond_sentence, measured_sentence
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
+from ..impact_models.machinery.measured import MeasuredRebounds
+from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
-from ..remarks import Remark, gravest_first
+from ..remarks import Remark, Severity, gravest_first
 from ..simulation.engine import (
     ENDS,
     FRICTION,
+    IMPACT,
     LEFT_TERRAIN,
     LIMIT,
     STOPPED,
@@ -37,6 +41,10 @@ END_WORDS = {
     LEFT_TERRAIN: "left the terrain",
     LIMIT: "were cut off at the limit of time or impacts",
 }
+MOST_LOOKED_AT = 50_000
+"""Impacts from which the share of those beyond the measured conditions is found."""
+MUCH_BEYOND = 0.25
+"""From this share on a result of the model observed is mostly one of conditions that nobody has measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +74,7 @@ class Scenario:
     terrain : the surface, or the cloud whose points the blocks meet.
     releases : puts the blocks on the ground, with their sizes, densities, number and velocities.
     models : name → the parameters that are not to have their default, for all zones; in the order in which they run.
+    measured : what the model observed draws from; None where it does not run.
     structures : name → walls, fences, roads, houses that stand on the terrain.
     zones : None for one that is everywhere.
     rolling, friction, drag, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
@@ -75,6 +84,7 @@ class Scenario:
     terrain: Surface | Cloud
     releases: ReleaseSource
     models: Mapping[str, Mapping[str, object]]
+    measured: MeasuredRebounds | None = None
     structures: Mapping[str, Surface | Cloud] = field(default_factory=dict)
     zones: Zones | None = None
     rolling: Rolling = "azzoni_1995"
@@ -94,6 +104,7 @@ class Scenario:
             Settings(
                 model,
                 parameters,
+                self.measured,
                 zones={zone: models[model] for zone, models in zones.items() if model in models},
                 rolling=self.rolling,
                 friction=self.friction,
@@ -240,4 +251,21 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
         f"{simulation.v_max_mps.max():.1f} m/s. It took {simulation.seconds:.1f} s."
     )
     remarks.append(Remark(text, "note", model))
+    measured = simulation.settings.measured
+    if measured is not None and find_model(model).draws_from_impacts:
+        remarks.append(Remark(measured_sentence(measured), "note", model))
+        remarks += _beyond(simulation, measured)
     return remarks
+
+
+def _beyond(simulation: Simulation, measured: MeasuredRebounds) -> list[Remark]:
+    """How many of the impacts are beyond the measured conditions, if they were recorded."""
+    records = simulation.records
+    rows = np.flatnonzero(records.what == IMPACT)
+    if not rows.size:
+        return []
+    rows = rows[:: 1 + rows.size // MOST_LOOKED_AT]
+    settings = find_model(simulation.settings.model).settings(simulation.settings.parameters)
+    beyond = beyond_measured(measured, settings, records.v1[rows], records.normal[rows])
+    severity: Severity = "warning" if beyond.mean() > MUCH_BEYOND else "note"
+    return [Remark(beyond_sentence(beyond), severity, simulation.settings.model)]

@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The model `observed`: it gives back the table that it draws from, and cannot win by memorising."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from rockfall.core.analysis.calibration import calibrate
 from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.equivalence import equivalent
 from rockfall.core.analysis.measured_rebounds import measured_rebounds, without_own
 from rockfall.core.analysis.scores import scores
+from rockfall.core.cli import main
 from rockfall.core.errors import InputError
+from rockfall.core.exchange.tables import write_impacts
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.machinery.measured import MeasuredRebounds
@@ -19,7 +24,9 @@ from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.terrain.writers import write_ply
 from rockfall.core.vectors import cross, dot, norm, unit
+from rockfall.core.workflow.simulation import remarks_of, run_models
 from scipy.stats import ks_1samp, ks_2samp
 
 MODEL = MODELS["observed"]
@@ -376,7 +383,60 @@ def test_the_simulation_rebounds_as_the_model_does():
     np.testing.assert_allclose(out.velocity, records.v2[hits], rtol=1e-12, atol=1e-12)
 
 
+def test_what_is_beyond_the_measured_conditions_is_said():
+    given = table(80, spread=0.2)
+    ground, releases = thrown(40)
+    (run,) = run_models(ground, releases, [Settings("observed", measured=given, rolling="none")])
+    said = [remark.text for remark in remarks_of([run])]
+    assert any("observed draws from 80 measured impacts" in text for text in said)
+    records = run.records
+    hits = records.what == engine.IMPACT
+    seen = apparent(records.v1[hits], records.v2[hits], records.normal[hits])
+    count = int(given.beyond(seen.theta1, seen.vn1).sum())
+    assert 0 < count < hits.sum()
+    assert any(f"{count} of {hits.sum()} impacts looked at" in text for text in said)
+
+
 def test_without_measured_impacts_there_is_no_simulation():
     ground, releases = thrown(2)
     with pytest.raises(InputError, match="observed draws from measured impacts, and there are none"):
         simulate(ground, releases, Settings("observed"))
+
+
+# --- On the command line ---------------------------------------------------------------------------------------------
+
+
+def test_simulate_and_compare_draw_from_a_table(tmp_path, capsys):
+    write_impacts(field(6, 8, seed=1), tmp_path / "impacts.csv")
+    write_ply(slope(35.0), tmp_path / "slope.ply")
+    (tmp_path / "releases.csv").write_text("x_m,y_m,vx_mps,vz_mps\n30,100,5,-6\n40,120,6,-5\n", encoding="utf-8")
+    asked = ["simulate", str(tmp_path / "releases.csv"), "--terrain", str(tmp_path / "slope.ply"), "--rolling", "none"]
+    asked += ["--model", "observed", "--number", "3"]
+    drawn = ["--observed", str(tmp_path / "impacts.csv")]
+    assert main([*asked, *drawn, "--out", str(tmp_path / "runs")]) == 0
+    assert "observed draws from 48 measured impacts" in capsys.readouterr().out
+    summary = json.loads((tmp_path / "runs" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["inputs"]["observed"]["file"] == "impacts.csv"
+    assert summary["models"]["observed"]["measured_impacts"] == 48
+    assert main([*asked, "--out", str(tmp_path / "none")]) == 1
+    assert "there are none. Give the site's impacts.csv, or a merged one: --observed" in capsys.readouterr().err
+    assert main([*asked, "--out", str(tmp_path / "no"), "--observed", str(tmp_path / "nothing.csv")]) == 1
+    assert "nothing.csv" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+    compared = ["compare", str(tmp_path / "impacts.csv"), "--tables-only", "--model"]
+    assert main([*compared, "observed", "--out", str(tmp_path / "own")]) == 0
+    assert "observed draws from 48 measured impacts" in capsys.readouterr().out
+    assert main([*compared, "observed", *drawn, "--out", str(tmp_path / "given")]) == 0
+    for name in ("predictions.csv", "scores.csv"):
+        assert (tmp_path / "own" / name).read_bytes() == (tmp_path / "given" / name).read_bytes()
+    assert main([*compared, "noel_2017", *drawn, "--out", str(tmp_path / "idle")]) == 1
+    assert "which no model draws from. Add --model observed" in capsys.readouterr().err
+
+
+def test_what_is_measured_is_not_fitted():
+    impacts = field(6, 8, seed=1)
+    with pytest.raises(InputError, match="observed has no coefficients to fit"):
+        calibrate(impacts, "observed", ["angle_bandwidth"])
+    with pytest.raises(InputError, match="observed has no coefficients to fit"):
+        equivalent(impacts, "observed", {}, "noel_2017", ["rt"])

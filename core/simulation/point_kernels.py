@@ -19,17 +19,35 @@ from ..terrain.kernels import box_distance2
 from ..terrain.point_kernels import nearest
 from .contact_kernels import RESTING_S, STEPS, TOUCHING_M, enter_node, first_root, last_inside, prepared
 
-BAND = 0.1
-"""Points within this part of the radius of the sphere make the normal."""
+BAND, MANY, WIDEST = 0.1, 2.0, 0.3
+"""Points within this part of the radius of the sphere make the normal; on a plane those within 0.45 of the radius. Where
+points are far apart, the band is so wide that the patch reaches `MANY` spacings, up to `WIDEST`."""
 FACING = 0.7
 """Cosine between the directions of a point and of the first one below which it belongs to another face."""
 HELD_LEVEL = 0.03
 """Points that spread less than this part of the radius about their middle do not tilt the plane."""
-CORE = 0.975
-"""No point comes nearer to the centre than this part of the radius."""
+CORE, DEEPEST = 0.025, 0.1
+"""No flight takes a point deeper into a block than this part of the radius; where points are far apart, than a sphere
+sinks between them on a plane, up to `DEEPEST`."""
+FARTHEST_BACK = 0.5
+"""A contact is taken back along the flight by this part of the radius at most."""
 BOX_STEPS = 3
 MOST_PASSED = 1000
 """A flight may brush past so many contacts."""
+
+
+@kernel
+def band_of(radius, spacing):  # type: ignore[no-untyped-def]
+    """Thickness of the shell about a sphere whose points make the normal [m]: a cap is √(2 r band) wide on a plane."""
+    ratio = MANY * spacing / radius
+    return radius * min(max(BAND, 0.5 * ratio * ratio), WIDEST)
+
+
+@kernel
+def core_of(radius, spacing):  # type: ignore[no-untyped-def]
+    """How near a point may come to the centre of a sphere that passes it [m]."""
+    ratio = spacing / radius
+    return radius * (1.0 - min(max(CORE, 0.5 * ratio * ratio), DEEPEST))
 
 
 @kernel
@@ -113,11 +131,13 @@ def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type
 
     band, axis : points within `band` of the sphere and towards `−axis` are being passed, as all within the sphere are.
     """
-    bounds, first, count, points, _ = tree
-    grown = radius + 2.0 * TOUCHING_M
+    bounds, first, count, points, spacing = tree
+    grown, deepest = radius + 2.0 * TOUCHING_M, core_of(radius, spacing)
     inner, outer = (radius + TOUCHING_M) ** 2, (radius + band) ** 2
     best, found, hard = min(limit, last_inside(bounds, p, v, a, grown)), -1, False
     direction = (0.0, 0.0, 0.0)
+    fast = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    strong = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     path = prepared(p, v, a, radius, best)
     stack[0], times[0] = 0, 0.0
     top = 1 if best >= 0.0 else 0
@@ -130,8 +150,16 @@ def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type
             begin = touch_box(bounds, node, p, v, a, grown, begin, best)
             if begin > best:
                 continue
+            # What the block can travel until the best contact so far: points beyond that are no better.
+            window = best - begin
+            x0 = p[0] + (v[0] + 0.5 * a[0] * begin) * begin
+            y0 = p[1] + (v[1] + 0.5 * a[1] * begin) * begin
+            z0 = p[2] + (v[2] + 0.5 * a[2] * begin) * begin
+            reach = radius + (fast + strong * best) * window + TOUCHING_M
             for i in range(first[node], first[node] + count[node]):
                 q = (points[i, 0], points[i, 1], points[i, 2])
+                if (q[0] - x0) ** 2 + (q[1] - y0) ** 2 + (q[2] - z0) ** 2 > reach * reach:
+                    continue
                 core, passed = radius, False
                 if begin == 0.0 or band > 0.0:
                     x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
@@ -139,7 +167,7 @@ def _next_touch(tree, stack, times, p, v, a, radius, band, axis, limit):  # type
                     if square < outer:
                         d = sqrt(square)
                         passed = square < inner or x * axis[0] + y * axis[1] + z * axis[2] > FACING * d
-                        core = min(CORE * radius, d)
+                        core = min(deepest, d)
                 t, e, deep = touch_point(q, p, v, a, radius, core, 0.0 if passed else begin, best, passed)
                 if t < best or (t == best and found < 0):
                     best, found, direction, hard = t, i, e, deep
@@ -179,20 +207,31 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
         elapsed += t
         if hard:
             break
-        n = patch_normal(tree, stack, p, radius, n)
+        n, height = patch(tree, stack, p, radius, n)
         speed = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
         bend = a[0] * n[0] + a[1] * n[1] + a[2] * n[2]
-        if speed < 0.0 or (bend < 0.0 and -2.0 * speed <= -bend * RESTING_S):
+        if speed < 0.0:
+            if height < radius:
+                # Back to where it was tangent to their plane.
+                size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+                elapsed -= min(first_root(height - radius, -speed, bend), min(t, FARTHEST_BACK * radius / size))
             break
-        band = BAND * radius
+        if bend < 0.0 and -2.0 * speed <= -bend * RESTING_S:
+            break
+        band = band_of(radius, tree[4])
     return elapsed, n, place
 
 
 @kernel
-def patch_normal(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
-    """The normal of the points that a sphere at p touches, on the side of the direction `towards` (to its centre)."""
-    bounds, first, count, points, _ = tree
-    reach = (1.0 + BAND) * radius
+def patch(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
+    """The plane of the points that a sphere at p touches, on the side of the direction `towards` (to its centre).
+
+    Returns
+    -------
+    normal, height : of the centre above it [m].
+    """
+    bounds, first, count, points, spacing = tree
+    reach = radius + band_of(radius, spacing)
     total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
     sx, sy, sz = 0.0, 0.0, 0.0
     xx, yy, zz, xy, yz, zx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -224,7 +263,7 @@ def patch_normal(tree, stack, p, radius, towards):  # type: ignore[no-untyped-de
             xy, yz, zx = xy + w * x * y, yz + w * y * z, zx + w * z * x
     size = sqrt(mx * mx + my * my + mz * mz)
     if size == 0.0:
-        return towards
+        return towards, radius
     mx, my, mz = mx / size, my / size, mz / size
     sx, sy, sz = sx / total, sy / total, sz / total
     xx, yy, zz = xx / total - sx * sx, yy / total - sy * sy, zz / total - sz * sz
@@ -247,50 +286,26 @@ def patch_normal(tree, stack, p, radius, towards):  # type: ignore[no-untyped-de
     one, other = (am * bb - bm * ab) / det, (bm * aa - am * ab) / det
     x, y, z = mx - one * ax - other * bx, my - one * ay - other * by, mz - one * az - other * bz
     size = sqrt(x * x + y * y + z * z)
-    return x / size, y / size, z / size
-
-
-@kernel
-def clearance(tree, stack, p, n, radius):  # type: ignore[no-untyped-def]
-    """How far a sphere has to move along n until it only touches the points on that side; negative: back."""
-    bounds, first, count, points, _ = tree
-    reach = (1.0 + BAND) * radius
-    most = -inf
-    stack[0] = 0
-    top = 1
-    while top:
-        top -= 1
-        node = stack[top]
-        if box_distance2(bounds, node, p[0], p[1], p[2]) >= reach * reach:
-            continue
-        if count[node] == 0:
-            stack[top], stack[top + 1] = first[node], first[node] + 1
-            top += 2
-            continue
-        for i in range(first[node], first[node] + count[node]):
-            x, y, z = p[0] - points[i, 0], p[1] - points[i, 1], p[2] - points[i, 2]
-            square = x * x + y * y + z * z
-            along = x * n[0] + y * n[1] + z * n[2]
-            if square < reach * reach and along * along > FACING * FACING * square and along > 0.0:
-                most = max(most, sqrt(max(radius * radius - square + along * along, 0.0)) - along)
-    return most
+    x, y, z = x / size, y / size, z / size
+    return (x, y, z), x * sx + y * sy + z * sz
 
 
 @kernel
 def closest(tree, stack, p, radius):  # type: ignore[no-untyped-def]
     """The ground below a sphere that touches points, or nearly: (x, y, z, squared distance, place), place −1 when none.
 
-    It is the place in the plane across the normal that is one radius from where the sphere only touches the points.
+    It is the place below the centre in the plane of the points that the sphere touches, or higher where the nearest
+    point stands out of that plane.
     """
-    square, place = nearest(tree, stack, p, (1.0 + BAND) * radius)
+    square, place = nearest(tree, stack, p, radius + band_of(radius, tree[4]))
     if place < 0:
         return 0.0, 0.0, 0.0, inf, -1
     d = sqrt(square)
     if d == 0.0:
         return p[0], p[1], p[2], 0.0, place
     points = tree[3]
-    n = ((p[0] - points[place, 0]) / d, (p[1] - points[place, 1]) / d, (p[2] - points[place, 2]) / d)
-    n = patch_normal(tree, stack, p, radius, n)
-    up = clearance(tree, stack, p, n, radius)
-    d = radius - up if up > -inf else d
+    x, y, z = p[0] - points[place, 0], p[1] - points[place, 1], p[2] - points[place, 2]
+    n, height = patch(tree, stack, p, radius, (x / d, y / d, z / d))
+    along = x * n[0] + y * n[1] + z * n[2]
+    d = min(height, radius + along - sqrt(max(radius * radius - square + along * along, 0.0)))
     return p[0] - d * n[0], p[1] - d * n[1], p[2] - d * n[2], d * d, place

@@ -13,7 +13,7 @@ from ..errors import InputError, RockfallError
 from ..georeference import GlobalShift
 from ..vectors import Array
 
-type PointTree = tuple[Array, NDArray[np.int32], NDArray[np.int32], Array, int]
+type PointTree = tuple[Array, NDArray[np.int32], NDArray[np.int32], Array, float]
 
 SAMPLES, ENOUGH = 2000, 12
 """The spacing is taken about so many points, from discs that hold so many."""
@@ -31,6 +31,7 @@ class PointIndex:
     first, count : (n,) points of a leaf; or the first of two children and 0.
     points : (k, 3) in the order of the leaves [m].
     number : (k,) the cloud's point behind each of them.
+    spacing_m : side of the square that a point has to itself on the surface [m]: the median; inf for a single point.
     """
 
     bounds: Array
@@ -38,11 +39,12 @@ class PointIndex:
     count: NDArray[np.int32]
     points: Array
     number: NDArray[np.int32]
+    spacing_m: float
 
     @property
     def tree(self) -> PointTree:
         """What the kernels take."""
-        return self.bounds, self.first, self.count, self.points, 0
+        return self.bounds, self.first, self.count, self.points, self.spacing_m
 
 
 def build_point_index(points: Array) -> PointIndex:
@@ -51,6 +53,11 @@ def build_point_index(points: Array) -> PointIndex:
     Raises
     ------
     RockfallError : there are no points.
+
+    Notes
+    -----
+    The spacing is √(π R²/n) with the radius R of a ball about a point that holds n ≥ `ENOUGH` points, so that steep
+    faces count as level ground does: the median over `SAMPLES` points.
     """
     from . import point_kernels
 
@@ -62,7 +69,14 @@ def build_point_index(points: Array) -> PointIndex:
     first, count, order = (np.empty(size, np.int32) for size in (nodes, nodes, k))
     ordered = np.array(points, dtype=np.float64, order="C")
     used = point_kernels.build_point_tree(ordered, bounds, first, count, order)
-    return PointIndex(bounds[:used].copy(), first[:used].copy(), count[:used].copy(), ordered, order)
+    tree = bounds[:used].copy(), first[:used].copy(), count[:used].copy()
+    places = np.ascontiguousarray(ordered[:: max(1, k // SAMPLES)])
+    spacing = np.full(len(places), np.inf)
+    if k > 1:
+        size = tree[0][0, 3:] - tree[0][0, :3]
+        reach = max(float(np.sqrt(max(size[0] * size[1], size.max() ** 2 * 1e-3) / k)), 1e-9)
+        point_kernels.spacings((*tree, ordered, 0.0), places, min(ENOUGH, k), reach, spacing)
+    return PointIndex(*tree, ordered, order, float(np.median(spacing)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,26 +106,10 @@ class Cloud:
         """The spatial index; built when first needed."""
         return build_point_index(self.points)
 
-    @cached_property
+    @property
     def spacing_m(self) -> float:
-        """Side of the square that a point has to itself on the surface [m]: the median over the cloud.
-
-        Notes
-        -----
-        About points spread over the cloud, √(π R²/n) with the radius R of a ball that holds n ≥ `ENOUGH` points, so
-        that steep faces count as level ground does.
-        """
-        from . import point_kernels
-
-        k = len(self.points)
-        if k < 2:
-            return float("inf")
-        places = self.points[:: max(1, k // SAMPLES)]
-        result = np.empty(len(places))
-        size = self.bounds[1] - self.bounds[0]
-        reach = max(float(np.sqrt(max(size[0] * size[1], size.max() ** 2 * 1e-3) / k)), 1e-9)
-        point_kernels.spacings(self.index.tree, places, min(ENOUGH, k), reach, result)
-        return float(np.median(result))
+        """Side of the square that a point has to itself on the surface [m]: the median over the cloud."""
+        return self.index.spacing_m
 
 
 def heights_above_points(cloud: Cloud, places: Any) -> Array:

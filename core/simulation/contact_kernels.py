@@ -114,19 +114,24 @@ def prepared(p, v, a, radius, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def touch(corners, i, p, v, a, radius, path, limit):  # type: ignore[no-untyped-def]
-    """First time before `limit` at which the sphere touches triangle i and comes nearer: (t, e), t inf when not."""
+def triangle_box(corners, i):  # type: ignore[no-untyped-def]
+    """Low and high corner of the box of triangle i, as six numbers."""
+    ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
+    bx, by, bz = corners[i, 1, 0], corners[i, 1, 1], corners[i, 1, 2]
+    cx, cy, cz = corners[i, 2, 0], corners[i, 2, 1], corners[i, 2, 2]
+    return (
+        min(min(ax, bx), cx), min(min(ay, by), cy), min(min(az, bz), cz),
+        max(max(ax, bx), cx), max(max(ay, by), cy), max(max(az, bz), cz),
+    )  # fmt: skip
+
+
+@kernel
+def touch(corners, i, p, v, a, radius, t, limit):  # type: ignore[no-untyped-def]
+    """First time in t…limit at which the sphere touches triangle i and comes nearer: (t, e), t inf when not."""
     nowhere = (0.0, 0.0, 0.0)
     ax, ay, az = corners[i, 0, 0], corners[i, 0, 1], corners[i, 0, 2]
     bx, by, bz = corners[i, 1, 0], corners[i, 1, 1], corners[i, 1, 2]
     cx, cy, cz = corners[i, 2, 0], corners[i, 2, 1], corners[i, 2, 2]
-    t, limit = enter_box(
-        min(min(ax, bx), cx), min(min(ay, by), cy), min(min(az, bz), cz),
-        max(max(ax, bx), cx), max(max(ay, by), cy), max(max(az, bz), cz),
-        p, v, a, path, limit,
-    )  # fmt: skip
-    if t == inf:
-        return inf, nowhere
     bx, by, bz, cx, cy, cz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
     mx, my, mz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
     size = sqrt(mx * mx + my * my + mz * mz)
@@ -202,7 +207,11 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
             continue
         if count[node]:
             for i in range(first[node], first[node] + count[node]):
-                t, e = touch(corners, i, p, v, a, radius, path, best)
+                low_x, low_y, low_z, high_x, high_y, high_z = triangle_box(corners, i)
+                near, far = enter_box(low_x, low_y, low_z, high_x, high_y, high_z, p, v, a, path, best)
+                if near == inf:
+                    continue
+                t, e = touch(corners, i, p, v, a, radius, near, far)
                 if t < best or (t == best and found < 0):
                     best, found, normal = t, i, e
             continue

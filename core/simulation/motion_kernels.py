@@ -2,9 +2,11 @@
 """The motion of one block from its release to its end: it flies, hits, rolls or slides, and stops. Compiled kernels.
 
 Flight is the parabola (`contact_kernels`), or with drag a chain of parabolas. At a contact the impact model decides. A
-block whose rebound would hop less than `HOP` of its radius stays on the ground: there it moves on in steps shorter than
-half its radius, each a free fall that the terrain corrects to one radius above its closest point. A free fall that ends
-above that leaves the ground: so blocks fly off crests by themselves.
+block whose rebound would hop less than `HOP` of its radius stays on the ground. There a leg takes it over a triangle in
+closed form (`leg_kernels`); round edges and in corners it moves on in steps shorter than half its radius, each a free
+fall that the terrain corrects to one radius above its closest point. A free fall that ends above that is followed to
+where it lands: when that is a hop as well the block has stayed on the ground, else it has left it. So blocks fly off
+crests by themselves.
 
 On the ground the direction follows gravity along the terrain, the speed follows the energy,
 
@@ -19,10 +21,12 @@ from math import inf, sqrt
 import numpy as np
 
 from ..compiled import kernel
-from ..terrain.kernels import STACK_SIZE, box_distance2, closest_on_triangle, nearest_point
+from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import fill_uniform
 from .contact_kernels import TOUCHING_M, last_root
 from .ground_kernels import box, first_contact
+from .leg_kernels import leg
+from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
 from .point_kernels import closest
 
 STOPPED, LEFT, LIMIT = 0, 1, 2
@@ -33,8 +37,6 @@ NO_ROLLING, AZZONI, COULOMB = 0, 1, 2
 
 HOP = 0.1
 """A rebound that rises less than this part of the radius above the ground is none."""
-NEIGHBOURHOOD, MOST_NEAR = 6.0, 48
-"""On the ground, triangles within so many radii are looked up at once, as long as they are not more."""
 STEP, FALL = 0.5, 0.05
 """A step on the ground is shorter than these parts of the radius: along the ground, and in free fall."""
 SHARP = 0.866
@@ -138,39 +140,13 @@ def _write(rows, k, run, what, time, p, v, w, v1, w1, n, place):  # type: ignore
 
 
 @kernel
-def _collect(tree, stack, p, reach, near):  # type: ignore[no-untyped-def]
-    """Fill `near` with the triangles within `reach` of a point; how many, −1 when there is no room."""
-    bounds, first, count, corners = tree
-    square, found = reach * reach, 0
-    stack[0] = 0
-    top = 1
-    while top:
-        top -= 1
-        node = stack[top]
-        if box_distance2(bounds, node, p[0], p[1], p[2]) > square:
-            continue
-        if count[node]:
-            for i in range(first[node], first[node] + count[node]):
-                x, y, z = closest_on_triangle(corners, i, p[0], p[1], p[2])
-                if (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2 <= square:
-                    if found == near.size:
-                        return -1
-                    near[found] = i
-                    found += 1
-            continue
-        stack[top], stack[top + 1] = first[node], first[node] + 1
-        top += 2
-    return found
-
-
-@kernel
-def _closest(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
-    """The closest of the ground to a block: see `_closest_triangle` and `point_kernels.closest`."""
+def _closest(tree, stack, p, radius, nearby):  # type: ignore[no-untyped-def]
+    """The closest of the ground to a block: see `closest_near` and `point_kernels.closest`."""
     if len(tree) == 5:
         return closest(tree, stack, p, radius)
     if len(tree) == 4:
-        return _closest_triangle(tree, stack, p, radius, near, around)
-    x, y, z, square, place = _closest_triangle(tree[0], stack, p, radius, near, around)
+        return closest_near(tree, stack, p, radius, nearby)
+    x, y, z, square, place = closest_near(tree[0], stack, p, radius, nearby)
     qx, qy, qz, other, found = closest(tree[1], stack, p, radius)
     if found >= 0 and other < square:
         return qx, qy, qz, other, tree[0][3].shape[0] + found
@@ -178,35 +154,7 @@ def _closest(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _closest_triangle(tree, stack, p, radius, near, around):  # type: ignore[no-untyped-def]
-    """The closest point of the terrain within twice the radius: (x, y, z, squared distance, place).
-
-    near, around : the triangles about a place that was passed before, how many they are, its coordinates and how far
-        they reach: a block on the ground asks again nearby, and walks the tree only when it has left them.
-    """
-    dx, dy, dz = p[0] - around[1], p[1] - around[2], p[2] - around[3]
-    if around[0] < 0.0 or sqrt(dx * dx + dy * dy + dz * dz) + 2.0 * radius > around[4]:
-        reach = NEIGHBOURHOOD * radius
-        found = _collect(tree, stack, p, reach, near)
-        if found < 0:
-            reach = 2.5 * radius
-            found = _collect(tree, stack, p, reach, near)
-        if found < 0:
-            around[0] = -1.0
-            return nearest_point(tree, stack, p, 2.0 * radius)
-        around[0], around[1], around[2], around[3], around[4] = found, p[0], p[1], p[2], reach
-    best, place = 4.0 * radius * radius, -1
-    qx, qy, qz = 0.0, 0.0, 0.0
-    for k in range(int(around[0])):
-        x, y, z = closest_on_triangle(tree[3], near[k], p[0], p[1], p[2])
-        square = (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
-        if square < best:
-            best, place, qx, qy, qz = square, near[k], x, y, z
-    return qx, qy, qz, best, place
-
-
-@kernel
-def _touching(tree, stack, p, v, radius, near, around):  # type: ignore[no-untyped-def]
+def _touching(tree, stack, p, v, radius, nearby):  # type: ignore[no-untyped-def]
     """The centre moved out of the ground, and the contacts that moved it.
 
     Returns
@@ -218,7 +166,7 @@ def _touching(tree, stack, p, v, radius, near, around):  # type: ignore[no-untyp
     """
     distance, support, place, against, other, most = inf, (0.0, 0.0, -2.0), -1, (0.0, 0.0, 1.0), -1, -inf
     for k in range(MOST_AT_ONCE):
-        qx, qy, qz, square, found = _closest(tree, stack, p, radius, near, around)
+        qx, qy, qz, square, found = _closest(tree, stack, p, radius, nearby)
         if found < 0:
             break
         d = sqrt(square)
@@ -240,6 +188,42 @@ def _touching(tree, stack, p, v, radius, near, around):  # type: ignore[no-untyp
 
 
 @kernel
+def _moved(p, q, v, towards, gravity, mu):  # type: ignore[no-untyped-def]
+    """A way on the ground, or as much of it as the energy lasts for.
+
+    Parameters
+    ----------
+    p, q : the centre before and after. v : before. towards : the direction of the velocity after.
+    gravity : the part of it that accelerates. mu : friction, as a part of the weight.
+
+    Returns
+    -------
+    part : of the way that is gone. p, v : after it. ds : length of the whole way.
+    """
+    way = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
+    ds, size, square = sqrt(_dot(way, way)), sqrt(_dot(towards, towards)), _dot(v, v)
+    loss = 2.0 * gravity * (way[2] + mu * ds)
+    left = square - loss
+    if left > 1e-12 * square and size > 0.0:
+        now = sqrt(left) / size
+        return 1.0, q, (now * towards[0], now * towards[1], now * towards[2]), ds
+    part = min(max(square / loss, 0.0), 1.0) if loss > 0.0 and size > 0.0 else 1.0
+    return part, (p[0] + part * way[0], p[1] + part * way[1], p[2] + part * way[2]), (0.0, 0.0, 0.0), ds
+
+
+@kernel
+def _lands(tree, stack, times, nearby, p, v, gravity, radius):  # type: ignore[no-untyped-def]
+    """Where a block that hops on the ground lands: `first_contact`, looked for nearby first."""
+    a = (0.0, 0.0, -gravity)
+    if len(tree) == 4 and nearby[2][0] >= 0.0:
+        limit = inside(nearby, p, sqrt(_dot(v, v)), gravity, radius)
+        t, e, hit = first_near(tree[3], nearby, p, v, a, radius, -1, limit)
+        if hit >= 0:
+            return t, e, hit
+    return first_contact(tree, stack, times, p, v, a, radius, inf)
+
+
+@kernel
 def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
     """When a flight that meets nothing is gone from the box of the terrain."""
     leave = 0.0
@@ -256,7 +240,7 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
 
 @kernel
 def run_block(  # type: ignore[no-untyped-def]
-    tree, zone, rebound, parameters, friction, draws, stack, times, near, around, rows, count,
+    tree, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count,
     run, seed, p, v, w, radius, mass, inertia, drag, gravity, law, most_impacts, most_s, record,
 ):  # fmt: skip
     """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
@@ -275,7 +259,8 @@ def run_block(  # type: ignore[no-untyped-def]
     time, length, impacts, at_once, held, end = 0.0, 0.0, 0, 0, 0, -1
     v_max = sqrt(_dot(v, v))
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
-    around[0] = -1.0  # nothing of another block
+    nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
+    known, t, e, hit, at_edge = False, 0.0, zero, -1, False
     _write(rows, count, run, RELEASED, time, p, v, w, v, w, n, -1)
     count += 1
     while end < 0:
@@ -296,7 +281,9 @@ def run_block(  # type: ignore[no-untyped-def]
                     f * (moved[1] - v[1] * horizon),
                     f * (moved[2] - v[2] * horizon),
                 )  # the parabola through both ends
-            t, e, hit = first_contact(tree, stack, times, p, v, a, radius, horizon)
+            if not known:
+                t, e, hit = first_contact(tree, stack, times, p, v, a, radius, horizon)
+            known = False
             if hit < 0:
                 gone = _leaves(bounds, p, v, a, radius)
                 t = min(horizon, gone)
@@ -332,7 +319,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 v_max = max(v_max, sqrt(_dot(v, v)))
             rises = _dot(v, n)
             if n[2] > 0.0 and rises * rises < 2.0 * gravity * n[2] * HOP * radius:
-                grounded, v = True, _along(v, n)
+                grounded, v, at_edge = True, _along(v, n), False
                 if law == NO_ROLLING:
                     end = STOPPED
             elif at_once >= MOST_AT_ONCE:
@@ -350,17 +337,46 @@ def run_block(  # type: ignore[no-untyped-def]
         if speed < 1e-6 and steep <= mu * cosine:
             end = STOPPED
             break
+        if len(tree) == 4 and not at_edge:
+            at_edge = True
+            t, q, turned, stopped = leg(tree, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time)
+            if t > 0.0:
+                if stopped:
+                    q = _touching(tree, stack, q, turned, radius, nearby)[0]
+                part, p, v, ds = _moved(p, q, v, turned, factor * gravity, mu * max(cosine, 0.0))
+                time, length = time + part * t, length + part * ds
+                at_edge = stopped
+                held = held + 1 if ds < HELD * radius else 0
+                if held > MOST_HELD:
+                    end = STOPPED
+                w = _rolling(n, v, radius)
+                v_max = max(v_max, sqrt(_dot(v, v)))
+                if record:
+                    _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
+                    count += 1
+                continue
         free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
         pull = -gravity * factor * dt
         ahead = _along((v[0], v[1], v[2] + pull), n)
-        q, e, touched, against, other, distance = _touching(tree, stack, free, ahead, radius, near, around)
+        q, e, touched, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby)
         if distance > radius + TOUCHING_M:
-            grounded = False
+            t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
+            q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
+            t, lands = t + dt, _dot(turned, e)
+            if hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius:
+                part, p, v, ds = _moved(p, q, v, _along(turned, e), factor * gravity, mu * max(cosine, 0.0))
+                time, length = time + part * t, length + part * ds
+                n, place, at_edge = e, hit, False
+                w = _rolling(n, v, radius)
+                v_max = max(v_max, sqrt(_dot(v, v)))
+                if record:
+                    _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
+                    count += 1
+                continue
+            grounded, known = False, drag == 0.0
             if record:
                 _write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
                 count += 1
-            p, v, time = free, falling, time + dt
-            length += speed * dt
             at_once = 0
             continue
         if touched < 0:
@@ -398,7 +414,7 @@ def run_block(  # type: ignore[no-untyped-def]
             square = min(square, size * size)
         loss = 2.0 * factor * gravity * ((q[2] - p[2]) + mu * max(cosine, 0.0) * ds)
         left = square - loss
-        n, place = e, touched
+        n, place, at_edge = e, touched, blocked
         if speed < 1e-6:
             # From rest: what friction leaves of gravity along the ground, and along a wall that the block leans on.
             pulls = size - mu * (factor * gravity * cosine * dt + (-back if blocked else 0.0))
@@ -438,13 +454,12 @@ def run_blocks(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
-    near, around = np.empty(MOST_NEAR, np.int64), np.empty(5)
-    around[0] = -1.0
+    nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     draws = np.empty(draw_count)
     rows, count = np.empty((64 * len(runs), COLUMNS)), 0
     for i in range(len(runs)):
         rows, count, end, time, impacts, length, v_max = run_block(
-            tree, zone, rebound, parameters, friction, draws, stack, times, near, around, rows, count, runs[i], seed,
+            tree, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count, runs[i], seed,
             (place[i, 0], place[i, 1], place[i, 2]), (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
             (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i], drag[i], gravity, law,
             most_impacts, most_s, record,

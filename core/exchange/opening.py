@@ -22,12 +22,33 @@ def open_project(project: Project) -> tuple[Surface | None, Reconstruction]:
     ------
     RockfallError : the project names no picks, a file is bad, or the picks do not lie on the terrain.
     """
+    surface = open_terrain(project)
+    return surface, reconstruct_project(project, surface)
+
+
+def read_project_picks(project: Project, surface: Surface | None) -> Picks:
+    """The project's picks, in the frame of its terrain.
+
+    Raises
+    ------
+    RockfallError : the project names none, the table is bad.
+    """
     if project.picks is None:
         raise RockfallError('The project names no table of picks: add [picks] file = "picks.csv" to it.')
-    surface = open_terrain(project)
-    picks = read_picks(project.picks, None if surface is None else surface.shift)
+    return read_picks(project.picks, None if surface is None else surface.shift)
+
+
+def reconstruct_project(project: Project, surface: Surface | None, picks: Picks | None = None) -> Reconstruction:
+    """Reconstruct as a project says; `picks` are those of the project when None.
+
+    Raises
+    ------
+    RockfallError : see `read_project_picks`; the picks do not lie on the terrain.
+    """
+    if picks is None:
+        picks = read_project_picks(project, surface)
     how = project.reconstruction
-    result = reconstruct(
+    return reconstruct(
         picks,
         surface=surface,
         block=blocks_of(project, picks),
@@ -37,7 +58,6 @@ def open_project(project: Project) -> tuple[Surface | None, Reconstruction]:
         site=project.site.name,
         flights=cast(FlightEnds, how.flights),
     )
-    return surface, result
 
 
 def open_terrain(project: Project) -> Surface | None:

@@ -13,7 +13,10 @@
     from = "polygon"                 # measured, table, points, line, polygon, steep
     points_m = [[2600010.0, 1200040.0], [2600030.0, 1200040.0], [2600030.0, 1200060.0]]
     number = 1000
-    diameter_m = 0.5
+    shape = "box"                    # sphere, cube, ellipsoid
+    proportions = [3.0, 2.0, 1.0]
+    diameter_m = "lognormal:0.5,0.2" # or a number, "0.3..0.6", "normal:MEAN,SD"
+    density_kgpm3 = 2600
 
     [[simulation.structures]]
     name = "fence"
@@ -31,8 +34,9 @@ from typing import Any, cast
 from ..errors import InputError
 from ..impact_models.registry import find_model
 from ..simulation.block_shapes import SHAPES, Shape
+from ..simulation.distributions import FORMS, Distribution, parse_distribution
 from ..simulation.engine import FRICTION, ROLLING, Rolling
-from .toml_text import TomlTable
+from .toml_text import TomlTable, is_number
 
 MEASURED, TABLE, POINTS, LINE, POLYGON, STEEP = "measured", "table", "points", "line", "polygon", "steep"
 SOURCES = (MEASURED, TABLE, POINTS, LINE, POLYGON, STEEP)
@@ -49,23 +53,30 @@ class ReleaseEntry:
 
     Attributes
     ----------
-    source : one of `SOURCES`: the project's measured releases, the rows of a table, points, anywhere on a line, in a
+    source : one of `SOURCES`: what the project has measured, the rows of a table, points, anywhere on a line, in a
         polygon, or on terrain steeper than an angle.
+    trajectory, time_s : of what was measured only this trajectory, from the pick at this time on.
     file : releases.csv, for a table.
     points_m : for points, a line and a polygon: survey coordinates, with or without z [m]; without it on the terrain.
     steeper_than_deg : for steep terrain.
+    name : of the releases from points, a line or a polygon.
     number : blocks from each measured release, row or point; altogether from a line, polygon or steep terrain.
-    shape, diameter_m, density_kgpm3 : of blocks for which the source does not say; None takes the project's block.
+    shape, diameter, proportions, density : of the blocks, see `Blocks`. Where none of them is given, measured blocks
+        are as they were measured, and others like the project's block.
     """
 
     source: str = MEASURED
+    trajectory: str = ""
+    time_s: float | None = None
     file: Path | None = None
     points_m: tuple[tuple[float, ...], ...] = ()
     steeper_than_deg: float = STEEPER_THAN_DEG
+    name: str = ""
     number: int = 1
-    shape: Shape = "sphere"
-    diameter_m: float | None = None
-    density_kgpm3: float | None = None
+    shape: Shape | None = None
+    diameter: Distribution | None = None
+    proportions: tuple[float, float, float] | None = None
+    density: Distribution | None = None
     extra: Extra = field(default_factory=dict)
 
 
@@ -133,25 +144,36 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
     content |= {"seed": entry.seed, "rolling": entry.rolling, "friction": entry.friction, "drag": entry.drag}
     if entry.record is not None:
         content["record"] = list(entry.record)
-    releases = entry.releases
-    content["releases"] = {"from": releases.source}
-    if releases.file is not None:
-        content["releases"]["file"] = relative(releases.file)
-    if releases.points_m:
-        content["releases"]["points_m"] = [list(point) for point in releases.points_m]
-    if releases.source == STEEP:
-        content["releases"]["steeper_than_deg"] = releases.steeper_than_deg
-    content["releases"] |= {"number": releases.number, "shape": releases.shape}
-    for name in ("diameter_m", "density_kgpm3"):
-        value = getattr(releases, name)
-        if value is not None:
-            content["releases"][name] = value
-    content["releases"] |= dict(releases.extra)
+    content["releases"] = _release_content(entry.releases, relative)
     if entry.structures:
         content["structures"] = [
             {"name": structure.name, "file": relative(structure.file)} | dict(structure.extra)
             for structure in entry.structures
         ]
+    return content | dict(entry.extra)
+
+
+def _release_content(entry: ReleaseEntry, relative: Callable[[Path], str]) -> dict[str, Any]:
+    content: dict[str, Any] = {"from": entry.source}
+    for name in ("trajectory", "name"):
+        if getattr(entry, name):
+            content[name] = getattr(entry, name)
+    if entry.time_s is not None:
+        content["time_s"] = entry.time_s
+    if entry.file is not None:
+        content["file"] = relative(entry.file)
+    if entry.points_m:
+        content["points_m"] = [list(point) for point in entry.points_m]
+    if entry.source == STEEP:
+        content["steeper_than_deg"] = entry.steeper_than_deg
+    content["number"] = entry.number
+    if entry.shape is not None:
+        content["shape"] = entry.shape
+    if entry.proportions is not None:
+        content["proportions"] = list(entry.proportions)
+    for name, law in (("diameter_m", entry.diameter), ("density_kgpm3", entry.density)):
+        if law is not None:
+            content[name] = law.first if law.law == "fixed" else f"{law.law}:{law.first!r},{law.second!r}"
     return content | dict(entry.extra)
 
 
@@ -168,15 +190,32 @@ def _read_releases(table: TomlTable) -> ReleaseEntry:
         raise table.wrong("steeper_than_deg", f"is {angle:g}", "Give an angle from 0 to 180: 90 is vertical")
     return ReleaseEntry(
         source=source,
+        trajectory=table.text("trajectory", ""),
+        time_s=table.signed("time_s") if table.has("time_s") else None,
         file=table.path("file") if table.has("file") else None,
         points_m=points,
         steeper_than_deg=angle,
+        name=table.text("name", ""),
         number=table.whole("number", 1),
-        shape=cast(Shape, table.choice("shape", SHAPES, "sphere")),
-        diameter_m=table.optional_number("diameter_m"),
-        density_kgpm3=table.optional_number("density_kgpm3"),
+        shape=cast(Shape, table.choice("shape", SHAPES, "sphere")) if table.has("shape") else None,
+        diameter=_read_law(table, "diameter_m"),
+        proportions=table.optional_vector("proportions"),
+        density=_read_law(table, "density_kgpm3"),
         extra=table.rest(),
     )
+
+
+def _read_law(table: TomlTable, key: str) -> Distribution | None:
+    """A number, or a law as a text."""
+    if not table.has(key):
+        return None
+    value = table.take(key)
+    if not (isinstance(value, str) or is_number(value)):
+        raise table.wrong(key, f"is {value!r}, no number and no law", f"Write {FORMS}")
+    try:
+        return parse_distribution(value) if isinstance(value, str) else Distribution("fixed", float(value))
+    except InputError as error:
+        raise table.wrong(key, f"is {value!r}: {error.problem}", error.advice or f"Write {FORMS}") from error
 
 
 def _read_structures(table: TomlTable) -> tuple[StructureEntry, ...]:

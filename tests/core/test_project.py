@@ -21,6 +21,7 @@ from rockfall.core.exchange.project import (
     write_project,
 )
 from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, StructureEntry
+from rockfall.core.simulation.distributions import Distribution
 
 FULL = """
 schema = 1
@@ -268,8 +269,10 @@ kept = 1
 from = "polygon"
 points_m = [[2600010.25, 1200040.0], [2600030.0, 1200040.0, 512.5], [2600030.0, 1200060.0]]
 number = 1000
-shape = "cube"
-diameter_m = 0.5
+shape = "box"
+proportions = [3.0, 2.0, 1.0]
+diameter_m = "lognormal:0.5,0.2"
+density_kgpm3 = 2500
 kept = 2
 [[simulation.structures]]
 name = "fence"
@@ -289,8 +292,10 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
             source="polygon",
             points_m=((2600010.25, 1200040.0), (2600030.0, 1200040.0, 512.5), (2600030.0, 1200060.0)),
             number=1000,
-            shape="cube",
-            diameter_m=0.5,
+            shape="box",
+            diameter=Distribution("lognormal", 0.5, 0.2),
+            proportions=(3.0, 2.0, 1.0),
+            density=Distribution("fixed", 2500.0),
             extra={"kept": 2},
         ),
         structures=(StructureEntry("fence", tmp_path / "fence.ply", {"kept": 3}),),
@@ -306,7 +311,8 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
     for source in (
         ReleaseEntry(),
         ReleaseEntry("table", file=tmp_path / "fence.ply"),
-        ReleaseEntry("steep", steeper_than_deg=61.5, density_kgpm3=2500.0),
+        ReleaseEntry("steep", steeper_than_deg=61.5, diameter=Distribution("uniform", 0.1 + 0.2, 0.6)),
+        ReleaseEntry("measured", trajectory="B01", time_s=-3.25),
     ):
         project = Project(simulation=SimulationEntry(releases=source))
         write_project(project, again)
@@ -325,7 +331,9 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
         (", [2600030.0, 1200060.0]", "", "simulation.releases.points_m has 2 points"),
         ("[2600030.0, 1200060.0]", "[2600030.0]", "simulation.releases.points_m is not a list of points"),
         ("number = 1000", "number = 0", "simulation.releases.number is 0"),
-        ("diameter_m = 0.5", "diameter_m = -0.5", "simulation.releases.diameter_m is -0.5"),
+        ('"lognormal:0.5,0.2"', "-0.5", "simulation.releases.diameter_m is -0.5"),
+        ('"lognormal:0.5,0.2"', '"weibull:0.5,0.2"', "There is no law 'weibull'"),
+        ('"lognormal:0.5,0.2"', "true", "simulation.releases.diameter_m is True, no number and no law"),
         ("kept = 2", "steeper_than_deg = 180", "simulation.releases.steeper_than_deg is 180"),
         ('"fence.ply"', '"wall.ply"', "structures 1: file names a file that is not there"),
         ("kept = 3", '[[simulation.structures]]\nname = "fence"\nfile = "fence.ply"', "names 'fence' twice"),

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From project.toml to a scenario: its terrain, structures, releases and models."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..impact_models.registry import COMPARED
+from ..progress import Progress, silent
+from ..reconstruction.drag import Drag
+from ..reconstruction.picks import take
+from ..reconstruction.trajectory import Reconstruction
+from ..simulation.block_shapes import ROUND
+from ..simulation.blocks import Blocks
+from ..simulation.distributions import Distribution
+from ..simulation.ground import Ground
+from ..simulation.measured_releases import from_reconstruction
+from ..simulation.polygons import Polygon
+from ..simulation.release import Releases
+from ..simulation.release_sources import in_polygon, on_line, on_points, steeper_than
+from ..terrain.readers import read_terrain
+from ..terrain.surface import Surface
+from ..workflow.simulation import ReleaseSource, Scenario
+from .opening import open_terrain, read_project_picks, reconstruct_project
+from .parameters import checked_parameters
+from .project import BlockEntry, Project
+from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from .simulation_tables import read_releases
+
+SAME_TIME_S = 1e-6
+
+
+def open_simulation(project: Project, file: Path, progress: Progress = silent) -> tuple[Scenario, dict[str, Path]]:
+    """What a project simulates, and the files that decide it, by what they are.
+
+    Parameters
+    ----------
+    file : the project's own, for messages.
+
+    Notes
+    -----
+    A project that says nothing of a simulation releases each measured block once, with the models that are compared by
+    default.
+
+    Raises
+    ------
+    RockfallError : the project has no terrain, or nothing measured where that is asked for; a file is bad.
+    """
+    progress("Reading the terrain", 0, 0)
+    source, terrain = project.terrain, open_terrain(project)
+    if source is None or terrain is None:
+        raise InputError(
+            "The project names no terrain", file=file, advice='Add [terrain] file = "terrain.ply" to simulate on it'
+        )
+    entry = project.simulation or SimulationEntry()
+    known = checked_parameters(project.extra["models"], file) if "models" in project.extra else {}
+    inputs = {"project": file, "terrain": source.file}
+    if entry.releases.source == MEASURED and project.picks is not None:
+        inputs["picks"] = project.picks
+    elif entry.releases.file is not None:
+        inputs["releases"] = entry.releases.file
+    structures = {}
+    for structure in entry.structures:
+        progress(f"Reading {structure.file.name}", 0, 0)
+        structures[structure.name] = read_terrain(structure.file, up=source.up, unit_m=source.unit_m)
+        inputs[structure.name] = structure.file
+    how = project.reconstruction
+    scenario = Scenario(
+        terrain,
+        release_source(project, terrain, entry),
+        {name: known.get(name, {}) for name in entry.models or COMPARED},
+        structures=structures,
+        rolling=entry.rolling,
+        friction=entry.friction,
+        drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
+        gravity_mps2=how.gravity_mps2,
+        seed=entry.seed,
+    )
+    return scenario, inputs
+
+
+def release_source(project: Project, terrain: Surface, entry: SimulationEntry) -> ReleaseSource:
+    """What puts the blocks of a project on its ground.
+
+    Raises
+    ------
+    RockfallError : nothing is measured where that is asked for; blocks that cannot be.
+    """
+    releases, seed = entry.releases, entry.seed
+    given = (releases.shape, releases.diameter, releases.proportions, releases.density)
+    blocks = _blocks(releases, project.block)
+    if releases.source == MEASURED:
+        measured = _measured(project, terrain, releases)
+        own = None if given == (None,) * len(given) else blocks
+        return lambda ground: from_reconstruction(ground, measured, own, releases.number, seed)
+    if releases.source == STEEP:
+        angle = np.radians(releases.steeper_than_deg)
+        return lambda ground: steeper_than(ground, angle, blocks, releases.number, seed)
+    if releases.source == TABLE:
+        return lambda ground: _from_table(ground, releases, blocks)
+    return lambda ground: _from_drawing(ground, releases, blocks, seed)
+
+
+def _measured(project: Project, terrain: Surface, entry: ReleaseEntry) -> Reconstruction:
+    if not entry.trajectory:
+        return reconstruct_project(project, terrain)
+    picks = read_project_picks(project, terrain)
+    onward = picks.trajectory == entry.trajectory
+    if not onward.any():
+        known = ", ".join(dict.fromkeys(picks.trajectory.tolist()))
+        raise InputError(
+            f"There is no trajectory {entry.trajectory!r} to release blocks from", advice=f"Known: {known}"
+        )
+    if entry.time_s is not None:
+        onward &= picks.time_s >= entry.time_s - SAME_TIME_S
+    return reconstruct_project(project, terrain, take(picks, onward))
+
+
+def _from_drawing(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int) -> Releases:
+    """From points, a line or a polygon."""
+    survey = np.array([[*point, np.nan][:3] for point in entry.points_m])
+    points = ground.shift.to_local(survey)
+    if entry.source == POINTS:
+        several = len(points) > 1
+        names = [f"{entry.name} {i + 1}".strip() if several else entry.name for i in range(len(points))]
+        return on_points(ground, points, blocks, entry.number, seed, np.array(names, dtype=np.str_))
+    if entry.source == LINE:
+        return on_line(ground, [points], blocks, entry.number, seed, names=[entry.name])
+    return in_polygon(ground, [Polygon(entry.name, (points[:, :2],))], blocks, entry.number, seed)
+
+
+def _from_table(ground: Ground, entry: ReleaseEntry, blocks: Blocks) -> Releases:
+    assert entry.file is not None
+    return read_releases(
+        entry.file, ground, diameter_m=blocks.diameter.mean, density_kgpm3=blocks.density.mean, number=entry.number
+    )
+
+
+def _blocks(entry: ReleaseEntry, block: BlockEntry) -> Blocks:
+    """The law of the blocks: what is not given is as in the project's block."""
+    three = (block.d1_m, block.d2_m, block.d3_m)
+    shape = entry.shape or ("sphere" if len(set(three)) == 1 else "ellipsoid")
+    own = (1.0, 1.0, 1.0) if shape in ROUND else three
+    return Blocks(
+        shape,
+        entry.diameter or Distribution("fixed", sum(three) / 3),
+        entry.proportions or own,
+        entry.density or Distribution("fixed", block.density_kgpm3),
+    )

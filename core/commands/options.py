@@ -12,7 +12,6 @@ from ..errors import InputError
 
 if TYPE_CHECKING:
     from ..impact_models.machinery.measured import MeasuredRebounds
-    from ..impact_models.machinery.parameters import Value
     from ..progress import Progress
     from ..terrain.surface import Surface
 
@@ -212,7 +211,7 @@ def add_parameter_options(parser: argparse.ArgumentParser) -> None:
 
 
 def model_parameters(
-    arguments: argparse.Namespace, models: Sequence[str], known: "Mapping[str, Mapping[str, Value]] | None" = None
+    arguments: argparse.Namespace, models: Sequence[str], known: "Mapping[str, Mapping[str, Any]] | None" = None
 ) -> dict[str, dict[str, Any]]:
     """Parameters of the models: from ``--set``, else from ``--parameters``, else those already known.
 

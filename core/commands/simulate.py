@@ -2,9 +2,10 @@
 """``rockfall simulate``: blocks that fall down the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv."""
 
 import argparse
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
@@ -26,57 +27,50 @@ from .progress import PrintedProgress, stopped_by_interrupt
 
 if TYPE_CHECKING:
     from ..simulation.release import Releases
-
-RECORDS = ("impacts", "trajectories")
-LARGE = 20_000
-"""From so many blocks on, motion in time is written only when it is asked for."""
+    from ..workflow.simulation import Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("releases", metavar="RELEASES", help="releases.csv: x_m, y_m and, if not on the terrain, z_m")
+    parser.add_argument(
+        "releases",
+        metavar="RELEASES",
+        help="releases.csv: x_m, y_m and, if not on the terrain, z_m; or project.toml with all that is needed",
+    )
     add_out(parser)
-    parser.add_argument("--terrain", metavar="FILE", required=True, help="mesh, grid or cloud")
+    parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; a project names its own")
     parser.add_argument(
         "--model",
         action="append",
         metavar="NAME",
-        required=True,
         help="impact model; may be given several times: each gets the same blocks. `rockfall models` lists all",
     )
     add_parameter_options(parser)
-    add_observed_option(parser, "needed by that model")
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    add_observed_option(parser, "needed by that model; a project can give its own")
+    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
     parser.add_argument(
-        "--number", type=whole, default=1, metavar="N", help="blocks from each release without a number (default 1)"
+        "--number", type=whole, metavar="N", help="blocks from each release without a number (default 1)"
     )
     block = parser.add_argument_group("blocks of releases that do not say")
-    block.add_argument("--diameter", type=positive, default=0.35, metavar="M", help="[m] (default %(default)s)")
-    block.add_argument(
-        "--density", type=positive, default=ROCK_DENSITY_KGPM3, metavar="RHO", help="[kg/m³] (default %(default)s)"
-    )
+    block.add_argument("--diameter", type=positive, metavar="M", help="[m] (default 0.35)")
+    block.add_argument("--density", type=positive, metavar="RHO", help=f"[kg/m³] (default {ROCK_DENSITY_KGPM3:g})")
     motion = parser.add_argument_group("motion")
     motion.add_argument("--drag", action="store_true", help="flights with the drag of air")
     motion.add_argument(
         "--rolling",
         choices=("azzoni_1995", "coulomb", "none"),
-        default="azzoni_1995",
         help="on the ground: rolling (default), sliding, or a stop where a block would begin to",
     )
-    motion.add_argument(
-        "--friction", type=not_negative, default=0.5, metavar="MU", help="of either (default %(default)s)"
-    )
-    motion.add_argument(
-        "--gravity", type=positive, default=GRAVITY_MPS2, metavar="G", help="[m/s²] (default %(default)s)"
-    )
+    motion.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
+    motion.add_argument("--gravity", type=positive, metavar="G", help=f"[m/s²] (default {GRAVITY_MPS2:g})")
     motion.add_argument(
         "--structure", action="append", default=[], metavar="NAME=FILE", help="a wall, a road, a house: a mesh"
     )
     parser.add_argument(
         "--record",
         metavar="A,B",
-        help="tables beside runs.csv: impacts, trajectories, or none (default both; impacts alone from "
-        f"{LARGE} blocks on)",
+        help="tables beside runs.csv: impacts, trajectories, or none (default both; impacts alone from 20000 blocks "
+        "on)",
     )
     parser.add_argument(
         "--runs",
@@ -91,76 +85,124 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, write the tables, print the summary."""
     from ..exchange.output import output_folder
-    from ..exchange.simulation_tables import read_releases, summary, write_hits, write_runs, write_summary
-    from ..exchange.tables import write_impacts, write_trajectories
-    from ..impact_models.registry import find_model
-    from ..reconstruction.drag import Drag
-    from ..simulation.results import impacts_of, sample_runs
-    from ..workflow.simulation import Scenario, ground_of, remarks_of, run_models
+    from ..exchange.simulation_entry import RECORDS
+    from ..exchange.simulation_output import default_records, write_simulations
+    from ..workflow.simulation import ground_of, remarks_of, run_models
 
-    models = [find_model(name).name for name in arguments.model]
-    parameters = model_parameters(arguments, models)
-    measured = measured_as_asked(arguments, models, needed=True)
-    files = _structures(arguments.structure)
+    record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
+    prepare = _project if arguments.releases.endswith(".toml") else _scenario
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        terrain = terrain_as_asked(arguments, arguments.terrain, progress)
-        scenario = Scenario(
-            terrain,
-            partial(
-                read_releases,
-                arguments.releases,
-                diameter_m=arguments.diameter,
-                density_kgpm3=arguments.density,
-                number=arguments.number,
-            ),
-            {name: parameters.get(name, {}) for name in models},
-            measured,
-            structures={name: terrain_as_asked(arguments, file, progress) for name, file in files.items()},
-            rolling=arguments.rolling,
-            friction=arguments.friction,
-            drag=Drag() if arguments.drag else None,
-            gravity_mps2=arguments.gravity,
-            seed=arguments.seed,
-        )
+        asked = prepare(arguments, progress)
+        scenario = asked.scenario
         ground = ground_of(scenario)
-        progress(f"Reading {arguments.releases}")
+        progress("Releasing the blocks")
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
-        asked = RECORDS[: 1 if len(releases) >= LARGE else 2]
-        record = known_names(arguments.record, RECORDS, "--record") if arguments.record is not None else asked
+        if record is None:
+            record = default_records(len(releases)) if asked.record is None else asked.record
         with stopped_by_interrupt(progress) as counted:
             simulations = run_models(
                 ground,
                 releases,
                 scenario.settings,
-                record=bool(record or files),
+                record=bool(record or scenario.structures),
                 first_run=first_run,
                 threads=arguments.threads,
                 progress=counted,
             )
-        remarks = remarks_of(simulations, models)
-        progress("Writing the tables")
-        write_runs(simulations, folder / "runs.csv")
-        written = ["runs.csv"]
-        if "impacts" in record:
-            write_impacts([impacts_of(one) for one in simulations], folder / "impacts.csv")
-            written.append("impacts.csv")
-        if "trajectories" in record:
-            samples = [sample_runs(one, progress=progress) for one in simulations]
-            write_trajectories(samples, folder / "trajectories.csv")
-            written.append("trajectories.csv")
-        if files:
-            write_hits(simulations, folder / "hits.csv")
-            written.append("hits.csv")
-        inputs = {"releases": Path(arguments.releases), "terrain": Path(arguments.terrain)}
-        if measured is not None:
-            inputs["observed"] = Path(arguments.observed)
-        inputs |= {name: Path(file) for name, file in files.items()}
-        write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
-        written.append("summary.json")
-    for sentence in (*terrain.summary, *remarks):
+        remarks = remarks_of(simulations, list(scenario.models))
+        written = write_simulations(
+            simulations, folder, record=record, inputs=asked.inputs, remarks=remarks, progress=progress
+        )
+    for sentence in (*scenario.terrain.summary, *remarks):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+class _Asked(NamedTuple):
+    """What is simulated, the tables beside runs.csv that a project names, and the files that decide it."""
+
+    scenario: "Scenario"
+    record: tuple[str, ...] | None
+    inputs: dict[str, Path]
+
+
+def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
+    """A table of releases, with what the options say."""
+    from ..exchange.simulation_tables import read_releases
+    from ..impact_models.registry import find_model
+    from ..reconstruction.drag import Drag
+    from ..workflow.simulation import Scenario
+
+    for option in ("terrain", "model"):
+        if getattr(arguments, option) is None:
+            raise InputError(f"--{option} is missing", advice="Only a project, project.toml, can do without it")
+    models = [find_model(name).name for name in arguments.model]
+    parameters = model_parameters(arguments, models)
+    measured = measured_as_asked(arguments, models, needed=True)
+    files = _structures(arguments.structure)
+    given = {
+        name: getattr(arguments, option)
+        for option, name in (
+            ("rolling", "rolling"), ("friction", "friction"), ("gravity", "gravity_mps2"), ("seed", "seed"),
+        )
+        if getattr(arguments, option) is not None
+    }  # fmt: skip
+    scenario = Scenario(
+        terrain_as_asked(arguments, arguments.terrain, progress),
+        partial(
+            read_releases,
+            arguments.releases,
+            diameter_m=0.35 if arguments.diameter is None else arguments.diameter,
+            density_kgpm3=ROCK_DENSITY_KGPM3 if arguments.density is None else arguments.density,
+            number=1 if arguments.number is None else arguments.number,
+        ),
+        {name: parameters.get(name, {}) for name in models},
+        measured,
+        structures={name: terrain_as_asked(arguments, file, progress) for name, file in files.items()},
+        drag=Drag() if arguments.drag else None,
+        **given,
+    )
+    inputs = {"releases": Path(arguments.releases), "terrain": Path(arguments.terrain)}
+    if measured is not None:
+        inputs["observed"] = Path(arguments.observed)
+    return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()})
+
+
+def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
+    """A project, in which options replace what its [simulation] says."""
+    from ..exchange.project import read_project
+    from ..exchange.simulation_entry import SimulationEntry
+    from ..exchange.simulation_project import open_simulation
+    from ..simulation.distributions import Distribution
+
+    for option in ("terrain", "structure", "gravity"):
+        if getattr(arguments, option):
+            raise InputError(f"--{option} is what a project says itself", advice="Write it into the project")
+    file = Path(arguments.releases)
+    project = read_project(file)
+    entry = project.simulation or SimulationEntry()
+    number, diameter, density = arguments.number, arguments.diameter, arguments.density
+    releases = replace(
+        entry.releases,
+        number=entry.releases.number if number is None else number,
+        diameter=entry.releases.diameter if diameter is None else Distribution("fixed", diameter),
+        density=entry.releases.density if density is None else Distribution("fixed", density),
+    )
+    entry = replace(
+        entry,
+        models=tuple(arguments.model or entry.models),
+        releases=releases,
+        rolling=arguments.rolling or entry.rolling,
+        friction=entry.friction if arguments.friction is None else arguments.friction,
+        drag=arguments.drag or entry.drag,
+        observed=entry.observed if arguments.observed is None else Path(arguments.observed),
+        seed=entry.seed if arguments.seed is None else arguments.seed,
+    )
+    scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
+    known = model_parameters(arguments, list(scenario.models), scenario.models)
+    models = {name: known.get(name, {}) for name in scenario.models}
+    return _Asked(replace(scenario, models=models), entry.record, inputs)
 
 
 def _asked_runs(releases: "Releases", runs: tuple[int, int] | None) -> tuple["Releases", int]:

@@ -41,7 +41,9 @@ from .toml_text import TomlTable, is_number
 MEASURED, TABLE, POINTS, LINE, POLYGON, STEEP = "measured", "table", "points", "line", "polygon", "steep"
 SOURCES = (MEASURED, TABLE, POINTS, LINE, POLYGON, STEEP)
 LEAST_POINTS = {POINTS: 1, LINE: 2, POLYGON: 3}
-RECORDS = ("impacts", "trajectories")
+IMPACTS, TRAJECTORIES = "impacts", "trajectories"
+RECORDS = (IMPACTS, TRAJECTORIES)
+"""Tables beside runs.csv."""
 STEEPER_THAN_DEG = 45.0
 
 Extra = Mapping[str, Any]
@@ -97,6 +99,7 @@ class SimulationEntry:
     ----------
     models : names, in the order in which they run; none takes those that are compared by default.
     releases, structures, rolling, friction, seed : see `workflow.simulation.Scenario`.
+    observed : impacts.csv that the model observed draws from; None takes what the project has measured.
     drag : of the air, with the coefficient and density of the project's reconstruction.
     record : of `RECORDS`, the tables beside runs.csv; None lets the number of blocks decide.
     """
@@ -107,6 +110,7 @@ class SimulationEntry:
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     drag: bool = False
+    observed: Path | None = None
     seed: int = 0
     record: tuple[str, ...] | None = None
     extra: Extra = field(default_factory=dict)
@@ -132,6 +136,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         rolling=cast(Rolling, table.choice("rolling", ROLLING, "azzoni_1995")),
         friction=table.number("friction", FRICTION, zero_allowed=True),
         drag=table.flag("drag", False),
+        observed=table.path("observed") if table.has("observed") else None,
         seed=table.whole("seed", 0, zero_allowed=True),
         record=table.choices("record", RECORDS) if table.has("record") else None,
         extra=table.rest(),
@@ -142,6 +147,8 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
     """The section as TOML can hold it; the unknown keys at the end."""
     content: dict[str, Any] = {"models": list(entry.models)} if entry.models else {}
     content |= {"seed": entry.seed, "rolling": entry.rolling, "friction": entry.friction, "drag": entry.drag}
+    if entry.observed is not None:
+        content["observed"] = relative(entry.observed)
     if entry.record is not None:
         content["record"] = list(entry.record)
     content["releases"] = _release_content(entry.releases, relative)

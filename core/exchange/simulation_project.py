@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..analysis.measured_rebounds import measured_rebounds
 from ..errors import InputError
-from ..impact_models.registry import COMPARED
+from ..impact_models.machinery.measured import MeasuredRebounds
+from ..impact_models.registry import COMPARED, find_model
 from ..progress import Progress, silent
 from ..reconstruction.drag import Drag
 from ..reconstruction.picks import take
@@ -27,6 +29,7 @@ from .parameters import checked_parameters
 from .project import BlockEntry, Project
 from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry, SimulationEntry
 from .simulation_tables import read_releases
+from .tables import read_impacts
 
 SAME_TIME_S = 1e-6
 
@@ -55,10 +58,14 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         )
     entry = project.simulation or SimulationEntry()
     known = checked_parameters(project.extra["models"], file) if "models" in project.extra else {}
+    models = entry.models or COMPARED
     inputs = {"project": file, "terrain": source.file}
-    if entry.releases.source == MEASURED and project.picks is not None:
+    drawing = any(find_model(name).draws_from_impacts for name in models)
+    if drawing and entry.observed is not None:
+        inputs["observed"] = entry.observed
+    if project.picks is not None and (entry.releases.source == MEASURED or (drawing and entry.observed is None)):
         inputs["picks"] = project.picks
-    elif entry.releases.file is not None:
+    if entry.releases.source == TABLE and entry.releases.file is not None:
         inputs["releases"] = entry.releases.file
     structures = {}
     for structure in entry.structures:
@@ -69,15 +76,24 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
     scenario = Scenario(
         terrain,
         release_source(project, terrain, entry),
-        {name: known.get(name, {}) for name in entry.models or COMPARED},
+        {name: known.get(name, {}) for name in models},
+        _drawn_from(project, terrain, entry) if drawing else None,
         structures=structures,
         rolling=entry.rolling,
         friction=entry.friction,
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
+        record=entry.record is None or bool(entry.record),
     )
     return scenario, inputs
+
+
+def _drawn_from(project: Project, terrain: Surface, entry: SimulationEntry) -> MeasuredRebounds:
+    """The measured impacts that the model observed draws from."""
+    if entry.observed is not None:
+        return measured_rebounds(read_impacts(entry.observed))
+    return measured_rebounds(reconstruct_project(project, terrain).impacts)
 
 
 def release_source(project: Project, terrain: Surface, entry: SimulationEntry) -> ReleaseSource:

@@ -260,6 +260,7 @@ schema = 1
 [simulation]
 models = ["noel_2017", "stevens_1998"]
 seed = 3
+observed = "impacts.csv"
 rolling = "coulomb"
 friction = 0.4
 drag = true
@@ -283,7 +284,8 @@ kept = 3
 
 def test_a_simulation_round_trips(tmp_path: Path) -> None:
     path, again = tmp_path / "project.toml", tmp_path / "again.toml"
-    (tmp_path / "fence.ply").touch()
+    for name in ("fence.ply", "impacts.csv"):
+        (tmp_path / name).touch()
     path.write_text(SIMULATED, encoding="utf-8")
     project = read_project(path)
     assert project.simulation == SimulationEntry(
@@ -302,6 +304,7 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
         rolling="coulomb",
         friction=0.4,
         drag=True,
+        observed=tmp_path / "impacts.csv",
         seed=3,
         record=(),
         extra={"kept": 1},
@@ -341,7 +344,8 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
 )
 def test_bad_simulations_are_located(tmp_path: Path, old: str, new: str, problem: str) -> None:
     path = tmp_path / "project.toml"
-    (tmp_path / "fence.ply").touch()
+    for name in ("fence.ply", "impacts.csv"):
+        (tmp_path / name).touch()
     assert SIMULATED.count(old) == 1
     path.write_text(SIMULATED.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError) as error:

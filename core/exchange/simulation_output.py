@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All tables of a simulation in one folder."""
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+
+from ..progress import Progress, silent
+from ..remarks import Remark
+from ..simulation.engine import Simulation
+from ..simulation.results import impacts_of, sample_runs
+from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
+from .simulation_tables import summary, write_hits, write_runs, write_summary
+from .tables import write_impacts, write_trajectories
+
+LARGE = 20_000
+"""From so many blocks on, motion in time is written only when it is asked for."""
+
+
+def default_records(blocks: int) -> tuple[str, ...]:
+    """The tables beside runs.csv where none are named."""
+    return RECORDS if blocks < LARGE else (IMPACTS,)
+
+
+def write_simulations(
+    simulations: Sequence[Simulation],
+    folder: Path,
+    *,
+    record: Collection[str],
+    inputs: Mapping[str, Path],
+    remarks: Sequence[Remark] = (),
+    progress: Progress = silent,
+) -> list[str]:
+    """Write runs.csv, what `record` names, hits.csv where there are structures, and summary.json.
+
+    Parameters
+    ----------
+    simulations : of one ground and the same releases, one for each model.
+    record : of `RECORDS`; the simulations must have been recorded for them.
+    inputs : what it is → file, for the hashes in summary.json.
+
+    Returns
+    -------
+    The names of the files.
+
+    Raises
+    ------
+    OSError : the folder cannot be written.
+    """
+    progress("Writing the tables", 0, 0)
+    write_runs(simulations, folder / "runs.csv")
+    written = ["runs.csv"]
+    if IMPACTS in record:
+        write_impacts([impacts_of(one) for one in simulations], folder / "impacts.csv")
+        written.append("impacts.csv")
+    if TRAJECTORIES in record:
+        samples = [sample_runs(one, progress=progress) for one in simulations]
+        write_trajectories(samples, folder / "trajectories.csv")
+        written.append("trajectories.csv")
+    if simulations[0].ground.structures:
+        write_hits(simulations, folder / "hits.csv")
+        written.append("hits.csv")
+    write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
+    return [*written, "summary.json"]

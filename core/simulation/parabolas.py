@@ -133,13 +133,16 @@ def _moments(
 ) -> tuple[_Moments, Indices]:
     """Moments of what is no exact parabola, and the first moment of each chain, with the count at its end.
 
-    A flight with drag is a chain; steps on the ground that follow each other are one.
+    A flight with drag is a chain; steps on the ground that follow each other are one. On each of them the acceleration
+    is constant: the middle of a long one is a moment too.
     """
     records = simulation.records
     joins = np.zeros(begin.size, np.bool_)
     joins[1:] = ~flies[1:] & ~flies[:-1] & (begin[1:] == begin[:-1] + 1)
     ends = np.append(~joins[1:], True) if begin.size else joins
-    inner = np.where(flies, np.ceil(duration / DRAG_STEP_S).astype(np.intp) - 1, 0)
+    change = records.v1[begin + 1] - records.v2[begin]
+    bent = norm(change) * duration / 8 > 0.1 * TOLERANCE_M
+    inner = np.where(flies, np.ceil(duration / DRAG_STEP_S).astype(np.intp) - 1, bent.astype(np.intp))
     parts = 1 + inner + ends
     which = np.repeat(np.arange(begin.size), parts)
     within = np.arange(which.size) - np.repeat(np.cumsum(parts) - parts, parts)
@@ -147,10 +150,13 @@ def _moments(
     row = begin[which]
     place = records.position[row].copy()
     between = (within > 0) & (within <= inner[which])
-    place[between], _ = fly(
-        records.position[row[between]], records.v2[row[between]], elapsed[between],
-        simulation.settings.gravity_mps2, drag[row[between]],
+    aloft, middle = between & flies[which], between & ~flies[which]
+    place[aloft], _ = fly(
+        records.position[row[aloft]], records.v2[row[aloft]], elapsed[aloft],
+        simulation.settings.gravity_mps2, drag[row[aloft]],
     )  # fmt: skip
+    sag = change[which[middle]] * duration[which[middle], None] / 8
+    place[middle] = 0.5 * (place[middle] + records.position[row[middle] + 1]) - sag
     last = (within > 0) & ~between
     place[last] = records.position[row[last] + 1]
     firsts = (np.cumsum(parts) - parts)[~joins]

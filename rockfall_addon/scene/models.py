@@ -15,10 +15,17 @@ from ...core.analysis.comparison import compare
 from ...core.analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...core.errors import RockfallError
 from ...core.impact_models.machinery.parameters import Value
-from ...core.impact_models.registry import find_model
+from ...core.impact_models.registry import COMPARED, MODELS, find_model
 from ...core.reconstruction.trajectory import Reconstruction
 from . import keyframes, store, terrain, timing, trails, trajectories
 
+ORDER = (*COMPARED, *(name for name in MODELS if name not in COMPARED))
+"""The models as they are listed."""
+CHOICES = [
+    (name, MODELS[name].title, f"{MODELS[name].title} ({name}): {MODELS[name].reference}", 1 << i)
+    for i, name in enumerate(ORDER)
+]
+"""Items of a property that holds some of the models."""
 LINGER_S = 0.2
 """How long a predicted block lies where it has landed."""
 

@@ -17,8 +17,10 @@ from . import fingerprints, migration, models, problems, store, terrain, traject
 from . import picks as pick_objects
 
 
-def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Reconstruction:
-    """Reconstruct picks (by default those in the scene) with the scene's terrain and settings.
+def reconstruct_scene(
+    scene: bpy.types.Scene, picks: Picks | None = None, surface: Surface | None = None
+) -> Reconstruction:
+    """Reconstruct picks (by default those in the scene) with a terrain (by default the scene's) and its settings.
 
     Raises
     ------
@@ -28,7 +30,7 @@ def reconstruct_scene(scene: bpy.types.Scene, picks: Picks | None = None) -> Rec
     picks = pick_objects.trusted(pick_objects.picks_of(scene) if picks is None else picks)
     return reconstruct(
         picks,
-        surface=ground(scene),
+        surface=ground(scene) if surface is None else surface,
         block=blocks_of(scene, set(picks.trajectory.tolist())),
         drag=Drag(*list(scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT)))) if settings.use_drag else None,
         gravity_mps2=float(scene.get(store.GRAVITY, GRAVITY_MPS2)),

@@ -111,6 +111,11 @@ def lines_of(obj: bpy.types.Object) -> Lines:
     return Lines(obj[store.MODEL], first, position.reshape(-1, 3), _read(curves, SPEED, len(curves.points)), figures)
 
 
+def figure(obj: bpy.types.Object, name: str) -> Array:
+    """(n,) one of `FIGURES` of an object's runs."""
+    return _read(obj.data, name, len(obj.data.curves))
+
+
 def colours_of(lines: Lines, colour_by: str, speed_top_mps: float, energy_top_kj: float) -> Array:
     """(m, 3) sRGB of the points, by SPEED, ENERGY or MODEL."""
     if colour_by == "MODEL":

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated rockfalls in the scene: their blocks beside the real ones, and their paths.
 
-Of each model two objects: a mesh with a vertex for each parabola of the motion, which geometry nodes make blocks of,
-and curves, one for each run, with the run's numbers. Both hold all that is shown, so that it is saved and undone with
-them.
+Of each model two objects: a mesh with a vertex for each parabola of the motion, of which geometry nodes make blocks;
+and curves, one for each run, with the run's numbers. They hold all that is shown, so that it is saved and undone.
 """
 
 import json
@@ -14,6 +13,7 @@ import bpy
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ...core.colours import rounded_top
 from ...core.impact_models.registry import find_model
 from ...core.simulation.engine import Simulation
 from ...core.simulation.parabolas import Parabolas, parabolas_of
@@ -69,7 +69,6 @@ def prepare(simulation: Simulation) -> Prepared:
     number = {name: place for place, name in enumerate(releases)}
     release = np.array([number[name] for name in names.tolist()])
     parabolas = parabolas_of(simulation)
-    radius = simulation.releases.radius_m[parabolas.run]
     nowhere = np.full(len(parabolas), np.nan)
     attributes = {
         RUN: ("INT", parabolas.run),
@@ -82,7 +81,7 @@ def prepare(simulation: Simulation) -> Prepared:
         simulated_nodes.ACCELERATION: ("FLOAT_VECTOR", parabolas.acceleration),
         simulated_nodes.SPIN: ("FLOAT_VECTOR", parabolas.spin),
         simulated_nodes.TURN: ("QUATERNION", _turns(parabolas)),
-        simulated_nodes.HALF_AXES: ("FLOAT_VECTOR", np.repeat(radius[:, None], 3, axis=1)),
+        simulated_nodes.HALF_AXES: ("FLOAT_VECTOR", simulation.releases.axes_m[parabolas.run] / 2),
     }
     paths = simulated_paths.prepare(simulation, parabolas, release)
     return Prepared(simulation.settings.model, releases, parabolas.position, attributes, paths)
@@ -118,6 +117,7 @@ def show_prepared(
         place.objects.link(_pattern(blocks, each.model))
         shown.append(blocks)
     follow(scene)
+    look(scene)
     return shown
 
 
@@ -144,6 +144,36 @@ def follow(scene: bpy.types.Scene) -> None:
         _write(mesh, simulated_nodes.BEGIN, "FLOAT", begin)
         _write(mesh, simulated_nodes.END, "FLOAT", begin + _read(mesh, LASTS))
         mesh.update()
+
+
+def look(scene: bpy.types.Scene) -> None:
+    """Show blocks and paths as the scene's settings say."""
+    settings, tops = scene.rockfall_simulation, scale_tops(scene)
+    for obj in blocks_of(scene):
+        obj.hide_viewport = obj.hide_render = not settings.show_blocks
+    for obj in paths_of(scene):
+        obj.hide_render = not settings.show_paths
+        lines = simulated_paths.lines_of(obj)
+        simulated_paths.paint(obj, simulated_paths.colours_of(lines, settings.colour_by, *tops), path_radius(scene))
+
+
+def paths_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The objects of the simulated paths, one of each model."""
+    return store.with_role(scene, store.SIMULATED_PATHS_ROLE)
+
+
+def path_radius(scene: bpy.types.Scene) -> float:
+    """Half the thickness of the paths in a render [m]."""
+    return 0.5 * scene.rockfall.trail_radius_m
+
+
+def scale_tops(scene: bpy.types.Scene) -> tuple[float, float]:
+    """The upper ends of the scales of speed [m/s] and energy [kJ]: of the simulated paths."""
+    speed, energy = [0.0], [0.0]
+    for obj in paths_of(scene):
+        for name, values in (("v_max_mps", speed), ("kinetic_max_kj", energy)):
+            values.append(float(simulated_paths.figure(obj, name).max(initial=0.0)))
+    return rounded_top(max(speed)), rounded_top(max(energy))
 
 
 def release_begins(scene: bpy.types.Scene, obj: bpy.types.Object) -> Array:

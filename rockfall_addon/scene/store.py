@@ -14,6 +14,7 @@ PICK_ROLE, BLOCK_ROLE, FLIGHTS_ROLE = "pick", "block", "flights"
 MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"
 SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
+RELEASE_ROLE = "release"  # a drawn line, area or points
 CAMERA_ROLE = "camera"
 COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
 
@@ -40,6 +41,7 @@ GROUND, GROUND_CONTENTS = "rockfall_ground", "rockfall_ground_contents"  # finge
 PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems"
 SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
 MODEL = "rockfall_model"  # of what a model predicts
+SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
 
 # of simulated blocks and paths

@@ -32,11 +32,13 @@ class Work:
     compute : runs in a thread, without Blender; CancelledError raised in its progress ends it.
     keep : stores what was computed in the scene in which the work began, and says so in a sentence; RockfallError where
         that cannot be done any more.
+    keeps_part : when it is stopped, `compute` gives what is finished, which is kept.
     """
 
     step: str
     compute: Callable[[Progress], object]
     keep: Callable[[bpy.types.Scene, object], str]
+    keeps_part: bool = False
 
 
 class Job:
@@ -47,6 +49,7 @@ class Job:
         self.text, self.done, self.total = label, 0, 0
         self.problem = ""
         self.found: object = None
+        self.came_to_nothing = False
         self._stop = Event()
         self._thread = Thread(target=self._run, name=f"rockfall {work.step}", daemon=True)
         self._thread.start()
@@ -64,6 +67,8 @@ class Job:
     @property
     def line(self) -> str:
         """Where the work is."""
+        if self._stop.is_set():
+            return "Stopping: what is finished is kept …"
         return f"{self.text}: {self.done} of {self.total}." if self.total else f"{self.text} …"
 
     @property
@@ -84,7 +89,7 @@ class Job:
         try:
             self.found = self.work.compute(self._progress)
         except CancelledError:
-            pass
+            self.came_to_nothing = True
         except RockfallError as error:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001 - whatever it is, it must not be lost in the thread
@@ -122,7 +127,7 @@ class InBackground:
 
 
 class ROCKFALL_OT_stop_job(bpy.types.Operator):
-    """Stop what Rockfall computes in the background; nothing changes"""
+    """Stop what Rockfall computes in the background; what is not finished changes nothing"""
 
     bl_idname = "rockfall.stop_job"
     bl_label = "Stop Background Work"
@@ -172,10 +177,11 @@ def begin(work: Work, label: str, scene: bpy.types.Scene) -> None:
 
 
 def cancel() -> None:
-    """Stop the work; nothing changes."""
+    """Stop the work; nothing changes, or what is finished is kept as soon as it has stopped."""
     for job in tuple(_running):
         job.stop()
-        _end(job, f"{job.label} was stopped. Nothing has changed.")
+        if not job.work.keeps_part:
+            _end(job, _stopped(job))
 
 
 def forget() -> None:
@@ -198,6 +204,8 @@ def tick() -> float | None:
         _in_window(_show_progress)
     elif job.problem:
         _end(job, job.problem, is_problem=True)
+    elif job.came_to_nothing:
+        _end(job, _stopped(job))
     elif not sync.is_dragging():  # a person's drag is a step of its own
         _keep(job)
     return TICK_S if _running else None
@@ -214,6 +222,10 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str) -> N
     for other, words in _ended:
         if other == step:
             paragraph(context, layout, words, "ERROR")
+
+
+def _stopped(job: Job) -> str:
+    return f"{job.label} was stopped. Nothing has changed."
 
 
 def _busy() -> str:

@@ -8,14 +8,9 @@ from bpy_extras.io_utils import ImportHelper
 
 from ....core.analysis.predicted_flights import score_landings
 from ....core.exchange.parameters import read_parameters
-from ....core.impact_models.registry import COMPARED, MODELS
+from ....core.impact_models.registry import MODELS
 from ...scene import models, reconstruction, store
 from ...view.reporting import reported
-
-CHOICES = [
-    (name, MODELS[name].title, f"{MODELS[name].title} ({name}): {MODELS[name].reference}", 1 << i)
-    for i, name in enumerate((*COMPARED, *(name for name in MODELS if name not in COMPARED)))
-]
 
 
 class ROCKFALL_OT_show_models(bpy.types.Operator):
@@ -26,7 +21,7 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     models: EnumProperty(
-        name="Models", description="Whose blocks to show", items=CHOICES, options={"ENUM_FLAG"}, default={"noel_2017"}
+        name="Models", description="Whose blocks to show", items=models.CHOICES, options={"ENUM_FLAG"}, default={"noel_2017"}
     )
 
     @classmethod
@@ -45,7 +40,7 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
         if not self.models:
             models.remove_models(scene)
             return {"FINISHED"}
-        chosen = [name for name, *_ in CHOICES if name in self.models]
+        chosen = [name for name in models.ORDER if name in self.models]
         marks = score_landings(models.show_models(scene, reconstruction.reconstruct_scene(scene), chosen))
         said = [
             f"{MODELS[mark.model].title}: {mark.median_offset_m:.1f} m"

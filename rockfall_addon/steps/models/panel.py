@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....core.impact_models.registry import COMPARED, MODELS
+from ....core.impact_models.registry import MODELS
 from ...scene import models, store
 from ...view.panel import RockfallPanel, State, paragraph
 
@@ -28,7 +28,7 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
         layout, shown = self.layout, models.shown_models(context.scene)
         paragraph(context, layout, QUESTION, "QUESTION")
         column = layout.column(align=True)
-        for name in (*COMPARED, *(other for other in MODELS if other not in COMPARED)):
+        for name in models.ORDER:
             on = name in shown
             button = column.operator(
                 "rockfall.show_models",

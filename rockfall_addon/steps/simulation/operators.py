@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simulate in the background, and take away what is shown."""
+
+import bpy
+
+from ....core.impact_models.registry import MODELS
+from ....core.progress import Progress
+from ...scene import simulated_sources, simulation, simulation_setup, store
+from ...view import job
+from ...view.job import InBackground, Work
+from ...view.reporting import possible, reported
+
+
+class ROCKFALL_OT_simulate(InBackground, bpy.types.Operator):
+    """Let the blocks fall, in the background; the same seed gives the same blocks"""
+
+    bl_idname = "rockfall.simulate"
+    bl_label = "Simulate"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        lacking = simulation_setup.missing(context.scene)
+        return possible(cls, not lacking, lacking) and job.is_free(cls)
+
+    def prepare(self, context: bpy.types.Context) -> Work:
+        scene = context.scene
+        if scene.rockfall_simulation.source == "PICK":
+            scene.rockfall_simulation.pick = simulated_sources.selected_pick(scene)[store.ID]
+        plan = simulation_setup.plan(scene)
+
+        def compute(progress: Progress) -> object:
+            return simulation_setup.run(plan, progress)
+
+        def keep(scene: bpy.types.Scene, found: object) -> str:
+            prepared, remarks = found
+            simulation.show_prepared(scene, prepared, plan.origins)
+            simulation_setup.keep(scene, plan.said, remarks)
+            return remarks[0].text
+
+        return Work("simulation", compute, keep, keeps_part=True)
+
+
+class ROCKFALL_OT_remove_simulation(bpy.types.Operator):
+    """Show no simulated blocks and paths"""
+
+    bl_idname = "rockfall.remove_simulation"
+    bl_label = "Remove Simulation"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return possible(cls, simulation.blocks_of(context.scene), "Nothing simulated is shown")
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        simulation_setup.forget(context.scene)
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_choose_simulated_model(bpy.types.Operator):
+    """Simulate with this model, or leave it out"""
+
+    bl_idname = "rockfall.choose_simulated_model"
+    bl_label = "Choose Model"
+    bl_options = {"INTERNAL", "UNDO"}
+
+    model: bpy.props.StringProperty()
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        model = MODELS[properties.model]
+        return f"{model.title} ({model.name}): {model.reference}"
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = context.scene.rockfall_simulation
+        settings.models = set(settings.models) ^ {self.model}
+        return {"FINISHED"}
+
+
+CLASSES = (ROCKFALL_OT_simulate, ROCKFALL_OT_remove_simulation, ROCKFALL_OT_choose_simulated_model)

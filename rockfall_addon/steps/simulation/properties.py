@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is to be simulated, and how it is shown."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
+
+from ....core.constants import ROCK_DENSITY_KGPM3
+from ....core.simulation.block_shapes import SHAPES
+from ....core.simulation.engine import FRICTION
+from ...scene import drawn_releases, models, simulation, store
+
+
+def _look_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    simulation.look(self.id_data)
+
+
+def _can_be_source(self: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
+    return obj.type in drawn_releases.TYPES and obj.get(store.ROLE, store.RELEASE_ROLE) == store.RELEASE_ROLE
+
+
+class SimulationSettings(bpy.types.PropertyGroup):
+    """Where which blocks start, which models carry them, and what is shown of them."""
+
+    source: EnumProperty(
+        name="Release from", description="Where the blocks start",
+        items=[
+            ("MEASURED", "Measured releases", "The first moment of each reconstructed trajectory, as it was measured"),
+            ("PICK", "Selected pick", "The selected release or impact, with its measured velocity"),
+            ("DRAWN", "Drawn line or area", "Anywhere on a drawn line, in a drawn area, or at drawn points"),
+            ("STEEP", "Steep terrain", "All faces steeper than an angle, equally on each square metre of rock"),
+        ],
+        default="MEASURED",
+    )  # fmt: skip
+    drawn: PointerProperty(
+        name="Drawing", type=bpy.types.Object, poll=_can_be_source,
+        description="A line, an area (a closed line) or points on the terrain: drawn with the buttons below, "
+        "or any mesh, curve or Grease Pencil object of yours",
+    )  # fmt: skip
+    pick: StringProperty(name="Pick", description="Id of the pick that blocks were last released from")
+    steeper_than_deg: FloatProperty(
+        name="Steeper than", description="Blocks start on faces that are steeper than this [°]",
+        default=60.0, min=0.0, max=179.0, precision=1,
+    )  # fmt: skip
+    number: IntProperty(
+        name="Number", description="Blocks of each model: from each measured release or drawn point, or altogether",
+        default=20, min=1, soft_max=10_000, max=10_000_000,
+    )  # fmt: skip
+    seed: IntProperty(name="Seed", description="Of the random numbers: the same seed gives the same blocks", min=0)
+    diameter_m: FloatProperty(
+        name="Diameter", description="Mean diameter of the blocks; measured releases have that of their trajectory",
+        default=0.5, min=0.01, soft_max=10.0, unit="LENGTH", precision=2,
+    )  # fmt: skip
+    diameter_law: EnumProperty(
+        name="Sizes", description="How the diameters of the blocks are drawn",
+        items=[
+            ("fixed", "All alike", "All blocks have one diameter"),
+            ("uniform", "Between two", "Any diameter from the first to the second"),
+            ("normal", "Normal", "Normal law: mean and standard deviation"),
+            ("lognormal", "Lognormal", "Lognormal law: mean and standard deviation of the diameters themselves"),
+        ],
+        default="fixed",
+    )  # fmt: skip
+    diameter_second_m: FloatProperty(
+        name="Second diameter", description="The largest diameter, or the standard deviation",
+        default=1.0, min=0.0, soft_max=10.0, unit="LENGTH", precision=2,
+    )  # fmt: skip
+    proportions: FloatVectorProperty(
+        name="Proportions", description="d1 : d2 : d3 of a box or an ellipsoid",
+        size=3, default=(1.0, 1.0, 1.0), min=0.01, precision=2,
+    )  # fmt: skip
+    density_kgpm3: FloatProperty(
+        name="Density", description="Of the rock [kg/m³]",
+        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0,
+    )  # fmt: skip
+    shape: EnumProperty(
+        name="Shape", description="Decides mass and inertia; the ground is met by the sphere of the mean diameter",
+        items=[(name, name.capitalize(), "") for name in SHAPES], default="sphere",
+    )  # fmt: skip
+    models: EnumProperty(
+        name="Models", description="Impact models that carry the same blocks down",
+        items=models.CHOICES, options={"ENUM_FLAG"}, default={"noel_2017"},
+    )  # fmt: skip
+    rolling: EnumProperty(
+        name="On the ground", description="How a block moves that no longer bounces",
+        items=[
+            ("azzoni_1995", "Rolls", "Rolling after Azzoni et al. 1995"),
+            ("coulomb", "Slides", "Coulomb's sliding"),
+            ("none", "Stops", "It stops where it would begin to roll"),
+        ],
+        default="azzoni_1995",
+    )  # fmt: skip
+    friction: FloatProperty(
+        name="Friction", description="Coefficient μ of rolling or sliding on the ground: the tangent of the angle at "
+        "which a block no longer slows down", default=FRICTION, min=0.0, max=5.0, precision=2,
+    )  # fmt: skip
+    use_drag: BoolProperty(name="Air drag", description="Flights with the drag of air (½ρ C_D A v²)", default=False)
+
+    colour_by: EnumProperty(
+        name="Colour by", description="What the colours of the simulated paths mean",
+        items=[
+            ("SPEED", "Speed", "Speed of the block"),
+            ("ENERGY", "Energy", "Kinetic energy of the block's translation"),
+            ("MODEL", "Model", "The colour of the impact model"),
+        ],
+        default="MODEL", update=_look_changed,
+    )  # fmt: skip
+    show_paths: BoolProperty(
+        name="Paths", description="Draw the paths of the simulated blocks", default=True, update=_look_changed
+    )
+    show_blocks: BoolProperty(
+        name="Blocks", description="Show the simulated blocks at the scene's time", default=True, update=_look_changed
+    )
+    run_model: StringProperty(name="Model", description="Of the selected run")
+    run: IntProperty(
+        name="Run", description="The selected run: its path is drawn bold, its numbers stand below; 0 selects none",
+        default=0, min=0,
+    )  # fmt: skip
+
+
+CLASSES = (SimulationSettings,)
+
+
+def register() -> None:
+    bpy.types.Scene.rockfall_simulation = PointerProperty(type=SimulationSettings)
+
+
+def unregister() -> None:
+    del bpy.types.Scene.rockfall_simulation

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Legends over a 3-D view: a scale of colours, or swatches with names."""
+
+from collections.abc import Sequence
+
+import blf
+import bpy
+import gpu
+from gpu_extras.batch import batch_for_shader
+
+from ...core.colours import SPEED_SCALE
+
+WIDTH, HEIGHT, MARGIN, TEXT = 220, 12, 28, 12  # in pixels at interface scale 1
+
+Colour = tuple[float, float, float]
+
+
+def begin(scale: float) -> None:
+    """Set the font; `end` sets it back."""
+    blf.size(0, TEXT * scale)
+    blf.color(0, 0.95, 0.95, 0.95, 1.0)
+    blf.enable(0, blf.SHADOW)
+    blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.8)
+
+
+def end() -> None:
+    """What comes after has no shadow."""
+    blf.disable(0, blf.SHADOW)
+
+
+def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], title: str) -> None:
+    """A square and a name for each row, from the lower margin up, and a title above."""
+    size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    for i, (name, colour) in enumerate(reversed(rows)):
+        low = bottom + i * step
+        corners = [(left, low), (left + size, low), (left, low + size), (left + size, low + size)]
+        shader.uniform_float("color", (*colour, 1.0))
+        batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
+        text(left + 1.6 * size, low + 0.1 * size, name)
+    text(left, bottom + (len(rows) + 0.2) * step, title)
+
+
+def bar(left: float, scale: float, top: float, title: str) -> None:
+    """The scale of colours from 0 to `top`, and a title above."""
+    bottom, width, height = (MARGIN + TEXT) * scale, WIDTH * scale, HEIGHT * scale
+    steps = len(SPEED_SCALE)
+    places, colours = [], []
+    for i, colour in enumerate(SPEED_SCALE):
+        x = left + width * i / (steps - 1)
+        places += [(x, bottom), (x, bottom + height)]
+        colours += [(*colour, 1.0)] * 2
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    batch_for_shader(shader, "TRI_STRIP", {"pos": places, "color": colours}).draw(shader)
+    for part in (0.0, 0.5, 1.0):
+        words = f"{top * part:g}"
+        text(left + width * part - blf.dimensions(0, words)[0] / 2, bottom - (TEXT + 4) * scale, words)
+    text(left, bottom + height + 6 * scale, title)
+
+
+def text(x: float, y: float, words: str) -> None:
+    """Words at a place of the region."""
+    blf.position(0, x, y, 0)
+    blf.draw(0, words)
+
+
+def covered_left(area: bpy.types.Area) -> float:
+    """Width of the toolbar, which lies over the view."""
+    return next((float(r.width) for r in area.regions if r.type == "TOOLS"), 0.0)
+
+
+def covered_right(area: bpy.types.Area) -> float:
+    """Width of the sidebar, which lies over the view."""
+    return next((float(r.width) for r in area.regions if r.type == "UI" and r.width > 1), 0.0)

@@ -38,9 +38,15 @@ STEPS = (
         "rockfall.refine", "rockfall.apply_refinement", "rockfall.discard_refinement",
     )),
     ("models", "6  Models", ("rockfall.show_models", "rockfall.load_parameters", "rockfall.remove_models")),
-    ("playback", "7  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),
-    ("film", "8  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
-    ("share", "9  Share", ("rockfall.export_tables", "rockfall.export_project")),
+    ("simulation", "7  Simulation", (
+        ("rockfall.draw_release", "Draw Release Line", {"kind": "line"}),
+        ("rockfall.draw_release", "Draw Release Area", {"kind": "polygon"}),
+        ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}), None,
+        "rockfall.simulate", "rockfall.stop_job", "rockfall.select_run", "rockfall.remove_simulation",
+    )),
+    ("playback", "8  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),
+    ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
+    ("share", "10  Share", ("rockfall.export_tables", "rockfall.export_project")),
 )  # fmt: skip
 """Name, title and entries of each menu: an operator, or an operator with its text and properties; None is a line."""
 

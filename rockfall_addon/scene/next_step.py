@@ -29,8 +29,11 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         own = ("rockfall.import_terrain", "rockfall.open_project")
         return NextStep("Import your scan, or begin with a demo.", (*demos, *own))
     if camera is None and not picks:
-        sentence = "Add the videos of the fall, or import a table of timed picks."
-        return NextStep(sentence, ("rockfall.add_video", "rockfall.import_picks"))
+        if store.with_role(scene, store.SIMULATED_BLOCKS_ROLE):
+            sentence = "Play the simulated fall; step 7 has the numbers of each run."
+            return NextStep(sentence, ("screen.animation_play", "rockfall.select_run"))
+        sentence = "Add the videos of the fall, or import a table of timed picks. Without either, simulate in step 7."
+        return NextStep(sentence, ("rockfall.add_video", "rockfall.import_picks", "rockfall.draw_release"))
     if camera is not None and not camera_paths.is_solved(camera):
         hint = alignment.hint(scene, camera)
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
@@ -52,5 +55,5 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if camera is not None and not refined and not proposal.lacking(scene):
         sentence = "Look at each pick and correct it. Refine fits them all to the tracked pixels."
         return NextStep(sentence, (PICK_TOOL, "rockfall.refine"))
-    sentence = "Play the fall; then models, film and tables: steps 6 to 9."
+    sentence = "Play the fall; then models, simulation, film and tables: steps 6 to 10."
     return NextStep(sentence, ("screen.animation_play", "rockfall.export_tables"))

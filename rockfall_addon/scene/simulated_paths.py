@@ -4,6 +4,7 @@
 In the 3-D view they are drawn as lines (steps/simulation/overlay); a render shows the curves themselves.
 """
 
+import json
 from dataclasses import dataclass
 
 import bpy
@@ -15,6 +16,7 @@ from ...core.simulation.engine import Simulation
 from ...core.simulation.parabolas import Parabolas, polylines_of
 from ...core.simulation.results import run_figures
 from ...core.vectors import Array
+from ...core.workflow.simulation import END_WORDS
 from . import materials, store
 
 LINE_TOLERANCE_M = 0.05
@@ -59,6 +61,7 @@ class Paths:
     sizes : (n,) how many of the m points each has, at least one.
     position, time_s, speed_mps : (m, 3) local [m], (m,) since the release, (m,).
     figures : name → (n,), see `FIGURES`.
+    ends : the ways to end, by their number.
     """
 
     sizes: Array
@@ -66,6 +69,7 @@ class Paths:
     time_s: Array
     speed_mps: Array
     figures: dict[str, Array]
+    ends: tuple[str, ...]
 
 
 def prepare(simulation: Simulation, parabolas: Parabolas, release: Array) -> Paths:
@@ -80,7 +84,7 @@ def prepare(simulation: Simulation, parabolas: Parabolas, release: Array) -> Pat
     position, time, speed = np.zeros((alone.size, 3)), np.zeros(alone.size), np.zeros(alone.size)
     position[~alone], time[~alone], speed[~alone] = lines.position[drawn], lines.time_s[drawn], lines.speed_mps[drawn]
     position[alone] = simulation.position[found == 0]
-    return Paths(sizes, position, time, speed, _figures(simulation, release))
+    return Paths(sizes, position, time, speed, _figures(simulation, release), simulation.ends)
 
 
 def make(model: str, paths: Paths) -> bpy.types.Object:
@@ -95,7 +99,7 @@ def make(model: str, paths: Paths) -> bpy.types.Object:
     curves.attributes.new(COLOUR, "FLOAT_COLOR", "POINT")
     curves.materials.append(materials.emission_material("Rockfall simulated path", COLOUR))
     obj = bpy.data.objects.new(curves.name, curves)
-    obj[store.ROLE] = store.SIMULATED_PATHS_ROLE
+    obj[store.ROLE], obj[store.ENDS] = store.SIMULATED_PATHS_ROLE, json.dumps(paths.ends)
     obj.hide_select = obj.hide_viewport = True
     return obj
 
@@ -114,6 +118,18 @@ def lines_of(obj: bpy.types.Object) -> Lines:
 def figure(obj: bpy.types.Object, name: str) -> Array:
     """(n,) one of `FIGURES` of an object's runs."""
     return _read(obj.data, name, len(obj.data.curves))
+
+
+def line_of(obj: bpy.types.Object, run: int) -> Array:
+    """(k, 3) the points of one run, local [m]."""
+    curve = obj.data.curves[run]
+    start, count = curve.first_point_index, curve.points_length
+    return np.array([obj.data.points[i].position[:] for i in range(start, start + count)])
+
+
+def ends_of(obj: bpy.types.Object) -> list[str]:
+    """How runs end, in words, by their number."""
+    return [END_WORDS.get(name, name.replace("structure:", "held by ")) for name in json.loads(obj[store.ENDS])]
 
 
 def colours_of(lines: Lines, colour_by: str, speed_top_mps: float, energy_top_kj: float) -> Array:

@@ -162,6 +162,52 @@ def paths_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return store.with_role(scene, store.SIMULATED_PATHS_ROLE)
 
 
+def model_of(obj: bpy.types.Object) -> str:
+    """The model of simulated blocks or paths."""
+    return str(obj[store.MODEL])
+
+
+def selected_paths(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The paths among which the selected run is."""
+    settings = scene.rockfall_simulation
+    found = next((obj for obj in paths_of(scene) if model_of(obj) == settings.run_model), None)
+    return found if found is not None and 1 <= settings.run <= len(found.data.curves) else None
+
+
+def selected_line(scene: bpy.types.Scene) -> Array | None:
+    """(k, 3) the path of the selected run, local [m]; None where none is selected or it is not drawn."""
+    obj = selected_paths(scene)
+    points = None if obj is None else simulated_paths.line_of(obj, scene.rockfall_simulation.run - 1)
+    return points if points is not None and len(points) > 1 else None
+
+
+def selected_run(scene: bpy.types.Scene) -> list[tuple[str, str]] | None:
+    """Names and values of the selected run, for people; None where none is selected."""
+    obj = selected_paths(scene)
+    if obj is None:
+        return None
+    run = scene.rockfall_simulation.run - 1
+    value = {name: float(simulated_paths.figure(obj, name)[run]) for name in simulated_paths.FIGURES}
+    release = json.loads(obj[store.RELEASES])[int(value["release"])][0]
+    rows = [
+        ("Model", find_model(model_of(obj)).title),
+        ("Run", f"{run + 1} of {len(obj.data.curves)}"),
+        ("Release", release),
+        ("End", simulated_paths.ends_of(obj)[int(value["end"])]),
+        ("Run-out in plan", f"{value['away_m']:.1f} m"),
+        ("Drop", f"{value['drop_m']:.1f} m"),
+        ("Length, duration", f"{value['length_m']:.1f} m, {value['time_s']:.1f} s"),
+        ("Impacts", f"{value['impacts']:.0f}"),
+        ("Greatest speed", f"{value['v_max_mps']:.1f} m/s"),
+        ("Greatest energy", f"{value['kinetic_max_kj']:.3g} kJ"),
+        ("Greatest height", f"{value['height_max_m']:.1f} m" if np.isfinite(value["height_max_m"]) else "no flight"),
+        ("Block", f"{value['diameter_m']:.2f} m, {value['mass_kg']:.0f} kg"),
+    ]
+    return rows if value["drop_m"] <= 0 or value["away_m"] == 0 else [
+        *rows[:6], ("Energy line", f"{np.degrees(np.arctan2(value['drop_m'], value['away_m'])):.1f}°"), *rows[6:]
+    ]
+
+
 def path_radius(scene: bpy.types.Scene) -> float:
     """Half the thickness of the paths in a render [m]."""
     return 0.5 * scene.rockfall.trail_radius_m

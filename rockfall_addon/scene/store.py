@@ -45,6 +45,7 @@ SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
 
 # of simulated blocks and paths
+ENDS = "rockfall_ends"  # of paths: the ways to end, as text
 RELEASES = "rockfall_releases"  # name, trajectory and clock time of each, as text
 
 # of a pick; blocks and flights have the trajectory, too

@@ -7,7 +7,7 @@ from types import ModuleType
 import bpy
 
 from .. import view
-from ..scene import settings
+from ..scene import model_parameters, settings
 from ..view.reporting import leave_newer_alone
 
 STEPS = (
@@ -19,6 +19,7 @@ STEPS = (
     "impacts",
     "refinement",
     "models",
+    "simulation",
     "playback",
     "film",
     "share",
@@ -31,10 +32,10 @@ _registered_tools: list[type] = []
 
 def parts() -> list[ModuleType]:
     """All modules that register something: first the properties, which the rest reads; then step by step."""
-    found = [settings, *view.PARTS]
+    found = [settings, model_parameters, *view.PARTS]
     for name in STEPS:
         found += import_module(f".{name}", __name__).PARTS
-    return sorted(found, key=lambda part: not part.__name__.endswith((".settings", ".properties")))
+    return sorted(found, key=lambda part: not part.__name__.endswith((".settings", ".model_parameters", ".properties")))
 
 
 def classes() -> list[type]:

@@ -47,6 +47,25 @@ def pixel_at(context: bpy.types.Context, xy: Sequence[float]) -> Array | None:
     return pixel if (pixel >= 0).all() and (pixel <= size).all() else None
 
 
+def view_under(
+    context: bpy.types.Context, x: int, y: int
+) -> tuple[bpy.types.Area, bpy.types.Region, tuple[int, int]] | None:
+    """The 3-D view under a place of the window, and the place in its region; None over panels and other editors."""
+    for area in context.window.screen.areas:
+        if area.type != "VIEW_3D" or not _inside(area, x, y):
+            continue
+        for region in area.regions:
+            if region.type != "WINDOW" and region.width > 1 and region.height > 1 and _inside(region, x, y):
+                return None
+        region = next(region for region in area.regions if region.type == "WINDOW")
+        return area, region, (x - region.x, y - region.y)
+    return None
+
+
+def _inside(part: bpy.types.Area | bpy.types.Region, x: int, y: int) -> bool:
+    return part.x <= x < part.x + part.width and part.y <= y < part.y + part.height
+
+
 def place_at(context: bpy.types.Context, xy: Sequence[float], name: str) -> Place:
     """Where a place of the region lies on the terrain, for the block of a trajectory.
 

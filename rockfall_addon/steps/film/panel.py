@@ -9,7 +9,7 @@ from . import remembered
 
 
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
-    bl_label = "8  Film"
+    bl_label = "9  Film"
     bl_idname = "ROCKFALL_PT_film"
     bl_options = {"DEFAULT_CLOSED"}
     needs = store.FLIGHTS_ROLE

@@ -8,7 +8,7 @@ from ...view.panel import RockfallPanel, State
 
 
 class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
-    bl_label = "7  Playback"
+    bl_label = "8  Playback"
     bl_idname = "ROCKFALL_PT_playback"
     bl_options = {"DEFAULT_CLOSED"}
     needs = store.FLIGHTS_ROLE

@@ -8,7 +8,7 @@ from ...view.panel import RockfallPanel, State, advise
 
 
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
-    bl_label = "9  Share"
+    bl_label = "10  Share"
     bl_idname = "ROCKFALL_PT_share"
     needs = store.PICK_ROLE
 

@@ -70,7 +70,7 @@ class ROCKFALL_OT_draw_release(bpy.types.Operator):
         if event.type == "BACK_SPACE" and event.value == "PRESS":
             del self.points[-1:]
         elif event.type in ("LEFTMOUSE", "MOUSEMOVE"):
-            view = _view_under(context, event)
+            view = pointing.view_under(context, event.mouse_x, event.mouse_y)
             if view is None:
                 self.mouse = None
                 return {"PASS_THROUGH"}
@@ -133,26 +133,6 @@ class ROCKFALL_OT_draw_release(bpy.types.Operator):
 def _largest_view(context: bpy.types.Context) -> bpy.types.Area | None:
     areas = [area for area in context.window.screen.areas if area.type == "VIEW_3D"] if context.window else []
     return max(areas, key=lambda area: area.width * area.height, default=None)
-
-
-def _view_under(
-    context: bpy.types.Context, event: bpy.types.Event
-) -> tuple[bpy.types.Area, bpy.types.Region, tuple[int, int]] | None:
-    """The 3-D view under the mouse and the place in its region; None over panels and other editors."""
-    x, y = event.mouse_x, event.mouse_y
-    for area in context.window.screen.areas:
-        if area.type != "VIEW_3D" or not _inside(area, x, y):
-            continue
-        for region in area.regions:
-            if region.type != "WINDOW" and region.width > 1 and region.height > 1 and _inside(region, x, y):
-                return None
-        region = next(region for region in area.regions if region.type == "WINDOW")
-        return area, region, (x - region.x, y - region.y)
-    return None
-
-
-def _inside(part: bpy.types.Area | bpy.types.Region, x: int, y: int) -> bool:
-    return part.x <= x < part.x + part.width and part.y <= y < part.y + part.height
 
 
 CLASSES = (ROCKFALL_OT_draw_release,)

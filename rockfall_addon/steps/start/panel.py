@@ -20,6 +20,8 @@ LOOKS = {
     "rockfall.discard_refinement": ("Discard", "X"),
     "rockfall.refine": ("", "SHADERFX"),
     "rockfall.export_tables": ("", "EXPORT"),
+    "rockfall.draw_release": ("Draw a Release Line", "IPO_LINEAR"),
+    "rockfall.select_run": ("", "EYEDROPPER"),
     "screen.animation_play": ("Play or Pause", "PLAY"),
     PICK_TOOL: ("Pick Impacts", "CURSOR"),
 }

@@ -13,7 +13,7 @@ from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.terrain.surface import Surface
-from . import fingerprints, migration, models, problems, store, terrain, trajectories
+from . import fingerprints, migration, models, problems, simulation, store, terrain, trajectories
 from . import picks as pick_objects
 
 
@@ -64,6 +64,7 @@ def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
     fingerprints.remember_all(scene)
     problems.keep_trajectories(scene, problems.of_result(scene, result))
     problems.update(scene)
+    simulation.follow(scene)
     models.follow(scene, result)
 
 

@@ -30,7 +30,7 @@ def missing(scene: bpy.types.Scene) -> str:
     """What the chosen source still needs, in a sentence; empty when all is there."""
     settings = scene.rockfall_simulation
     if settings.source in FILMED and not store.with_role(scene, store.PICK_ROLE):
-        return "There are no measured trajectories. Draw a line or an area to release blocks from, or pick impacts first."
+        return "Nothing is measured yet. Release blocks from a drawn line or area, from steep terrain, or pick first."
     if settings.source == "PICK" and selected_pick(scene) is None:
         return "Select a release or an impact in the view: blocks will start there."
     if settings.source == "DRAWN" and drawn(scene) is None:
@@ -131,11 +131,7 @@ def selected_pick(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def _can_start(obj: bpy.types.Object | None) -> bool:
-    return (
-        obj is not None
-        and obj.get(store.ROLE) == store.PICK_ROLE
-        and obj.get(store.KIND) in ("release", "impact")
-    )
+    return obj is not None and obj.get(store.ROLE) == store.PICK_ROLE and obj.get(store.KIND) in ("release", "impact")
 
 
 def _from_pick(scene: bpy.types.Scene, surface: Surface) -> tuple[ReleaseSource, Mapping[str, Origin]]:

@@ -105,6 +105,10 @@ def show_prepared(
 ) -> list[bpy.types.Object]:
     """`show` what was prepared before."""
     remove(scene)
+    if store.KEYED_RATE not in scene:  # nothing is measured: time begins at frame 0
+        scene[store.KEYED_RATE] = timing.frame_rate(scene)
+        scene.frame_start = 0
+        scene.frame_set(0)
     shown = []
     for each in prepared:
         place = store.collection(scene, COLLECTION, find_model(each.model).title)
@@ -144,6 +148,8 @@ def follow(scene: bpy.types.Scene) -> None:
         _write(mesh, simulated_nodes.BEGIN, "FLOAT", begin)
         _write(mesh, simulated_nodes.END, "FLOAT", begin + _read(mesh, LASTS))
         mesh.update()
+    if blocks_of(scene):
+        scene.frame_end = max(scene.frame_end, int(np.ceil((last_moment(scene) + 1.0) * timing.frame_rate(scene))))
 
 
 def look(scene: bpy.types.Scene) -> None:
@@ -203,9 +209,11 @@ def selected_run(scene: bpy.types.Scene) -> list[tuple[str, str]] | None:
         ("Greatest height", f"{value['height_max_m']:.1f} m" if np.isfinite(value["height_max_m"]) else "no flight"),
         ("Block", f"{value['diameter_m']:.2f} m, {value['mass_kg']:.0f} kg"),
     ]
-    return rows if value["drop_m"] <= 0 or value["away_m"] == 0 else [
-        *rows[:6], ("Energy line", f"{np.degrees(np.arctan2(value['drop_m'], value['away_m'])):.1f}°"), *rows[6:]
-    ]
+    return (
+        rows
+        if value["drop_m"] <= 0 or value["away_m"] == 0
+        else [*rows[:6], ("Energy line", f"{np.degrees(np.arctan2(value['drop_m'], value['away_m'])):.1f}°"), *rows[6:]]
+    )
 
 
 def path_radius(scene: bpy.types.Scene) -> float:

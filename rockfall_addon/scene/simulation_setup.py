@@ -20,17 +20,13 @@ from ...core.simulation.engine import Rolling
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import Scenario, ground_of, remarks_of, run_models
 from . import (
-    drawn_releases,
     fingerprints,
-    georeference,
     models,
-    picks,
     reconstruction,
     simulated_sources,
     simulation,
     store,
     terrain,
-    timing,
 )
 from .simulation import Origin, Prepared
 

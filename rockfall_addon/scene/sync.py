@@ -26,6 +26,7 @@ from . import (
     picks,
     problems,
     reconstruction,
+    simulation,
     store,
     terrain_mesh,
     terrain_view,
@@ -189,6 +190,7 @@ def recompute(scene: bpy.types.Scene) -> None:
         reconstruction.refresh(scene)
     except RockfallError:
         sync(scene, again=True)
+    simulation.follow(scene)
 
 
 def retime(obj: bpy.types.Object, text: str) -> None:
@@ -361,6 +363,7 @@ def _finish(scene: bpy.types.Scene) -> None:
         scene.frame_end = int(np.ceil(last + timing.frame_rate(scene)))
     if trails.set_tops(scene):
         trails.paint_observed(scene)
+    simulation.follow(scene)
     if models.shown_models(scene):
         try:
             models.follow(scene, reconstruction.reconstruct_scene(scene))

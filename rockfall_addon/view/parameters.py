@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parameters of an impact model in a panel: each with its unit, its range and source in the tooltip, and a reset."""
+"""The parameters of an impact model in a panel: each with its unit, range and source in the tooltip, and a reset."""
 
 import bpy
 from bpy.props import StringProperty

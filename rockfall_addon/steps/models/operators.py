@@ -21,7 +21,11 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     models: EnumProperty(
-        name="Models", description="Whose blocks to show", items=models.CHOICES, options={"ENUM_FLAG"}, default={"noel_2017"}
+        name="Models",
+        description="Whose blocks to show",
+        items=models.CHOICES,
+        options={"ENUM_FLAG"},
+        default={"noel_2017"},
     )
 
     @classmethod

@@ -124,10 +124,8 @@ def _draw_legend() -> None:
     speed_top, energy_top = simulation.scale_tops(scene)
     legend.begin(scale)
     if settings.colour_by == "MODEL" or not settings.show_paths:
-        rows = [
-            (f"{MODELS[simulation.model_of(obj)].title}: {len(obj.data.curves)}", MODELS[simulation.model_of(obj)].colour)
-            for obj in objects
-        ]
+        models = [(MODELS[simulation.model_of(obj)], len(obj.data.curves)) for obj in objects]
+        rows = [(f"{model.title}: {count}", model.colour) for model, count in models]
         if store.with_role(scene, store.BLOCK_ROLE):
             rows.insert(0, ("real blocks", OBSERVED_COLOUR))
         legend.swatches(left, scale, rows, "Simulated blocks")

@@ -2,7 +2,15 @@
 """What is to be simulated, and how it is shown."""
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
 
 from ....core.constants import ROCK_DENSITY_KGPM3
 from ....core.simulation.block_shapes import SHAPES

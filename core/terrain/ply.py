@@ -46,7 +46,7 @@ def read_ply(path: Path) -> Source:
     InputError : not a PLY file, a header that makes no sense, a truncated file, a face without a vertex.
     """
     data = np.memmap(path, dtype=np.uint8, mode="r") if path.stat().st_size else np.empty(0, np.uint8)
-    order, elements, start, header_rows, crs = _header(data, path)
+    order, elements, start, header_rows, crs = read_header(data, path)
     if order:
         contents = _read_binary(data, start, elements, order, path)
     else:
@@ -57,7 +57,7 @@ def read_ply(path: Path) -> Source:
     return Source(points, check_face_indices(faces, len(points), path), crs=crs)
 
 
-def _header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], int, int, str]:
+def read_header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], int, int, str]:
     """Byte order ("" when ascii), elements, offset of the data, rows of the header, coordinate reference system."""
     if not data.size:
         raise InputError("The file is empty", file=path, advice="Export it again")
@@ -109,14 +109,14 @@ def _read_binary(
 ) -> tuple[NDArray[np.float64], NDArray[Any] | None]:
     points, faces = np.empty((0, 3)), None
     for element in elements:
-        dtype = _row_type(data, offset, element, order)
+        dtype = row_type(data, offset, element, order)
         end = offset + element.rows * dtype.itemsize
         uniform = end <= data.size
         rows = data[offset:end].view(dtype) if uniform else np.empty(0, dtype)
-        uniform = uniform and all((rows[name] == rows[name][0]).all() for name in _counts(dtype) if len(rows))
+        uniform = uniform and all((rows[name] == rows[name][0]).all() for name in list_counts(dtype) if len(rows))
         lists: dict[str, list[list[int]]] = {}
         if not uniform:
-            if not _counts(dtype):
+            if not list_counts(dtype):
                 raise _truncated(element, (data.size - offset) // max(dtype.itemsize, 1), path)
             lists, end = _walk(data, offset, element, order, path)
         if element.name == "vertex":
@@ -132,7 +132,7 @@ def _read_binary(
     return points, faces
 
 
-def _row_type(data: NDArray[np.uint8], offset: int, element: Element, order: str) -> np.dtype:
+def row_type(data: NDArray[np.uint8], offset: int, element: Element, order: str) -> np.dtype:
     """The type of a row if all lists are as long as in the first row, as they nearly always are."""
     fields: list[tuple] = []
     for p in element.properties:
@@ -147,7 +147,7 @@ def _row_type(data: NDArray[np.uint8], offset: int, element: Element, order: str
     return np.dtype(fields)
 
 
-def _counts(dtype: np.dtype) -> list[str]:
+def list_counts(dtype: np.dtype) -> list[str]:
     return [name for name in dtype.names or () if name.startswith("count ")]
 
 

@@ -57,12 +57,14 @@ class Zones:
     of_face : (m,) place in `names` of each of the terrain's faces, of a cloud's points.
     parameters : zone → model → parameters that differ there.
     friction : zone → μ that differs there.
+    remarks : what a user should know of how they cover the terrain.
     """
 
     names: tuple[str, ...]
     of_face: NDArray[np.int32]
     parameters: Mapping[str, Mapping[str, Mapping[str, object]]] = field(default_factory=dict)
     friction: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,11 +3,10 @@
 
 import argparse
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
+from ..constants import GRAVITY_MPS2
 from ..errors import InputError
 from .options import (
     add_observed_option,
@@ -24,6 +23,14 @@ from .options import (
     whole_range,
 )
 from .progress import PrintedProgress, stopped_by_interrupt
+from .release_options import (
+    add_release_options,
+    blocks_as_asked,
+    blocks_said,
+    releases_as_asked,
+    sources_given,
+    zones_as_asked,
+)
 
 if TYPE_CHECKING:
     from ..simulation.release import Releases
@@ -35,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "releases",
         metavar="RELEASES",
-        help="releases.csv: x_m, y_m and, if not on the terrain, z_m; or project.toml with all that is needed",
+        nargs="?",
+        help="releases.csv: x_m, y_m and, if not on the terrain, z_m; or project.toml with all that is needed; else "
+        "one of the sources below",
     )
     add_out(parser)
     parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; a project names its own")
@@ -48,12 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_parameter_options(parser)
     add_observed_option(parser, "needed by that model; a project can give its own")
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
-    parser.add_argument(
-        "--number", type=whole, metavar="N", help="blocks from each release without a number (default 1)"
-    )
-    block = parser.add_argument_group("blocks of releases that do not say")
-    block.add_argument("--diameter", type=positive, metavar="M", help="[m] (default 0.35)")
-    block.add_argument("--density", type=positive, metavar="RHO", help=f"[kg/m³] (default {ROCK_DENSITY_KGPM3:g})")
+    add_release_options(parser)
     motion = parser.add_argument_group("motion")
     motion.add_argument("--drag", action="store_true", help="flights with the drag of air")
     motion.add_argument(
@@ -90,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
-    prepare = _project if arguments.releases.endswith(".toml") else _scenario
+    prepare = _project if (arguments.releases or "").endswith(".toml") else _scenario
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         asked = prepare(arguments, progress)
         scenario = asked.scenario
@@ -128,8 +132,7 @@ class _Asked(NamedTuple):
 
 
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
-    """A table of releases, with what the options say."""
-    from ..exchange.simulation_tables import read_releases
+    """What the options say."""
     from ..impact_models.registry import find_model
     from ..reconstruction.drag import Drag
     from ..workflow.simulation import Scenario
@@ -148,22 +151,20 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
         )
         if getattr(arguments, option) is not None
     }  # fmt: skip
+    source, release_files = releases_as_asked(arguments)
+    terrain = terrain_as_asked(arguments, arguments.terrain, progress)
+    zones, zone_files = zones_as_asked(arguments, terrain, models)
     scenario = Scenario(
-        terrain_as_asked(arguments, arguments.terrain, progress),
-        partial(
-            read_releases,
-            arguments.releases,
-            diameter_m=0.35 if arguments.diameter is None else arguments.diameter,
-            density_kgpm3=ROCK_DENSITY_KGPM3 if arguments.density is None else arguments.density,
-            number=1 if arguments.number is None else arguments.number,
-        ),
+        terrain,
+        source,
         {name: parameters.get(name, {}) for name in models},
         measured,
         structures={name: terrain_as_asked(arguments, file, progress) for name, file in files.items()},
+        zones=zones,
         drag=Drag() if arguments.drag else None,
         **given,
     )
-    inputs = {"releases": Path(arguments.releases), "terrain": Path(arguments.terrain)}
+    inputs = {**release_files, **zone_files, "terrain": Path(arguments.terrain)}
     if measured is not None:
         inputs["observed"] = Path(arguments.observed)
     return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()})
@@ -174,21 +175,27 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
     from ..exchange.project import read_project
     from ..exchange.simulation_entry import SimulationEntry
     from ..exchange.simulation_project import open_simulation
-    from ..simulation.distributions import Distribution
 
-    for option in ("terrain", "structure", "gravity"):
-        if getattr(arguments, option):
-            raise InputError(f"--{option} is what a project says itself", advice="Write it into the project")
+    own = ["--terrain", "--structure", "--gravity", "--zone-attribute", *sources_given(arguments)[1:]]
+    for option in own:
+        if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, []):
+            raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
     file = Path(arguments.releases)
     project = read_project(file)
     entry = project.simulation or SimulationEntry()
-    number, diameter, density = arguments.number, arguments.diameter, arguments.density
-    releases = replace(
-        entry.releases,
-        number=entry.releases.number if number is None else number,
-        diameter=entry.releases.diameter if diameter is None else Distribution("fixed", diameter),
-        density=entry.releases.density if density is None else Distribution("fixed", density),
-    )
+    releases = entry.releases if arguments.number is None else replace(entry.releases, number=arguments.number)
+    if blocks_said(arguments):
+        blocks = blocks_as_asked(arguments)
+        if blocks.measured is not None:
+            raise InputError("A project takes no table of measured sizes", advice="Give a number, a range or a law")
+        said = {
+            name: getattr(blocks, name)
+            for name in ("shape", "diameter", "proportions", "density")
+            if getattr(arguments, name) is not None
+        }
+        if len(set(blocks.proportions)) > 1:
+            said |= {"proportions": blocks.proportions, "shape": blocks.shape}
+        releases = replace(releases, **said)
     entry = replace(
         entry,
         models=tuple(arguments.model or entry.models),
@@ -202,7 +209,9 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
     scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
     known = model_parameters(arguments, list(scenario.models), scenario.models)
     models = {name: known.get(name, {}) for name in scenario.models}
-    return _Asked(replace(scenario, models=models), entry.record, inputs)
+    zones, zone_files = zones_as_asked(arguments, scenario.terrain, list(models))
+    scenario = replace(scenario, models=models, zones=scenario.zones if zones is None else zones)
+    return _Asked(scenario, entry.record, inputs | zone_files)
 
 
 def _asked_runs(releases: "Releases", runs: tuple[int, int] | None) -> tuple["Releases", int]:

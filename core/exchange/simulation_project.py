@@ -114,7 +114,7 @@ def release_source(project: Project, terrain: Surface, entry: SimulationEntry) -
         angle = np.radians(releases.steeper_than_deg)
         return lambda ground: steeper_than(ground, angle, blocks, releases.number, seed)
     if releases.source == TABLE:
-        return lambda ground: _from_table(ground, releases, blocks)
+        return lambda ground: _from_table(ground, releases, blocks, seed)
     return lambda ground: _from_drawing(ground, releases, blocks, seed)
 
 
@@ -146,11 +146,9 @@ def _from_drawing(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int
     return in_polygon(ground, [Polygon(entry.name, (points[:, :2],))], blocks, entry.number, seed)
 
 
-def _from_table(ground: Ground, entry: ReleaseEntry, blocks: Blocks) -> Releases:
+def _from_table(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int) -> Releases:
     assert entry.file is not None
-    return read_releases(
-        entry.file, ground, diameter_m=blocks.diameter.mean, density_kgpm3=blocks.density.mean, number=entry.number
-    )
+    return read_releases(entry.file, ground, blocks, entry.number, seed)
 
 
 def _blocks(entry: ReleaseEntry, block: BlockEntry) -> Blocks:

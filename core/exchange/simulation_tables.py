@@ -14,11 +14,13 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.registry import find_model
 from ..remarks import Remark, to_plain
+from ..simulation.blocks import Blocks, draw_blocks
 from ..simulation.convergence import Convergence, convergence
 from ..simulation.engine import Simulation
 from ..simulation.ground import Ground
 from ..simulation.hits import hits_of
 from ..simulation.release import Releases, make_releases, overlapping, placed_on
+from ..simulation.release_sources import check_number, check_size
 from ..simulation.results import release_names, run_figures
 from ..vectors import Mask, norm
 from .csv_text import read_table
@@ -31,20 +33,17 @@ RELEASES_REQUIRED = ("x_m", "y_m")
 RELEASES_KNOWN = (
     *RELEASES_REQUIRED, "z_m", "release", *VELOCITY, *SPIN, *DIAMETERS, "diameter_m", "density_kgpm3", "number",
 )  # fmt: skip
-MOST_BLOCKS = 10_000_000
-"""More would fill the memory before the first of them has fallen."""
 DEEP = 0.01
 """A release may be in the ground by this part of its radius, as rounded tables put it there."""
 
 
-def read_releases(
-    path: str | Path, ground: Ground, *, diameter_m: float, density_kgpm3: float, number: int = 1
-) -> Releases:
+def read_releases(path: str | Path, ground: Ground, blocks: Blocks, number: int = 1, seed: int = 0) -> Releases:
     """Read releases.csv: places of blocks' centres in survey coordinates.
 
     Parameters
     ----------
-    diameter_m, density_kgpm3, number : where the table does not say.
+    blocks, number : where the table does not say. Three diameters in a row make an ellipsoid where blocks are spheres.
+    seed : of blocks that are drawn, each for itself.
 
     Raises
     ------
@@ -55,56 +54,59 @@ def read_releases(
     A release without z lies on the terrain, touching it.
     """
     table = read_table(path, RELEASES_REQUIRED, RELEASES_KNOWN)
-    n = len(table)
-    if not n:
-        raise InputError("The table has no release", file=path, advice="Add a row for each place")
+    counts = table.numbers("number")
+    counts = np.where(np.isnan(counts), number, counts)
+    sizes = np.column_stack([table.numbers("diameter_m"), table.vectors(DIAMETERS)])
+    density = table.numbers("density_kgpm3")
+    for what, values in (("diameter", sizes), ("density", density[:, None])):
+        for i in np.flatnonzero((values <= 0).any(axis=1))[:1].tolist():
+            raise table.error(i, f"The {what} is {np.nanmin(values[i]):g}", "Give a number above zero")
+    for i in np.flatnonzero(~((counts >= 1) & (counts == np.round(counts))))[:1].tolist():
+        raise table.error(i, f"The number of blocks is {counts[i]:g}", "Give a whole number above zero")
+    try:
+        check_number(int(counts.sum()))
+    except InputError as error:
+        raise InputError(error.problem, file=path, advice=error.advice) from error
+
+    row = np.repeat(np.arange(len(table)), counts.astype(np.intp))
+    drawn, drawn_density = draw_blocks(blocks, row.size, seed)
+    one, three = sizes[row, :1], sizes[row, 1:]
+    given: Mask = np.asarray(np.isfinite(three).all(axis=1))
+    axes = np.where(given[:, None], three, np.where(np.isnan(one), drawn, one * drawn / drawn.mean(axis=1)[:, None]))
+    density = np.where(np.isnan(density[row]), drawn_density, density[row])
+    diameter = axes.mean(axis=1)
+    check_size(ground, diameter)
+
     shift = ground.terrain.shift
     survey = np.column_stack(
         [table.numbers("x_m", required=True), table.numbers("y_m", required=True), table.numbers("z_m")]
     )
-    placed = np.isnan(survey[:, 2])
-    position = shift.to_local(np.where(np.isnan(survey), 0.0, survey))
-    diameter = table.numbers("diameter_m")
-    three = table.vectors(DIAMETERS)
-    mean = three.mean(axis=1)
-    diameter = np.where(np.isnan(diameter), np.where(np.isnan(mean), diameter_m, mean), diameter)
-    density = table.numbers("density_kgpm3")
-    density = np.where(np.isnan(density), density_kgpm3, density)
-    counts = table.numbers("number")
-    counts = np.where(np.isnan(counts), number, counts)
-    for what, values, good in (
-        ("diameter", diameter, diameter > 0), ("density", density, density > 0),
-        ("number of blocks", counts, (counts >= 1) & (counts == np.round(counts))),
-    ):  # fmt: skip
-        for i in np.flatnonzero(~good)[:1].tolist():
-            raise table.error(i, f"The {what} is {values[i]:g}", "Give a number above zero")
-    if counts.sum() > MOST_BLOCKS:
-        raise InputError(
-            f"{counts.sum():.0f} blocks are too many for one run, which takes up to {MOST_BLOCKS}",
-            file=path,
-            advice="Release fewer, or divide them into several runs with seeds of their own",
-        )
+    placed = np.isnan(survey[row, 2])
+    position = shift.to_local(np.where(np.isnan(survey), 0.0, survey))[row]
     if placed.any():
         position[placed] = placed_on(ground, position[placed, :2], diameter[placed])
         for i in np.flatnonzero(np.isnan(position[:, 2]))[:1].tolist():
-            raise table.error(i, "There is no terrain under this release", "Correct it, or give a larger terrain")
+            raise table.error(
+                int(row[i]), "There is no terrain under this release", "Correct it, or give a larger terrain"
+            )
     velocity, spin = table.vectors(VELOCITY), table.vectors(SPIN)
-    given: Mask = np.asarray(np.isfinite(three).all(axis=1))
     releases = make_releases(
         position,
-        name=np.array(table.text("release"), dtype=np.str_),
-        velocity=np.where(np.isnan(velocity), 0.0, velocity),
-        angular_velocity=np.where(np.isnan(spin), 0.0, spin),
-        axes_m=np.where(given[:, None], three, diameter[:, None]),
-        shape=np.where(given, "ellipsoid", "sphere"),
+        name=np.array(table.text("release"), dtype=np.str_)[row],
+        velocity=np.where(np.isnan(velocity), 0.0, velocity)[row],
+        angular_velocity=np.where(np.isnan(spin), 0.0, spin)[row],
+        axes_m=axes,
+        shape=np.where(given & (blocks.shape == "sphere"), "ellipsoid", blocks.shape),
         density_kgpm3=density,
     )
     depth = overlapping(ground, releases)
     for i in np.flatnonzero(depth > DEEP * releases.radius_m)[:1].tolist():
         raise table.error(
-            i, f"This release is {depth[i]:.3g} m deep in the ground", "Raise z_m, or leave it empty to put it there"
+            int(row[i]),
+            f"This release is {depth[i]:.3g} m deep in the ground",
+            "Raise z_m, or leave it empty to put it there",
         )
-    return releases.take(np.repeat(np.arange(n), counts.astype(np.intp)))
+    return releases
 
 
 def write_runs(simulations: Sequence[Simulation], path: str | Path) -> None:
@@ -191,6 +193,7 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
         "parameters": dict(settings.parameters),
         **drawn,
         "zones": {name: dict(values) for name, values in settings.zones.items()},
+        "zone_friction": dict(settings.zone_friction),
         "blocks": n,
         "ends": {name: int(count) for name, count in zip(simulation.ends, ends, strict=True)},
         "impacts": int(simulation.impacts.sum()),

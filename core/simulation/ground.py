@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..remarks import Remark
 from ..terrain.cloud import Cloud, PointIndex, build_point_index, heights_above_points, nearest_points
 from ..terrain.index import TriangleIndex, build_index
 from ..terrain.joining import moved
@@ -38,6 +39,7 @@ class Ground:
     structures, zones : names.
     flat : how many triangles without area were left out.
     spacing_m : of the points, of each cloud among the terrain and the structures by name.
+    remarks : what a user should know of its zones.
     """
 
     terrain: Surface | Cloud
@@ -50,6 +52,7 @@ class Ground:
     zones: tuple[str, ...] = ("terrain",)
     flat: int = 0
     spacing_m: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
 
     @property
     def shift(self) -> GlobalShift:

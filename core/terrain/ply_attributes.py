@@ -29,6 +29,11 @@ class PlyAttribute:
     values: Array
     of_faces: bool
 
+    def in_metres(self, up: str, unit_m: float) -> Array:
+        """(k, 3) the places as `read_terrain` puts them, with its arguments, in survey coordinates."""
+        places = self.places * unit_m
+        return np.stack([places[:, 0], -places[:, 2], places[:, 1]], axis=1) if up == "y" else places
+
 
 def read_ply_attribute(path: str | Path, name: str) -> PlyAttribute:
     """The attribute of a name; of the faces where both have it.

@@ -2,7 +2,7 @@
 """Whole rockfalls: what is stated of them becomes a ground and releases, and the models run one after the other."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +131,8 @@ def ground_of(scenario: Scenario) -> Ground:
     zones = scenario.zones
     if zones is None:
         return make_ground(scenario.terrain, scenario.structures)
-    return make_ground(scenario.terrain, scenario.structures, zones.of_face, zones.names)
+    ground = make_ground(scenario.terrain, scenario.structures, zones.of_face, zones.names)
+    return replace(ground, remarks=zones.remarks)
 
 
 def run_scenario(
@@ -228,6 +229,7 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
     for simulation in simulations:
         remarks += _remarks_of_one(simulation)
     ground = simulations[0].ground
+    remarks += [*ground.remarks, *simulations[0].releases.remarks]
     if ground.flat:
         remarks.append(Remark(f"{ground.flat} triangles without area were left out.", "note", "terrain"))
     return tuple(gravest_first(remarks))

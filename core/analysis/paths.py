@@ -232,7 +232,7 @@ def simulated_paths(simulation: "Simulation") -> Paths:
     The underside is one radius below the centre. A run that leaves the terrain has its stop beyond the edge; one that
     is cut off at a limit has none.
     """
-    from ..simulation.engine import ENDS, IMPACT, LEFT_TERRAIN, STOPPED
+    from ..simulation.engine import ENDS, IMPACT, LEFT_TERRAIN
     from ..simulation.results import flights_of, release_names
 
     records, releases = simulation.records, simulation.releases
@@ -243,7 +243,7 @@ def simulated_paths(simulation: "Simulation") -> Paths:
     in_flight[flights_of(simulation)[0]] = True
     lower = np.zeros((len(simulation), 3))
     lower[:, 2] = releases.radius_m
-    stopped, left = (simulation.end == ENDS.index(one) for one in (STOPPED, LEFT_TERRAIN))
+    stopped, left = simulation.at_rest, simulation.end == ENDS.index(LEFT_TERRAIN)
     return Paths(
         name=np.asarray(release_names(simulation)),
         mass_kg=releases.mass_kg,

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..reconstruction.block import per_pick
 from ..reconstruction.chains import find_segments
 from ..reconstruction.flight import solve_flights
+from ..remarks import Remark
 from ..simulation.ground import Ground
 from ..vectors import Array, Indices, Mask, Names, dot
 from .paths import Paths, first_flights, observed_paths

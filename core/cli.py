@@ -22,6 +22,7 @@ COMMANDS = {
     "demo": "the whole job on the bundled site: reconstruct, figures, animation",
     "reconstruct": "timed picks → impacts.csv and trajectories.csv",
     "compare": "impact models on measured impacts → predictions.csv, scores.csv, figures and a page",
+    "compare-runs": "whole observed falls beside simulated ones → whole_runs.csv, whole_values.csv, runs.csv, figures",
     "explore": "a live page on this machine: a slider for every parameter of every model",
     "calibrate": "parameters of an impact model that fit measured impacts → calibration.csv, parameters.toml",
     "equivalent": "parameters with which one model behaves like another → equivalent.csv, parameters.toml",
@@ -35,7 +36,7 @@ COMMANDS = {
     "simulate": "whole rockfalls on the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv, summary.json",
     "render": "the animation of a project, through Blender",
 }
-"""Name → help; the module of the same name in `commands` does it."""
+"""Name → help; the module of the same name in `commands`, with _ for -, does it."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -86,7 +87,7 @@ def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     for name, purpose in COMMANDS.items():
         command = commands.add_parser(name, help=purpose, description=purpose[:1].upper() + purpose[1:] + ".")
         if name == asked:
-            module = import_module(f".commands.{name}", __package__)
+            module = import_module(f".commands.{name.replace('-', '_')}", __package__)
             module.add_arguments(command)
             command.set_defaults(run=module.run)
     return parser

@@ -219,9 +219,13 @@ def observed_paths(reconstruction: "Reconstruction") -> Paths:
 
 
 def first_flights(reconstruction: "Reconstruction") -> Indices:
-    """The first flight of each trajectory that has one."""
-    flights = reconstruction.flights
-    free = np.flatnonzero(~flights.is_contact)
+    """The flight with which each trajectory begins: from its release, or from its first impact that it leaves."""
+    picks, flights, impacts = reconstruction.picks, reconstruction.flights, reconstruction.impacts
+    into = impacts.flags["into_ground"]
+    sunk = set(zip(impacts.trajectory[into].tolist(), impacts.time_s[into].tolist(), strict=True))
+    starts = zip(flights.trajectory.tolist(), flights.start_time_s.tolist(), strict=True)
+    leaves = ~np.array([start in sunk for start in starts], dtype=np.bool_)
+    free = np.flatnonzero(~flights.is_contact & leaves & np.isin(picks.kind[flights.first_pick], ("release", "impact")))
     names = flights.trajectory[free]
     return free[np.r_[True, names[1:] != names[:-1]][: free.size]]
 

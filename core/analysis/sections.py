@@ -110,7 +110,7 @@ def default_sections(paths: Paths, fewest: int, up_m: float = 0.0) -> tuple[Sect
     if max(int(crossings(paths, level, axis).crosses.sum()) for level in levels) >= fewest:
         return levels
     drops = [part * float(np.median(starts - ends)) for part in DEFAULT_PARTS]
-    return tuple(Section(f"{drop:.1f} m down", drop_m=drop) for drop in drops)
+    return tuple(Section(f"{drop:.1f} m below the start", drop_m=drop) for drop in drops)
 
 
 def crossings(paths: Paths, section: Section, axis: Axis) -> Crossings:

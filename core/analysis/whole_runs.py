@@ -8,30 +8,20 @@ height; and how far they get: how many reach each section, run-out, energy line 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
-from ..reconstruction.block import per_pick
-from ..reconstruction.chains import find_segments
-from ..reconstruction.flight import solve_flights
 from ..remarks import Remark
 from ..simulation.ground import Ground
 from ..vectors import Array, Indices, Mask, Names, dot
-from .paths import Paths, first_flights, observed_paths
+from .observed_runs import Observed
+from .paths import Paths
 from .ranks import FEWEST, RankTest, holm, rank_test, reach_test
 from .sections import Axis, Section, axis_of, crossings, extremes, heights_at, impacts_apart, impacts_per_metre
-
-if TYPE_CHECKING:
-    from ..reconstruction.picks import Picks
-    from ..reconstruction.trajectory import Reconstruction
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 SIGNIFICANT = 0.05
 """Of the probability that is corrected for the number of tests of a model."""
-ERROR_DRAWS = 64
-"""So many times the picks are moved by their errors, for the standard deviations of what is read off."""
 SHORTEST_S = 0.2
 """Between two impacts that a person tells apart, where no observed ones say."""
 
@@ -52,8 +42,8 @@ class Quantity:
 
 
 AT_SECTIONS = (
-    Quantity("time_s", "time", "s"),
-    Quantity("along_m", "place along it", "m"),
+    Quantity("time_s", "time since the start", "s"),
+    Quantity("along_m", "place along the section", "m"),
     Quantity("speed_mps", "speed", "m/s"),
     Quantity("height_m", "height", "m"),
     Quantity("kinetic_J", "kinetic energy", "J", tested=False),
@@ -64,26 +54,10 @@ OF_RUNS = (
     Quantity("height_max_m", "greatest height", "m"),
     Quantity("runout_m", "run-out", "m"),
     Quantity("energy_line_deg", "energy line", "°"),
-    Quantity("stop_aside_m", "place of the stop", "m"),
+    Quantity("stop_aside_m", "stop, left of the mean way", "m"),
 )
 REACH = Quantity("reach", "blocks that reach it", "")
 QUANTITIES = {one.name: one for one in (*AT_SECTIONS, *OF_RUNS, REACH)}
-
-
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """Runs that were observed.
-
-    Attributes
-    ----------
-    paths : each of a name of its own.
-    from_impact : (n,) the release was not seen: the run is known from an impact on.
-    moved : the same with all picks moved at random by their standard deviations; none where these are not known.
-    """
-
-    paths: Paths
-    from_impact: Mask
-    moved: tuple[Paths, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +68,7 @@ class Compared:
     ----------
     observed, sigma : (n,) of each observed run, NaN where there is none; sigma is NaN where it is not known.
     count, quantiles : (n,) and (n, 5) of the simulated values of the same release, see `QUANTILES`.
-    all_quantiles : (5,) of all simulated values of the releases with an observed one.
+    simulated, all_quantiles : (s,) all simulated values of the releases with an observed one, and their (5,) quantiles.
     test : None for a quantity that is not tested.
     p, p_holm : probability that the observed come from the simulated; the latter corrected for all tests of the model.
     """
@@ -106,6 +80,7 @@ class Compared:
     sigma: Array
     count: Indices
     quantiles: Array
+    simulated: Array
     all_quantiles: Array
     test: RankTest | None
     p: float
@@ -167,44 +142,40 @@ class WholeRuns:
         return next(one for one in self.of(model) if (one.section, one.quantity.name) == (section, quantity))
 
 
-def observe_runs(reconstruction: "Reconstruction", ground: Ground, draws: int = ERROR_DRAWS, seed: int = 0) -> Observed:
-    """The reconstructed trajectories, and what they would be had the picks' errors been others.
+def whole_run_remarks(comparison: WholeRuns) -> tuple[Remark, ...]:
+    """What is not seen, and a sentence for each model."""
+    remarks = []
+    unseen = int(np.isnan(comparison.observed.stop[:, 0]).sum())
+    if unseen:
+        text = (
+            f"{unseen} of {len(comparison.observed)} observed runs are not seen to their stop: they do not count there."
+        )
+        remarks.append(Remark(text, "note", "stops"))
+    for model in comparison.simulated:
+        known = [one for one in comparison.of(model) if np.isfinite(one.p_holm)]
+        if not known:
+            text = f"{model}: too few runs were observed to tell anything ({FEWEST} are needed)."
+            remarks.append(Remark(text, "warning", model))
+            continue
+        clearest = min(known, key=lambda one: one.p)
+        differ = sum(one.differs for one in known)
+        where = f" at {clearest.section}" if clearest.section else ""
+        what = f"{clearest.quantity.title}{where} (p = {clearest.p:.2g}, corrected {clearest.p_holm:.2g}"
+        what += f"{_medians(clearest)})"
+        if differ:
+            text = f"{model} differs from what was observed in {differ} of {len(known)} tests, most in {what}."
+        else:
+            text = f"{model}: no difference seen in {len(known)} tests; the least probable is {what}."
+        remarks.append(Remark(text, "note", model))
+    return tuple(remarks)
 
-    Raises
-    ------
-    InputError : there is no flight.
-    """
-    paths = observed_paths(reconstruction)
-    if not len(paths):
-        raise InputError("There is no flight among the picks", advice="Give picks of blocks that fly")
-    picks = reconstruction.picks
-    kinds = picks.kind[reconstruction.flights.first_pick[first_flights(reconstruction)]]
-    from_impact = np.asarray(kinds == "impact")
-    if not (np.isfinite(picks.sigma_position_m) | np.isfinite(picks.sigma_time_s)).any():
-        return Observed(paths, from_impact)
-    nodes = _nodes(reconstruction, ground)
-    drag = reconstruction.drag
-    drag_per_m = None if drag is None else per_pick(picks, reconstruction.block, drag.per_metre)
-    rng = np.random.default_rng(seed)
-    moved = []
-    for _ in range(draws):
-        others = _moved(nodes, rng)
-        flights = solve_flights(others, find_segments(others), reconstruction.gravity_mps2, drag_per_m)
-        moved.append(observed_paths(replace(reconstruction, picks=others, flights=flights)))
-    return Observed(paths, from_impact, tuple(moved))
 
-
-def observe_stops(name: Names, start: Array, stop: Array, mass_kg: Array) -> Observed:
-    """Runs of which only the start and the stop (n, 3) are known, local [m]."""
-    n = len(name)
-    none, still = np.zeros(n, dtype=np.bool_), np.zeros((n, 3))
-    return Observed(
-        Paths(
-            name, mass_kg, stop, none, none, np.arange(n), none, np.zeros(n), np.zeros(n), start, start, still, still,
-            np.zeros(n), np.zeros(0, dtype=np.intp), 1.0,
-        ),
-        none,
-    )  # fmt: skip
+def _medians(one: Compared) -> str:
+    """Of both."""
+    if one.test is None:
+        return ""
+    unit = f" {one.quantity.unit}"
+    return f"; medians {np.nanmedian(one.observed):.3g}{unit} observed, {one.all_quantiles[2]:.3g}{unit} simulated"
 
 
 def compare_runs(
@@ -329,9 +300,10 @@ def _compare(
     test = rank_test(observed, np.split(as_seen, borders), seed) if quantity.tested else None
     some = [part for part, there in zip(parts, known.tolist(), strict=True) if there]
     together = np.concatenate(some) if some else np.zeros(0)
+    count, quantiles = np.array([part.size for part in parts]), np.stack([_quantiles(part) for part in parts])
     return Compared(
-        model, section, quantity, observed, sigma, np.array([part.size for part in parts]),
-        np.stack([_quantiles(part) for part in parts]), _quantiles(together), test, test.p if test else np.nan,
+        model, section, quantity, observed, sigma, count, quantiles, together, _quantiles(together), test,
+        test.p if test else np.nan,
     )  # fmt: skip
 
 
@@ -349,7 +321,10 @@ def _reach(model: str, section: Section, paths: Paths, runs: Paths, axis: Axis, 
     nothing[:, 2] = np.bincount(place, their.crosses, len(paths)) / np.maximum(number, 1)
     mean = np.full(len(QUANTILES), np.nan)
     mean[2] = nothing[among, 2].mean() if among.any() else np.nan
-    return Compared(model, section.name, REACH, observed, np.full(len(paths), np.nan), number, nothing, mean, None, p)
+    unknown = np.full(len(paths), np.nan)
+    return Compared(
+        model, section.name, REACH, observed, unknown, number, nothing, np.zeros(0), mean, None, p
+    )  # fmt: skip
 
 
 def _quantiles(values: Array) -> Array:
@@ -363,27 +338,3 @@ def _shortest(paths: Paths) -> float:
     run, time = paths.run[piece][apart], (paths.time_s + paths.duration_s)[piece][apart]
     gaps = np.diff(time)[run[1:] == run[:-1]]
     return float(gaps.min()) if gaps.size else SHORTEST_S
-
-
-def _nodes(reconstruction: "Reconstruction", ground: Ground) -> "Picks":
-    """The picks at the places that the flights join."""
-    from ..reconstruction.motion import GROUNDED, block_centres
-    from ..reconstruction.placement import pick_normals
-
-    picks = reconstruction.picks
-    if reconstruction.ends == "contacts":
-        return picks
-    radius = per_pick(picks, reconstruction.block, lambda one: one.radius_m)
-    normals = pick_normals(picks, ground.surface, 2 * radius, None, np.isin(picks.kind, GROUNDED))
-    return block_centres(picks, normals, radius)
-
-
-def _moved(picks: "Picks", rng: np.random.Generator) -> "Picks":
-    """The picks with other errors; the times keep their order."""
-    n = len(picks)
-    gap = np.diff(picks.time_s, prepend=-np.inf, append=np.inf)
-    gap[picks.group_starts] = np.inf
-    room = 0.45 * np.minimum(gap[:-1], gap[1:])
-    late = np.nan_to_num(picks.sigma_time_s) * rng.standard_normal(n)
-    off = np.nan_to_num(picks.sigma_position_m)[:, None] * rng.standard_normal((n, 3))
-    return replace(picks, time_s=picks.time_s + np.clip(late, -room, room), position=picks.position + off)

@@ -2,6 +2,7 @@
 """``rockfall compare-runs``: whole runs of observed blocks beside simulated ones → tables and figures."""
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,11 +22,15 @@ from .options import (
 from .progress import PrintedProgress, stopped_by_interrupt
 
 if TYPE_CHECKING:
+    from ..analysis.observed_runs import Observed
     from ..analysis.sections import Section
-    from ..analysis.whole_runs import Observed, WholeRuns
+    from ..analysis.whole_runs import WholeRuns
     from ..exchange.project import Project
+    from ..exchange.simulation_entry import StructureEntry
+    from ..impact_models.machinery.parameters import Value
     from ..progress import Progress
     from ..reconstruction.drag import Drag
+    from ..reconstruction.trajectory import Reconstruction
     from ..simulation.ground import Ground
     from ..simulation.release import Releases
 
@@ -57,11 +62,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="blocks for each observed one and model (default %(default)s)",
     )
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default: the project's, else 0)")
-    section = parser.add_argument_group("sections (default: three contour levels, or three drops below the starts)")
-    section.add_argument(
-        "--contours", metavar="Z,Z", help="heights in survey coordinates, below which blocks fall [m]"
+    parser.add_argument(
+        "--seed", type=whole, metavar="S", help="of the random numbers (default: the project's, else 0)"
     )
+    section = parser.add_argument_group("sections (default: three contour levels, or three drops below the starts)")
+    section.add_argument("--contours", metavar="Z,Z", help="heights in survey coordinates, below which blocks fall [m]")
     section.add_argument("--drops", metavar="H,H", help="heights below each block's own start [m]")
     section.add_argument(
         "--section", action="append", default=[], metavar="NAME=FILE", help="a line in plan, a table of x_m, y_m"
@@ -69,7 +74,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     motion = parser.add_argument_group("motion (default: as the project says)")
     motion.add_argument("--drag", action="store_true", help="flights with the drag of air; not for a project")
     motion.add_argument(
-        "--rolling", choices=("azzoni_1995", "coulomb", "none"), help="on the ground: rolling (default), sliding, a stop"
+        "--rolling",
+        choices=("azzoni_1995", "coulomb", "none"),
+        help="on the ground: rolling (default), sliding, a stop",
     )
     motion.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
     motion.add_argument(
@@ -164,22 +171,127 @@ def _case(arguments: argparse.Namespace, project: "Project | None", progress: "P
     from ..reconstruction.drag import Drag
     from ..reconstruction.trajectory import reconstruct
     from ..simulation.ground import make_ground
-    from ..workflow.simulation import structures_of
 
     inputs = {"observed": Path(arguments.observed)}
-    if arguments.number < 1:
-        raise InputError("--number is 0", advice="Give the number of blocks for each observed one")
     if project is not None:
-        for option, given in (("--terrain", arguments.terrain), ("--stops", arguments.stops)):
+        for option, given in (
+            ("--terrain", arguments.terrain),
+            ("--stops", arguments.stops),
+            ("--drag", arguments.drag),
+        ):
             if given:
-                raise InputError(f"{option} is given with a project", advice="Leave it out, or give picks.csv instead")
+                raise InputError(
+                    f"{option} is given with a project", advice="Leave it out: the project says so; or give picks.csv"
+                )
         progress("Reading the project")
         surface, made = open_project(project)
         if surface is None or project.terrain is None:
             raise InputError("The project has no terrain", file=arguments.observed, advice="Add [terrain] to it")
         inputs["terrain"] = project.terrain.file
-    elif not arguments.terrain:
+        structures = {one.name: terrain_as_asked(arguments, str(one.file), progress) for one in _structures(project)}
+        ground = make_ground(surface, structures)
+        return _measured(arguments, ground, made, inputs, progress)
+    if not arguments.terrain:
         raise InputError("No terrain is given", advice="Give it with --terrain, or a project.toml that names one")
-    else:
-        surface = terrain_as_asked(arguments, arguments.terrain, progress)
-        inputs["terrain"] = Path(arguments.terrain)
+    surface = terrain_as_asked(arguments, arguments.terrain, progress)
+    inputs["terrain"] = Path(arguments.terrain)
+    ground = make_ground(surface)
+    drag = Drag() if arguments.drag else None
+    progress(f"Reading {arguments.observed}")
+    if arguments.stops:
+        inputs["stops"] = Path(arguments.stops)
+        releases = read_releases(
+            arguments.observed,
+            ground,
+            diameter_m=arguments.diameter,
+            density_kgpm3=arguments.density,
+            number=arguments.number,
+        )
+        observed = read_stops(arguments.stops, releases, ground)
+        return _Case(ground, observed, releases, drag, arguments.gravity, inputs)
+    picks = read_picks(arguments.observed, surface.shift)
+    block = Block(arguments.diameter, arguments.diameter, arguments.diameter, arguments.density)
+    made = reconstruct(picks, surface=surface, block=block, gravity_mps2=arguments.gravity, drag=drag)
+    return _measured(arguments, ground, made, inputs, progress)
+
+
+def _measured(
+    arguments: argparse.Namespace,
+    ground: "Ground",
+    made: "Reconstruction",
+    inputs: dict[str, Path],
+    progress: "Progress",
+) -> _Case:
+    """Runs that were reconstructed from picks."""
+    from ..analysis.observed_runs import observe_runs
+    from ..workflow.whole_runs import released_as_observed
+
+    progress("Errors of what was observed")
+    observed = observe_runs(made, ground)
+    releases = released_as_observed(ground, observed, made, arguments.number)
+    return _Case(ground, observed, releases, made.drag, made.gravity_mps2, inputs)
+
+
+def _structures(project: "Project") -> "tuple[StructureEntry, ...]":
+    return project.simulation.structures if project.simulation else ()
+
+
+def _known(project: "Project | None", file: str) -> "Mapping[str, Mapping[str, Value]] | None":
+    """The parameters of models that the project has."""
+    from ..exchange.parameters import checked_parameters
+
+    if project is None or "models" not in project.extra:
+        return None
+    return checked_parameters(project.extra["models"], file)
+
+
+def _sections(arguments: argparse.Namespace, ground: "Ground") -> "tuple[Section, ...]":
+    """Those that were asked for."""
+    from ..analysis.sections import Section
+    from ..exchange.whole_run_tables import read_section
+
+    low, high = ground.shift.to_survey(ground.terrain.bounds)[:, 2].tolist()
+    sections = []
+    for z in _numbers(arguments.contours, "--contours"):
+        if not low <= z <= high:
+            raise InputError(
+                f"--contours has {z:g}, where there is no terrain", advice=f"It reaches from {low:.0f} to {high:.0f} m"
+            )
+        sections.append(Section(f"{z:g} m", level_m=z - ground.shift.z))
+    for height in _numbers(arguments.drops, "--drops"):
+        if height <= 0:
+            raise InputError(f"--drops has {height:g}", advice="Give heights above zero: so far below the start")
+        sections.append(Section(f"{height:g} m below the start", drop_m=height))
+    for text in arguments.section:
+        name, equals, file = text.partition("=")
+        if not (equals and name.strip() and file):
+            raise InputError(f"--section {text} names no file", advice="Write NAME=FILE, for example road=road.csv")
+        sections.append(read_section(name.strip(), file, ground))
+    names = [section.name for section in sections]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"The section {name} is given twice", advice="Give each section once, with its own name")
+    return tuple(sections)
+
+
+def _numbers(text: str | None, option: str) -> list[float]:
+    values = []
+    for part in (text or "").split(","):
+        if part.strip():
+            try:
+                values.append(float(part))
+            except ValueError:
+                raise InputError(f"{option} has '{part}'", advice="Give numbers between commas") from None
+    return values
+
+
+def _draw(comparison: "WholeRuns", ground: "Ground", folder: Path, progress: "Progress") -> list[str]:
+    """The figures, if their library is there; else what to install."""
+    from ..analysis.extras import FIGURES, install_command, is_there
+    from ..analysis.whole_run_figures import save_whole_run_figures
+
+    if not is_there(FIGURES):
+        return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]
+    progress("Drawing the figures")
+    save_whole_run_figures(comparison, ground, folder / "figures")
+    return []

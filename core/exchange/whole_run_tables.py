@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..analysis.observed_runs import Observed, observe_stops
 from ..analysis.sections import Section
-from ..analysis.whole_runs import QUANTILES, Compared, Observed, WholeRuns, observe_stops
+from ..analysis.whole_runs import QUANTILES, Compared, WholeRuns
 from ..errors import InputError
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
@@ -51,7 +52,9 @@ def read_stops(path: str | Path, releases: Releases, ground: Ground) -> Observed
     for i, name in enumerate(names.tolist()):
         found = np.flatnonzero(releases.name == name)
         if not found.size:
-            raise table.error(i, f"There is no release {name!r}", "Give it in the table of releases, or correct its name")
+            raise table.error(
+                i, f"There is no release {name!r}", "Give it in the table of releases, or correct its name"
+            )
         rows.append(int(found[0]))
     survey = np.column_stack(
         [table.numbers("x_m", required=True), table.numbers("y_m", required=True), table.numbers("z_m")]
@@ -61,7 +64,9 @@ def read_stops(path: str | Path, releases: Releases, ground: Ground) -> Observed
     stop[bare, 2] = ground.highest_m
     stop[bare, 2] -= ground.heights_above(stop[bare])
     for i in bare[np.isnan(stop[bare, 2])][:1].tolist():
-        raise table.error(i, "There is no terrain under this stop", "Correct it, give its z_m, or give a larger terrain")
+        raise table.error(
+            i, "There is no terrain under this stop", "Correct it, give its z_m, or give a larger terrain"
+        )
     start = releases.position[rows]
     start = start - releases.radius_m[rows][:, None] * [0.0, 0.0, 1.0]
     return observe_stops(names, start, stop, releases.mass_kg[rows])

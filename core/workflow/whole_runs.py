@@ -3,36 +3,39 @@
 compared.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.observed_runs import Observed
 from ..analysis.paths import Paths, simulated_paths
 from ..analysis.ranks import FEWEST
 from ..analysis.sections import Section, default_sections
-from ..analysis.whole_runs import Observed, WholeRuns, compare_runs
+from ..analysis.whole_runs import WholeRuns, compare_runs
 from ..errors import InputError
 from ..progress import CancelledError, Progress, silent
-from ..reconstruction.block import Block
+from ..reconstruction.trajectory import Reconstruction
+from ..remarks import Remark
 from ..simulation.engine import Settings, Simulation
 from ..simulation.ground import Ground
-from ..simulation.release import Releases, make_releases, overlapping
+from ..simulation.measured_releases import from_reconstruction
+from ..simulation.release import Releases, standing_on
 from ..terrain.raycast import closest_points
-from ..vectors import Array, Names, cross
-from .simulation import run_models
+from ..vectors import Array, Mask
+from .simulation import remarks_of, run_models
 
 NUMBER = 100
 """Blocks for each observed run."""
-LIFTS, CLEAR_M = 40, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class ComparedSimulations:
-    """The comparison, and the simulations that it is of."""
+    """The comparison, the simulations that it is of, and what there is to know of these."""
 
     comparison: WholeRuns
     simulations: tuple[Simulation, ...]
+    remarks: tuple[Remark, ...]
 
 
 def compare_whole_runs(
@@ -69,67 +72,45 @@ def compare_whole_runs(
     paths = {one.settings.model: simulated_paths(one) for one in finished}
     if not sections and observed.paths.impact_piece.size:
         sections = default_sections(observed.paths, FEWEST, ground.shift.z)
-    return ComparedSimulations(compare_runs(observed, paths, ground, sections, seed=seed), finished)
+    told = [one for one in remarks_of(simulations, [one.model for one in settings]) if one.severity != "note"]
+    return ComparedSimulations(
+        compare_runs(observed, paths, ground, sections, seed=seed), finished, (*releases.remarks, *told)
+    )
 
 
 def released_as_observed(
-    ground: Ground, observed: Observed, blocks: Mapping[str, Block], number: int = NUMBER
+    ground: Ground, observed: Observed, reconstruction: Reconstruction, number: int = NUMBER
 ) -> Releases:
-    """Blocks that start as the observed ones did, `number` for each.
-
-    Parameters
-    ----------
-    blocks : by name of the run.
+    """Blocks that start as the observed ones did, `number` for each: see `from_reconstruction`.
 
     Raises
     ------
-    InputError : a number of zero; a start beside the terrain; a terrain that is a cloud of points.
+    InputError : a number of zero; a start that is not on the terrain; a terrain that is a cloud of points.
 
     Notes
     -----
-    A run starts at its release, with the velocity that its first flight begins with; a run whose release was not seen,
-    where its first flight begins. Where the picks have standard deviations, each block starts as one of the runs with
-    picks moved by their errors. A block starts without spin from a release, and rolling (ω = n × v/r) from an impact,
-    since its spin is not seen. It is put on the ground if it would be in it.
+    Where the picks have standard deviations, each block starts as one of the runs with picks moved by their errors, so
+    that what is not known of the start is in the simulation too.
     """
-    if number < 1:
-        raise InputError(f"{number} blocks cannot be released", advice="Release at least one for each run")
-    paths = observed.paths
-    variants = [one for one in observed.moved if np.array_equal(one.name, paths.name)] or [paths]
-    starts, velocities = (np.stack(each) for each in zip(*(_starts(one) for one in variants), strict=True))
-    chosen = np.arange(number) % len(variants)
-    start = starts[chosen].swapaxes(0, 1).reshape(-1, 3)
-    velocity = velocities[chosen].swapaxes(0, 1).reshape(-1, 3)
-    name = np.repeat(paths.name, number)
-    radius = np.array([blocks[one].radius_m for one in name.tolist()])
-    density = np.repeat(paths.mass_kg, number) / (np.pi / 6 * (2 * radius) ** 3)
-    centre, normal = _placed(ground, start, radius, name)
-    rolling = cross(normal, velocity) / radius[:, None]
-    moving = np.repeat(observed.from_impact, number)
-    return make_releases(
-        centre,
-        name=name,
-        velocity=velocity,
-        angular_velocity=np.where(moving[:, None], rolling, 0.0),
-        diameter_m=2 * radius,
-        density_kgpm3=density,
-    )
+    releases = from_reconstruction(ground, reconstruction, number=number)
+    variants = [one for one in observed.moved if np.array_equal(one.name, observed.paths.name)]
+    if not variants:
+        return releases
+    own = {name: i for i, name in enumerate(observed.paths.name.tolist())}
+    row = np.array([own[name] for name in releases.name.tolist()])
+    variant = (np.arange(len(releases)) - np.searchsorted(row, row)) % len(variants)
+    place, velocity = _starts(observed.paths)
+    places, velocities = (np.stack(each) for each in zip(*map(_starts, variants), strict=True))
+    centre = releases.position + (places[variant, row] - place[row])
+    radius = releases.radius_m
+    lay: Mask = ground.distance(releases.position) < 1.001 * radius
+    near = closest_points(ground.surface, centre[lay])
+    normal = ground.surface.face_normals[near.face]
+    stands, fits = standing_on(ground, near.point, normal, 2 * radius[lay])
+    centre[lay] = np.where(fits[:, None], stands, releases.position[lay])
+    return replace(releases, position=centre, velocity=releases.velocity + (velocities[variant, row] - velocity[row]))
 
 
 def _starts(paths: Paths) -> tuple[Array, Array]:
     first = paths.first_piece[:-1]
     return paths.start[first], paths.start_velocity[first]
-
-
-def _placed(ground: Ground, start: Array, radius: Array, name: Names) -> tuple[Array, Array]:
-    """Centres (m, 3) of blocks whose undersides start at places (m, 3), clear of the ground, and its normals there."""
-    near = closest_points(ground.surface, start)
-    normal = ground.surface.face_normals[near.face]
-    on_ground = (near.distance < radius)[:, None]
-    centre = np.where(on_ground, near.point + radius[:, None] * normal, start + radius[:, None] * [0.0, 0.0, 1.0])
-    for _ in range(LIFTS):
-        depth = overlapping(ground, make_releases(centre, name=name, diameter_m=2 * radius))
-        if not (deep := depth > 0).any():
-            break
-        centre[:, 2] += np.where(deep, depth + CLEAR_M, 0.0)
-    return centre, normal

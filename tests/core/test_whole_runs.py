@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rockfall.core.analysis.observed_runs import Observed, observe_runs, observe_stops
 from rockfall.core.analysis.paths import Paths, observed_paths, simulated_paths
 from rockfall.core.analysis.ranks import holm, rank_test, reach_test
 from rockfall.core.analysis.sections import (
@@ -16,7 +17,7 @@ from rockfall.core.analysis.sections import (
     extremes,
     impacts_per_metre,
 )
-from rockfall.core.analysis.whole_runs import Observed, compare_runs, observe_runs, observe_stops
+from rockfall.core.analysis.whole_runs import compare_runs
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
@@ -363,8 +364,7 @@ def test_blocks_are_released_as_they_were_observed(ground: Ground) -> None:
     made = reconstruct(picks, block=Block(0.6, 0.6, 0.6))
     observed = observe_runs(made, ground, draws=16)
     assert observed.from_impact.tolist() == [False, True]
-    blocks = {"A": Block(0.6, 0.6, 0.6), "B": Block(0.6, 0.6, 0.6)}
-    releases = released_as_observed(ground, observed, blocks, number=32)
+    releases = released_as_observed(ground, observed, made, number=32)
     assert releases.name.tolist() == ["A"] * 32 + ["B"] * 32
     assert ground.distance(releases.position).min() >= 0.3 - 1e-9
     assert releases.mass_kg == pytest.approx(Block(0.6, 0.6, 0.6).mass_kg)
@@ -376,7 +376,7 @@ def test_blocks_are_released_as_they_were_observed(ground: Ground) -> None:
     assert (np.linalg.norm(releases.angular_velocity[32:], axis=1) <= speed / 0.3 + 1e-9).all()
     assert (releases.angular_velocity[32:, 1] > 0).all()  # rolls to the east
     with pytest.raises(InputError, match="0 blocks"):
-        released_as_observed(ground, observed, blocks, number=0)
+        released_as_observed(ground, observed, made, number=0)
     done = compare_whole_runs(ground, observed, releases, [Settings("noel_2017")])
     tested = [one for one in done.comparison.compared if one.quantity.tested]
     assert all(one.verdict.startswith("too few observed to tell") for one in tested)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The 80 runs of Tschamut 2014 (Volkwein & Gerber 2018, doi 10.16904/envidat.34) and those of models from the same places.
+"""The 80 runs of Tschamut 2014 (Volkwein & Gerber 2018, doi 10.16904/envidat.34) beside those of models.
 
 What this can tell: whether run-outs come out in the right order of magnitude with untuned parameters, and how much the
 models differ among each other on one slope. What it cannot: which model is right. The terrain is a proxy, a grid of

@@ -4,12 +4,15 @@
 import argparse
 from pathlib import Path
 
+from ..errors import InputError
 from ..film.engines import ENGINES
+from ..film.job import Kind
 from ..film.presets import parse_frames
-from .options import add_parameter_options, model_parameters
+from ..film.simulated import NUMBER, check_number
+from .options import add_parameter_options, model_parameters, whole
 from .progress import PrintedProgress
 
-FILM, STILL = "rockfall.mp4", "rockfall.png"
+FILES = {"film": "rockfall.mp4", "still": "rockfall.png", "slope": "slope.png"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,9 +43,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="show beside the real blocks those of an impact model, from the same impacts; may be given several times",
     )
+    parser.add_argument(
+        "--simulate",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="let blocks of an impact model fall beside the real ones, from the same starts to their ends; may be "
+        "given several times",
+    )
+    parser.add_argument(
+        "--number", type=whole, metavar="N", help=f"simulated blocks for each real one and model (default {NUMBER})"
+    )
+    parser.add_argument("--seed", type=whole, metavar="S", help="of the simulation's random numbers (default 0)")
     add_parameter_options(parser)
     parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
-    parser.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
+    picture = parser.add_mutually_exclusive_group()
+    picture.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
+    picture.add_argument("--slope", action="store_true", help="one picture instead: of the whole slope with all paths")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -55,22 +72,43 @@ def run(arguments: argparse.Namespace) -> int:
     from ..film.presets import find_preset
     from ..impact_models.registry import find_model
 
-    models = tuple(dict.fromkeys(find_model(name).name for name in arguments.model))
+    models, simulate = (
+        tuple(dict.fromkeys(find_model(name).name for name in names)) for names in (arguments.model, arguments.simulate)
+    )
+    if models and simulate:
+        raise InputError(
+            "--model and --simulate would show two kinds of blocks in the same colours",
+            advice="Make a film of each: --model flies from impact to impact, --simulate falls to the end",
+        )
+    if not simulate and (arguments.number is not None or arguments.seed is not None):
+        raise InputError("--number and --seed are of simulated blocks", advice="Add --simulate and a model")
+    number = NUMBER if arguments.number is None else arguments.number
+    check_number(number, len(simulate))
     project = read_project(arguments.project)
+    if simulate and project.terrain is None:
+        raise InputError(
+            "Simulated blocks fall on a terrain, and the project names none",
+            file=arguments.project,
+            advice='Add [terrain] file = "…" to it',
+        )
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
-    parameters = model_parameters(arguments, models, known)
+    parameters = model_parameters(arguments, models or simulate, known)
     preset = find_preset(project, arguments.preset)
     maker = film_maker()
-    name = STILL if arguments.still else FILM
+    kind: Kind = "slope" if arguments.slope else "still" if arguments.still else "film"
+    name = FILES[kind]
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         job = FilmJob(
-            kind="still" if arguments.still else "film",
+            kind=kind,
             source=arguments.project,
             out=folder.absolute() / name,
             engine=arguments.engine or preset.engine,
             preset=preset.name,
             frames=arguments.frames,
             models=models,
+            simulate=simulate,
+            number=number,
+            seed=arguments.seed or 0,
             parameters=parameters,
         )
         done = maker.film(job, progress)

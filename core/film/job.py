@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..impact_models.machinery.parameters import Value
+from .simulated import NUMBER
 
 Kind = Literal["film", "still", "slope", "terrain"]
 
@@ -26,7 +27,9 @@ class FilmJob:
     engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen.
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
-    models : impact models whose blocks are shown beside the real ones.
+    models : impact models whose blocks are shown beside the real ones, from each impact to the next.
+    simulate : impact models whose blocks fall beside the real ones, from their first flight to their end.
+    number, seed : of simulated blocks for each real one and model, and of their random numbers.
     parameters : model → parameter → value, where it is not the default.
     title : written into the picture of a terrain; empty for the name of its file.
     """
@@ -41,6 +44,9 @@ class FilmJob:
     unit_m: float = 1.0
     title: str = ""
     models: tuple[str, ...] = ()
+    simulate: tuple[str, ...] = ()
+    number: int = NUMBER
+    seed: int = 0
     parameters: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
     def with_engine(self, engine: str) -> "FilmJob":
@@ -54,7 +60,7 @@ class FilmJob:
     @classmethod
     def from_json(cls, text: str) -> "FilmJob":
         values = json.loads(text)
-        frames, models = values.pop("frames"), tuple(values.pop("models"))
+        frames, models, simulate = values.pop("frames"), tuple(values.pop("models")), tuple(values.pop("simulate"))
         source, out = Path(values.pop("source")), Path(values.pop("out"))
         span = None if frames is None else (frames[0], frames[1])
-        return cls(source=source, out=out, frames=span, models=models, **values)
+        return cls(source=source, out=out, frames=span, models=models, simulate=simulate, **values)

@@ -81,9 +81,9 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> None:
                 assert child.stdout is not None
                 for line in child.stdout:
                     word, _, rest = line.strip().partition(" ")
-                    if word == "frame":
-                        done, total = rest.split()
-                        progress("Rendering", int(done), int(total))
+                    if word == "progress":
+                        done, total, text = rest.split(maxsplit=2)
+                        progress(text, int(done), int(total))
                     elif word == "error":
                         problem = rest
                 status = child.wait()

@@ -48,6 +48,15 @@ def compared_lines(models: int) -> tuple[str, str]:
     )
 
 
+def simulated_lines(blocks: int, models: int) -> tuple[str, str]:
+    """Two lines that say what is seen when simulated blocks fall beside measured ones."""
+    return (
+        f"{blocks} measured block{'' if blocks == 1 else 's'} (white), and simulated ones by "
+        + (f"{models} models" if models > 1 else "a model"),
+        "from the same starts, with the measured velocity",
+    )
+
+
 def notes(block_scale: float = 1.0, time_scale: float = 1.0, rings: bool = False) -> str:
     """The note under the picture.
 

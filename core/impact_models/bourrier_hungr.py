@@ -56,4 +56,5 @@ MODEL = ImpactModel(
     reference="Bourrier, F. et al. (2009): Nat. Hazards Earth Syst. Sci. 9, 831–842, for the idea; see the module.",
     function=rebound,
     parameter_type=Parameters,
+    colour=(0.62, 0.80, 0.25),
 )

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blocks that start as real ones were measured: at their releases, or just after their impacts."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -129,24 +130,17 @@ def from_reconstruction(
     names, position, velocity, omega, reach = [], [], [], [], []
     after = _spin_after(impacts)
     begun_later = 0
-    starts = picks.group_starts
-    for i, trajectory in zip(starts.tolist(), picks.trajectory[starts].tolist(), strict=True):
-        flight = int(reconstruction.restituted_flight[i])
-        if picks.kind[i] == "release" and flight >= 0 and not flights.is_contact[flight]:
-            names.append(trajectory)
-            position.append(picks.position[i])
-            velocity.append(flights.start_velocity[flight])
-            omega.append(np.nan_to_num(picks.angular_velocity[i]))
+    for trajectory, release, impact in _beginnings(reconstruction):
+        names.append(trajectory)
+        if release >= 0:
+            position.append(picks.position[release])
+            velocity.append(flights.start_velocity[reconstruction.restituted_flight[release]])
+            omega.append(np.nan_to_num(picks.angular_velocity[release]))
             reach.append(FAR_IN_THE_AIR_M)
-            continue
-        own = np.flatnonzero((impacts.trajectory == trajectory) & _known(impacts.v2))
-        own = own[~impacts.flags["into_ground"][own]]
-        if own.size:
-            first = int(own[0])
-            names.append(trajectory)
-            position.append(ground.shift.to_local(impacts.shift.to_survey(impacts.position[first])))
-            velocity.append(impacts.v2[first])
-            omega.append(after[first])
+        else:
+            position.append(ground.shift.to_local(impacts.shift.to_survey(impacts.position[impact])))
+            velocity.append(impacts.v2[impact])
+            omega.append(after[impact])
             reach.append(FAR_M)
             begun_later += 1
     if not names:
@@ -170,11 +164,38 @@ def from_reconstruction(
     if begun_later:
         text = f"{begun_later} of {len(names)} trajectories have no release; they start just after their first impact."
         remarks.append(Remark(text, "note", "releases"))
-    left = len(starts) - len(names)
+    left = len(picks.group_starts) - len(names)
     if left:
         text = f"{left} trajectories are left out: no velocity is known of a release or an impact."
         remarks.append(Remark(text, "advice", "releases"))
     return releases.with_remarks(*remarks)
+
+
+def start_times(reconstruction: Reconstruction) -> dict[str, float]:
+    """Trajectory → when its blocks of `from_reconstruction` start, on the common clock [s]."""
+    picks, impacts = reconstruction.picks, reconstruction.impacts
+    return {
+        trajectory: float(picks.time_s[release] if release >= 0 else impacts.time_s[impact])
+        for trajectory, release, impact in _beginnings(reconstruction)
+    }
+
+
+def _beginnings(reconstruction: Reconstruction) -> Iterator[tuple[str, int, int]]:
+    """Each trajectory that begins with a flight: its name, and the pick of its release or the row of its impact.
+
+    The other one is −1.
+    """
+    picks, flights, impacts = reconstruction.picks, reconstruction.flights, reconstruction.impacts
+    starts = picks.group_starts
+    for i, trajectory in zip(starts.tolist(), picks.trajectory[starts].tolist(), strict=True):
+        flight = int(reconstruction.restituted_flight[i])
+        if picks.kind[i] == "release" and flight >= 0 and not flights.is_contact[flight]:
+            yield trajectory, i, -1
+            continue
+        own = np.flatnonzero((impacts.trajectory == trajectory) & _known(impacts.v2))
+        own = own[~impacts.flags["into_ground"][own]]
+        if own.size:
+            yield trajectory, -1, int(own[0])
 
 
 def _known(values: Array) -> Mask:

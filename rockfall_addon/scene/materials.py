@@ -20,6 +20,7 @@ SPEED_COLOUR = "speed_colour"
 TICK_ATTRIBUTE = "tick"
 TICK_RADII = 1.5
 RELIEF_COLOUR = "relief"
+PATH_MATERIAL = "Rockfall simulated film path"
 TERRAIN_MATERIAL = "Rockfall terrain"
 TERRAIN_VALUES = {"hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "brightness": 1.0, "contrast": 1.0}
 """Nodes of the terrain's material whose values the sliders set."""
@@ -59,6 +60,27 @@ def emission_material(name: str, attribute: str, strength: float = 1.0) -> bpy.t
         tree.links.new(emission.outputs[0], output.inputs["Surface"])
 
     return _material(name, build)
+
+
+def path_material(opacity: float) -> bpy.types.Material:
+    """Of simulated paths in a film: their colours, and through them a part of what is behind. Workbench shows no part.
+
+    opacity : of one path; the same material serves all.
+    """
+
+    def build(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> None:
+        colour, emission = tree.nodes.new("ShaderNodeAttribute"), tree.nodes.new("ShaderNodeEmission")
+        colour.attribute_name = SPEED_COLOUR
+        clear, mix = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeMixShader")
+        mix.name = "Opacity"
+        tree.links.new(colour.outputs["Color"], emission.inputs["Color"])
+        tree.links.new(clear.outputs[0], mix.inputs[1])
+        tree.links.new(emission.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], output.inputs["Surface"])
+
+    material = _material(PATH_MATERIAL, build)
+    material.node_tree.nodes["Opacity"].inputs[0].default_value = opacity
+    return material
 
 
 def shaded_material(name: str, attribute: str) -> bpy.types.Material:

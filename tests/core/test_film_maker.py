@@ -54,11 +54,11 @@ def test_the_probe_gets_the_script() -> None:
     assert choose_engine("auto", command) == "workbench"
 
 
-def test_frames_of_a_process_are_reported() -> None:
+def test_the_progress_of_a_process_is_reported() -> None:
     seen = []
-    script = "print('frame 1 2'); print('frame 2 2')"
-    run_job([sys.executable, "-c", script], "x.mp4", lambda _, done, total: seen.append((done, total)))
-    assert seen == [(1, 2), (2, 2)]
+    script = "print('progress 0 9 Simulating a model'); print('progress 2 2 Rendering')"
+    run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said))
+    assert seen == [("Simulating a model", 0, 9), ("Rendering", 2, 2)]
 
 
 def test_what_a_process_says_is_wrong_is_our_error() -> None:

@@ -13,7 +13,7 @@ from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.simulation.blocks import Blocks, block_of
 from rockfall.core.simulation.distributions import parse_distribution
 from rockfall.core.simulation.ground import Ground, make_ground
-from rockfall.core.simulation.measured_releases import from_impacts, from_reconstruction
+from rockfall.core.simulation.measured_releases import from_impacts, from_reconstruction, start_times
 from rockfall.core.simulation.polygons import Polygon
 from rockfall.core.simulation.release import placed_on
 from rockfall.core.simulation.release_sources import in_polygon, on_line, on_points, steeper_than
@@ -203,6 +203,7 @@ def test_measured_releases_and_impacts_start_as_they_were_measured(cliff: Ground
     np.testing.assert_allclose(made.mass_kg, 2700 * 0.6 * 0.5 * 0.4)
     assert (made.shape == "box").all()
     assert "start just after their first impact" in str(made.remarks[0])
+    assert start_times(measured) == {"a": 0.0, "b": 10.0}
 
     leaving = from_impacts(cliff, measured.impacts)
     assert leaving.name.tolist() == ["a 1", "b 1"]

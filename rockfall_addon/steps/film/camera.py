@@ -17,19 +17,25 @@ from ...scene import georeference, store, terrain
 from .motions import Motion
 
 FRAMED_POINTS, WATCHED_POINTS = 2000, 160
+BESIDE_LEGEND = Margins(left=0.38, right=0.05, bottom=0.06, top=0.16)
 LIFT_M = 0.5  # what is watched is a block above the ground, not a line on it
 CONTEXT = 0.12  # of the trajectories' extent: how much slope around them belongs to a picture of the whole
 
 
-def automatic_view(scene: bpy.types.Scene, motions: list[Motion], aspect: float, whole: bool = False) -> View:
+def automatic_view(
+    scene: bpy.types.Scene, motions: list[Motion], aspect: float, whole: bool = False, others: Array | None = None
+) -> View:
     """A view of all trajectories, or of the whole slope around them.
+
+    others : (n, 3) more points that are to be in the picture.
 
     Raises
     ------
     RockfallError : there are neither trajectories nor a terrain.
     """
     surface = terrain.surface_of_scene(scene)
-    points = np.vstack([motion.position for motion in motions]) if motions else np.empty((0, 3))
+    further = np.empty((0, 3)) if others is None else others
+    points = np.vstack([*(motion.position for motion in motions), further])
     around = surface.vertices if surface is not None and (whole or not motions) else np.empty((0, 3))
     if len(points) and len(around):
         low, high = points.min(axis=0), points.max(axis=0)
@@ -45,7 +51,8 @@ def automatic_view(scene: bpy.types.Scene, motions: list[Motion], aspect: float,
         downhill = _steepest_way(around)
     watched = _thinned(points if len(points) else around, WATCHED_POINTS)
     seen = None if surface is None else _visibility(surface, watched)
-    return place_camera(framed, downhill, aspect, seen, Margins(0.04, 0.04, 0.04, 0.04) if whole else None)
+    margins = BESIDE_LEGEND if len(further) else Margins(0.04, 0.04, 0.04, 0.04) if whole else None
+    return place_camera(framed, downhill, aspect, seen, margins)
 
 
 def given_view(scene: bpy.types.Scene, placement: CameraPlacement, aspect: float) -> View:

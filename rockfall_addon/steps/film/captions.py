@@ -12,7 +12,8 @@ from ....core.vectors import Array
 from ...scene import materials
 
 VALUE_ATTRIBUTE, COLOUR_ATTRIBUTE = "caption_value", "colour"
-WHITE, GREY, SHADOW = (0.95, 0.96, 0.97), (0.66, 0.71, 0.76), (0.02, 0.025, 0.03)
+WHITE, BRIGHT_GREY, GREY = (0.95, 0.96, 0.97), (0.84, 0.87, 0.90), (0.66, 0.71, 0.76)
+SHADOW = (0.02, 0.025, 0.03)
 ROUNDNESS = 3  # segments of a letter's curve: all letters are drawn six times over, and anew for every frame
 OUTLINE, BOLD = 0.075, 0.022  # of the text's size, in a small picture
 FONT = "Inter.woff2"

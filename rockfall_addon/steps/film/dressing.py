@@ -9,10 +9,11 @@ from ....core.exchange.project import RenderPreset
 from ....core.film.engines import IDENTIFIERS
 from ....core.film.framing import View, rounded_scale
 from ....core.film.presets import FilmTiming
-from ....core.film.wording import compared_lines, fastest_speed, notes
+from ....core.film.simulated import Group, LegendEntry, last_moment, legend
+from ....core.film.wording import compared_lines, fastest_speed, notes, simulated_lines
 from ....core.impact_models.registry import find_model
-from ...scene import models, store, timing
-from . import camera, layout, marks, presence, remembered
+from ...scene import models, simulation, store, timing
+from . import camera, layout, marks, presence, remembered, simulated
 from .engine import use_engine
 from .motions import Motion, motions_of
 
@@ -46,22 +47,25 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
     _size_things(scene, motions, view)
     settings.trail_until_now = True
     motions = motions_of(scene)
-    last = film.last_frame(max((float(motion.time_s[-1]) for motion in motions), default=0.0))
+    groups, real = simulated.groups_of(scene), simulated.measured(scene, motions)
+    final = last_moment(float(real.end_s.max(initial=0.0)), groups)
+    last = film.last_frame(final)
     scene.frame_start, scene.frame_end = 0, last
     moments = np.arange(last + 1) * film.frame_s
     shown = models.shown_models(scene)
     remarks = notes(settings.block_scale, preset.time_scale, rings=bool(motions))
-    subtitle, more = compared_lines(len(shown)) if shown else (_count(motions), "")
+    subtitle, more = _said(motions, shown, groups)
     words = layout.Words(
         title=_title(scene),
         subtitle=subtitle,
         note="\n".join(filter(None, (more, remarks))),
-        speed_top_mps=settings.speed_top_mps if motions and not shown else None,
-        sources=_sources(shown),
+        speed_top_mps=settings.speed_top_mps if motions and not shown and not groups else None,
+        legend=legend(real, groups, moments, final) if groups else _sources(shown),
         time_s=moments,
-        fastest_mps=fastest_speed([(motion.time_s, motion.speed_mps) for motion in motions], moments),
+        fastest_mps=None if groups else fastest_speed([(each.time_s, each.speed_mps) for each in motions], moments),
         rate=1.0 / film.frame_s,
     )
+    _show_simulated(scene, until_now=True)
     _furnish(scene, view, motions, words, preset)
     presence.show_while_moving(scene, motions)
     use_engine(scene, engine)
@@ -85,13 +89,19 @@ def set_up_picture(
     motions = motions_of(scene)
     for obj in store.with_role(scene, store.BLOCK_ROLE):
         obj.hide_render = True
+    groups, real, shown = simulated.groups_of(scene), simulated.measured(scene, motions), models.shown_models(scene)
+    said, more = _said(motions, shown, groups)
+    for obj in simulation.blocks_of(scene):
+        obj.hide_render = True
+    end = np.full(1, np.inf)
     words = layout.Words(
         title=title or _title(scene),
-        subtitle=subtitle or _count(motions),
-        note=notes(rings=bool(motions)),
-        speed_top_mps=scene.rockfall.speed_top_mps if motions and not models.shown_models(scene) else None,
-        sources=_sources(models.shown_models(scene)),
+        subtitle=subtitle or said,
+        note="\n".join(filter(None, (more if groups else "", notes(rings=bool(motions))))),
+        speed_top_mps=scene.rockfall.speed_top_mps if motions and not shown and not groups else None,
+        legend=legend(real, groups, end, np.inf) if groups else _sources(shown),
     )
+    _show_simulated(scene, until_now=False)
     _furnish(scene, view, motions, words, preset)
     use_engine(scene, engine, still=True)
     scene.frame_set(scene.frame_end)
@@ -101,8 +111,12 @@ def remove_film(scene: bpy.types.Scene) -> None:
     """Take the set-up away: the scene is as it was."""
     _remove_furniture(scene)
     presence.show_always(scene)
-    for obj in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
+    shown = (store.PICK_ROLE, store.BLOCK_ROLE, store.SIMULATED_BLOCKS_ROLE)
+    for obj in (each for role in shown for each in store.with_role(scene, role)):
         obj.hide_render = False
+    for obj in store.with_role(scene, store.SIMULATED_PATHS_ROLE):
+        obj.hide_render = False
+    simulated.restore_colours(scene)
     if remembered.is_set_up(scene):
         remembered.put_back(scene)
 
@@ -119,7 +133,7 @@ def _view(scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, w
     aspect = preset.width / preset.height
     if preset.camera is not None:
         return camera.given_view(scene, preset.camera, aspect)
-    return camera.automatic_view(scene, motions, aspect, whole)
+    return camera.automatic_view(scene, motions, aspect, whole, simulated.points_of(scene))
 
 
 def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> None:
@@ -135,6 +149,7 @@ def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> N
     if abs(settings.block_scale - scale) > 1e-6:
         settings.block_scale = scale
     settings.trail_radius_m = max(remembered.value(scene, "rockfall.trail_radius_m"), TRAIL_PX * pixel / 2)
+    simulation.follow(scene)
 
 
 def _furnish(
@@ -219,11 +234,31 @@ def _pixel_m(scene: bpy.types.Scene, view: View, motions: list[Motion]) -> float
     return float(view.pixel_m(depth, (SMALL_WIDTH * max(SMALL_WIDTH, scene.render.resolution_x)) ** 0.5))
 
 
-def _sources(names: tuple[str, ...]) -> tuple[layout.Source, ...]:
+def _show_simulated(scene: bpy.types.Scene, *, until_now: bool) -> None:
+    """Thin paths in place of those of the step, and the measured blocks in white, where there are simulated ones."""
+    radius = simulated.PATH_PART * scene.rockfall.trail_radius_m
+    paths = simulated.make_paths(scene, radius, until_now=until_now)
+    for obj in paths:
+        _add(scene, obj)
+    if paths:
+        simulated.whiten(scene)
+    for obj in store.with_role(scene, store.SIMULATED_PATHS_ROLE):
+        obj.hide_render = True
+
+
+def _sources(names: tuple[str, ...]) -> tuple[LegendEntry, ...]:
     """Whose blocks there are, when there are others than the real ones."""
     if not names:
         return ()
-    return ("observed", OBSERVED_COLOUR), *((model.title, model.colour) for model in map(find_model, names))
+    known = [find_model(name) for name in names]
+    return LegendEntry("observed", OBSERVED_COLOUR), *(LegendEntry(model.title, model.colour) for model in known)
+
+
+def _said(motions: list[Motion], shown: tuple[str, ...], groups: list[Group]) -> tuple[str, str]:
+    """Two lines on what is seen."""
+    if groups:
+        return simulated_lines(len(motions), len(groups))
+    return compared_lines(len(shown)) if shown else (_count(motions), "")
 
 
 def _title(scene: bpy.types.Scene) -> str:

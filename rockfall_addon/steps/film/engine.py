@@ -4,8 +4,13 @@
 import bpy
 import gpu
 
+from ...scene import materials
+
 FILM_SAMPLES, PICTURE_SAMPLES = 4, 24
 """Per pixel, and only to smooth edges: nothing here is noisy."""
+
+MOST_LAYERS = 64
+"""So many simulated paths are seen through each other."""
 
 
 def use_engine(scene: bpy.types.Scene, engine: str, still: bool = False) -> None:
@@ -30,7 +35,7 @@ def _cycles(scene: bpy.types.Scene, samples: int) -> None:
     cycles.samples = samples
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = 0
-    cycles.transparent_max_bounces = 0
+    cycles.transparent_max_bounces = MOST_LAYERS if bpy.data.materials.get(materials.PATH_MATERIAL) else 0
     cycles.use_auto_tile = False
     for material in bpy.data.materials:
         if material.name.startswith("Rockfall"):

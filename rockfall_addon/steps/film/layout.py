@@ -9,15 +9,16 @@ import bpy
 import numpy as np
 
 from ....core.colours import SPEED_SCALE, scale_colours, srgb_to_linear
+from ....core.film.simulated import LegendEntry
 from ....core.vectors import Array
 from ...scene import materials
 from . import captions
 
 EDGE = 0.055
 LEGEND_STEPS = 48
+COUNT_SIZE = 0.9
+"""Of the letters that count blocks, as a part of those of their names."""
 BACKDROP = ((0.075, 0.085, 0.10), (0.175, 0.205, 0.24))  # slate, below and above
-Source = tuple[str, tuple[float, float, float]]
-"""Whose blocks they are, and their sRGB colour."""
 CREDIT = "made with Rockfall"
 
 
@@ -28,16 +29,16 @@ class Words:
     Attributes
     ----------
     title, subtitle, note : may be empty; the note may have several lines.
-    sources : whose blocks have which colour; the legend when there is no scale of speeds.
+    legend : whose blocks have which colour, where there is no scale of speeds.
     speed_top_mps : at the upper end of the legend; None without a legend.
-    time_s, fastest_mps : (n,) the numbers for each moment, `rate` of them for a second; None for a still picture.
+    time_s, fastest_mps : (n,) the numbers for each moment, `rate` of them for a second; None to say none.
     """
 
     title: str
     subtitle: str = ""
     note: str = ""
     speed_top_mps: float | None = None
-    sources: tuple[Source, ...] = ()
+    legend: tuple[LegendEntry, ...] = ()
     time_s: Array | None = None
     fastest_mps: Array | None = None
     rate: float = 1.0
@@ -56,16 +57,21 @@ def lay_out(words: Words, aspect: float, height_px: int) -> list[bpy.types.Objec
     for i, (name, text) in enumerate((("Film subtitle", words.subtitle), *remarks)):
         line = high - 0.75 * large - 1.45 * small * (i + 1)
         objects.append(make(name, text, (left, line), small, colour=captions.GREY))
-    if words.time_s is not None and words.fastest_mps is not None:
-        objects += [
-            make("Film time", "", (right, high - 0.75 * large), large, align="RIGHT", values=words.time_s,
-                 rate=words.rate, unit=" s"),
-            make("Film fastest block", "fastest block  ", (right, high - 0.75 * large - 1.45 * small), small,
-                 align="RIGHT", values=words.fastest_mps, rate=words.rate, unit=" m/s"),
-        ]  # fmt: skip
+    if words.time_s is not None:
+        time = make(
+            "Film time", "", (right, high - 0.75 * large), large, align="RIGHT", values=words.time_s, rate=words.rate,
+            unit=" s",
+        )  # fmt: skip
+        objects.append(time)
+    if words.fastest_mps is not None:
+        fastest = make(
+            "Film fastest block", "fastest block  ", (right, high - 0.75 * large - 1.45 * small), small, align="RIGHT",
+            values=words.fastest_mps, rate=words.rate, unit=" m/s",
+        )  # fmt: skip
+        objects.append(fastest)
     if words.speed_top_mps is not None:
-        objects += _legend(make, words.speed_top_mps, left, low, small)
-    objects += _sources(make, words.sources, left, low, small)
+        objects += _scale(make, words.speed_top_mps, left, low, small)
+    objects += _legend(make, words, left, low, small)
     objects.append(make("Film credit", CREDIT, (right, low), small, align="RIGHT", colour=captions.GREY))
     return objects
 
@@ -86,7 +92,7 @@ def _weight(height_px: int) -> float:
     return min(1.0, (360 / height_px) ** 0.8)
 
 
-def _legend(
+def _scale(
     make: Callable[..., bpy.types.Object], top_mps: float, left: float, low: float, size: float
 ) -> list[bpy.types.Object]:
     width, height, bottom = 11.0 * size, 0.5 * size, low + 1.15 * size
@@ -108,14 +114,21 @@ def _legend(
     return [_shown("Film legend", mesh), title, *marks]
 
 
-def _sources(
-    make: Callable[..., bpy.types.Object], sources: tuple[Source, ...], left: float, low: float, size: float
+def _legend(
+    make: Callable[..., bpy.types.Object], words: Words, left: float, low: float, size: float
 ) -> list[bpy.types.Object]:
-    """A swatch and a name for each, the first on top."""
-    objects = []
-    for i, (name, colour) in enumerate(reversed(sources)):
-        bottom, side = low + 1.5 * size * i, 0.8 * size
-        mesh = bpy.data.meshes.new("Film source")
+    """A swatch, a name and what there is to count for each, the first on top."""
+    objects, bottom, side = [], low, 0.8 * size
+    for entry in reversed(words.legend):
+        beside = left + 2.1 * side
+        if entry.counts is not None:
+            counted = make(
+                f"Film count {entry.name}", entry.text, (beside, bottom), COUNT_SIZE * size,
+                colour=captions.BRIGHT_GREY, values=entry.counts, rate=words.rate, decimals=0, unit=entry.unit,
+            )  # fmt: skip
+            objects.append(counted)
+            bottom += 1.2 * size
+        mesh = bpy.data.meshes.new("Film legend entry")
         corners = [
             (left, bottom),
             (left + 1.6 * side, bottom),
@@ -123,9 +136,10 @@ def _sources(
             (left, bottom + side),
         ]
         mesh.from_pydata([(*corner, 0.0) for corner in corners], [], [(0, 1, 2, 3)])
-        captions.mark_colour(mesh, _opaque(srgb_to_linear(np.tile(colour, (4, 1)))))
-        place = (left + 2.1 * side, bottom)
-        objects += [_shown(f"Film swatch {name}", mesh), make(f"Film source {name}", name, place, size)]
+        captions.mark_colour(mesh, _opaque(srgb_to_linear(np.tile(entry.colour, (4, 1)))))
+        name = make(f"Film source {entry.name}", entry.name, (beside, bottom), size)
+        objects += [_shown(f"Film swatch {entry.name}", mesh), name]
+        bottom += 1.5 * size
     return objects
 
 

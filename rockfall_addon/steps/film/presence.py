@@ -13,14 +13,14 @@ HIDING = ("hide_render", "hide_viewport")
 def show_while_moving(scene: bpy.types.Scene, motions: list[Motion]) -> None:
     """Key the visibility of the blocks."""
     rate = timing.frame_rate(scene)
-    resting = _resting(scene)
+    at_rest = resting(scene)
     for obj in store.with_role(scene, store.BLOCK_ROLE):
         motion = next((each for each in motions if each.name == obj[store.TRAJECTORY]), None)
         if motion is None:
             continue
         start, end = float(motion.time_s[0]) * rate, float(motion.time_s[-1] + LINGER_S) * rate
         keys = [(min(-1.0, start - 1.0), True), (start, False)]
-        if motion.name not in resting:
+        if motion.name not in at_rest:
             keys.append((end, True))
         for name in HIDING:
             for frame, hidden in keys:
@@ -36,7 +36,7 @@ def show_always(scene: bpy.types.Scene) -> None:
             setattr(obj, name, False)
 
 
-def _resting(scene: bpy.types.Scene) -> set[str]:
+def resting(scene: bpy.types.Scene) -> set[str]:
     """Trajectories whose last pick is a stop."""
     last: dict[str, bpy.types.Object] = {}
     for obj in store.with_role(scene, store.PICK_ROLE):

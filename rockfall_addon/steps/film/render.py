@@ -6,12 +6,14 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import InputError, RockfallError
-from ....core.exchange.project import RenderPreset, read_project
+from ....core.exchange.project import Project, RenderPreset, read_project
+from ....core.film.falls import fall_beside
 from ....core.film.job import FilmJob
 from ....core.film.presets import HD, FilmTiming, find_preset
 from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
-from ...scene import models
+from ....core.simulation.measured_releases import start_times
+from ...scene import models, simulation
 from ...scene.project import load_project
 from . import dressing
 from .engine import use_engine
@@ -33,6 +35,8 @@ def make(job: FilmJob, progress: Progress) -> None:
         result = _load(scene, job.source, preset)
         if job.models:
             models.show_models(scene, result, job.models, job.parameters)
+        if job.simulate:
+            _simulate(scene, job, project, result, progress)
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:
@@ -112,6 +116,14 @@ def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Recons
     settings.playback = "REAL" if preset.stagger_s is None else "TOGETHER"
     settings.stagger_s = preset.stagger_s or 0.0
     return load_project(scene, project, with_videos=False)
+
+
+def _simulate(
+    scene: bpy.types.Scene, job: FilmJob, project: Project, result: Reconstruction, progress: Progress
+) -> None:
+    """Let blocks fall from the starts of the measured ones, and show them."""
+    starts = {name: simulation.Origin(name, time_s) for name, time_s in start_times(result).items()}
+    simulation.show(scene, fall_beside(job, project, len(starts), progress), starts)
 
 
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:

@@ -13,6 +13,7 @@ from rockfall.core.analysis.measured_rebounds import measured_rebounds, without_
 from rockfall.core.analysis.scores import scores
 from rockfall.core.cli import main
 from rockfall.core.errors import InputError
+from rockfall.core.exchange.selection import rows_of
 from rockfall.core.exchange.tables import write_impacts
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.machinery.base import Incident
@@ -178,22 +179,43 @@ def test_the_plain_function_is_the_compiled_one():
             np.testing.assert_allclose(out.angular_velocity[0], plain[1], rtol=1e-12, atol=1e-12)
 
 
-def test_conditions_beyond_the_measured_ones_are_counted_and_served_by_the_nearest():
+@pytest.mark.parametrize("vn", [400.0, 11.0])
+def test_conditions_beyond_the_measured_ones_are_served_by_the_nearest(vn):
+    """Far away, and where the kernel still holds one to four impacts."""
     given = table(40, spread=0.3)
-    assert not given.beyond(np.radians([25.0]), np.array([4.0])).any()
-    far = np.radians([25.0, 0.3, 25.0]), np.array([0.05, 4.0, 400.0])
-    assert given.beyond(*far).all()
-    assert not given.beyond(*far, 10.0, 10.0)[:2].any(), "wider bandwidths reach further"
-    state = blocks(20_000, 20.0, 400.0)
+    angle, speed = given.bandwidths
+    d = np.hypot(np.log(given.theta1 / np.radians(20)) / angle, np.log(given.vn1 / vn) / speed)
+    assert (d < np.sqrt(6)).sum() in ((0,) if vn == 400.0 else (1, 2, 3, 4))
+    assert given.beyond(np.radians([20.0]), np.array([vn])).all()
+    state = blocks(20_000, 20.0, vn)
     rn = outcomes(state, MODEL.rebound(state, rng=np.random.default_rng(8), measured=given).velocity)[0]
     counts = np.bincount(np.abs(rn[:, None] - given.rn).argmin(axis=1), minlength=40)
-    angle, speed = given.bandwidths
-    d = np.hypot(np.log(given.theta1 / np.radians(20)) / angle, np.log(given.vn1 / 400) / speed)
     share = np.maximum(0, 1 - (d / (1 + np.sort(d)[4])) ** 2)
     share /= share.sum()
     assert 5 <= (share > 0).sum() < 25
     assert given.vn1[share > 0].mean() > given.vn1.mean() + np.std(given.vn1) / 2
     assert (np.abs(counts - 20_000 * share) < 4.5 * np.sqrt(20_000 * share * (1 - share)) + 1).all()
+
+
+def test_conditions_beyond_the_measured_ones_are_told():
+    given = table(40, spread=0.3)
+    assert not given.beyond(np.radians([25.0]), np.array([4.0])).any()
+    far = np.radians([25.0, 0.3, 25.0]), np.array([0.05, 4.0, 400.0])
+    assert given.beyond(*far).all()
+    assert not given.beyond(*far, 10.0, 10.0)[:2].any(), "wider bandwidths reach further"
+
+
+def test_a_block_rolls_afterwards():
+    """Without slip where it touches, v_T + r n × ω = 0, also where its speed was limited, and without spin about n."""
+    given, rng = table(60, spread=0.4), np.random.default_rng(9)
+    for theta, vn in ((25, 4), (80, 20)):
+        state = blocks(500, theta, vn, normal=(0.1, 0.3, 0.9))
+        out = MODEL.rebound(state, rng=rng, measured=replace(given, rn=given.rn * 3))
+        tangential = out.velocity - dot(out.velocity, state.normal)[:, None] * state.normal
+        slip = tangential + 0.2 * cross(state.normal, out.angular_velocity)
+        assert norm(tangential).min() > 0.1
+        assert norm(slip).max() < 1e-9
+        assert np.abs(dot(out.angular_velocity, state.normal)).max() < 1e-9
 
 
 # --- In compare ------------------------------------------------------------------------------------------------------
@@ -260,6 +282,12 @@ def test_a_database_that_holds_the_trajectory_under_another_name_does_not_help()
     one = compare(impacts, ["observed"], replicates=5)
     other = compare(impacts, ["observed"], replicates=5, measured=measured_rebounds(renamed))
     np.testing.assert_array_equal(one.v2, other.v2)
+    few = rows_of(impacts, np.flatnonzero((impacts.trajectory != "b03") | (impacts.impact == 4)))
+    at = few.trajectory == "b03"
+    others = measured_rebounds(rows_of(renamed, np.flatnonzero(impacts.trajectory != "b03")))
+    whole = compare(few, ["observed"], replicates=5, measured=measured_rebounds(renamed))
+    without = compare(few, ["observed"], replicates=5, measured=others)
+    np.testing.assert_array_equal(whole.v2[:, :, at], without.v2[:, :, at], "nor does its impact that is not compared")
 
 
 def test_pure_noise_is_not_memorised():

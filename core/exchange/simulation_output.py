@@ -7,10 +7,9 @@ from pathlib import Path
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Simulation
-from ..simulation.results import impacts_of, sample_runs
+from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
 from .simulation_tables import summary, write_hits, write_runs, write_summary
-from .tables import write_impacts, write_trajectories
 
 LARGE = 20_000
 """From so many blocks on, motion in time is written only when it is asked for."""
@@ -50,11 +49,10 @@ def write_simulations(
     write_runs(simulations, folder / "runs.csv")
     written = ["runs.csv"]
     if IMPACTS in record:
-        write_impacts([impacts_of(one) for one in simulations], folder / "impacts.csv")
+        write_simulated_impacts(simulations, folder / "impacts.csv", progress=progress)
         written.append("impacts.csv")
     if TRAJECTORIES in record:
-        samples = [sample_runs(one, progress=progress) for one in simulations]
-        write_trajectories(samples, folder / "trajectories.csv")
+        write_simulated_trajectories(simulations, folder / "trajectories.csv", progress=progress)
         written.append("trajectories.csv")
     if simulations[0].ground.structures:
         write_hits(simulations, folder / "hits.csv")

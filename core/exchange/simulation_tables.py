@@ -24,9 +24,8 @@ from ..simulation.release_sources import check_number, check_size
 from ..simulation.results import release_names, run_figures
 from ..vectors import Mask, norm
 from .csv_text import read_table
-from .tables import POSITION, Columns, vector_columns, write_columns
+from .tables import POSITION, VELOCITY, Columns, vector_columns, write_columns
 
-VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
 SPIN = ("omegax_radps", "omegay_radps", "omegaz_radps")
 DIAMETERS = ("d1_m", "d2_m", "d3_m")
 RELEASES_REQUIRED = ("x_m", "y_m")

@@ -17,6 +17,7 @@ from ..vectors import Array, Indices, Mask, Names, dot
 from .csv_text import read_table
 
 POSITION = ("x_m", "y_m", "z_m")
+VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
 NORMAL = ("nx", "ny", "nz")
 SPIN = ("omega1x_radps", "omega1y_radps", "omega1z_radps")
 PICKS_REQUIRED = ("trajectory", "time_s", *POSITION)
@@ -62,6 +63,7 @@ _MORE: tuple[Column, ...] = (
         for name in ("kinetic1_j", "kinetic2_j", "rotational1_j", "rotational2_j", "bounce_height_m", "chord_height_m")
     ),
 )
+_SIMULATED = ("angular_velocity", "kinetic1_j", "kinetic2_j", "rotational1_j", "rotational2_j")
 _NUMBERS = (*_BEFORE, *_DERIVED, *_BLOCK)
 _UNCERTAIN = (*_DERIVED, *(column for column in _MORE if column[1] in ("kinetic1_j", "kinetic2_j")))
 """What can have a standard deviation, in a column of its own."""
@@ -131,7 +133,7 @@ def write_impacts(impacts: Impacts | Sequence[Impacts], path: str | Path) -> Non
 
 def _impact_cells(impacts: Impacts) -> Columns:
     columns: Columns = {"site": impacts.site, "trajectory": impacts.trajectory, "impact": impacts.impact}
-    columns |= {column[0]: _of(impacts, column) for column in _NUMBERS}
+    columns |= impact_numbers(impacts)
     columns["flags"] = impacts.flag_text()
     for name, attribute, component, degrees in _UNCERTAIN:
         if attribute in impacts.sigma:
@@ -143,6 +145,16 @@ def _impact_cells(impacts: Impacts) -> Columns:
         if np.isfinite(values).any():
             columns[column[0]] = values
     return {**columns, **impacts.extra}
+
+
+def impact_numbers(impacts: Impacts) -> dict[str, Array]:
+    """The columns of numbers that are always there, by name."""
+    return {column[0]: _of(impacts, column) for column in _NUMBERS}
+
+
+def spin_and_energies(impacts: Impacts) -> dict[str, Array]:
+    """The columns of spin and energies by name, those that are always known of a simulated impact."""
+    return {column[0]: _of(impacts, column) for column in (*_SPIN, *_MORE) if column[1] in _SIMULATED}
 
 
 def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
@@ -225,7 +237,7 @@ def _trajectory_cells(samples: TrajectorySamples) -> Columns:
         "time_s": _rounded(samples.time_s),
     }
     columns |= {name: _rounded(survey[:, i]) for i, name in enumerate(POSITION)}
-    columns |= {name: _rounded(samples.velocity[:, i]) for i, name in enumerate(("vx_mps", "vy_mps", "vz_mps"))}
+    columns |= {name: _rounded(samples.velocity[:, i]) for i, name in enumerate(VELOCITY)}
     columns |= {"height_m": _rounded(samples.height_m), "kinetic_J": _rounded(samples.kinetic_j)}
     return columns
 
@@ -276,7 +288,7 @@ def _rounded(values: Array) -> list[str]:
     return ["" if value != value else f"{value:.6f}" for value in values.tolist()]
 
 
-def vector_columns(names: Iterable[str], values: Array) -> Columns:
+def vector_columns(names: Iterable[str], values: Array) -> dict[str, Array]:
     return {name: values[:, i] for i, name in enumerate(names)}
 
 

@@ -1,18 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is read off a simulation: hits of structures, who holds a block, and the tables' numbers."""
 
+import csv
+from dataclasses import fields
+from pathlib import Path
+
 import numpy as np
 import pytest
+from rockfall.core.exchange import simulated_motion
+from rockfall.core.exchange.decimal_tables import Words, write_decimal_table
+from rockfall.core.exchange.simulated_motion import write_simulated_impacts, write_simulated_trajectories
+from rockfall.core.exchange.tables import read_impacts, write_impacts, write_trajectories
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.convergence import convergence
 from rockfall.core.simulation.engine import Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.hits import hits_of
 from rockfall.core.simulation.release import make_releases
+from rockfall.core.simulation.results import impacts_of, sample_runs
 from rockfall.core.simulation.structures import structure_frame
 from rockfall.core.terrain.surface import Surface
 
 G = 9.81
+LOCAL = GlobalShift()
 AZIMI = "azimi_desvarreux_1977"
 
 
@@ -22,14 +32,17 @@ def plane(slope: float = 0.0) -> Surface:
     return Surface(vertices, np.array([[0, 1, 3], [0, 3, 2]], np.int32), GlobalShift(), "plane")
 
 
-def wall(start: tuple[float, float], end: tuple[float, float], low: float, high: float, parts: int = 5) -> Surface:
+def wall(
+    start: tuple[float, float], end: tuple[float, float], low: float, high: float, shift: GlobalShift = LOCAL
+) -> Surface:
     """Upright, of panels that become narrower: nothing may depend on how it is divided."""
+    parts = 5
     share = 1 - (1 - np.linspace(0, 1, parts + 1)) ** 2
     foot = np.array(start) + share[:, None] * (np.array(end) - np.array(start))
     vertices = np.concatenate([np.column_stack([foot, np.full(parts + 1, z)]) for z in (low, high)])
     i = np.arange(parts)
     faces = np.concatenate([np.stack([i, i + 1, i + parts + 2], 1), np.stack([i, i + parts + 2, i + parts + 1], 1)])
-    return Surface(vertices, faces.astype(np.int32), GlobalShift(), "wall")
+    return Surface(vertices, faces.astype(np.int32), shift, "wall")
 
 
 @pytest.mark.parametrize(
@@ -131,3 +144,105 @@ def test_intervals_hold_what_they_are_for() -> None:
     assert (few.mean, few.standard_error) == (2.0, pytest.approx(1 / np.sqrt(3)))
     assert np.isnan(few.q95_high)
     assert np.isnan(convergence(np.array([4.0])).standard_error)
+
+
+def test_decimals_are_those_of_pythons_formatting(tmp_path: Path) -> None:
+    """Each number is as near as its decimals allow; the text is Python's own where no tie is near."""
+    rng = np.random.default_rng(1)
+    drawn = rng.normal(size=2000) * 10.0 ** rng.integers(-8, 6, 2000)
+    drawn[::50] = np.nan
+    values = np.concatenate([drawn, [0.0, -0.0, -1e-9, 999.9999996]])
+    columns = {"a": values, "b": values, "c": np.arange(values.size) - 3}
+    columns["word"] = Words(np.arange(values.size) % 3, ("", "plain", 'with, "quotes"'))
+    write_decimal_table(tmp_path / "table.csv", [lambda: columns], {"b": 9, "c": 0})
+    with (tmp_path / "table.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == values.size
+    for row, value, count in zip(rows, values.tolist(), range(-3, values.size), strict=False):
+        for name, decimals in (("a", 6), ("b", 9)):
+            if np.isnan(value):
+                assert row[name] == ""
+            else:
+                assert abs(float(row[name]) - value) <= 0.5000001 * 10.0**-decimals + 2 * np.spacing(abs(value))
+                assert len(row[name].partition(".")[2]) == decimals
+        assert row["c"] == str(count)
+        assert row["word"] == ("", "plain", 'with, "quotes"')[(count + 3) % 3]
+    assert [row["a"] for row in rows[-4:]] == ["0.000000", "0.000000", "0.000000", "1000.000000"]
+
+
+def test_a_number_with_too_many_digits_is_written_with_all_of_them(tmp_path: Path) -> None:
+    columns = {"a": np.array([1e300, 123456789012345.6, np.nan]), "b": Words(np.array([0, 1, 0]), ("x", "y,z"))}
+    write_decimal_table(tmp_path / "table.csv", [lambda: columns], {})
+    text = (tmp_path / "table.csv").read_text(encoding="utf-8")
+    assert text == 'a,b\n1e+300,x\n123456789012345.6,"y,z"\n,x\n'
+
+
+def test_parts_are_written_in_order_and_an_empty_table_has_its_header(tmp_path: Path) -> None:
+    parts = [lambda k=k: {"a": np.arange(1000.0 * k, 1000.0 * (k + 1))} for k in range(40)]
+    write_decimal_table(tmp_path / "table.csv", parts, {"a": 0})
+    text = (tmp_path / "table.csv").read_text(encoding="utf-8")
+    assert text == "a\n" + "".join(f"{k}\n" for k in range(40_000))
+    write_decimal_table(tmp_path / "empty.csv", [lambda: {"a": np.empty(0), "b": Words(np.empty(0, np.intp), ())}], {})
+    assert (tmp_path / "empty.csv").read_text(encoding="utf-8") == "a,b\n"
+
+
+def falls(number: int = 40) -> Simulation:
+    """Blocks on the plane in survey coordinates, with and without a name, one with flights only."""
+    shift = GlobalShift(2_600_000.0, 1_200_000.0, 500.0)
+    terrain = Surface(plane(0.6).vertices, plane().faces, shift, "plane")
+    ground = make_ground(terrain, {"a, b": wall((60, 20), (60, 100), -60.0, -35.0, shift)})
+    start = np.column_stack([np.full(number, 20.0), np.linspace(30, 90, number), np.full(number, -10.0)])
+    name = np.array(["", "cliff", 'le "dge'])[np.arange(number) % 3]
+    return simulate(ground, make_releases(start, name=name, diameter_m=0.37), Settings("stevens_1998", seed=2))
+
+
+def test_impacts_are_those_that_are_written_with_all_digits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulated_motion, "PART_ROWS", 50)
+    simulation = falls()
+    write_simulated_impacts([simulation], tmp_path / "quick.csv", "site")
+    write_impacts(impacts_of(simulation, "site"), tmp_path / "whole.csv")
+    with (tmp_path / "quick.csv").open(encoding="utf-8", newline="") as stream:
+        header = next(csv.reader(stream))
+    with (tmp_path / "whole.csv").open(encoding="utf-8", newline="") as stream:
+        assert next(csv.reader(stream)) == header
+    quick, whole = read_impacts(tmp_path / "quick.csv"), read_impacts(tmp_path / "whole.csv")
+    assert len(quick) == simulation.impacts.sum() > 200
+    for column in fields(quick):
+        got, expected = getattr(quick, column.name), getattr(whole, column.name)
+        if isinstance(got, np.ndarray) and got.dtype.kind == "f":
+            atol = 0.51e-9 if column.name == "normal" else 0.51e-6
+            scale = np.degrees(1) if column.name.startswith("theta") else 1.0
+            np.testing.assert_allclose(scale * got, scale * expected, rtol=1e-15, atol=atol)
+        elif isinstance(got, np.ndarray):
+            assert got.tolist() == expected.tolist()
+    assert {name: got.tolist() for name, got in quick.extra.items()} == {
+        name: expected.tolist() for name, expected in whole.extra.items()
+    }
+    np.testing.assert_array_equal(quick.mass_kg, whole.mass_kg)
+    for flag, marked in quick.flags.items():
+        np.testing.assert_array_equal(marked, whole.flags[flag])
+
+
+def test_trajectories_are_those_that_are_written_row_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulated_motion, "PART_ROWS", 300)
+    simulation = falls(12)
+    write_simulated_trajectories([simulation], tmp_path / "quick.csv")
+    write_trajectories(sample_runs(simulation), tmp_path / "whole.csv")
+    quick, whole = ((tmp_path / name).read_text(encoding="utf-8").splitlines() for name in ("quick.csv", "whole.csv"))
+    assert len(quick) == len(whole) > 400
+    for one, other in zip(csv.reader(quick), csv.reader(whole), strict=True):
+        assert one[:3] == other[:3]
+        if one[0] != "source":
+            np.testing.assert_allclose(
+                [float(cell or "nan") for cell in one[3:]], [float(cell or "nan") for cell in other[3:]], atol=1.01e-6
+            )
+
+
+def test_without_an_impact_the_table_has_its_header(tmp_path: Path) -> None:
+    ground = make_ground(plane(0.6))
+    start = np.array([[119.0, 60.0, 40.0]])
+    away = simulate(ground, make_releases(start, velocity=np.array([[50.0, 0, 0]])), Settings(AZIMI))
+    write_simulated_impacts([away], tmp_path / "impacts.csv")
+    header = (tmp_path / "impacts.csv").read_text(encoding="utf-8")
+    assert header.startswith("site,trajectory,impact,time_s")
+    assert header.count("\n") == 1

@@ -212,8 +212,9 @@ def simulate(
         rows[start] = run_blocks(
             tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
             releases.position[part], releases.velocity[part], releases.angular_velocity[part],
-            releases.radius_m[part], releases.mass_kg[part], releases.inertia[part], drag[part], settings.gravity_mps2,
-            ROLLING.index(settings.rolling), settings.most_impacts, settings.most_s, record, results[part],
+            releases.radius_m[part], releases.mass_kg[part], releases.inertia[part], releases.principal_kgm2[part],
+            drag[part], settings.gravity_mps2, ROLLING.index(settings.rolling), settings.most_impacts, settings.most_s,
+            record, results[part],
         )  # fmt: skip
         return part.stop - part.start
 

@@ -14,6 +14,9 @@ On the ground the direction follows gravity along the terrain, the speed follows
 
 which gives the same energy line for any step. A is 1 for sliding (Coulomb) and 1/(1 + c) for rolling (Azzoni et al.
 1995), with the inertia c m r²; μ is the coefficient of friction of the zone.
+
+A block whose three moments of inertia are not the same turns freely in flight (`rotation`): the spin that it hits with
+is not the one that it left with. Its attitude is drawn at the release, kept at contacts and while it rolls.
 """
 
 from math import inf, sqrt
@@ -22,12 +25,13 @@ import numpy as np
 
 from ..compiled import kernel
 from ..terrain.kernels import STACK_SIZE
-from .chance_kernels import fill_uniform
+from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, last_root
 from .ground_kernels import box, first_contact
 from .leg_kernels import leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
 from .point_kernels import closest
+from .rotation import drawn_axes, turn
 
 STOPPED, LEFT, LIMIT = 0, 1, 2
 """How a run ends."""
@@ -47,6 +51,7 @@ HELD, MOST_HELD = 1e-4, 100
 """A block that moves less than this part of its radius in so many steps is held where it is."""
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
+UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 COLUMNS = 22
 """run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
 
@@ -241,7 +246,7 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
 @kernel
 def run_block(  # type: ignore[no-untyped-def]
     tree, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count,
-    run, seed, p, v, w, radius, mass, inertia, drag, gravity, law, most_impacts, most_s, record,
+    run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record,
 ):  # fmt: skip
     """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
 
@@ -250,7 +255,8 @@ def run_block(  # type: ignore[no-untyped-def]
     zone : (m,) of each triangle in the order of the leaves: its row in `parameters` (z, k) and `friction` (z,).
     rebound : a model's compiled function.
     draws : (d,) work space for the uniform numbers of one impact.
-    inertia : c of c m r². drag : ½ρC_D A/m [1/m]. law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
+    inertia : c of c m r², for rolling. moments : three, of inertia, for flight. drag : ½ρC_D A/m [1/m].
+    law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
     """
     zero = (0.0, 0.0, 0.0)
     bounds = box(tree)
@@ -261,6 +267,11 @@ def run_block(  # type: ignore[no-untyped-def]
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
     known, t, e, hit, at_edge = False, 0.0, zero, -1, False
+    tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
+    if tumbles:
+        u = np.empty(3)
+        fill_uniform(seed, run, ATTITUDE, u)
+        axes = drawn_axes(u)
     _write(rows, count, run, RELEASED, time, p, v, w, v, w, n, -1)
     count += 1
     while end < 0:
@@ -270,7 +281,9 @@ def run_block(  # type: ignore[no-untyped-def]
             end = LIMIT
             break
         speed = sqrt(_dot(v, v))
-        if not grounded:
+        if grounded:
+            spun = time
+        else:
             a, horizon, then = (0.0, 0.0, -gravity), inf, zero
             if drag > 0.0:
                 horizon = DRAG_CHANGE / (drag * speed + 1e-3)
@@ -306,6 +319,9 @@ def run_block(  # type: ignore[no-untyped-def]
             chord = (p[0] - before[0], p[1] - before[1], p[2] - before[2])
             length += sqrt(_dot(chord, chord))
             n, place = e, hit
+            if tumbles:
+                axes, w = turn(moments, axes, w, time - spun)
+                spun = time
             v1, w1 = v, w
             v_max = max(v_max, sqrt(_dot(v, v)))
             if _dot(v, n) < 0.0 and at_once < MOST_AT_ONCE:
@@ -441,6 +457,8 @@ def run_block(  # type: ignore[no-untyped-def]
         if record:
             _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
             count += 1
+    if tumbles and not grounded:
+        axes, w = turn(moments, axes, w, time - spun)
     if count + 2 >= rows.shape[0]:
         rows = _grown(rows)
     _write(rows, count, run, ENDED, time, p, v, w, v, w, n, place)
@@ -450,7 +468,7 @@ def run_block(  # type: ignore[no-untyped-def]
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
     tree, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass, inertia,
-    drag, gravity, law, most_impacts, most_s, record, results,
+    moments, drag, gravity, law, most_impacts, most_s, record, results,
 ):  # fmt: skip
     """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
@@ -461,8 +479,8 @@ def run_blocks(  # type: ignore[no-untyped-def]
         rows, count, end, time, impacts, length, v_max = run_block(
             tree, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count, runs[i], seed,
             (place[i, 0], place[i, 1], place[i, 2]), (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
-            (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i], drag[i], gravity, law,
-            most_impacts, most_s, record,
+            (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],
+            (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record,
         )  # fmt: skip
         results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4] = end, time, impacts, length, v_max
     return rows[:count].copy()

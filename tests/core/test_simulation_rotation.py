@@ -1,11 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The free rotation of blocks: published values, Euler's equations integrated by another code, SciPy's functions."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.simulation.block_shapes import principal_moments
+from rockfall.core.simulation.chance_kernels import ATTITUDE, fill_uniform
 from rockfall.core.simulation.elliptic_kernels import carlson_rc, carlson_rf, carlson_rj, jacobi
+from rockfall.core.simulation.engine import IMPACT, Settings, simulate
+from rockfall.core.simulation.ground import make_ground
+from rockfall.core.simulation.release import make_releases
 from rockfall.core.simulation.rotation import drawn_axes, turn
+from rockfall.core.terrain.surface import Surface
 from scipy import special
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -112,3 +121,62 @@ def test_drawn_axes_are_rotations_and_point_everywhere() -> None:
     np.testing.assert_allclose(np.linalg.det(rows), 1.0)
     assert abs(rows.mean(axis=0)).max() < 4 / np.sqrt(3 * 3000)
     np.testing.assert_allclose((rows**2).mean(axis=0), np.full((3, 3), 1 / 3), atol=0.02)
+
+
+def falls(shape: str, threads: int = 1, first: int = 0, count: int = 40, drag: Drag | None = None):
+    """Boxes that are thrown over a slope, turning, with a model that leaves spin: two flights at least."""
+    line = np.arange(0.0, 121.0, 5.0)
+    x, y = np.meshgrid(line, line)
+    vertices = np.column_stack([x.ravel(), y.ravel(), -0.6 * x.ravel()])
+    i = np.arange(line.size**2).reshape(line.size, -1)
+    faces = np.concatenate(
+        [np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:]], -1), np.stack([i[:-1, :-1], i[1:, 1:], i[1:, :-1]], -1)]
+    )
+    ground = make_ground(Surface(vertices, faces.reshape(-1, 3).astype(np.int32), GlobalShift(), "slope"))
+    rng = np.random.default_rng(6)
+    start = np.column_stack([rng.uniform(8, 20, count), rng.uniform(50, 70, count), rng.uniform(0, 4, count)])
+    releases = make_releases(
+        start,
+        velocity=rng.normal(0.0, 3.0, (count, 3)),
+        angular_velocity=rng.normal(0.0, 15.0, (count, 3)),
+        axes_m=np.tile([1.2, 0.9, 0.5], (count, 1)),
+        shape=shape,  # type: ignore[arg-type]
+    )
+    settings = Settings("wyllie_2014", seed=8, drag=drag, most_impacts=20)
+    return simulate(ground, releases.take(slice(first, count)), settings, first_run=first, threads=threads)
+
+
+@pytest.mark.parametrize("drag", [None, Drag()])
+def test_boxes_turn_freely_between_their_impacts(drag: Drag | None) -> None:
+    """The spin at the first two impacts, by integration from the attitude that belongs to the seed and the run."""
+    run = falls("box", drag=drag)
+    records, moments = run.records, tuple(run.releases.principal_kgm2[0].tolist())
+    compared = 0
+    for number in range(12):
+        u = np.empty(3)
+        fill_uniform(8, number, ATTITUDE, u)
+        axes = np.array(drawn_axes(u))
+        own = np.flatnonzero(records.run == number)
+        for before, after in pairwise(own[:3].tolist()):
+            if records.what[after] != IMPACT:
+                break
+            flight = records.time_s[after] - records.time_s[before]
+            axes, spin = integrated(moments, axes, records.omega2[before], flight)
+            np.testing.assert_allclose(records.omega1[after], spin, atol=1e-7 * np.linalg.norm(spin))
+            compared += abs(records.omega1[after] - records.omega2[before]).max() > 0.1
+    assert compared > 12
+
+
+def test_spheres_and_cubes_keep_their_spin_in_flight() -> None:
+    for shape in ("sphere", "cube"):
+        records = falls(shape).records
+        flights = np.flatnonzero((records.what[1:] == IMPACT) & (records.what[:-1] <= IMPACT))
+        np.testing.assert_array_equal(records.omega1[flights + 1], records.omega2[flights])
+
+
+def test_boxes_are_the_same_for_any_threads_and_parts() -> None:
+    whole, other, part = falls("box"), falls("box", threads=3), falls("box", first=25)
+    for name in ("time_s", "position", "omega1", "omega2"):
+        values = getattr(whole.records, name)
+        np.testing.assert_array_equal(values, getattr(other.records, name))
+        np.testing.assert_array_equal(values[whole.records.run >= 25], getattr(part.records, name))

@@ -2,7 +2,7 @@
 """Any terrain file → a `Surface` in local coordinates, with normals out of the ground."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..georeference import GlobalShift
 from ..progress import Progress, silent
 from ..vectors import Array
 from . import advice, cleaning, clouds, geotiff, grids, meshes, ply, triangulation, winding
+from .cloud import Cloud
 from .crs import surely_different
 from .source import Source
 from .surface import Surface
@@ -87,6 +88,58 @@ def read_terrain(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
+    return _surface(_opened(path, shift, up, unit_m, ground_only), max_edge_m, progress)
+
+
+def read_points(
+    path: str | Path,
+    *,
+    shift: GlobalShift | None = None,
+    up: str = "auto",
+    unit_m: float = 1.0,
+    ground_only: bool | None = None,
+    progress: Progress = silent,
+) -> Cloud:
+    """Read a cloud as its points, without a surface between them; of a mesh its vertices, of a grid its heights.
+
+    Parameters and errors are those of `read_terrain`.
+    """
+    path = Path(path)
+    progress(f"Reading {path.name}", 0, 1)
+    return _cloud(_opened(path, shift, up, unit_m, ground_only))
+
+
+def read_structure(
+    path: str | Path,
+    *,
+    shift: GlobalShift | None = None,
+    up: str = "auto",
+    unit_m: float = 1.0,
+    ground_only: bool | None = None,
+    progress: Progress = silent,
+) -> Surface | Cloud:
+    """Read a mesh or a grid as a surface, a cloud as its points: a wall has no surface in plan.
+
+    Parameters and errors are those of `read_terrain`.
+    """
+    path = Path(path)
+    progress(f"Reading {path.name}", 0, 2)
+    opened = _opened(path, shift, up, unit_m, ground_only)
+    return _cloud(opened) if opened.source.kind == "cloud" else _surface(opened, None, progress)
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A file's contents in local coordinates, and what there is to say of them."""
+
+    path: Path
+    source: Source
+    shift: GlobalShift
+    notes: tuple[str, ...]
+    advice: tuple[str, ...]
+
+
+def _opened(path: Path, shift: GlobalShift | None, up: str, unit_m: float, ground_only: bool | None) -> _Opened:
     source = _read(path, ground_only)
     points = _placed(source, up, unit_m, path)
     notes = list(source.notes)
@@ -97,30 +150,41 @@ def read_terrain(
     low, high = _box(points[heights], path)
     advice.refuse_degrees(source, low, high, unit_m, path)
     shift = _shift(shift, low, high, source.crs, path)
-    local = points - shift.vector
-    del points
+    said = [*advice.sentences(low, high, shift)]
+    if shift.vector.any():
+        said.append(f"Shifted by ({shift.x:.0f}, {shift.y:.0f}, {shift.z:.0f}) m from survey to local coordinates.")
+    if source.crs and source.crs != shift.crs:
+        said.append(f"The file names its system {source.crs}: check that this is the same as the project's.")
+    said.append(
+        f"Coordinate reference system {shift.crs}." if shift.crs else "The coordinate reference system is unknown."
+    )
+    return _Opened(path, replace(source, points=points - shift.vector), shift, tuple(notes), tuple(said))
+
+
+def _cloud(opened: _Opened) -> Cloud:
+    points = opened.source.points
+    points = points[np.isfinite(points[:, 2])]
+    note = "Blocks meet the points themselves: there is no surface between them."
+    return Cloud(points, opened.shift, opened.path.name, (*opened.notes, note, *opened.advice))
+
+
+def _surface(opened: _Opened, max_edge_m: float | None, progress: Progress) -> Surface:
+    source, path, shift = opened.source, opened.path, opened.shift
+    before, after = opened.notes, opened.advice
     progress("Meshing" if source.kind != "mesh" else "Orienting faces", 1, 2)
     try:
         if source.grid_shape is not None:
-            meshed = triangulation.mesh_grid(local, source.grid_shape)
+            meshed = triangulation.mesh_grid(source.points, source.grid_shape)
         elif source.faces is None:
-            meshed = triangulation.mesh_cloud(local, max_edge_m)
+            meshed = triangulation.mesh_cloud(source.points, max_edge_m)
         else:
-            meshed = triangulation.Meshed(local, source.faces, ())
-        kind, source_crs = source.kind, source.crs
-        del local, source
+            meshed = triangulation.Meshed(source.points, source.faces, ())
+        kind = source.kind
+        del source, opened  # their points are as large as what follows
         vertices, faces, done = _cleaned(meshed, kind)
     except InputError as error:
         raise InputError(error.problem, file=path, advice=error.advice) from error
-    notes += [*meshed.notes, *done, *advice.sentences(low, high, shift)]
-    if shift.vector.any():
-        notes.append(f"Shifted by ({shift.x:.0f}, {shift.y:.0f}, {shift.z:.0f}) m from survey to local coordinates.")
-    if source_crs and source_crs != shift.crs:
-        notes.append(f"The file names its system {source_crs}: check that this is the same as the project's.")
-    notes.append(
-        f"Coordinate reference system {shift.crs}." if shift.crs else "The coordinate reference system is unknown."
-    )
-    return Surface(vertices, faces, shift, path.name, tuple(notes))
+    return Surface(vertices, faces, shift, path.name, (*before, *meshed.notes, *done, *after))
 
 
 def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) -> TerrainInfo:

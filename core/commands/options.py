@@ -131,14 +131,12 @@ def terrain_as_asked(arguments: argparse.Namespace, file: str, progress: "Progre
     from ..terrain.readers import read_terrain
 
     progress(f"Reading {file}", 0, 0)
-    return read_terrain(
-        file,
-        up=arguments.up,
-        unit_m=arguments.unit,
-        max_edge_m=arguments.max_edge,
-        ground_only=arguments.ground_only,
-        progress=progress,
-    )
+    return read_terrain(file, max_edge_m=arguments.max_edge, progress=progress, **reading_as_asked(arguments))
+
+
+def reading_as_asked(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the options of `add_terrain_options` say of any file, for the readers."""
+    return {"up": arguments.up, "unit_m": arguments.unit, "ground_only": arguments.ground_only}
 
 
 def add_incident_options(parser: argparse.ArgumentParser) -> None:

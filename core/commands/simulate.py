@@ -18,6 +18,7 @@ from .options import (
     model_parameters,
     not_negative,
     positive,
+    reading_as_asked,
     terrain_as_asked,
     whole,
     whole_range,
@@ -34,6 +35,8 @@ from .release_options import (
 
 if TYPE_CHECKING:
     from ..simulation.release import Releases
+    from ..terrain.cloud import Cloud
+    from ..terrain.surface import Surface
     from ..workflow.simulation import Scenario
 
 
@@ -68,7 +71,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     motion.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
     motion.add_argument("--gravity", type=positive, metavar="G", help=f"[m/s²] (default {GRAVITY_MPS2:g})")
     motion.add_argument(
-        "--structure", action="append", default=[], metavar="NAME=FILE", help="a wall, a road, a house: a mesh"
+        "--structure",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        help="a wall, a road, a house: a mesh, or a cloud, whose points blocks meet",
+    )
+    motion.add_argument(
+        "--contact",
+        choices=("mesh", "points"),
+        help="what of the terrain blocks meet: a surface (default; clouds and grids are meshed), or points alone, "
+        "those of a cloud, of a mesh its vertices",
     )
     parser.add_argument(
         "--record",
@@ -135,6 +148,7 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
     """What the options say."""
     from ..impact_models.registry import find_model
     from ..reconstruction.drag import Drag
+    from ..terrain.readers import read_points, read_structure
     from ..workflow.simulation import Scenario
 
     for option in ("terrain", "model"):
@@ -152,14 +166,20 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
         if getattr(arguments, option) is not None
     }  # fmt: skip
     source, release_files = releases_as_asked(arguments)
-    terrain = terrain_as_asked(arguments, arguments.terrain, progress)
+    reading = reading_as_asked(arguments)
+    if arguments.contact == "points":
+        if arguments.max_edge is not None:
+            raise InputError("--max-edge is of a mesh, and --contact points makes none", advice="Leave out one of them")
+        terrain: Surface | Cloud = read_points(arguments.terrain, progress=progress, **reading)
+    else:
+        terrain = terrain_as_asked(arguments, arguments.terrain, progress)
     zones, zone_files = zones_as_asked(arguments, terrain, models)
     scenario = Scenario(
         terrain,
         source,
         {name: parameters.get(name, {}) for name in models},
         measured,
-        structures={name: terrain_as_asked(arguments, file, progress) for name, file in files.items()},
+        structures={name: read_structure(file, progress=progress, **reading) for name, file in files.items()},
         zones=zones,
         drag=Drag() if arguments.drag else None,
         **given,
@@ -200,6 +220,7 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
         entry,
         models=tuple(arguments.model or entry.models),
         releases=releases,
+        contact=arguments.contact or entry.contact,
         rolling=arguments.rolling or entry.rolling,
         friction=entry.friction if arguments.friction is None else arguments.friction,
         drag=arguments.drag or entry.drag,

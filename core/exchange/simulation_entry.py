@@ -5,6 +5,7 @@
     models = ["noel_2017", "stevens_1998"]
     seed = 3
     rolling = "azzoni_1995"          # coulomb, none
+    contact = "mesh"                 # points: blocks meet the points of a cloud instead of its meshed surface
     friction = 0.5
     drag = true
     record = ["impacts"]             # trajectories; without it the number of blocks decides
@@ -36,6 +37,7 @@ from ..impact_models.registry import find_model
 from ..simulation.block_shapes import SHAPES, Shape
 from ..simulation.distributions import FORMS, Distribution, parse_distribution
 from ..simulation.engine import FRICTION, ROLLING, Rolling
+from ..simulation.ground import CONTACTS, Contact
 from .toml_text import TomlTable, is_number
 
 MEASURED, TABLE, POINTS, LINE, POLYGON, STEEP = "measured", "table", "points", "line", "polygon", "steep"
@@ -84,7 +86,7 @@ class ReleaseEntry:
 
 @dataclass(frozen=True)
 class StructureEntry:
-    """A wall, fence, road or house: a mesh in the coordinates of the terrain."""
+    """A wall, fence, road or house: a mesh or a cloud in the coordinates of the terrain."""
 
     name: str
     file: Path
@@ -99,6 +101,7 @@ class SimulationEntry:
     ----------
     models : names, in the order in which they run; none takes those that are compared by default.
     releases, structures, rolling, friction, seed : see `workflow.simulation.Scenario`.
+    contact : what of the terrain blocks meet, see `simulation.ground.CONTACTS`.
     observed : impacts.csv that the model observed draws from; None takes what the project has measured.
     drag : of the air, with the coefficient and density of the project's reconstruction.
     record : of `RECORDS`, the tables beside runs.csv; None lets the number of blocks decide.
@@ -107,6 +110,7 @@ class SimulationEntry:
     models: tuple[str, ...] = ()
     releases: ReleaseEntry = field(default_factory=ReleaseEntry)
     structures: tuple[StructureEntry, ...] = ()
+    contact: Contact = "mesh"
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     drag: bool = False
@@ -133,6 +137,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         models=models,
         releases=_read_releases(table.table("releases")),
         structures=_read_structures(table),
+        contact=cast(Contact, table.choice("contact", CONTACTS, "mesh")),
         rolling=cast(Rolling, table.choice("rolling", ROLLING, "azzoni_1995")),
         friction=table.number("friction", FRICTION, zero_allowed=True),
         drag=table.flag("drag", False),
@@ -146,7 +151,13 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
 def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) -> dict[str, Any]:
     """The section as TOML can hold it; the unknown keys at the end."""
     content: dict[str, Any] = {"models": list(entry.models)} if entry.models else {}
-    content |= {"seed": entry.seed, "rolling": entry.rolling, "friction": entry.friction, "drag": entry.drag}
+    content |= {
+        "seed": entry.seed,
+        "contact": entry.contact,
+        "rolling": entry.rolling,
+        "friction": entry.friction,
+        "drag": entry.drag,
+    }
     if entry.observed is not None:
         content["observed"] = relative(entry.observed)
     if entry.record is not None:

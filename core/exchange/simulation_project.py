@@ -21,7 +21,8 @@ from ..simulation.measured_releases import from_reconstruction
 from ..simulation.polygons import Polygon
 from ..simulation.release import Releases
 from ..simulation.release_sources import in_polygon, on_line, on_points, steeper_than
-from ..terrain.readers import read_terrain
+from ..terrain.cloud import Cloud
+from ..terrain.readers import read_points, read_structure
 from ..terrain.surface import Surface
 from ..workflow.simulation import ReleaseSource, Scenario
 from .opening import open_terrain, read_project_picks, reconstruct_project
@@ -67,14 +68,17 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         inputs["picks"] = project.picks
     if entry.releases.source == TABLE and entry.releases.file is not None:
         inputs["releases"] = entry.releases.file
-    structures = {}
+    structures: dict[str, Surface | Cloud] = {}
     for structure in entry.structures:
         progress(f"Reading {structure.file.name}", 0, 0)
-        structures[structure.name] = read_terrain(structure.file, up=source.up, unit_m=source.unit_m)
+        structures[structure.name] = read_structure(structure.file, up=source.up, unit_m=source.unit_m)
         inputs[structure.name] = structure.file
     how = project.reconstruction
+    met: Surface | Cloud = terrain
+    if entry.contact == "points":
+        met = read_points(source.file, shift=terrain.shift, up=source.up, unit_m=source.unit_m)
     scenario = Scenario(
-        terrain,
+        met,
         release_source(project, terrain, entry),
         {name: known.get(name, {}) for name in models},
         _drawn_from(project, terrain, entry) if drawing else None,

@@ -21,7 +21,8 @@ from ..simulation.ground import Ground
 from ..simulation.hits import hits_of
 from ..simulation.release import Releases, make_releases, overlapping, placed_on
 from ..simulation.release_sources import check_number, check_size
-from ..simulation.results import release_names, run_figures
+from ..simulation.results import fell_through, release_names, run_figures
+from ..terrain.cloud import Cloud
 from ..vectors import Mask, norm
 from .csv_text import read_table
 from .tables import POSITION, VELOCITY, Columns, vector_columns, write_columns
@@ -176,6 +177,8 @@ def summary(
         "seed": settings.seed,
         "first_run": first.first_run + 1,
         "blocks_wanted": first.wanted,
+        "contact": "points" if isinstance(first.ground.terrain, Cloud) else "mesh",
+        "point_spacing_m": {name: round(spacing, 6) for name, spacing in first.ground.spacing_m.items()},
         "triangles_without_area": first.ground.flat,
         "models": {simulation.settings.model: _model_summary(simulation) for simulation in simulations},
         "remarks": to_plain(remarks),
@@ -195,6 +198,7 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
         "zone_friction": dict(settings.zone_friction),
         "blocks": n,
         "ends": {name: int(count) for name, count in zip(simulation.ends, ends, strict=True)},
+        "fell_through": int(fell_through(simulation).sum()),
         "impacts": int(simulation.impacts.sum()),
         "seconds": round(simulation.seconds, 3),
         "blocks_per_s": round(n / simulation.seconds, 1),

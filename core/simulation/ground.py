@@ -4,7 +4,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from ..terrain.joining import moved
 from ..terrain.raycast import closest_points, heights_above
 from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
+
+Contact = Literal["mesh", "points"]
+CONTACTS: tuple[Contact, ...] = ("mesh", "points")
+"""What of the terrain blocks meet: its triangles, where a cloud is meshed in plan; or points alone."""
 
 TERRAIN = 0
 """The owner of the terrain's elements; structures follow from 1."""

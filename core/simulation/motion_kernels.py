@@ -49,6 +49,8 @@ DRAG_CHANGE = 0.005
 """With drag, the speed changes by less than this part on one parabola."""
 HELD, MOST_HELD = 1e-4, 100
 """A block that moves less than this part of its radius in so many steps is held where it is."""
+LINGERS = 0.1
+"""So is one that rocks: that in so many short steps gets no further than this part of its radius."""
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -266,6 +268,7 @@ def run_block(  # type: ignore[no-untyped-def]
     v_max = sqrt(_dot(v, v))
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
+    anchor, lingers = p, 0
     known, t, e, hit, at_edge = False, 0.0, zero, -1, False
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:
@@ -402,6 +405,13 @@ def run_block(  # type: ignore[no-untyped-def]
         ds = sqrt(_dot(way, way))
         held = held + 1 if ds < HELD * radius else 0
         if held > MOST_HELD:
+            end = STOPPED
+            break
+        gone = (q[0] - anchor[0], q[1] - anchor[1], q[2] - anchor[2])
+        lingers += 1
+        if _dot(gone, gone) > (LINGERS * radius) ** 2:
+            anchor, lingers = q, 0
+        if lingers > MOST_HELD:
             end = STOPPED
             break
         towards = -_dot(v, against)

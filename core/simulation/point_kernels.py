@@ -20,8 +20,8 @@ from ..terrain.point_kernels import nearest
 from .contact_kernels import RESTING_S, STEPS, TOUCHING_M, enter_node, first_root, last_inside, prepared
 
 BAND, MANY, WIDEST = 0.1, 2.0, 0.3
-"""Points within this part of the radius of the sphere make the normal; on a plane those within 0.45 of the radius. Where
-points are far apart, the band is so wide that the patch reaches `MANY` spacings, up to `WIDEST`."""
+"""Points within this part of the radius of the sphere make the normal; on a plane those within 0.45 of the radius.
+Where points are far apart, the band is so wide that the patch reaches `MANY` spacings, up to `WIDEST`."""
 FACING = 0.7
 """Cosine between the directions of a point and of the first one below which it belongs to another face."""
 HELD_LEVEL = 0.03

@@ -9,8 +9,8 @@ from ..progress import Progress, silent
 from ..reconstruction.free_flight import fly
 from ..reconstruction.impact import Impacts, apparent, make_impacts
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
-from ..vectors import Array, Indices, Names, dot
-from .engine import FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
+from ..vectors import Array, Indices, Mask, Names, dot
+from .engine import ENDS, FLIES_OFF, IMPACT, LEFT_TERRAIN, ON_GROUND, RELEASED, Simulation
 
 HIGHEST_FLIGHTS = 3
 """The highest point of a run is looked for on so many of its longest flights, the bounces that can be the highest."""
@@ -46,6 +46,15 @@ def run_figures(simulation: Simulation) -> RunFigures:
         _greatest_heights(simulation),
         np.where(flat > 0, line, np.nan),
     )
+
+
+def fell_through(simulation: Simulation) -> Mask:
+    """(n,) runs that left the terrain and ended under it: they fell through a hole, or between points."""
+    through = np.zeros(len(simulation), np.bool_)
+    left = np.flatnonzero(simulation.end == ENDS.index(LEFT_TERRAIN))
+    if left.size:
+        through[left] = simulation.ground.heights_above(simulation.position[left]) < 0  # NaN beside the terrain
+    return through
 
 
 def flights_of(simulation: Simulation) -> tuple[Indices, Array]:

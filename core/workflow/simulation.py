@@ -30,11 +30,15 @@ from ..simulation.engine import (
 )
 from ..simulation.ground import Ground, make_ground
 from ..simulation.release import Releases
+from ..simulation.results import fell_through
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 
 type ReleaseSource = Callable[[Ground], Releases]
 """Puts the blocks on a ground: points, a line, a polygon, steep faces, measured releases, a table."""
+
+DENSE = 3.0
+"""Where points are further apart than the radius divided by this, blocks feel them one by one."""
 
 END_WORDS = {
     STOPPED: "stopped",
@@ -230,9 +234,27 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
         remarks += _remarks_of_one(simulation)
     ground = simulations[0].ground
     remarks += [*ground.remarks, *simulations[0].releases.remarks]
+    remarks += _remarks_of_points(simulations[0])
     if ground.flat:
         remarks.append(Remark(f"{ground.flat} triangles without area were left out.", "note", "terrain"))
     return tuple(gravest_first(remarks))
+
+
+def _remarks_of_points(simulation: Simulation) -> list[Remark]:
+    """How dense a cloud is for its blocks."""
+    remarks = []
+    least = float(simulation.releases.radius_m.min())
+    for name, spacing in simulation.ground.spacing_m.items():
+        text = f"Blocks meet the points of {name}, {spacing:.3g} m apart"
+        if least < DENSE * spacing:
+            text += (
+                f": that is coarse for the smallest radius of {least:.3g} m, for which they are to be "
+                f"{least / DENSE:.2g} m apart at the most. Such blocks feel single points and stop early."
+            )
+            remarks.append(Remark(text, "warning", "terrain"))
+        else:
+            remarks.append(Remark(f"{text}.", "note", "terrain"))
+    return remarks
 
 
 def _remarks_of_one(simulation: Simulation) -> list[Remark]:
@@ -242,6 +264,10 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     limited = counts[ENDS.index(LIMIT)]
     if limited:
         text = f"{limited} of {n} blocks with {model} {END_WORDS[LIMIT]}: they are not at rest."
+        remarks.append(Remark(text, "warning", model))
+    through = int(fell_through(simulation).sum())
+    if through:
+        text = f"{through} of {n} blocks with {model} fell through the terrain: it has holes larger than they are."
         remarks.append(Remark(text, "warning", model))
     held = {f"structure:{name}": f"held by {name}" for name in simulation.ground.structures}
     words = END_WORDS | held

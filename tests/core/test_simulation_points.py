@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blocks on points alone: contacts against closed forms, and the same falls as on triangles of the same surface."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
-from rockfall.core.simulation.engine import Settings, simulate
-from rockfall.core.simulation.ground import make_ground
+from rockfall.core.simulation import engine
+from rockfall.core.simulation.engine import ENDS, IMPACT, Settings, Simulation, simulate
+from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.point_kernels import CORE
 from rockfall.core.simulation.release import make_releases, overlapping, placed_on
+from rockfall.core.simulation.results import fell_through
 from rockfall.core.terrain.cloud import Cloud, heights_above_points, nearest_points
 from rockfall.core.terrain.kernels import STACK_SIZE
+from rockfall.core.terrain.readers import read_points, read_terrain
 from rockfall.core.terrain.surface import Surface
 from scipy.spatial import cKDTree
+from scipy.stats import ks_2samp
 
 G = 9.81
 
@@ -169,3 +177,149 @@ def test_a_wall_of_points_on_a_mesh_and_a_wall_of_triangles_on_points() -> None:
         first = np.flatnonzero(run.records.what == 1)[np.argmax(hits)]
         np.testing.assert_allclose(run.records.normal[first], [-1, 0, 0], atol=0.02)
         np.testing.assert_allclose(15 - run.records.position[first, 0], 0.5, atol=0.02)
+
+
+def survey_height(x, y):
+    """A rough slope of 35° that runs out at 11°."""
+    drop = -0.7 * np.minimum(x, 60) - 0.2 * np.maximum(x - 60, 0)
+    return drop + 0.4 * np.sin(x / 3) * np.cos(y / 4) + 0.1 * np.sin(2.1 * x + y) * np.cos(1.7 * y)
+
+
+LENGTH, WIDTH = 110.0, 30.0
+
+
+@pytest.fixture(scope="module")
+def one_surface(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ground]:
+    """The same slope as a mesh, as a cloud of points at random places, and as an ESRI grid that is read."""
+    step = 0.25
+    x, y = np.meshgrid(np.arange(0, LENGTH, step), np.arange(0, WIDTH, step))
+    z = survey_height(x, y)
+    i = np.arange(x.size).reshape(x.shape)
+    lower = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:]], axis=-1).reshape(-1, 3)
+    upper = np.stack([i[:-1, :-1], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 3)
+    faces = np.concatenate([lower, upper]).astype(np.int32)
+    mesh = Surface(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), faces, GlobalShift(), "mesh")
+    plan = np.random.default_rng(8).uniform(0, [LENGTH, WIDTH], (int(LENGTH * WIDTH / 0.15**2), 2))
+    cloud = Cloud(np.column_stack([plan, survey_height(*plan.T)]), GlobalShift(), "cloud")
+    file = tmp_path_factory.mktemp("grid") / "slope.asc"
+    header = f"ncols {x.shape[1]}\nnrows {x.shape[0]}\nxllcenter 0\nyllcenter 0\ncellsize {step}\nNODATA_value -9999\n"
+    np.savetxt(file, z[::-1], fmt="%.6f", header=header.rstrip(), comments="")
+    grid = read_terrain(file, shift=GlobalShift())
+    assert len(grid.faces) == len(faces)
+    return {"mesh": make_ground(mesh), "cloud": make_ground(cloud), "grid": make_ground(grid)}
+
+
+def fall_on(ground: Ground, model: str = "noel_2017", count: int = 400, diameter: float = 1.5, **more) -> Simulation:
+    rng = np.random.default_rng(1)
+    plan = rng.uniform([6, 8], [20, WIDTH - 8], (count, 2))
+    start = np.column_stack([plan, survey_height(*plan.T) + diameter + 0.5])
+    return simulate(ground, make_releases(start, diameter_m=diameter), Settings(model, seed=3), **more)
+
+
+def run_out(run: Simulation) -> np.ndarray:
+    return np.hypot(*(run.position - run.releases.position)[:, :2].T)
+
+
+def test_mesh_cloud_and_grid_of_one_surface_give_the_same_run_out(one_surface: dict[str, Ground]) -> None:
+    """Kolmogorov and Smirnov's test of two samples of 400 runs; points at a fifth of the radius, triangles at a third.
+
+    The same test tells a block of another size from this one.
+    """
+    runs = {name: fall_on(ground) for name, ground in one_surface.items()}
+    for run in runs.values():
+        assert np.bincount(run.end, minlength=len(ENDS))[ENDS.index("stopped")] > 390
+    for name in ("cloud", "grid"):
+        assert ks_2samp(run_out(runs[name]), run_out(runs["mesh"])).pvalue > 0.05
+        assert np.median(run_out(runs[name])) == pytest.approx(np.median(run_out(runs["mesh"])), rel=0.03)
+    small = fall_on(one_surface["cloud"], diameter=0.5)
+    assert ks_2samp(run_out(small), run_out(runs["mesh"])).pvalue < 1e-3
+
+
+def test_no_point_is_deeper_in_a_block_than_is_stated_on_any_flight(one_surface: dict[str, Ground]) -> None:
+    run = fall_on(one_surface["cloud"], count=100)
+    cloud, records = one_surface["cloud"].terrain, run.records
+    assert isinstance(cloud, Cloud)
+    start = np.flatnonzero((records.what[:-1] == IMPACT) & (records.what[1:] == IMPACT))
+    start = start[records.run[start] == records.run[start + 1]]
+    assert start.size > 400
+    for part in np.linspace(0, 1, 21):
+        t = part * (records.time_s[start + 1] - records.time_s[start])[:, None]
+        place = records.position[start] + records.v2[start] * t + np.array([0, 0, -G / 2]) * t**2
+        assert nearest_points(cloud, place)[0].min() > (1 - CORE) * 0.75 - 1e-6
+
+
+def test_points_give_the_same_bits_for_any_threads_and_batches(
+    one_surface: dict[str, Ground], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = fall_on(one_surface["cloud"], count=60, threads=1)
+    monkeypatch.setattr(engine, "BATCH", 7)
+    for threads in (2, 7):
+        other = fall_on(one_surface["cloud"], count=60, threads=threads)
+        np.testing.assert_array_equal(other.position, one.position)
+        np.testing.assert_array_equal(other.records.v2, one.records.v2)
+
+
+def test_energy_never_grows_on_points(one_surface: dict[str, Ground]) -> None:
+    for model in ("noel_2017", "azimi_desvarreux_1977"):
+        run = fall_on(one_surface["cloud"], model, count=60)
+        records = run.records
+        energy = 0.5 * (records.v2**2).sum(axis=1) + G * records.position[:, 2]
+        spin = 0.5 * 0.4 * (run.releases.diameter_m[0] / 2) ** 2 * (records.omega2**2).sum(axis=1)
+        first = G * run.releases.position[records.run, 2]
+        assert (energy <= first + 1e-6 + spin).all()
+
+
+def test_a_large_block_rides_over_what_stops_a_small_one() -> None:
+    """A slope of points at 25° with waves 1.6 m long, 0.6 m from trough to crest."""
+    cloud = scattered(0.05, lambda x, y: -np.tan(np.radians(25)) * x + 0.3 * np.sin(4 * x), size=40.0)
+    ground = make_ground(cloud)
+    settings = Settings("azimi_desvarreux_1977", {"rn": 0.2, "rt": 0.9}, friction=0.35)
+    far = {}
+    for diameter in (0.3, 3.0):
+        places = placed_on(ground, np.column_stack([np.full(20, 5.0), np.linspace(8, 32, 20)]), np.full(20, diameter))
+        velocity = 2.0 * np.tile([np.cos(0.43), 0.0, -np.sin(0.43)], (20, 1))
+        run = simulate(ground, make_releases(places, velocity=velocity, diameter_m=diameter), settings)
+        far[diameter] = run.position[:, 0] - 5.0
+    assert (far[0.3] < 5).all()
+    assert (far[3.0] > 30).all()
+
+
+def test_a_block_that_falls_through_a_hole_of_the_cloud_is_counted() -> None:
+    cloud = lattice(0.1)
+    hole = np.hypot(cloud.points[:, 0] - 10, cloud.points[:, 1] - 10) < 2
+    ground = make_ground(Cloud(cloud.points[~hole], GlobalShift(), "cloud"))
+    deep = np.array([[1.0, 1.0, -30.0]])  # so that the terrain reaches below
+    ground = make_ground(Cloud(np.concatenate([ground.points, deep]), GlobalShift(), "cloud"))
+    releases = make_releases(np.array([[10.0, 10.0, 2.0], [5.0, 5.0, 2.0], [19.0, 10.0, 2.0]]), diameter_m=0.6)
+    settings = Settings("azimi_desvarreux_1977", {"rn": 0.1})
+    for speed, through in ((0.0, False), (2.2, True)):  # straight down it ends under the hole, not under points
+        velocity = np.array([[speed, 0, 0], [0, 0, 0], [9, 0, 0]])
+        run = simulate(ground, replace(releases, velocity=velocity), settings)
+        assert [ENDS[end] for end in run.end] == ["left_terrain", "stopped", "left_terrain"]
+        assert fell_through(run).tolist() == [through, False, False]
+
+
+@pytest.mark.parametrize("name", ["las_chablais3.laz", "sample_lareunion_epsg2975.laz"])
+def test_blocks_on_a_real_cloud(name: str) -> None:
+    cloud = read_points(Path(__file__).parents[1] / "data" / name)
+    low, high = cloud.bounds
+    assert 0.001 * np.hypot(*(high - low)[:2]) < cloud.spacing_m < 0.1 * np.hypot(*(high - low)[:2])
+    ground = make_ground(cloud)
+    diameter = 8 * cloud.spacing_m
+    rng = np.random.default_rng(2)
+    plan = rng.uniform(low[:2] + 0.3 * (high - low)[:2], high[:2] - 0.3 * (high - low)[:2], (60, 2))
+    places = placed_on(ground, plan, np.full(60, diameter))
+    places = places[np.isfinite(places).all(axis=1)]
+    releases = make_releases(places, diameter_m=diameter)
+    assert len(releases) > 40
+    assert overlapping(ground, releases).max() < 1e-6
+    run = simulate(ground, releases, Settings("noel_2017", seed=1))
+    assert len(run) == len(releases)
+    counts = np.bincount(run.end, minlength=len(ENDS))
+    assert counts.sum() == len(releases)
+    assert counts[ENDS.index("limit")] == 0
+    fallen = run.releases.position[:, 2] - run.position[:, 2]
+    assert (fallen > -1e-6).all()
+    assert (0.5 * run.v_max_mps**2 <= G * (places[:, 2] - low[2] + diameter) + 1e-6).all()
+    stopped = run.end == ENDS.index("stopped")
+    assert (abs(nearest_points(cloud, run.position[stopped])[0] / (diameter / 2) - 1) < 0.15).all()

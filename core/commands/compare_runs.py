@@ -170,6 +170,8 @@ def _case(arguments: argparse.Namespace, project: "Project | None", progress: "P
     from ..reconstruction.block import Block
     from ..reconstruction.drag import Drag
     from ..reconstruction.trajectory import reconstruct
+    from ..simulation.blocks import Blocks
+    from ..simulation.distributions import Distribution
     from ..simulation.ground import make_ground
 
     inputs = {"observed": Path(arguments.observed)}
@@ -183,7 +185,7 @@ def _case(arguments: argparse.Namespace, project: "Project | None", progress: "P
                 raise InputError(
                     f"{option} is given with a project", advice="Leave it out: the project says so; or give picks.csv"
                 )
-        progress("Reading the project")
+        progress("Reading the project", 0, 0)
         surface, made = open_project(project)
         if surface is None or project.terrain is None:
             raise InputError("The project has no terrain", file=arguments.observed, advice="Add [terrain] to it")
@@ -197,16 +199,13 @@ def _case(arguments: argparse.Namespace, project: "Project | None", progress: "P
     inputs["terrain"] = Path(arguments.terrain)
     ground = make_ground(surface)
     drag = Drag() if arguments.drag else None
-    progress(f"Reading {arguments.observed}")
+    progress(f"Reading {arguments.observed}", 0, 0)
     if arguments.stops:
         inputs["stops"] = Path(arguments.stops)
-        releases = read_releases(
-            arguments.observed,
-            ground,
-            diameter_m=arguments.diameter,
-            density_kgpm3=arguments.density,
-            number=arguments.number,
+        blocks = Blocks(
+            "sphere", Distribution("fixed", arguments.diameter), density=Distribution("fixed", arguments.density)
         )
+        releases = read_releases(arguments.observed, ground, blocks, number=arguments.number)
         observed = read_stops(arguments.stops, releases, ground)
         return _Case(ground, observed, releases, drag, arguments.gravity, inputs)
     picks = read_picks(arguments.observed, surface.shift)
@@ -226,7 +225,7 @@ def _measured(
     from ..analysis.observed_runs import observe_runs
     from ..workflow.whole_runs import released_as_observed
 
-    progress("Errors of what was observed")
+    progress("Errors of what was observed", 0, 0)
     observed = observe_runs(made, ground)
     releases = released_as_observed(ground, observed, made, arguments.number)
     return _Case(ground, observed, releases, made.drag, made.gravity_mps2, inputs)
@@ -292,6 +291,6 @@ def _draw(comparison: "WholeRuns", ground: "Ground", folder: Path, progress: "Pr
 
     if not is_there(FIGURES):
         return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]
-    progress("Drawing the figures")
+    progress("Drawing the figures", 0, 0)
     save_whole_run_figures(comparison, ground, folder / "figures")
     return []

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """impacts.csv and trajectories.csv of simulations: millions of rows, in parts, with fixed decimals."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +14,10 @@ from ..simulation.engine import IMPACT, Simulation
 from ..simulation.results import impacts_of, release_names, sample_runs
 from ..vectors import Array, Indices
 from .decimal_tables import DecimalColumns, Words, write_decimal_table
+from .simulation_parts import all_digits, in_parts
 from .tables import POSITION, VELOCITY, impact_numbers, spin_and_energies, vector_columns
 
 NORMAL_DECIMALS = 9
-PART_ROWS = 9000
-"""Rows that are computed at once: they stay in the processor's cache."""
 
 
 def write_simulated_impacts(
@@ -33,7 +31,7 @@ def write_simulated_impacts(
     ------
     OSError : the file cannot be written.
     """
-    parts = _in_parts(simulations, lambda one: one.impacts, partial(_impact_columns, site=site))
+    parts = in_parts(simulations, lambda one: one.impacts, partial(_impact_columns, site=site))
     write_decimal_table(
         path, parts, {"impact": 0, "run": 0} | dict.fromkeys(("nx", "ny", "nz"), NORMAL_DECIMALS), progress
     )
@@ -54,30 +52,8 @@ def write_simulated_trajectories(
         return moments + np.ceil(one.time_s / step_s).astype(np.intp)
 
     write_decimal_table(
-        path, _in_parts(simulations, rows, partial(_sample_columns, step_s=step_s)), {"run": 0}, progress
+        path, in_parts(simulations, rows, partial(_sample_columns, step_s=step_s)), {"run": 0}, progress
     )
-
-
-def _in_parts(
-    simulations: Sequence[Simulation],
-    rows: Callable[[Simulation], Indices],
-    columns: Callable[[Simulation], DecimalColumns],
-) -> list[Callable[[], DecimalColumns]]:
-    """What makes the columns of some runs each; the first of none, which gives the header of an empty table."""
-    parts: list[Callable[[], DecimalColumns]] = [lambda: columns(simulations[0].part(0, 0))]
-    for one in simulations:
-        end = np.cumsum(rows(one))
-        total = int(end[-1])
-        edges = np.searchsorted(end, np.arange(PART_ROWS, total, PART_ROWS))
-        edges = np.unique([0, *edges.tolist(), len(one)])
-        parts += [partial(_columns, columns, one, a, b) for a, b in pairwise(edges.tolist())]
-    return parts
-
-
-def _columns(
-    make: Callable[[Simulation], DecimalColumns], simulation: Simulation, start: int, end: int
-) -> DecimalColumns:
-    return make(simulation.part(start, end))
 
 
 def _impact_columns(simulation: Simulation, site: str) -> DecimalColumns:
@@ -89,7 +65,7 @@ def _impact_columns(simulation: Simulation, site: str) -> DecimalColumns:
     owner = ground.owner[records.face[rows]].astype(np.intp)
     numbers: dict[str, Array | Words] = {**impact_numbers(impacts)}
     for name, values in (("diameter_m", releases.diameter_m), ("mass_kg", releases.mass_kg)):
-        numbers[name] = Words(run, tuple(map(repr, values.tolist())))
+        numbers[name] = all_digits(run, values)
     return {
         "site": Words(none, (site,)),
         "trajectory": Words(run, tuple(release_names(simulation).tolist())),

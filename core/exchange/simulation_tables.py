@@ -25,7 +25,9 @@ from ..simulation.results import fell_through, release_names, run_figures
 from ..terrain.cloud import Cloud
 from ..vectors import Mask, norm
 from .csv_text import read_table
-from .tables import POSITION, VELOCITY, Columns, vector_columns, write_columns
+from .decimal_tables import DecimalColumns, Words, write_decimal_table
+from .simulation_parts import all_digits, in_parts
+from .tables import POSITION, VELOCITY, vector_columns
 
 SPIN = ("omegax_radps", "omegay_radps", "omegaz_radps")
 DIAMETERS = ("d1_m", "d2_m", "d3_m")
@@ -110,25 +112,31 @@ def read_releases(path: str | Path, ground: Ground, blocks: Blocks, number: int 
 
 
 def write_runs(simulations: Sequence[Simulation], path: str | Path) -> None:
-    """Write runs.csv: one row per block and model."""
-    write_columns(path, *map(_run_cells, simulations))
+    """Write runs.csv: one row per block and model; sizes and masses with all digits, other numbers with 6 decimals.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    parts = in_parts(simulations, lambda one: np.ones(len(one), np.intp), _run_columns)
+    write_decimal_table(path, parts, {"run": 0, "impacts": 0})
 
 
-def _run_cells(simulation: Simulation) -> Columns:
+def _run_columns(simulation: Simulation) -> DecimalColumns:
     releases, figures = simulation.releases, run_figures(simulation)
-    shift = simulation.ground.terrain.shift
+    shift, each = simulation.ground.shift, np.arange(len(simulation))
     return {
         "run": simulation.number,
-        "release": release_names(simulation).tolist(),
-        "model": [simulation.settings.model] * len(simulation),
-        "diameter_m": releases.diameter_m,
-        "mass_kg": releases.mass_kg,
+        "release": Words(each, tuple(release_names(simulation).tolist())),
+        "model": Words(np.zeros_like(each), (simulation.settings.model,)),
+        "diameter_m": all_digits(each, releases.diameter_m),
+        "mass_kg": all_digits(each, releases.mass_kg),
         **vector_columns(("x0_m", "y0_m", "z0_m"), shift.to_survey(releases.position)),
         **vector_columns(POSITION, shift.to_survey(simulation.position)),
         "time_s": simulation.time_s,
         "length_m": simulation.length_m,
         "impacts": simulation.impacts,
-        "end": [simulation.ends[end] for end in simulation.end.tolist()],
+        "end": Words(simulation.end, simulation.ends),
         "v_max_mps": simulation.v_max_mps,
         "kinetic_max_J": figures.kinetic_max_j,
         "height_max_m": figures.height_max_m,
@@ -137,27 +145,33 @@ def _run_cells(simulation: Simulation) -> Columns:
 
 
 def write_hits(simulations: Sequence[Simulation], path: str | Path) -> None:
-    """Write hits.csv: each time that a block meets a structure."""
-    write_columns(path, *map(_hit_cells, simulations))
+    """Write hits.csv, 6 decimals: each time that a block meets a structure; the place is that of its centre.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    parts = in_parts(simulations, lambda one: one.impacts, _hit_columns)
+    write_decimal_table(path, parts, {"run": 0})
 
 
-def _hit_cells(simulation: Simulation) -> Columns:
+def _hit_columns(simulation: Simulation) -> DecimalColumns:
     records, hits = simulation.records, hits_of(simulation)
     run = records.run[hits.record]
-    names = np.array(simulation.ground.structures)
+    place = simulation.ground.shift.to_survey(records.position[hits.record])
     return {
-        "structure": names[hits.structure].tolist(),
+        "structure": Words(hits.structure, simulation.ground.structures),
         "run": simulation.number[run],
-        "model": [simulation.settings.model] * len(hits),
+        "model": Words(np.zeros_like(run), (simulation.settings.model,)),
         "time_s": records.time_s[hits.record],
-        **vector_columns(POSITION, simulation.ground.terrain.shift.to_survey(records.position[hits.record])),
+        **vector_columns(POSITION, place),
         "along_m": hits.along_m,
         "up_m": hits.up_m,
         "v_mps": norm(records.v1[hits.record]),
         "angle_deg": np.degrees(hits.angle),
         "kinetic_J": hits.kinetic_j,
         "rotational_J": hits.rotational_j,
-        "passes": np.where(hits.passes, "1", "0").tolist(),
+        "passes": Words(hits.passes.astype(np.intp), ("0", "1")),
     }
 
 

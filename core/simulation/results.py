@@ -99,7 +99,7 @@ def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
         rotational1_j=0.5 * inertia * dot(spin1, spin1),
         rotational2_j=0.5 * inertia * dot(spin2, spin2),
         extra={
-            "run": simulation.number[run].astype(np.str_),
+            "run": simulation.number.astype(np.str_)[run],
             "structure": structure,
             "source": np.full(rows.size, simulation.settings.model),
         },

@@ -73,7 +73,7 @@ def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: P
         assert float(row["height_max_m"]) >= max(heights) - 0.1
         fall = float(row["z0_m"]) - float(row["z_m"])
         flat = np.hypot(float(row["x_m"]) - float(row["x0_m"]), float(row["y_m"]) - float(row["y0_m"]))
-        assert float(row["energy_line_deg"]) == pytest.approx(np.degrees(np.arctan2(fall, flat)), abs=1e-9)
+        assert float(row["energy_line_deg"]) == pytest.approx(np.degrees(np.arctan2(fall, flat)), abs=3e-6)
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["models"]["noel_2017"]["ends"] == {"stopped": 5, "left_terrain": 0, "limit": 0}
     assert summary["seed"] == 3
@@ -143,7 +143,7 @@ def test_hits_of_a_wall(terrain: Path, releases: Path, tmp_path: Path) -> None:
         assert radius[row["run"]] - 1e-6 < away < 1.5 * radius[row["run"]]
         speed = float(row["v_mps"])
         mass = float(runs[int(row["run"]) - 1]["mass_kg"])
-        assert float(row["kinetic_J"]) == pytest.approx(0.5 * mass * speed**2, rel=1e-9)
+        assert float(row["kinetic_J"]) == pytest.approx(0.5 * mass * speed**2, rel=1e-6)
         assert float(row["along_m"]) == pytest.approx(float(row["y_m"]) - NORTH, abs=0.3)
         assert 0 < float(row["up_m"]) < 8
         assert row["passes"] == "0"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rockfall.core.exchange import simulated_motion
+from rockfall.core.exchange import simulation_parts
 from rockfall.core.exchange.decimal_tables import Words, write_decimal_table
 from rockfall.core.exchange.simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from rockfall.core.exchange.tables import read_impacts, write_impacts, write_trajectories
@@ -197,7 +197,7 @@ def falls(number: int = 40) -> Simulation:
 
 
 def test_impacts_are_those_that_are_written_with_all_digits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulated_motion, "PART_ROWS", 50)
+    monkeypatch.setattr(simulation_parts, "PART_ROWS", 50)
     simulation = falls()
     write_simulated_impacts([simulation], tmp_path / "quick.csv", "site")
     write_impacts(impacts_of(simulation, "site"), tmp_path / "whole.csv")
@@ -224,7 +224,7 @@ def test_impacts_are_those_that_are_written_with_all_digits(tmp_path: Path, monk
 
 
 def test_trajectories_are_those_that_are_written_row_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulated_motion, "PART_ROWS", 300)
+    monkeypatch.setattr(simulation_parts, "PART_ROWS", 300)
     simulation = falls(12)
     write_simulated_trajectories([simulation], tmp_path / "quick.csv")
     write_trajectories(sample_runs(simulation), tmp_path / "whole.csv")

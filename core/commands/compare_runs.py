@@ -2,10 +2,10 @@
 """``rockfall compare-runs``: whole runs of observed blocks beside simulated ones → tables and figures."""
 
 import argparse
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
@@ -25,22 +25,19 @@ if TYPE_CHECKING:
     from ..analysis.observed_runs import Observed
     from ..analysis.sections import Section
     from ..analysis.whole_runs import WholeRuns
-    from ..exchange.project import Project
-    from ..exchange.simulation_entry import StructureEntry
-    from ..impact_models.machinery.parameters import Value
-    from ..progress import Progress
-    from ..reconstruction.drag import Drag
     from ..reconstruction.trajectory import Reconstruction
     from ..simulation.ground import Ground
     from ..simulation.release import Releases
+    from ..workflow.simulation import Scenario
 
 NUMBER = 100
+DIAMETER_M = 0.35
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
-        "observed", metavar="OBSERVED", help="project.toml or picks.csv; with --stops the releases.csv of the blocks"
+        "table", metavar="OBSERVED", help="project.toml or picks.csv; with --stops the releases.csv of the blocks"
     )
     add_out(parser)
     parser.add_argument(
@@ -72,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--section", action="append", default=[], metavar="NAME=FILE", help="a line in plan, a table of x_m, y_m"
     )
     motion = parser.add_argument_group("motion (default: as the project says)")
-    motion.add_argument("--drag", action="store_true", help="flights with the drag of air; not for a project")
+    motion.add_argument("--drag", action="store_true", help="flights with the drag of air")
     motion.add_argument(
         "--rolling",
         choices=("azzoni_1995", "coulomb", "none"),
@@ -80,27 +77,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     motion.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
     motion.add_argument(
-        "--gravity", type=positive, default=GRAVITY_MPS2, metavar="G", help="[m/s²], not for a project (default 9.81)"
+        "--gravity", type=positive, metavar="G", help=f"[m/s²] (default {GRAVITY_MPS2:g}); not for a project"
     )
     block = parser.add_argument_group("blocks of which the table does not say; not for a project")
-    block.add_argument("--diameter", type=positive, default=0.35, metavar="M", help="[m] (default %(default)s)")
-    block.add_argument(
-        "--density", type=positive, default=ROCK_DENSITY_KGPM3, metavar="RHO", help="[kg/m³] (default %(default)s)"
-    )
+    block.add_argument("--diameter", type=positive, metavar="M", help=f"[m] (default {DIAMETER_M:g})")
+    block.add_argument("--density", type=positive, metavar="RHO", help=f"[kg/m³] (default {ROCK_DENSITY_KGPM3:g})")
     parser.add_argument("--tables-only", action="store_true", help="no figures")
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
     add_terrain_options(parser)
 
 
-@dataclass(frozen=True, eq=False)
-class _Case:
-    """What is compared with what."""
+class _Case(NamedTuple):
+    """What is observed, what is simulated, and the files that decide it."""
 
+    scenario: "Scenario"
     ground: "Ground"
     observed: "Observed"
     releases: "Releases"
-    drag: "Drag | None"
-    gravity_mps2: float
     inputs: dict[str, Path]
 
 
@@ -108,41 +101,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate, compare, write the tables, print the summary."""
     from ..analysis.whole_runs import whole_run_remarks
     from ..exchange.output import output_folder
-    from ..exchange.project import read_project
     from ..exchange.simulation_tables import summary, write_runs, write_summary
     from ..exchange.whole_run_tables import write_whole_runs, write_whole_values
-    from ..impact_models.registry import COMPARED, find_model
-    from ..simulation.engine import FRICTION, Settings
     from ..workflow.whole_runs import compare_whole_runs
 
-    project = read_project(arguments.observed) if Path(arguments.observed).suffix.lower() == ".toml" else None
-    stated = project.simulation if project else None
-    models = [find_model(name).name for name in arguments.model or (stated.models if stated else ()) or COMPARED]
-    parameters = model_parameters(arguments, models, _known(project, arguments.observed))
-    seed = arguments.seed if arguments.seed is not None else stated.seed if stated else 0
-    friction = arguments.friction if arguments.friction is not None else stated.friction if stated else FRICTION
+    project = arguments.table.lower().endswith(".toml")
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        case = _case(arguments, project, progress)
-        settings = [
-            Settings(
-                name,
-                parameters.get(name, {}),
-                rolling=arguments.rolling or (stated.rolling if stated else "azzoni_1995"),
-                friction=friction,
-                gravity_mps2=case.gravity_mps2,
-                drag=case.drag,
-                seed=seed,
-            )
-            for name in dict.fromkeys(models)
-        ]
+        case = _of_project(arguments, progress) if project else _of_table(arguments, progress)
+        sections = _sections(arguments, case.ground)
         with stopped_by_interrupt(progress) as counted:
             done = compare_whole_runs(
                 case.ground,
                 case.observed,
                 case.releases,
-                settings,
-                _sections(arguments, case.ground),
-                seed=seed,
+                case.scenario.settings,
+                sections,
+                seed=case.scenario.seed,
                 threads=arguments.threads,
                 progress=counted,
             )
@@ -161,87 +135,110 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _case(arguments: argparse.Namespace, project: "Project | None", progress: "Progress") -> _Case:
-    """The observed runs, and the releases of the simulated ones."""
-    from ..exchange.opening import open_project
+def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case:
+    """The measured runs of a project; options replace what its [simulation] says."""
+    from ..exchange.opening import reconstruct_project
+    from ..exchange.project import read_project
+    from ..exchange.simulation_entry import ReleaseEntry, SimulationEntry
+    from ..exchange.simulation_project import open_simulation
+    from ..workflow.simulation import ground_of
+
+    for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density"):
+        if getattr(arguments, option.strip("-")) is not None:
+            raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
+    file = Path(arguments.table)
+    project = read_project(file)
+    entry = project.simulation or SimulationEntry()
+    entry = replace(
+        entry,
+        models=tuple(arguments.model or entry.models),
+        releases=ReleaseEntry(),
+        rolling=arguments.rolling or entry.rolling,
+        friction=entry.friction if arguments.friction is None else arguments.friction,
+        drag=arguments.drag or entry.drag,
+        seed=entry.seed if arguments.seed is None else arguments.seed,
+    )
+    scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
+    known = model_parameters(arguments, list(scenario.models), scenario.models)
+    scenario = replace(scenario, models={name: known.get(name, {}) for name in scenario.models})
+    ground = ground_of(scenario)
+    progress("Reconstructing")
+    return _measured(arguments, scenario, ground, reconstruct_project(project, ground.surface), inputs)
+
+
+def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case:
+    """The runs of a table of picks, or of releases and stops."""
+    from ..analysis.measured_rebounds import measured_rebounds
     from ..exchange.simulation_tables import read_releases
     from ..exchange.tables import read_picks
     from ..exchange.whole_run_tables import read_stops
+    from ..impact_models.registry import COMPARED, find_model
     from ..reconstruction.block import Block
     from ..reconstruction.drag import Drag
     from ..reconstruction.trajectory import reconstruct
-    from ..simulation.blocks import Blocks
-    from ..simulation.distributions import Distribution
-    from ..simulation.ground import make_ground
+    from ..simulation.blocks import block_of
+    from ..simulation.measured_releases import from_reconstruction
+    from ..workflow.simulation import Scenario, ground_of
 
-    inputs = {"observed": Path(arguments.observed)}
-    if project is not None:
-        for option, given in (
-            ("--terrain", arguments.terrain),
-            ("--stops", arguments.stops),
-            ("--drag", arguments.drag),
-        ):
-            if given:
-                raise InputError(
-                    f"{option} is given with a project", advice="Leave it out: the project says so; or give picks.csv"
-                )
-        progress("Reading the project", 0, 0)
-        surface, made = open_project(project)
-        if surface is None or project.terrain is None:
-            raise InputError("The project has no terrain", file=arguments.observed, advice="Add [terrain] to it")
-        inputs["terrain"] = project.terrain.file
-        structures = {one.name: terrain_as_asked(arguments, str(one.file), progress) for one in _structures(project)}
-        ground = make_ground(surface, structures)
-        return _measured(arguments, ground, made, inputs, progress)
     if not arguments.terrain:
-        raise InputError("No terrain is given", advice="Give it with --terrain, or a project.toml that names one")
+        raise InputError("--terrain is missing", advice="Only a project, project.toml, can do without it")
+    models = [find_model(name) for name in arguments.model or COMPARED]
+    parameters = model_parameters(arguments, [model.name for model in models])
+    given = {name: getattr(arguments, name) for name in ("rolling", "friction") if getattr(arguments, name) is not None}
+    gravity = GRAVITY_MPS2 if arguments.gravity is None else arguments.gravity
+    diameter = DIAMETER_M if arguments.diameter is None else arguments.diameter
+    density = ROCK_DENSITY_KGPM3 if arguments.density is None else arguments.density
     surface = terrain_as_asked(arguments, arguments.terrain, progress)
-    inputs["terrain"] = Path(arguments.terrain)
-    ground = make_ground(surface)
-    drag = Drag() if arguments.drag else None
-    progress(f"Reading {arguments.observed}", 0, 0)
+    progress(f"Reading {arguments.table}")
+    scenario = Scenario(
+        surface,
+        partial(
+            read_releases,
+            arguments.table,
+            blocks=block_of("sphere", diameter, diameter, diameter, density),
+            number=arguments.number,
+        ),
+        {model.name: parameters.get(model.name, {}) for model in models},
+        drag=Drag() if arguments.drag else None,
+        gravity_mps2=gravity,
+        seed=arguments.seed or 0,
+        **given,
+    )
+    inputs = {"observed": Path(arguments.table), "terrain": Path(arguments.terrain)}
+    drawing = [model.name for model in models if model.draws_from_impacts]
+    ground = ground_of(scenario)
     if arguments.stops:
-        inputs["stops"] = Path(arguments.stops)
-        blocks = Blocks(
-            "sphere", Distribution("fixed", arguments.diameter), density=Distribution("fixed", arguments.density)
-        )
-        releases = read_releases(arguments.observed, ground, blocks, number=arguments.number)
+        if drawing:
+            raise InputError(
+                f"The model {drawing[0]} draws from measured impacts, and stops have none", advice="Give picks.csv"
+            )
+        releases = scenario.releases(ground)
         observed = read_stops(arguments.stops, releases, ground)
-        return _Case(ground, observed, releases, drag, arguments.gravity, inputs)
-    picks = read_picks(arguments.observed, surface.shift)
-    block = Block(arguments.diameter, arguments.diameter, arguments.diameter, arguments.density)
-    made = reconstruct(picks, surface=surface, block=block, gravity_mps2=arguments.gravity, drag=drag)
-    return _measured(arguments, ground, made, inputs, progress)
+        return _Case(scenario, ground, observed, releases, inputs | {"stops": Path(arguments.stops)})
+    picks = read_picks(arguments.table, surface.shift)
+    block = Block(diameter, diameter, diameter, density)
+    made = reconstruct(picks, surface=surface, block=block, gravity_mps2=gravity, drag=scenario.drag)
+    scenario = replace(
+        scenario,
+        releases=partial(from_reconstruction, reconstruction=made, number=arguments.number),
+        measured=measured_rebounds(made.impacts) if drawing else None,
+    )
+    return _measured(arguments, scenario, ground, made, inputs)
 
 
 def _measured(
     arguments: argparse.Namespace,
+    scenario: "Scenario",
     ground: "Ground",
     made: "Reconstruction",
     inputs: dict[str, Path],
-    progress: "Progress",
 ) -> _Case:
     """Runs that were reconstructed from picks."""
     from ..analysis.observed_runs import observe_runs
     from ..workflow.whole_runs import released_as_observed
 
-    progress("Errors of what was observed", 0, 0)
     observed = observe_runs(made, ground)
-    releases = released_as_observed(ground, observed, made, arguments.number)
-    return _Case(ground, observed, releases, made.drag, made.gravity_mps2, inputs)
-
-
-def _structures(project: "Project") -> "tuple[StructureEntry, ...]":
-    return project.simulation.structures if project.simulation else ()
-
-
-def _known(project: "Project | None", file: str) -> "Mapping[str, Mapping[str, Value]] | None":
-    """The parameters of models that the project has."""
-    from ..exchange.parameters import checked_parameters
-
-    if project is None or "models" not in project.extra:
-        return None
-    return checked_parameters(project.extra["models"], file)
+    return _Case(scenario, ground, observed, released_as_observed(ground, observed, made, arguments.number), inputs)
 
 
 def _sections(arguments: argparse.Namespace, ground: "Ground") -> "tuple[Section, ...]":
@@ -284,13 +281,13 @@ def _numbers(text: str | None, option: str) -> list[float]:
     return values
 
 
-def _draw(comparison: "WholeRuns", ground: "Ground", folder: Path, progress: "Progress") -> list[str]:
+def _draw(comparison: "WholeRuns", ground: "Ground", folder: Path, progress: PrintedProgress) -> list[str]:
     """The figures, if their library is there; else what to install."""
     from ..analysis.extras import FIGURES, install_command, is_there
     from ..analysis.whole_run_figures import save_whole_run_figures
 
     if not is_there(FIGURES):
         return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]
-    progress("Drawing the figures", 0, 0)
+    progress("Drawing the figures")
     save_whole_run_figures(comparison, ground, folder / "figures")
     return []

@@ -3,7 +3,7 @@
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -244,6 +244,25 @@ def simulate(
         results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,
         time.perf_counter() - started, first_run,
     )  # fmt: skip
+
+
+def joined(parts: Sequence[Simulation], releases: Releases) -> Simulation:
+    """Parts of a simulation that follow one another, as one; `releases` are those of all."""
+    first = parts[0]
+    begins = np.cumsum([0, *(len(part) for part in parts)])
+    columns = {
+        name: np.concatenate([getattr(part.records, name) for part in parts]) for name in Records.__dataclass_fields__
+    }
+    runs = [part.records.run + begin for part, begin in zip(parts, begins.tolist(), strict=False)]
+    names = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position")
+    return replace(
+        first,
+        releases=releases,
+        records=Records(**(columns | {"run": np.concatenate(runs)})),
+        wanted=sum(part.wanted for part in parts),
+        seconds=sum(part.seconds for part in parts),
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names},
+    )
 
 
 def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:

@@ -14,10 +14,11 @@ from ..analysis.ranks import FEWEST
 from ..analysis.sections import Section, default_sections
 from ..analysis.whole_runs import WholeRuns, compare_runs
 from ..errors import InputError
+from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
-from ..simulation.engine import Settings, Simulation
+from ..simulation.engine import Settings, Simulation, joined, simulate
 from ..simulation.ground import Ground
 from ..simulation.measured_releases import from_reconstruction
 from ..simulation.release import Releases, standing_on
@@ -54,6 +55,7 @@ def compare_whole_runs(
     Parameters
     ----------
     releases : several for each observed run, of its name; see `released_as_observed`.
+    settings : one for each model. What is drawn from measured impacts is never drawn from the run's own.
     sections : none takes the default ones of the observed runs.
 
     Raises
@@ -64,7 +66,7 @@ def compare_whole_runs(
     for name in observed.paths.name.tolist():
         if name not in releases.name:
             raise InputError("No block is released for this run", trajectory=name, advice="Give its release")
-    simulations = run_models(ground, releases, settings, record=True, threads=threads, progress=progress)
+    simulations = _simulations(ground, releases, settings, threads, progress)
     finished = tuple(one for one in simulations if len(one) == one.wanted)
     if not finished:
         raise CancelledError
@@ -76,6 +78,42 @@ def compare_whole_runs(
     return ComparedSimulations(
         compare_runs(observed, paths, ground, sections, seed=seed), finished, (*releases.remarks, *told)
     )
+
+
+def _simulations(
+    ground: Ground, releases: Releases, settings: Sequence[Settings], threads: int | None, progress: Progress
+) -> tuple[Simulation, ...]:
+    """As `run_models`; a model that draws from measured impacts does so from those of the other trajectories."""
+    plain = [one for one in settings if one.measured is None or not find_model(one.model).draws_from_impacts]
+    drawing = [one for one in settings if one not in plain]
+    done: list[Simulation] = []
+    if plain or not drawing:
+        done += run_models(ground, releases, plain, threads=threads, progress=progress)
+    try:
+        if all(len(one) == one.wanted for one in done):
+            done += [_from_others(ground, releases, one, threads, progress) for one in drawing]
+    except CancelledError:
+        if not done:
+            raise
+    models = [one.model for one in settings]
+    return tuple(sorted(done, key=lambda one: models.index(one.settings.model)))
+
+
+def _from_others(
+    ground: Ground, releases: Releases, settings: Settings, threads: int | None, progress: Progress
+) -> Simulation:
+    """Simulate each release without the measured impacts of the trajectory of its name."""
+    measured = settings.measured
+    assert measured is not None
+    parts, ends = [], np.flatnonzero(np.r_[releases.name[1:] != releases.name[:-1], True]) + 1
+    for first, last in zip(np.r_[0, ends[:-1]].tolist(), ends.tolist(), strict=True):
+        name = str(releases.name[first])
+        progress(f"Simulating {settings.model}", first, len(releases))
+        others = replace(settings, measured=measured.without(measured.trajectory == name))
+        part = releases.take(slice(first, last))
+        simulation = simulate(ground, part, others, first_run=first, threads=threads)
+        parts.append(replace(simulation, settings=settings))
+    return joined(parts, releases)
 
 
 def released_as_observed(

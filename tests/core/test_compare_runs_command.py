@@ -78,7 +78,6 @@ def test_tables_agree_with_each_other(site: Path, tmp_path: Path, capsys) -> Non
     models = ["--model", "noel_2017", "wyllie_2014"]
     assert main(asked(site, out, *more, *models)) == 0
     said = capsys.readouterr().out
-    assert "noel_2017: no difference seen" in said
     assert re.search(r"wyllie_2014 differs from what was observed in \d+ of \d+ tests", said)
     assert sorted(path.name for path in (out / "figures").iterdir()) == [
         f"{name}.{kind}" for name in ("profiles", "sections", "whole_runs") for kind in ("pdf", "png", "svg")
@@ -86,6 +85,12 @@ def test_tables_agree_with_each_other(site: Path, tmp_path: Path, capsys) -> Non
     assert len(rows_of(out / "runs.csv")) == 2 * 6 * 25
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["seed"] == 4
     whole, values = rows_of(out / "whole_runs.csv"), rows_of(out / "whole_values.csv")
+    # The picks were made by the one law and not by the other; 5 % of such sites find something against their own.
+    differ = {
+        model: sum(row["model"] == model and "differs" in row["verdict"] for row in whole) for model in models[1:]
+    }
+    assert differ["noel_2017"] <= 2
+    assert differ["wyllie_2014"] >= 5
     assert {row["section"] for row in whole} == {"480 m", "road", ""}
     assert len({(row["model"], row["section"], row["quantity"]) for row in whole}) == len(whole) == 2 * (2 * 6 + 6)
     for row in whole:
@@ -172,5 +177,5 @@ def test_bad_tables(site: Path, tmp_path: Path, capsys) -> None:
     assert main(asked(site, out, "--stops", str(stops), observed="releases.csv")) == 1
     assert "row 2: There is no terrain under this stop" in capsys.readouterr().err
     assert main(["compare-runs", str(site / "picks.csv"), "--out", str(out)]) == 1
-    assert "No terrain is given" in capsys.readouterr().err
+    assert "--terrain is missing" in capsys.readouterr().err
     assert not out.exists()

@@ -20,10 +20,11 @@ from rockfall.core.analysis.sections import (
 from rockfall.core.analysis.whole_runs import compare_runs
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.impact_models.machinery.measured import MeasuredRebounds
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
-from rockfall.core.simulation.engine import Settings, simulate
+from rockfall.core.simulation.engine import Settings, joined, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
 from rockfall.core.terrain.surface import Surface
@@ -383,6 +384,50 @@ def test_blocks_are_released_as_they_were_observed(ground: Ground) -> None:
     assert done.comparison.find("noel_2017", "", "v_max_mps").n == 2
     with pytest.raises(InputError, match="trajectory B: No block is released"):
         compare_whole_runs(ground, observed, releases.take(slice(0, 32)), [Settings("noel_2017")])
+
+
+def test_a_run_is_never_drawn_from_its_own_impacts(ground: Ground) -> None:
+    """Another table for its own trajectory changes nothing of a run, and the runs of the others."""
+    rng = np.random.default_rng(3)
+    k = 14
+    names = np.repeat([f"B{i}" for i in range(3)], k)
+    rn = rng.uniform(0.2, 0.8, 3 * k)
+
+    angle, speed, rt = rng.uniform(0.3, 1.2, 3 * k), rng.uniform(1.0, 9.0, 3 * k), rng.uniform(0.5, 0.9, 3 * k)
+
+    def table(rebounds: np.ndarray) -> MeasuredRebounds:
+        return MeasuredRebounds(
+            np.full(3 * k, "site"), names, angle, speed, rebounds, rt, np.full(3 * k, 0.1), np.ones(3 * k)
+        )
+
+    xy = np.column_stack([np.full(3, 5.0), 30.0 + 20 * np.arange(3)])
+    place = placed_on(ground, xy, np.full(3, 0.4)) + np.array([0.0, 0.0, 2.0])
+    releases = make_releases(place, name=np.array(["B0", "B1", "B2"]), diameter_m=0.4, number=4)
+    only = observe_stops(np.array(["B0", "B1", "B2"]), place, place + np.array([30.0, 0.0, -20.0]), np.full(3, 90.0))
+    other = np.where(names == "B1", 0.9 * rn, rn)
+    first, second = (
+        compare_whole_runs(ground, only, releases, [Settings("observed", measured=table(each))]).simulations[0]
+        for each in (rn, other)
+    )
+    same = [np.array_equal(first.position[i : i + 4], second.position[i : i + 4]) for i in (0, 4, 8)]
+    assert same == [False, True, False]
+    assert first.releases is releases
+    assert np.unique(first.records.run).tolist() == list(range(12))
+
+
+def test_parts_of_a_simulation_are_joined_to_the_whole(ground: Ground) -> None:
+    xy = np.column_stack([np.full(3, 5.0), 30.0 + 20 * np.arange(3)])
+    releases = make_releases(
+        placed_on(ground, xy, np.full(3, 0.4)) + np.array([0.0, 0.0, 2.0]), diameter_m=0.4, number=3
+    )
+    whole = simulate(ground, releases, Settings("noel_2017"))
+    parts = [simulate(ground, releases.take(slice(i, i + 3)), whole.settings, first_run=i) for i in (0, 3, 6)]
+    again = joined(parts, releases)
+    for name in ("end", "time_s", "position", "impacts"):
+        assert np.array_equal(getattr(again, name), getattr(whole, name))
+    for name in ("run", "what", "time_s", "v2", "face"):
+        assert np.array_equal(getattr(again.records, name), getattr(whole.records, name))
+    assert again.wanted == 9
 
 
 def test_stops_without_motion(ground: Ground) -> None:

@@ -73,10 +73,11 @@ def without_own(measured: MeasuredRebounds, site: str, trajectory: str, theta1: 
     InputError : too few are left.
     """
     own = (measured.site == site) & (measured.trajectory == trajectory)
-    for angle, speed in zip(theta1.tolist(), vn1.tolist(), strict=True):
-        same = np.isclose(measured.theta1, angle, rtol=SAME) & np.isclose(measured.vn1, speed, rtol=SAME)
-        for place in np.flatnonzero(same & ~own).tolist():
-            own |= (measured.site == measured.site[place]) & (measured.trajectory == measured.trajectory[place])
+    same = (np.abs(measured.theta1 - theta1[:, None]) <= SAME * measured.theta1) & (
+        np.abs(measured.vn1 - vn1[:, None]) <= SAME * measured.vn1
+    )
+    for place in np.flatnonzero(same.any(axis=0) & ~own).tolist():
+        own |= (measured.site == measured.site[place]) & (measured.trajectory == measured.trajectory[place])
     try:
         return measured.without(own)
     except InputError as error:

@@ -15,6 +15,8 @@ conditions are beyond those measured, and the reach is one bandwidth more than t
     |v2| ≤ max(1, R) |v1|           else both parts are shortened alike; R is that of the drawn impact
     ω2   = (n × v_T2)/r             rolling [rad/s]
 
+The scatter is that of the measured values, errors of measuring included: the weights make uncertain impacts rare.
+
 The side is drawn because a slope prefers none. R_N and R_T were measured under other conditions, so that v2 could grow
 beyond any that was measured: hence the limit. Speed grows only where it did so in a measured impact; the energy with
 rotation may grow, since the spin before is not looked at. The mean is that of R_N, of R_T and of R with the same

@@ -10,9 +10,11 @@ import numpy as np
 from rockfall.core.analysis.comparison import compare, predict
 from rockfall.core.analysis.courses import find_courses
 from rockfall.core.impact_models.machinery.base import ImpactModel, Incident
+from rockfall.core.impact_models.machinery.measured import MeasuredRebounds
 from rockfall.core.impact_models.registry import FORMULAS, MODELS
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.vectors import dot, norm
 
 PLAIN_ROWS = 20_000
 
@@ -42,6 +44,16 @@ def timed(work: Callable[[], object], repeats: int) -> float:
     return statistics.median(taken)
 
 
+def made_rebounds(k: int) -> MeasuredRebounds:
+    """A table of k impacts over the conditions that are asked about."""
+    rng, state = np.random.default_rng(2), made_impacts(k)
+    vn1 = -dot(state.velocity, state.normal)
+    theta1 = np.arcsin(np.clip(vn1 / norm(state.velocity), 1e-3, 1.0))
+    names, half = np.array([f"b{i // 8}" for i in range(k)]), rng.uniform(0.3, 0.9, (2, k))
+    turn = np.radians(rng.uniform(0, 40, k))
+    return MeasuredRebounds(names, names, theta1, np.abs(vn1) + 0.1, half[0], half[1], turn, np.ones(k))
+
+
 def main() -> None:
     """Print the rates."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -67,6 +79,16 @@ def main() -> None:
             f"{name:<24}{first:>10.2f} s{arguments.impacts / mean / 1e6:>12.1f} M{rate / 1e6:>12.1f} M"
             f"{plain_rate / 1e6:>14.3f} M{rate / plain_rate:>8.0f}"
         )
+    for measured in map(made_rebounds, (100, 1000)):
+        model, rng = MODELS["observed"], np.random.default_rng(1)
+        model.rebound(made_impacts(1), measured=measured)
+        mean = timed(lambda model=model, measured=measured: model.rebound(state, measured=measured), arguments.repeats)
+        chance = timed(
+            lambda model=model, measured=measured, rng=rng: model.rebound(state, rng=rng, measured=measured),
+            arguments.repeats,
+        )
+        rates = [arguments.impacts / seconds / 1e6 for seconds in (mean, chance)]
+        print(f"{f'{model.name}, table of {len(measured)}':<24}{'':>12}{rates[0]:>12.1f} M{rates[1]:>12.1f} M")
     print("evaluations per second on one core; random: with the drawing of the numbers; ratio: random by plain Python")
 
     rng = np.random.default_rng(3)

@@ -10,13 +10,13 @@ def case_show_models_beside_the_real_blocks(window):
     with window.override():
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="demo")
-        assert bpy.ops.rockfall.show_models(models={"noel_2017", "pfeiffer_bowen_1989"}) == {"FINISHED"}
+        assert bpy.ops.rockfall.show_models(models={"noel_2017", "observed"}) == {"FINISHED"}
         bpy.ops.ed.undo_push(message="models")
     scene.rockfall.trail_until_now = True
     scene.frame_set(int(7.0 * scene.render.fps))
     yield 3.0
     window.screenshot("shown")
-    assert shown() == {"noel_2017", "pfeiffer_bowen_1989"}
+    assert shown() == {"noel_2017", "observed"}
     space = window.area().spaces.active
     block = next(o for o in scene.objects if o.get("rockfall_role") == "twin" and not o.hide_get())
     space.region_3d.view_location = block.matrix_world.translation
@@ -31,7 +31,7 @@ def case_show_models_beside_the_real_blocks(window):
     with window.override():
         bpy.ops.ed.redo()
     yield 1.0
-    assert shown() == {"noel_2017", "pfeiffer_bowen_1989"}
+    assert shown() == {"noel_2017", "observed"}
     with window.override():
         assert bpy.ops.rockfall.remove_models() == {"FINISHED"}
     yield 1.0

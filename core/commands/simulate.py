@@ -103,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate, write the tables, print the summary."""
     from ..exchange.output import output_folder
     from ..exchange.simulation_entry import RECORDS
-    from ..exchange.simulation_output import default_records, write_simulations
+    from ..exchange.simulation_output import default_records, recorded_for, write_simulations
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
@@ -121,7 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
                 ground,
                 releases,
                 scenario.settings,
-                record=bool(record or scenario.structures),
+                record=recorded_for(record, bool(scenario.structures)),
                 first_run=first_run,
                 threads=arguments.threads,
                 progress=counted,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..progress import Progress, silent
 from ..remarks import Remark
-from ..simulation.engine import Simulation
+from ..simulation.engine import Recorded, Simulation
 from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
 from .simulation_tables import summary, write_hits, write_runs, write_summary
@@ -18,6 +18,13 @@ LARGE = 20_000
 def default_records(blocks: int) -> tuple[str, ...]:
     """The tables beside runs.csv where none are named."""
     return RECORDS if blocks < LARGE else (IMPACTS,)
+
+
+def recorded_for(tables: Collection[str], structures: bool) -> Recorded:
+    """What a simulation has to record for some of `RECORDS`, and for hits.csv where there are structures."""
+    if TRAJECTORIES in tables:
+        return "all"
+    return "impacts" if tables or structures else "ends"
 
 
 def write_simulations(

@@ -29,6 +29,7 @@ from .opening import open_terrain, read_project_picks, reconstruct_project
 from .parameters import checked_parameters
 from .project import BlockEntry, Project
 from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from .simulation_output import recorded_for
 from .simulation_tables import read_releases
 from .tables import read_impacts
 
@@ -88,7 +89,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
-        record=entry.record is None or bool(entry.record),
+        record="all" if entry.record is None else recorded_for(entry.record, bool(structures)),
     )
     return scenario, inputs
 

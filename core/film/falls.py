@@ -30,7 +30,7 @@ def fall_beside(job: FilmJob, project: Project, measured: int, progress: Progres
     check_number(job.number, len(job.simulate), max(measured, 1))
     stated = project.simulation or SimulationEntry(drag=project.reconstruction.drag)
     asked = replace(
-        stated, models=job.simulate, releases=ReleaseEntry(number=job.number), seed=job.seed, record=("impacts",)
+        stated, models=job.simulate, releases=ReleaseEntry(number=job.number), seed=job.seed, record=("trajectories",)
     )
     scenario, _ = open_simulation(replace(project, simulation=asked), job.source, progress)
     models = {name: job.parameters.get(name, {}) for name in job.simulate}

@@ -25,6 +25,9 @@ from .structures import held_by
 Rolling = Literal["azzoni_1995", "coulomb", "none"]
 ROLLING: tuple[Rolling, ...] = ("none", "azzoni_1995", "coulomb")
 """In the order of the kernels' codes."""
+Recorded = Literal["ends", "impacts", "all"]
+RECORDED: tuple[Recorded, ...] = ("ends", "impacts", "all")
+"""How each run begins and ends; also flights and impacts; also each step on the ground. In the kernels' order."""
 FRICTION = 0.5
 """Coefficient of friction on the ground where none is given."""
 BATCH = 64
@@ -71,6 +74,9 @@ class Settings:
 class Records:
     """k moments of all runs, in the order of the runs and of time.
 
+    Between two of them a block flies. Only before an `ON_GROUND`, where all is recorded, its acceleration is constant:
+    from v2 of the first to v1 of the second.
+
     Attributes
     ----------
     run : (k,) place of the run in the simulation, from 0.
@@ -109,9 +115,9 @@ class Simulation:
     time_s, length_m, v_max_mps : (n,) until the end, of the path, the greatest speed.
     impacts : (n,) how many.
     position : (n, 3) of the centre at the end, local [m].
-    records : all moments if they were asked for, else releases and ends.
+    records : the moments that were asked for, releases and ends at least.
     wanted : how many blocks were asked for; more than n after a cancel.
-    recorded : whether `records` has all moments; without them nothing is known of single flights.
+    recorded : what `records` has, see `RECORDED`.
     seconds : how long it took.
     first_run : number of the first run, from 0, where these are a part of the runs.
     """
@@ -127,7 +133,7 @@ class Simulation:
     position: Array
     records: Records
     wanted: int
-    recorded: bool
+    recorded: Recorded
     seconds: float
     first_run: int = 0
 
@@ -173,7 +179,7 @@ def simulate(
     releases: Releases,
     settings: Settings,
     *,
-    record: bool = True,
+    record: Recorded = "all",
     first_run: int = 0,
     threads: int | None = None,
     progress: Progress = silent,
@@ -184,7 +190,7 @@ def simulate(
     ----------
     first_run : number of the first of these runs, from 0. A run depends on its number and the seed, not on the others:
         runs 50 to 99 of a hundred blocks are those of the blocks 50 to 99 with the first run 50.
-    record : keep every impact and step; else only how each run begins and ends.
+    record : what to keep of the motion, see `RECORDED`; it changes nothing of the runs.
     threads : None takes all cores. The result does not depend on it.
     progress : called with the number of finished blocks. A `CancelledError` raised in it ends the simulation with the
         runs that are finished, from the first on without a gap.
@@ -204,7 +210,9 @@ def simulate(
     results, starts = np.empty((n, 5)), range(0, n, BATCH)
     rows: dict[int, Array] = {}
 
-    from .motion_kernels import run_blocks
+    from .motion_kernels import COLUMNS, run_blocks
+
+    law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
     def batch(start: int) -> int:
         part = slice(start, min(start + BATCH, n))
@@ -213,8 +221,7 @@ def simulate(
             tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
             releases.position[part], releases.velocity[part], releases.angular_velocity[part],
             releases.radius_m[part], releases.mass_kg[part], releases.inertia[part], releases.principal_kgm2[part],
-            drag[part], settings.gravity_mps2, ROLLING.index(settings.rolling), settings.most_impacts, settings.most_s,
-            record, results[part],
+            drag[part], settings.gravity_mps2, law, settings.most_impacts, settings.most_s, level, results[part],
         )  # fmt: skip
         return part.stop - part.start
 
@@ -232,7 +239,7 @@ def simulate(
     whole = next((start for start in starts if start not in rows), n)
     if not whole:
         raise CancelledError
-    records = _records(np.concatenate([rows[start] for start in starts if start < whole]), ground.element, first_run)
+    records = _records(_in_turn(rows, whole, COLUMNS), ground.element, first_run)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
     if ground.structures:
@@ -293,6 +300,18 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     if not (np.isfinite(friction) & (friction >= 0)).all():
         raise InputError(f"The friction is {friction.min()}", advice="Give a number of zero or more")
     return np.array(rows), friction
+
+
+def _in_turn(parts: dict[int, Array], whole: int, columns: int) -> Array:
+    """The rows of all batches before `whole` in one array; each batch is given up for it, so that memory lasts."""
+    starts = sorted(start for start in parts if start < whole)
+    rows = np.empty((sum(len(parts[start]) for start in starts), columns))
+    filled = 0
+    for start in starts:
+        part = parts.pop(start)
+        rows[filled : filled + len(part)] = part
+        filled += len(part)
+    return rows
 
 
 def _records(rows: Array, element: NDArray[np.int32], first_run: int) -> Records:

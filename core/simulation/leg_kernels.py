@@ -20,6 +20,8 @@ BEND = 0.01
 """The path bends by this part of the radius at least, however slow the block."""
 FLAT = 1.0 - 1e-9
 """Cosine between a triangle's normal and that of the contact from which on the contact is within the triangle."""
+ON_TRIANGLE, AT_EDGE, AT_ANOTHER = 0, 1, 2
+"""Where a leg ends: on the triangle, at its edge, at another triangle."""
 
 
 @kernel
@@ -73,7 +75,7 @@ def leg(  # type: ignore[no-untyped-def]
     Returns
     -------
     t : [s], 0 for no leg. p : the centre after it. way : not the length, but the direction of v then.
-    stopped : whether another triangle ends it.
+    stop : `ON_TRIANGLE`, `AT_EDGE` or `AT_ANOTHER`.
     """
     speed = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     down = factor * gravity * n[2]
@@ -83,31 +85,32 @@ def leg(  # type: ignore[no-untyped-def]
     else:
         size = sqrt(pull[0] * pull[0] + pull[1] * pull[1] + pull[2] * pull[2])
         if size == 0.0:
-            return 0.0, p, v, False
+            return 0.0, p, v, AT_EDGE
         way = (pull[0] / size, pull[1] / size, pull[2] / size)
     brake = mu * max(down, 0.0)
     a = (pull[0] - brake * way[0], pull[1] - brake * way[1], pull[2] - brake * way[2])
     along = a[0] * way[0] + a[1] * way[1] + a[2] * way[2]
     bend = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     across = sqrt(max(bend * bend - along * along, 0.0))
-    limit = min(longest, on_triangle(tree[3], place, p, v, a, n, radius))
+    whole = on_triangle(tree[3], place, p, v, a, n, radius)
+    limit = min(longest, whole)
     if along < 0.0:
         limit = min(limit, -speed / along)
     if across > 1e-9 * bend:
         limit = min(limit, max(TURN * speed / across, sqrt(2.0 * BEND * radius / across)))
     if not 0.0 < limit < inf:
-        return 0.0, p, v, False
+        return 0.0, p, v, AT_EDGE
     if inside(nearby, p, speed, bend, radius) < limit and leaves(nearby, p):
         look_around(tree, stack, p, radius, nearby)
     limit = min(limit, inside(nearby, p, speed, bend, radius))
     if limit == 0.0:
-        return 0.0, p, v, False
+        return 0.0, p, v, AT_EDGE
     t, _, other = first_near(tree[3], nearby, p, v, a, (1.0 - SAG) * radius, place, limit)
-    stopped = other >= 0
-    if not stopped:
-        t = limit
+    stop = AT_ANOTHER
+    if other < 0:
+        t, stop = limit, AT_EDGE if limit == whole else ON_TRIANGLE
     h = 0.5 * t
     kept = 1.0 - brake * h / speed if speed > 0.0 else 0.0
     p = (p[0] + (v[0] + a[0] * h) * t, p[1] + (v[1] + a[1] * h) * t, p[2] + (v[2] + a[2] * h) * t)
     way = (kept * v[0] + pull[0] * t, kept * v[1] + pull[1] * t, kept * v[2] + pull[2] * t)
-    return t, p, way, stopped
+    return t, p, way, stop

@@ -28,7 +28,7 @@ from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, last_root
 from .ground_kernels import box, first_contact
-from .leg_kernels import leg
+from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
 from .point_kernels import closest
 from .rotation import drawn_axes, turn
@@ -38,6 +38,9 @@ STOPPED, LEFT, LIMIT = 0, 1, 2
 RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED = 0, 1, 2, 3, 4
 """What a record is about."""
 NO_ROLLING, AZZONI, COULOMB = 0, 1, 2
+ENDS_ONLY, IMPACTS, ALL = 0, 1, 2
+"""What is recorded beside release and end: nothing; impacts, where blocks fly off, the first step on the ground each
+time; all."""
 
 HOP = 0.1
 """A rebound that rises less than this part of the radius above the ground is none."""
@@ -259,6 +262,7 @@ def run_block(  # type: ignore[no-untyped-def]
     draws : (d,) work space for the uniform numbers of one impact.
     inertia : c of c m r², for rolling. moments : three, of inertia, for flight. drag : ½ρC_D A/m [1/m].
     law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
+    record : `ENDS_ONLY`, `IMPACTS` or `ALL`.
     """
     zero = (0.0, 0.0, 0.0)
     bounds = box(tree)
@@ -268,8 +272,8 @@ def run_block(  # type: ignore[no-untyped-def]
     v_max = sqrt(_dot(v, v))
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
+    known, t, e, hit, at_edge, marked = False, 0.0, zero, -1, False, False
     anchor, lingers = p, 0
-    known, t, e, hit, at_edge = False, 0.0, zero, -1, False
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:
         u = np.empty(3)
@@ -332,13 +336,13 @@ def run_block(  # type: ignore[no-untyped-def]
                 fill_uniform(seed, run, impacts, draws)
                 v, w = rebound(v1, n, w1, radius, mass, parameters[z], draws)
                 impacts += 1
-                if record:
+                if record >= IMPACTS:
                     _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, n, place)
                     count += 1
                 v_max = max(v_max, sqrt(_dot(v, v)))
             rises = _dot(v, n)
             if n[2] > 0.0 and rises * rises < 2.0 * gravity * n[2] * HOP * radius:
-                grounded, v, at_edge = True, _along(v, n), False
+                grounded, v, at_edge, marked = True, _along(v, n), False, False
                 if law == NO_ROLLING:
                     end = STOPPED
             elif at_once >= MOST_AT_ONCE:
@@ -356,117 +360,104 @@ def run_block(  # type: ignore[no-untyped-def]
         if speed < 1e-6 and steep <= mu * cosine:
             end = STOPPED
             break
+        moves = False
         if len(tree) == 4 and not at_edge:
-            at_edge = True
-            t, q, turned, stopped = leg(tree, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time)
-            if t > 0.0:
-                if stopped:
-                    q = _touching(tree, stack, q, turned, radius, nearby)[0]
-                part, p, v, ds = _moved(p, q, v, turned, factor * gravity, mu * max(cosine, 0.0))
-                time, length = time + part * t, length + part * ds
-                at_edge = stopped
-                held = held + 1 if ds < HELD * radius else 0
-                if held > MOST_HELD:
-                    end = STOPPED
-                w = _rolling(n, v, radius)
-                v_max = max(v_max, sqrt(_dot(v, v)))
-                if record:
-                    _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
-                    count += 1
-                continue
-        free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
-        pull = -gravity * factor * dt
-        ahead = _along((v[0], v[1], v[2] + pull), n)
-        q, e, touched, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby)
-        if distance > radius + TOUCHING_M:
-            t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
-            q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
-            t, lands = t + dt, _dot(turned, e)
-            if hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius:
-                part, p, v, ds = _moved(p, q, v, _along(turned, e), factor * gravity, mu * max(cosine, 0.0))
-                time, length = time + part * t, length + part * ds
-                n, place, at_edge = e, hit, False
-                w = _rolling(n, v, radius)
-                v_max = max(v_max, sqrt(_dot(v, v)))
-                if record:
-                    _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
-                    count += 1
-                continue
-            grounded, known = False, drag == 0.0
-            if record:
-                _write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
-                count += 1
-            at_once = 0
-            continue
-        if touched < 0:
-            end = STOPPED  # the centre is on the ground itself: there is no way out
-            break
-        way = (q[0] - p[0], q[1] - p[1], q[2] - p[2])
-        ds = sqrt(_dot(way, way))
-        held = held + 1 if ds < HELD * radius else 0
-        if held > MOST_HELD:
-            end = STOPPED
-            break
-        gone = (q[0] - anchor[0], q[1] - anchor[1], q[2] - anchor[2])
-        lingers += 1
-        if _dot(gone, gone) > (LINGERS * radius) ** 2:
-            anchor, lingers = q, 0
-        if lingers > MOST_HELD:
-            end = STOPPED
-            break
-        towards = -_dot(v, against)
-        if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(against, n) < SHARP:
-            fill_uniform(seed, run, impacts, draws)
-            v1, w1 = v, w
-            v, w = rebound(v1, against, w1, radius, mass, parameters[zone[other]], draws)
-            impacts += 1
-            if record:
-                _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
-                count += 1
-            rises = _dot(v, against)
-            if against[2] <= 0.0 or rises * rises >= 2.0 * gravity * against[2] * HOP * radius:
-                grounded = False
-            else:
-                v, n, place = _along(v, against), against, other
-            continue
-        turned = _along((v[0], v[1], v[2] + pull), e)
-        square = speed * speed
-        back = _dot(turned, against)
-        blocked = back < 0.0 and _dot(against, e) < SHARP
-        if blocked:
-            turned = _in_corner(turned, e, against)
-        size = sqrt(_dot(turned, turned))
-        if blocked or _dot(e, n) < SHARP:
-            square = min(square, size * size)
-        loss = 2.0 * factor * gravity * ((q[2] - p[2]) + mu * max(cosine, 0.0) * ds)
-        left = square - loss
-        n, place, at_edge = e, touched, blocked
-        if speed < 1e-6:
-            # From rest: what friction leaves of gravity along the ground, and along a wall that the block leans on.
-            pulls = size - mu * (factor * gravity * cosine * dt + (-back if blocked else 0.0))
-            if pulls <= 0.0:
+            e, hit = n, place
+            t, q, turned, stop = leg(tree, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time)
+            moves, at_edge = t > 0.0, stop != ON_TRIANGLE
+            if stop == AT_ANOTHER:
+                q = _touching(tree, stack, q, turned, radius, nearby)[0]
+        if not moves:
+            free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
+            pull = -gravity * factor * dt
+            ahead = _along((v[0], v[1], v[2] + pull), n)
+            away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby)
+            if distance > radius + TOUCHING_M:
+                t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
+                q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
+                t, lands = t + dt, _dot(turned, e)
+                moves = hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius
+                if not moves:
+                    grounded, known, at_once = False, drag == 0.0, 0
+                    if record >= IMPACTS:
+                        _write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
+                        count += 1
+                    continue
+                turned, at_edge = _along(turned, e), False
+        if moves:
+            part, p, v, ds = _moved(p, q, v, turned, factor * gravity, mu * max(cosine, 0.0))
+            time, length = time + part * t, length + part * ds
+            n, place = e, hit
+            held = held + 1 if ds < HELD * radius else 0
+            if held > MOST_HELD:
+                end = STOPPED
+        else:
+            if hit < 0:
+                end = STOPPED  # the centre is on the ground itself: there is no way out
+                break
+            way = (away[0] - p[0], away[1] - p[1], away[2] - p[2])
+            ds = sqrt(_dot(way, way))
+            held = held + 1 if ds < HELD * radius else 0
+            gone = (away[0] - anchor[0], away[1] - anchor[1], away[2] - anchor[2])
+            lingers += 1
+            if _dot(gone, gone) > (LINGERS * radius) ** 2:
+                anchor, lingers = away, 0
+            if held > MOST_HELD or lingers > MOST_HELD:
                 end = STOPPED
                 break
-            v = (turned[0] / size * pulls, turned[1] / size * pulls, turned[2] / size * pulls)
-            p, time, length = q, time + dt, length + ds
-            continue
-        if left <= 0.0 or size == 0.0:
-            # It comes to rest within this step, where the energy is spent.
-            part = min(max(square / loss, 0.0), 1.0) if loss > 0.0 and size > 0.0 else 0.0
-            p = (p[0] + part * way[0], p[1] + part * way[1], p[2] + part * way[2])
-            time += 2.0 * part * ds / speed
-            length += part * ds
-            v = zero
-        else:
-            now = sqrt(left)
-            v = (turned[0] / size * now, turned[1] / size * now, turned[2] / size * now)
-            time += 2.0 * ds / (speed + now)
-            p, length = q, length + ds
+            towards = -_dot(v, against)
+            if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(against, n) < SHARP:
+                fill_uniform(seed, run, impacts, draws)
+                v1, w1 = v, w
+                v, w = rebound(v1, against, w1, radius, mass, parameters[zone[other]], draws)
+                impacts += 1
+                if record >= IMPACTS:
+                    _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
+                    count += 1
+                marked = False
+                rises = _dot(v, against)
+                if against[2] <= 0.0 or rises * rises >= 2.0 * gravity * against[2] * HOP * radius:
+                    grounded = False
+                else:
+                    v, n, place = _along(v, against), against, other
+                continue
+            turned = _along((v[0], v[1], v[2] + pull), e)
+            square = speed * speed
+            back = _dot(turned, against)
+            blocked = back < 0.0 and _dot(against, e) < SHARP
+            if blocked:
+                turned = _in_corner(turned, e, against)
+            size = sqrt(_dot(turned, turned))
+            if blocked or _dot(e, n) < SHARP:
+                square = min(square, size * size)
+            loss = 2.0 * factor * gravity * (way[2] + mu * max(cosine, 0.0) * ds)
+            left = square - loss
+            n, place, at_edge = e, hit, blocked
+            if speed < 1e-6:
+                # From rest: what friction leaves of gravity along the ground, and along a wall that the block leans on.
+                pulls = size - mu * (factor * gravity * cosine * dt + (-back if blocked else 0.0))
+                if pulls <= 0.0:
+                    end = STOPPED
+                    break
+                v = (turned[0] / size * pulls, turned[1] / size * pulls, turned[2] / size * pulls)
+                p, time, length = away, time + dt, length + ds
+            elif left <= 0.0 or size == 0.0:
+                # It comes to rest within this step, where the energy is spent.
+                part = min(max(square / loss, 0.0), 1.0) if loss > 0.0 and size > 0.0 else 0.0
+                p = (p[0] + part * way[0], p[1] + part * way[1], p[2] + part * way[2])
+                time += 2.0 * part * ds / speed
+                length += part * ds
+                v = zero
+            else:
+                now = sqrt(left)
+                v = (turned[0] / size * now, turned[1] / size * now, turned[2] / size * now)
+                time += 2.0 * ds / (speed + now)
+                p, length = away, length + ds
         w = _rolling(n, v, radius)
         v_max = max(v_max, sqrt(_dot(v, v)))
-        if record:
+        if record == ALL or (record == IMPACTS and not marked):
             _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
-            count += 1
+            count, marked = count + 1, True
     if tumbles and not grounded:
         axes, w = turn(moments, axes, w, time - spun)
     if count + 2 >= rows.shape[0]:

@@ -152,7 +152,7 @@ def _on_flight(simulation: Simulation, start: Indices, elapsed: Array) -> tuple[
 
 
 def _greatest_heights(simulation: Simulation) -> Array:
-    if not simulation.recorded:
+    if simulation.recorded == "ends":
         return np.full(len(simulation), np.nan)
     rows, duration = flights_of(simulation)
     run = simulation.records.run[rows]

@@ -22,6 +22,7 @@ from ..simulation.engine import (
     LEFT_TERRAIN,
     LIMIT,
     STOPPED,
+    Recorded,
     Rolling,
     Settings,
     Simulation,
@@ -84,7 +85,7 @@ class Scenario:
     structures : name → walls, fences, roads, houses that stand on the terrain.
     zones : None for one that is everywhere.
     rolling, friction, drag, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
-    record : keep every impact and step of the runs; without them only how each begins and ends.
+    record : what to keep of the motion, see `engine.RECORDED`.
     """
 
     terrain: Surface | Cloud
@@ -100,7 +101,7 @@ class Scenario:
     seed: int = 0
     most_impacts: int = Settings.most_impacts
     most_s: float = Settings.most_s
-    record: bool = True
+    record: Recorded = "all"
 
     @property
     def settings(self) -> tuple[Settings, ...]:
@@ -161,7 +162,7 @@ def run_models(
     releases: Releases,
     settings: Sequence[Settings],
     *,
-    record: bool = True,
+    record: Recorded = "all",
     first_run: int = 0,
     threads: int | None = None,
     progress: Progress = silent,

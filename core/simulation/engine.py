@@ -6,7 +6,8 @@ import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from functools import cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,12 +207,17 @@ def simulate(
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
     ground.refuse_small(releases.radius_m)
     tree, zone = ground.tree, ground.zone[ground.element]
-    drag = releases.drag_per_m(settings.drag)
     results, starts = np.empty((n, 5)), range(0, n, BATCH)
     rows: dict[int, Array] = {}
 
-    from .motion_kernels import COLUMNS, run_blocks
+    from .motion_kernels import COLUMNS
 
+    run_blocks = _compiled_runs(tree)
+    columns = (
+        releases.position, releases.velocity, releases.angular_velocity, releases.radius_m, releases.mass_kg,
+        releases.inertia, releases.principal_kgm2, releases.drag_per_m(settings.drag),
+    )  # fmt: skip
+    blocks = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
     def batch(start: int) -> int:
@@ -219,9 +225,8 @@ def simulate(
         runs = np.arange(first_run + part.start, first_run + part.stop)
         rows[start] = run_blocks(
             tree, zone, model.compiled, numbers, friction, model.draws, runs, settings.seed,
-            releases.position[part], releases.velocity[part], releases.angular_velocity[part],
-            releases.radius_m[part], releases.mass_kg[part], releases.inertia[part], releases.principal_kgm2[part],
-            drag[part], settings.gravity_mps2, law, settings.most_impacts, settings.most_s, level, results[part],
+            *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts, settings.most_s,
+            level, results[part],
         )  # fmt: skip
         return part.stop - part.start
 
@@ -300,6 +305,35 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     if not (np.isfinite(friction) & (friction >= 0)).all():
         raise InputError(f"The friction is {friction.min()}", advice="Give a number of zero or more")
     return np.array(rows), friction
+
+
+@cache
+def _compiled_for(tree_type: Any) -> Any:
+    """`run_blocks` for one kind of ground and any model, which it takes as a pointer to a function: compiled once."""
+    from numba import types
+
+    from ..impact_models.machinery.compilation import rebound_type
+    from .motion_kernels import run_blocks
+
+    numba_types: Any = types
+    line, lines, whole, number = types.float64[::1], types.float64[:, ::1], types.intp, types.float64
+    block = (lines, lines, lines, line, line, line, lines, line)
+    run_blocks.disable_compile(False)
+    run_blocks.compile(
+        numba_types.Array(types.float64, 2, "C")(
+            tree_type, types.int32[::1], rebound_type(), lines, line, whole, types.int64[::1], whole, *block, number,
+            whole, whole, number, whole, lines,
+        )
+    )  # fmt: skip
+    run_blocks.disable_compile()
+    return run_blocks
+
+
+def _compiled_runs(tree: Any) -> Any:
+    import numba
+
+    typeof: Any = numba.typeof
+    return _compiled_for(typeof(tree))
 
 
 def _in_turn(parts: dict[int, Array], whole: int, columns: int) -> Array:

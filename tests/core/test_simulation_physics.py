@@ -37,7 +37,7 @@ def rough_case(count: int, diameter: float = 0.5, above: float = 1.0):
     line = np.arange(0.0, 140.5, 1.0)
     ground = make_ground(sheet(line, line, rough_height))
     places = np.random.default_rng(8).uniform([5, 20], [25, 120], (count, 2))
-    start = placed_on(ground, places, np.full(count, diameter)) + [0.0, 0.0, above]
+    start = placed_on(ground, places, np.full(count, diameter)) + np.array([0.0, 0.0, above])
     return ground, make_releases(start, diameter_m=diameter)
 
 
@@ -152,12 +152,15 @@ def _with_half_the_hop(monkeypatch: pytest.MonkeyPatch, ground, releases, settin
 
     run_block = anew(motion_kernels.run_block, HOP=motion_kernels.HOP / 2)
     monkeypatch.setattr(motion_kernels, "run_blocks", anew(motion_kernels.run_blocks, run_block=run_block))
-    return simulate(ground, releases, settings, record="ends")
+    engine._compiled_for.cache_clear()
+    run = simulate(ground, releases, settings, record="ends")
+    engine._compiled_for.cache_clear()
+    return run
 
 
 @pytest.mark.parametrize("name", ["noel_2017", "pfeiffer_bowen_1989", "stevens_1998"])
 def test_many_contacts_have_the_distribution_of_the_model_itself(name: str) -> None:
-    """First rebounds on a plane at a fixed incidence against ten times as many drawn directly, by another random generator."""
+    """First rebounds on a plane at a fixed incidence, and ten times as many drawn by another random generator."""
     ground = make_ground(sheet(np.linspace(0, 40, 9), np.linspace(0, 40, 9), lambda x, y: -np.tan(0.6) * x))
     n, blocks = 200_000, 20_000
     normal = np.array([np.sin(0.6), 0.0, np.cos(0.6)])

@@ -143,10 +143,9 @@ def zones_as_asked(
 
     Raises
     ------
-    InputError : see `read_zones` and `read_attribute_zones`.
+    InputError : see `open_zones`.
     """
-    from ..exchange.zones import read_attribute_zones, read_zones
-    from ..terrain.ply_attributes import read_ply_attribute
+    from ..exchange.zones import open_zones
 
     if arguments.zones is None:
         if arguments.zone_attribute is not None:
@@ -155,12 +154,11 @@ def zones_as_asked(
                 advice="Give --zones FILE with a row for each value",
             )
         return None, {}
-    inputs = {"zones": Path(arguments.zones)}
-    if arguments.zone_attribute is None:
-        return read_zones(arguments.zones, terrain, models), inputs
-    attribute = read_ply_attribute(arguments.terrain, arguments.zone_attribute)
-    places = attribute.in_metres(arguments.up, arguments.unit)
-    return read_attribute_zones(arguments.zones, terrain, attribute, terrain.shift.to_local(places), models), inputs
+    zones = open_zones(
+        arguments.zones, arguments.zone_attribute or "", terrain, models,
+        terrain_file=arguments.terrain or "", up=arguments.up, unit_m=arguments.unit,
+    )  # fmt: skip
+    return zones, {"zones": Path(arguments.zones)}
 
 
 def sources_given(arguments: argparse.Namespace) -> list[str]:

@@ -19,6 +19,10 @@
     diameter_m = "lognormal:0.5,0.2" # or a number, "0.3..0.6", "normal:MEAN,SD"
     density_kgpm3 = 2600
 
+    [simulation.zones]
+    file = "zones.geojson"           # polygons with parameters of their own
+    # attribute = "soil"             # of the terrain's PLY file; the file is then a table of its values
+
     [[simulation.structures]]
     name = "fence"
     file = "fence.ply"
@@ -94,13 +98,28 @@ class StructureEntry:
 
 
 @dataclass(frozen=True)
+class ZonesEntry:
+    """Parts of the ground with parameters of their own.
+
+    Attributes
+    ----------
+    file : polygons with their parameters, or a table of what the values of the attribute mean.
+    attribute : of the terrain's vertices or faces; empty for polygons.
+    """
+
+    file: Path
+    attribute: str = ""
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class SimulationEntry:
     """A simulation as a project states it.
 
     Attributes
     ----------
     models : names, in the order in which they run; none takes those that are compared by default.
-    releases, structures, rolling, friction, seed : see `workflow.simulation.Scenario`.
+    releases, structures, zones, rolling, friction, seed : see `workflow.simulation.Scenario`.
     contact : what of the terrain blocks meet, see `simulation.ground.CONTACTS`.
     observed : impacts.csv that the model observed draws from; None takes what the project has measured.
     drag : of the air, with the coefficient and density of the project's reconstruction.
@@ -111,6 +130,7 @@ class SimulationEntry:
     releases: ReleaseEntry = field(default_factory=ReleaseEntry)
     structures: tuple[StructureEntry, ...] = ()
     contact: Contact = "mesh"
+    zones: ZonesEntry | None = None
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     drag: bool = False
@@ -138,6 +158,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         releases=_read_releases(table.table("releases")),
         structures=_read_structures(table),
         contact=cast(Contact, table.choice("contact", CONTACTS, "mesh")),
+        zones=_read_zones(table.table("zones")) if table.has("zones") else None,
         rolling=cast(Rolling, table.choice("rolling", ROLLING, "azzoni_1995")),
         friction=table.number("friction", FRICTION, zero_allowed=True),
         drag=table.flag("drag", False),
@@ -163,6 +184,9 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
     if entry.record is not None:
         content["record"] = list(entry.record)
     content["releases"] = _release_content(entry.releases, relative)
+    if entry.zones is not None:
+        own = {"attribute": entry.zones.attribute} if entry.zones.attribute else {}
+        content["zones"] = {"file": relative(entry.zones.file)} | own | dict(entry.zones.extra)
     if entry.structures:
         content["structures"] = [
             {"name": structure.name, "file": relative(structure.file)} | dict(structure.extra)
@@ -234,6 +258,10 @@ def _read_law(table: TomlTable, key: str) -> Distribution | None:
         return parse_distribution(value) if isinstance(value, str) else Distribution("fixed", float(value))
     except InputError as error:
         raise table.wrong(key, f"is {value!r}: {error.problem}", error.advice or f"Write {FORMS}") from error
+
+
+def _read_zones(table: TomlTable) -> ZonesEntry:
+    return ZonesEntry(table.path("file"), table.text("attribute", ""), table.rest())
 
 
 def _read_structures(table: TomlTable) -> tuple[StructureEntry, ...]:

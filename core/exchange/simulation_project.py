@@ -32,6 +32,7 @@ from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry
 from .simulation_output import recorded_for
 from .simulation_tables import read_releases
 from .tables import read_impacts
+from .zones import open_zones
 
 SAME_TIME_S = 1e-6
 
@@ -74,6 +75,14 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         progress(f"Reading {structure.file.name}", 0, 0)
         structures[structure.name] = read_structure(structure.file, up=source.up, unit_m=source.unit_m)
         inputs[structure.name] = structure.file
+    zones = None
+    if entry.zones is not None:
+        progress(f"Reading {entry.zones.file.name}", 0, 0)
+        inputs["zones"] = entry.zones.file
+        zones = open_zones(
+            entry.zones.file, entry.zones.attribute, terrain, models,
+            terrain_file=source.file, up=source.up, unit_m=source.unit_m,
+        )  # fmt: skip
     how = project.reconstruction
     met: Surface | Cloud = terrain
     if entry.contact == "points":
@@ -84,6 +93,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         {name: known.get(name, {}) for name in models},
         _drawn_from(project, terrain, entry) if drawing else None,
         structures=structures,
+        zones=zones,
         rolling=entry.rolling,
         friction=entry.friction,
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,

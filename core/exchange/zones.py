@@ -18,7 +18,7 @@ from ..remarks import Remark
 from ..simulation.ground import element_places
 from ..simulation.zones import ZoneCover, face_values, nearest_values, zones_of_values, zones_within
 from ..terrain.cloud import Cloud
-from ..terrain.ply_attributes import PlyAttribute
+from ..terrain.ply_attributes import PlyAttribute, read_ply_attribute
 from ..terrain.surface import Surface
 from ..vectors import Array
 from ..workflow.simulation import Zones
@@ -96,6 +96,33 @@ def read_attribute_zones(
     except InputError as error:
         raise InputError(error.problem, file=path, advice=error.advice) from error
     return _zones(cover, found, models)
+
+
+def open_zones(
+    path: str | Path,
+    attribute: str,
+    terrain: Surface | Cloud,
+    models: Sequence[str],
+    *,
+    terrain_file: str | Path,
+    up: str,
+    unit_m: float,
+) -> Zones:
+    """Zones of polygons, or of an attribute of the terrain's file where one is named.
+
+    Parameters
+    ----------
+    terrain_file, up, unit_m : what the terrain was read from, and how.
+
+    Raises
+    ------
+    InputError : see `read_zones`, `read_ply_attribute` and `read_attribute_zones`.
+    """
+    if not attribute:
+        return read_zones(path, terrain, models)
+    values = read_ply_attribute(terrain_file, attribute)
+    places = terrain.shift.to_local(values.in_metres(up, unit_m))
+    return read_attribute_zones(path, terrain, values, places, models)
 
 
 def _zones(cover: ZoneCover, found: _Properties, models: Sequence[str]) -> Zones:

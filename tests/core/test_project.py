@@ -20,7 +20,7 @@ from rockfall.core.exchange.project import (
     read_project,
     write_project,
 )
-from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, StructureEntry
+from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, StructureEntry, ZonesEntry
 from rockfall.core.simulation.distributions import Distribution
 
 FULL = """
@@ -275,6 +275,10 @@ proportions = [3.0, 2.0, 1.0]
 diameter_m = "lognormal:0.5,0.2"
 density_kgpm3 = 2500
 kept = 2
+[simulation.zones]
+file = "soil.csv"
+attribute = "soil"
+kept = 4
 [[simulation.structures]]
 name = "fence"
 file = "fence.ply"
@@ -284,7 +288,7 @@ kept = 3
 
 def test_a_simulation_round_trips(tmp_path: Path) -> None:
     path, again = tmp_path / "project.toml", tmp_path / "again.toml"
-    for name in ("fence.ply", "impacts.csv"):
+    for name in ("fence.ply", "impacts.csv", "soil.csv"):
         (tmp_path / name).touch()
     path.write_text(SIMULATED, encoding="utf-8")
     project = read_project(path)
@@ -301,6 +305,7 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
             extra={"kept": 2},
         ),
         structures=(StructureEntry("fence", tmp_path / "fence.ply", {"kept": 3}),),
+        zones=ZonesEntry(tmp_path / "soil.csv", "soil", {"kept": 4}),
         rolling="coulomb",
         friction=0.4,
         drag=True,
@@ -338,13 +343,14 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
         ('"lognormal:0.5,0.2"', '"weibull:0.5,0.2"', "There is no law 'weibull'"),
         ('"lognormal:0.5,0.2"', "true", "simulation.releases.diameter_m is True, no number and no law"),
         ("kept = 2", "steeper_than_deg = 180", "simulation.releases.steeper_than_deg is 180"),
+        ('"soil.csv"', '"sand.csv"', "simulation.zones.file names a file that is not there"),
         ('"fence.ply"', '"wall.ply"', "structures 1: file names a file that is not there"),
         ("kept = 3", '[[simulation.structures]]\nname = "fence"\nfile = "fence.ply"', "names 'fence' twice"),
     ],
 )
 def test_bad_simulations_are_located(tmp_path: Path, old: str, new: str, problem: str) -> None:
     path = tmp_path / "project.toml"
-    for name in ("fence.ply", "impacts.csv"):
+    for name in ("fence.ply", "impacts.csv", "soil.csv"):
         (tmp_path / name).touch()
     assert SIMULATED.count(old) == 1
     path.write_text(SIMULATED.replace(old, new), encoding="utf-8")

@@ -150,3 +150,23 @@ def test_a_project_without_terrain_is_refused(folder: Path, capsys) -> None:
     path.write_text('schema = 1\n[picks]\nfile = "picks.csv"\n', encoding="utf-8")
     assert main(["simulate", str(path), "--out", str(folder / "out")]) == 1
     assert "The project names no terrain" in capsys.readouterr().err
+
+
+def test_zones_of_a_project_have_their_parameters(folder: Path, capsys) -> None:
+    """The half of the plane whose middle is at two thirds of its width."""
+    corners = [(100, 0), (200, 0), (200, 200), (100, 200)]
+    rows = [f"wood,{EAST + x},{NORTH + y},0.9,0.3" for x, y in corners]
+    (folder / "zones.csv").write_text("\n".join(["name,x_m,y_m,friction,rt", *rows]), encoding="utf-8")
+    path = project(folder, '[simulation]\nmodels = ["noel_2017"]\n[simulation.zones]\nfile = "zones.csv"')
+    scenario, inputs = open_simulation(read_project(path), path)
+    assert inputs["zones"] == folder / "zones.csv"
+    assert scenario.zones is not None
+    assert sorted(scenario.zones.of_face.tolist()) == [0, 1]
+    (settings,) = scenario.settings
+    assert settings.zone_friction == {"wood": 0.9}
+    assert settings.zones == {"wood": {"rt": 0.3}}
+    assert main(["simulate", str(path), "--record", "none", "--out", str(folder / "out")]) == 0
+    assert "1 of 2 faces are in no zone" in capsys.readouterr().out
+    with_attribute = project(folder, '[simulation.zones]\nfile = "zones.csv"\nattribute = "soil"')
+    assert main(["simulate", str(with_attribute), "--record", "none", "--out", str(folder / "other")]) == 1
+    assert "The file has no attribute 'soil'" in capsys.readouterr().err

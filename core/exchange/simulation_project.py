@@ -75,18 +75,18 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         progress(f"Reading {structure.file.name}", 0, 0)
         structures[structure.name] = read_structure(structure.file, up=source.up, unit_m=source.unit_m)
         inputs[structure.name] = structure.file
+    how = project.reconstruction
+    met: Surface | Cloud = terrain
+    if entry.contact == "points":
+        met = read_points(source.file, shift=terrain.shift, up=source.up, unit_m=source.unit_m)
     zones = None
     if entry.zones is not None:
         progress(f"Reading {entry.zones.file.name}", 0, 0)
         inputs["zones"] = entry.zones.file
         zones = open_zones(
-            entry.zones.file, entry.zones.attribute, terrain, models,
+            entry.zones.file, entry.zones.attribute, met, models,
             terrain_file=source.file, up=source.up, unit_m=source.unit_m,
         )  # fmt: skip
-    how = project.reconstruction
-    met: Surface | Cloud = terrain
-    if entry.contact == "points":
-        met = read_points(source.file, shift=terrain.shift, up=source.up, unit_m=source.unit_m)
     scenario = Scenario(
         met,
         release_source(project, terrain, entry),

@@ -194,6 +194,7 @@ def summary(
         "contact": "points" if isinstance(first.ground.terrain, Cloud) else "mesh",
         "point_spacing_m": {name: round(spacing, 6) for name, spacing in first.ground.spacing_m.items()},
         "triangles_without_area": first.ground.flat,
+        "terrain": None if first.ground.faults is None else asdict(first.ground.faults),
         "models": {simulation.settings.model: _model_summary(simulation) for simulation in simulations},
         "remarks": to_plain(remarks),
     }

@@ -18,6 +18,7 @@ from ..terrain.joining import moved
 from ..terrain.raycast import closest_points, heights_above
 from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
+from .ground_faults import GroundFaults, ground_faults
 
 Contact = Literal["mesh", "points"]
 CONTACTS: tuple[Contact, ...] = ("mesh", "points")
@@ -108,6 +109,11 @@ class Ground:
             return triangles
         return np.concatenate([triangles, self.point_index.number + np.int32(len(self.faces))])
 
+    @cached_property
+    def faults(self) -> GroundFaults | None:
+        """What is wrong with the terrain's triangles, counted; None where it is a cloud."""
+        return ground_faults(self.terrain) if isinstance(self.terrain, Surface) else None
+
     @property
     def highest_m(self) -> float:
         """Height of the highest vertex or point [m]."""
@@ -169,12 +175,14 @@ def make_ground(
 
     Raises
     ------
-    InputError : zones that do not cover the terrain, a structure that is nowhere near the terrain.
+    InputError : zones that do not cover the terrain, a structure that is nowhere near the terrain, coordinates that are
+        not finite.
 
     Notes
     -----
     Both sides of a triangle stop a block, whatever its winding. Triangles without area are left out, since their
-    neighbours cover the same ground. A border is an edge over which blocks fall.
+    neighbours cover the same ground. A border is an edge over which blocks fall. Whatever else is wrong with triangles
+    is met as it is, and counted: see `GroundFaults`.
     """
     names = tuple(structures or {})
     size = len(element_places(terrain))
@@ -185,6 +193,14 @@ def make_ground(
             "The zones do not fit the terrain", advice="Give each triangle or point the number of one of the zones"
         )
     parts = [terrain, *(moved(part, terrain.shift) for part in (structures or {}).values())]
+    for name, part in zip(("terrain", *names), parts, strict=True):
+        places = part.vertices if isinstance(part, Surface) else part.points
+        lost = len(places) - int(np.isfinite(places).all(axis=1).sum())
+        if lost:
+            what = "vertices" if isinstance(part, Surface) else "points"
+            raise InputError(
+                f"The {name} has {lost} {what} whose coordinates are no numbers", file=part.name, advice="Remove them"
+            )
     low, high = terrain.bounds
     for name, part in zip(names, parts[1:], strict=True):
         if (part.bounds[1] < low).any() or (part.bounds[0][:2] > high[:2]).any():

@@ -236,9 +236,36 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
     ground = simulations[0].ground
     remarks += [*ground.remarks, *simulations[0].releases.remarks]
     remarks += _remarks_of_points(simulations[0])
-    if ground.flat:
-        remarks.append(Remark(f"{ground.flat} triangles without area were left out.", "note", "terrain"))
+    remarks += [Remark(text, "note", "terrain") for text in _fault_sentences(ground)]
+    remarks += [Remark(f"No block meets {name}.", "note", name) for name in _not_met(simulations)]
     return tuple(gravest_first(remarks))
+
+
+def _fault_sentences(ground: Ground) -> list[str]:
+    """What is wrong with the triangles, and how blocks meet them."""
+    faults = ground.faults
+    counted = [(ground.flat, "triangles without area were left out.")]
+    if faults is not None:
+        counted += [
+            (faults.twice, "triangles are there twice; blocks meet them as one."),
+            (faults.opposed_edges, "edges join triangles of opposite winding; blocks meet both sides alike."),
+            (faults.branching_edges, "edges belong to more than two triangles; blocks meet each of them."),
+            (faults.spikes, "vertices stick out as spikes; blocks meet them as they are."),
+        ]
+    return [f"{count} {text}" for count, text in counted if count]
+
+
+def _not_met(simulations: Sequence[Simulation]) -> list[str]:
+    """Structures that no block hits, as far as impacts were recorded."""
+    ground = simulations[0].ground
+    met: set[int] = set()
+    for simulation in simulations:
+        records = simulation.records
+        rows = np.flatnonzero(records.what == IMPACT)
+        if rows.size < simulation.impacts.sum():
+            return []
+        met |= set(np.unique(ground.owner[records.face[rows]]).tolist())
+    return [name for place, name in enumerate(ground.structures, 1) if place not in met]
 
 
 def _remarks_of_points(simulation: Simulation) -> list[Remark]:

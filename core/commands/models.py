@@ -33,6 +33,7 @@ def _sheet(model: "ImpactModel") -> list[str]:
     traits = [
         "random parts" if model.is_random else "no random parts",
         "energy never grows" if model.energy_never_grows else "energy may grow",
+        *(["needs measured impacts"] if model.draws_from_impacts else []),
     ]
     lines = [f"{model.name}: {model.title} ({', '.join(traits)})", *_wrapped(model.reference, 2)]
     for spec in model.parameters:

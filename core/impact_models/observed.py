@@ -155,7 +155,8 @@ def rebound(
 MODEL = ImpactModel(
     name="observed",
     title="Measured rebounds",
-    reference="The site's own measured impacts, or a database of them, drawn again under like conditions.",
+    reference="Measured impacts of the site, or of several, drawn again under like conditions; after Lall, U. & "
+    "Sharma, A. (1996): A nearest neighbor bootstrap for resampling hydrologic time series. Water Resour. Res. 32(3), 679–693.",
     function=rebound,
     parameter_type=Parameters,
     draw_type=Draws,

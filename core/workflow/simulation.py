@@ -317,9 +317,12 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
 
 
 def _beyond(simulation: Simulation, measured: MeasuredRebounds) -> list[Remark]:
-    """How many of the impacts are beyond the measured conditions, if they were recorded."""
+    """How many of the impacts are beyond the measured conditions."""
     records = simulation.records
     rows = np.flatnonzero(records.what == IMPACT)
+    if simulation.recorded == "ends":
+        text = "No impacts were recorded: how many are beyond the measured conditions is not known."
+        return [Remark(text, "note", simulation.settings.model)]
     if not rows.size:
         return []
     rows = rows[:: 1 + rows.size // MOST_LOOKED_AT]

@@ -423,6 +423,8 @@ def test_what_is_beyond_the_measured_conditions_is_said():
     count = int(given.beyond(seen.theta1, seen.vn1).sum())
     assert 0 < count < hits.sum()
     assert any(f"{count} of {hits.sum()} impacts looked at" in text for text in said)
+    bare = run_models(ground, releases, [Settings("observed", measured=given, rolling="none")], record="ends")
+    assert any("No impacts were recorded" in remark.text for remark in remarks_of(bare))
 
 
 def test_without_measured_impacts_there_is_no_simulation():

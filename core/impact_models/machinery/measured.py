@@ -71,7 +71,7 @@ class MeasuredRebounds:
 
     @cached_property
     def bandwidths(self) -> tuple[float, float]:
-        """Of ln θ1 and ln v_N1: min(sd, IQR/1.349) · n^(−1/6), Silverman's rule in two dimensions (1986, § 4.3.2).
+        """Of ln θ1 and ln v_N1: min(sd, IQR/1.349) · n^(−1/6), Silverman's rule (1986) in two dimensions.
 
         n is Kish's effective number (Σw)²/Σw². A bandwidth of 0.25 is about 25 % of the angle or the speed.
         """

@@ -156,7 +156,8 @@ MODEL = ImpactModel(
     name="observed",
     title="Measured rebounds",
     reference="Measured impacts of the site, or of several, drawn again under like conditions; after Lall, U. & "
-    "Sharma, A. (1996): A nearest neighbor bootstrap for resampling hydrologic time series. Water Resour. Res. 32(3), 679–693.",
+    "Sharma, A. (1996): A nearest neighbor bootstrap for resampling hydrologic time series. Water Resources Research "
+    "32(3), 679–693.",
     function=rebound,
     parameter_type=Parameters,
     draw_type=Draws,

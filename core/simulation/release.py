@@ -154,9 +154,14 @@ def placed_on(ground: Ground, releases_xy: Array, diameter_m: Array) -> Array:
     """(n, 3) centres of spheres that touch the ground from above at places (n, 2).
 
     NaN where there is no ground below or above the place.
+
+    Raises
+    ------
+    InputError : spheres that would fall between the points of the ground.
     """
     from .placing_kernels import drop_many
 
+    ground.refuse_small(diameter_m / 2)
     tree, top = ground.tree, ground.highest_m
     places, radius = np.ascontiguousarray(releases_xy), np.ascontiguousarray(diameter_m / 2)
     heights = np.empty(len(places))

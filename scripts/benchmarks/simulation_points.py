@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How quick blocks fall on a cloud of points, beside a mesh of the same slope, in one run; and how much memory it takes."""
+"""How quick blocks fall on a cloud of points, beside a mesh of the same slope, in one run, and in how much memory."""
 
 import argparse
 import resource
@@ -72,7 +72,9 @@ def main() -> None:
         f"{time.process_time() - started:.1f} s of one core, {megabytes():.0f} MB in all"
     )
     grounds = {f"{arguments.points} points": cloud, f"{arguments.triangles} triangles": mesh(arguments.triangles)}
-    print(f"{'ground':<20}{'diameter':>9}{'impacts':>9}{'steps':>7}{'path':>8}{'one core':>12}{'all cores':>12}  blocks/s")
+    print(
+        f"{'ground':<20}{'diameter':>9}{'impacts':>9}{'steps':>7}{'path':>8}{'one core':>12}{'all cores':>12}  blocks/s"
+    )
     for diameter in arguments.diameter:
         releases = released(arguments.blocks, diameter)
         for name, ground in grounds.items():

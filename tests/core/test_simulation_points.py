@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blocks on points alone: contacts against closed forms, and the same falls as on triangles of the same surface."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rockfall.core.cli import main
 from rockfall.core.errors import InputError
+from rockfall.core.exchange.csv_text import read_table
+from rockfall.core.exchange.project import read_project, write_project
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import ENDS, IMPACT, Settings, Simulation, simulate
@@ -323,3 +327,75 @@ def test_blocks_on_a_real_cloud(name: str) -> None:
     assert (0.5 * run.v_max_mps**2 <= G * (places[:, 2] - low[2] + diameter) + 1e-6).all()
     stopped = run.end == ENDS.index("stopped")
     assert (abs(nearest_points(cloud, run.position[stopped])[0] / (diameter / 2) - 1) < 0.15).all()
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a slope and a wall as tables of points, and a table of releases, in survey coordinates."""
+    folder = tmp_path_factory.mktemp("survey")
+    east, north = 2_600_000.0, 1_200_000.0
+    plan = np.random.default_rng(3).uniform(0, [60, 20], (int(60 * 20 / 0.15**2), 2))
+    slope = np.column_stack([plan[:, 0] + east, plan[:, 1] + north, 500 - 0.7 * np.minimum(plan[:, 0], 30)])
+    along, up = np.meshgrid(np.arange(0, 20, 0.1), np.arange(479, 486, 0.1))
+    wall = np.column_stack([np.full(along.size, east + 40), north + along.ravel(), up.ravel()])
+    for name, points in (("slope", slope), ("wall", wall)):
+        np.savetxt(folder / f"{name}.xyz", points, fmt="%.4f")
+    rows = [f"{east + 5},{north + y},,1.2" for y in (8, 9, 10, 11)]
+    (folder / "releases.csv").write_text("x_m,y_m,z_m,diameter_m\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return folder
+
+
+def simulated(survey: Path, out: Path, *more: str) -> dict:
+    argv = ["simulate", str(survey / "releases.csv"), "--terrain", str(survey / "slope.xyz"), "--out", str(out)]
+    assert main([*argv, "--model", "azimi_desvarreux_1977", *more]) == 0
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_the_command_lets_blocks_meet_points_and_walls_of_points(survey: Path, tmp_path: Path, capsys) -> None:
+    wall = ("--structure", f"wall={survey / 'wall.xyz'}", "--friction", "0.2")
+    summary = simulated(survey, tmp_path / "points", "--contact", "points", *wall)
+    assert summary["contact"] == "points"
+    assert summary["point_spacing_m"] == pytest.approx({"the terrain": 0.16, "wall": 0.1}, rel=0.15)
+    assert "Blocks meet the points of the terrain, 0.1" in capsys.readouterr().out
+    (model,) = summary["models"].values()
+    assert sum(model["ends"].values()) == 4
+    assert model["fell_through"] == 0
+    hits = read_table(tmp_path / "points" / "hits.csv", ("structure", "x_m"), ()).numbers("x_m")
+    assert ((hits > 2_600_039) & (hits < 2_600_041)).all()
+    assert hits.size >= 4
+    mesh = simulated(survey, tmp_path / "mesh", *wall)
+    assert mesh["contact"] == "mesh"
+    assert list(mesh["point_spacing_m"]) == ["wall"]
+    ends = [read_table(tmp_path / name / "runs.csv", ("x_m",), ()).numbers("x_m") for name in ("points", "mesh")]
+    np.testing.assert_allclose(*ends, atol=6.0)  # the wall sends them back a little
+    assert (np.concatenate(ends) < 2_600_039.41).all()
+
+
+def test_the_command_refuses_what_points_cannot_do(survey: Path, tmp_path: Path, capsys) -> None:
+    argv = ["simulate", str(survey / "releases.csv"), "--terrain", str(survey / "slope.xyz"), "--contact", "points"]
+    argv += ["--model", "noel_2017", "--out", str(tmp_path / "out")]
+    assert main([*argv, "--max-edge", "2"]) == 1
+    assert "--max-edge is of a mesh" in capsys.readouterr().err
+    (tmp_path / "small.csv").write_text("x_m,y_m,diameter_m\n2600005,1200008,0.1\n", encoding="utf-8")
+    argv[1] = str(tmp_path / "small.csv")
+    assert main(argv) == 1
+    assert "between the points" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_project_asks_for_points(survey: Path, tmp_path: Path) -> None:
+    project = tmp_path / "project.toml"
+    project.write_text(
+        f'schema = 1\n[terrain]\nfile = "{survey / "slope.xyz"}"\n[simulation]\nmodels = ["azimi_desvarreux_1977"]\n'
+        f'contact = "points"\n[simulation.releases]\nfrom = "table"\nfile = "{survey / "releases.csv"}"\n',
+        encoding="utf-8",
+    )
+    assert main(["simulate", str(project), "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["contact"] == "points"
+    again = tmp_path / "again.toml"
+    write_project(read_project(project), again)
+    assert read_project(again).simulation.contact == "points"
+    project.write_text(project.read_text(encoding="utf-8").replace('"points"', '"lines"'), encoding="utf-8")
+    with pytest.raises(InputError, match="contact"):
+        read_project(project)

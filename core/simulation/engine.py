@@ -20,6 +20,7 @@ from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
 from ..vectors import Array, Indices, Mask
 from .ground import Ground
+from .memory import available_bytes, check_records
 from .release import Releases
 from .structures import held_by
 
@@ -33,6 +34,8 @@ FRICTION = 0.5
 """Coefficient of friction on the ground where none is given."""
 BATCH = 64
 """Runs that one thread takes at a time; larger ones leave a thread without work at the end."""
+ENOUGH = 1000
+"""So many runs tell how much memory all will need."""
 
 STOPPED, LEFT_TERRAIN, LIMIT = "stopped", "left_terrain", "limit"
 ENDS = (STOPPED, LEFT_TERRAIN, LIMIT)
@@ -198,7 +201,7 @@ def simulate(
 
     Raises
     ------
-    InputError : settings that cannot be.
+    InputError : settings that cannot be; records that will not fit into the memory.
     """
     n = len(releases)
     numbers, friction = check_settings(ground, settings)
@@ -220,7 +223,7 @@ def simulate(
     blocks = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
-    def batch(start: int) -> int:
+    def batch(start: int) -> tuple[int, int]:
         part = slice(start, min(start + BATCH, n))
         runs = np.arange(first_run + part.start, first_run + part.stop)
         rows[start] = run_blocks(
@@ -228,17 +231,22 @@ def simulate(
             *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts, settings.most_s,
             level, results[part],
         )  # fmt: skip
-        return part.stop - part.start
+        return part.stop - part.start, len(rows[start])
 
-    finished, started = 0, time.perf_counter()
+    finished, recorded, started, there = 0, 0, time.perf_counter(), available_bytes()
     progress("Simulating", 0, n)
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         waiting = [pool.submit(batch, start) for start in starts]
         try:
             for done in as_completed(waiting):
-                finished += done.result()
+                ended, moments = done.result()
+                finished, recorded = finished + ended, recorded + moments
+                if finished >= ENOUGH:
+                    check_records(n, finished, recorded, there)
                 progress("Simulating", finished, n)
         except CancelledError:
+            pass
+        finally:
             for one in waiting:
                 one.cancel()
     whole = next((start for start in starts if start not in rows), n)

@@ -19,11 +19,10 @@ from ..terrain.surface import face_cross_products
 from ..vectors import Array, Indices, Mask, Names, norm, unit
 from .blocks import Blocks, draw_blocks
 from .ground import Ground
+from .memory import check_blocks
 from .polygons import Polygon
 from .release import Releases, make_releases, placed_on, standing_on
 
-MOST_BLOCKS = 10_000_000
-"""More would fill the memory before the first of them has fallen."""
 ATTEMPTS = 64
 """So many places are drawn for a block before it is taken as too large for all."""
 
@@ -170,11 +169,7 @@ def check_number(number: int, places: int = 1) -> None:
     """Raises `InputError` for no blocks, and for more than fit into the memory."""
     if number < 1:
         raise InputError(f"{number} blocks cannot be released", advice="Release at least one")
-    if number * places > MOST_BLOCKS:
-        raise InputError(
-            f"{number * places} blocks are too many for one run, which takes up to {MOST_BLOCKS}",
-            advice="Release fewer, or divide them into several runs with seeds of their own",
-        )
+    check_blocks(number * places)
 
 
 def check_size(ground: Ground, diameter_m: Array) -> None:

@@ -164,7 +164,10 @@ def test_hits_of_a_wall(terrain: Path, releases: Path, tmp_path: Path) -> None:
         (f"{EAST + 10},{NORTH + 40},,0.4,0", "row 2: The number of blocks is 0"),
         (f"{EAST + 10},{NORTH + 40},,0.4,1.5", "row 2: The number of blocks is 1.5"),
         (f"{EAST + 10},wide,,0.4,1", "row 2: .*wide"),
-        (f"{EAST + 10},{NORTH + 40},,0.4,1000000000", "1000000000 blocks are too many for one run"),
+        (
+            f"{EAST + 10},{NORTH + 40},,0.4,1000000000",
+            "1000000000 blocks are too many for this memory",
+        ),
     ],
 )
 def test_bad_releases(terrain: Path, tmp_path: Path, capsys, row: str, problem: str) -> None:

@@ -155,7 +155,7 @@ def test_zones_have_parameters_of_their_own(simulate, tmp_path: Path, capsys) ->
         (("--steeper-than", "-3"), "no angle of a slope"),
         (("--steeper-than", "nan"), "no angle of a slope"),
         (("--steeper-than", "50", "--number", "0"), "0 blocks"),
-        (("--steeper-than", "50", "--number", "1000000000"), "too many for one run"),
+        (("--steeper-than", "50", "--number", "1000000000"), "too many for this memory"),
         (("--steeper-than", "50", "--diameter", "500"), "larger than the terrain"),
         (("--steeper-than", "50", "--diameter", "normal:0.1,1"), "below a tenth of its mean"),
         (("--steeper-than", "50", "--diameter", "1x2"), "no number and no law"),

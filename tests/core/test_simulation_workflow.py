@@ -8,6 +8,7 @@ import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.progress import CancelledError
+from rockfall.core.simulation import engine, memory
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases
@@ -130,3 +131,27 @@ def test_runs_computed_in_parts_are_those_computed_together(scenario: Scenario) 
             np.testing.assert_array_equal(getattr(part, name), getattr(cut, name))
         for name in ("run", "what", "time_s", "position", "v2", "omega2", "v1", "omega1", "normal", "face"):
             np.testing.assert_array_equal(getattr(part.records, name), getattr(cut.records, name))
+
+
+def test_memory_that_is_not_there_is_said_with_what_is_needed(
+    scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "available_bytes", lambda: 3_000_000_000)
+    memory.check_blocks(3_000_000)
+    with pytest.raises(InputError, match=r"4000000 blocks .* need 4.0 GB .* 3.0 GB are there"):
+        memory.check_blocks(4_000_000)
+    ground = ground_of(scenario)
+    monkeypatch.setattr(engine, "ENOUGH", 64)
+    monkeypatch.setattr(engine, "available_bytes", lambda: 1_000_000)
+    done = []
+    with pytest.raises(InputError, match="The motion of 2000 blocks does not fit into the memory"):
+        simulate(ground, drops(ground, 2000), scenario.settings[0], threads=1, progress=lambda *told: done.append(told))
+    assert len(done) < 10
+    whole = simulate(ground, drops(ground, 500), scenario.settings[0], record="ends")
+    assert len(whole) == 500
+    kept = sum(getattr(whole.records, name).nbytes for name in whole.records.__dataclass_fields__)
+    assert 2 * 64 < kept / len(whole.records) < memory.RECORD_BYTES
+
+
+def test_the_memory_that_is_there_is_known() -> None:
+    assert 1e8 < memory.available_bytes() < 1e14

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..impact_models.machinery.base import ImpactModel
 from ..vectors import Array, Mask
 
 NUMBER = 20
@@ -76,6 +77,11 @@ def check_number(number: int, models: int, releases: int = 1) -> None:
             f"{total} simulated blocks are too many for a film, which shows up to {MOST_BLOCKS}",
             advice=f"Give --number {max(MOST_BLOCKS // (models * releases), 1)} or less",
         )
+
+
+def group_name(model: ImpactModel) -> str:
+    """What the legend calls a model's blocks: without chance, those from one start fall as one."""
+    return model.title if model.is_random else f"{model.title}, without chance"
 
 
 def path_opacity(paths: int) -> float:

@@ -133,7 +133,8 @@ def test_the_film_lasts_until_the_last_block_stops(scene: bpy.types.Scene, simul
 
 def test_captions_count_the_blocks_that_have_stopped(scene: bpy.types.Scene, simulations, part) -> None:
     captions, seen = part("rockfall_addon.steps.film.captions"), set()
-    title = {model: part("core.impact_models.registry").find_model(model).title for model in MODELS}
+    named, found = part("core.film.simulated").group_name, part("core.impact_models.registry").find_model
+    title = {model: named(found(model)) for model in MODELS}
     ends = np.unique(np.concatenate([np.ceil((begin_of(one) + one.time_s) * RATE) for one in simulations]))
     for frame in (0, *ends[:: max(len(ends) // 3, 1)].astype(int).tolist(), scene.frame_end):
         scene.frame_set(frame)
@@ -189,7 +190,11 @@ def test_legend_paths_and_blocks_have_the_models_colours(scene: bpy.types.Scene,
         np.testing.assert_allclose(first_colour(scene.objects[name]), white, atol=1e-6)
     for name in MODELS:
         model = part("core.impact_models.registry").find_model(name)
-        shown = [f"Film swatch {model.title}", f"Film paths {name}", f"{name} simulated block"]
+        shown = [
+            f"Film swatch {part('core.film.simulated').group_name(model)}",
+            f"Film paths {name}",
+            f"{name} simulated block",
+        ]
         for each in shown:
             np.testing.assert_allclose(first_colour(scene.objects[each]), linear(np.array(model.colour)), atol=1e-6)
 
@@ -228,6 +233,29 @@ def test_a_still_of_the_end_and_a_picture_of_the_slope(rockfall, part, job) -> N
         picture = bpy.data.images.load(str(made.out))
         assert tuple(picture.size) == (64, 36)
     assert {f"Simulating {model}" for model in MODELS} <= set(said)
+
+
+def test_structures_of_the_project_stand_in_the_picture_and_hold_blocks(rockfall, part, job, project: Path) -> None:
+    """A wall across the foot of the slope: it is drawn, nothing comes past it, and what lies there has stopped."""
+    wall = np.array([[16.0, -19.0, -12.0], [16.0, 19.0, -12.0], [16.0, 19.0, 20.0], [16.0, -19.0, 20.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    surface = part("core.terrain.surface").Surface(wall, faces, part("core.georeference").GlobalShift(), "w", ())
+    part("core.terrain.writers").write_ply(surface, project.parent / "wall.ply")
+    text = project.read_text(encoding="utf-8")
+    stated = text + '[simulation]\n[[simulation.structures]]\nname = "wall"\nfile = "wall.ply"\n'
+    project.write_text(stated, encoding="utf-8")
+    from dataclasses import replace
+
+    render = part("rockfall_addon.steps.film.render")
+    render.make(replace(job, kind="slope", out=job.out.with_name("wall.png")), lambda *_: None)
+    scene = bpy.context.scene
+    drawn = shape(scene.objects["Structure wall"])
+    np.testing.assert_allclose(sorted(map(tuple, drawn.tolist())), sorted(map(tuple, wall.tolist())), atol=1e-5)
+    for group in part("rockfall_addon.steps.film.simulated").groups_of(scene):
+        assert group.left == 0
+        assert group.stopped.all()
+    for name in MODELS:
+        assert shape(scene.objects[f"Film paths {name}"])[:, 0].max() < 16.05
 
 
 def test_nothing_to_start_from_is_told(rockfall, part, job, project: Path) -> None:

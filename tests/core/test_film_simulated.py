@@ -17,6 +17,7 @@ from rockfall.core.film.simulated import (
     MOST_BLOCKS,
     Group,
     check_number,
+    group_name,
     last_moment,
     legend,
     path_opacity,
@@ -63,6 +64,11 @@ def test_one_block_and_one_model_are_told_as_one() -> None:
     assert entry.text == "1 block, "
     assert simulated_lines(1, 1)[0] == "1 measured block (white), and simulated ones by a model"
     assert simulated_lines(15, 2)[0] == "15 measured blocks (white), and simulated ones by 2 models"
+
+
+def test_a_model_without_chance_is_told() -> None:
+    assert group_name(MODELS["azimi_desvarreux_1977"]) == f"{MODELS['azimi_desvarreux_1977'].title}, without chance"
+    assert group_name(MODELS["noel_2017"]) == MODELS["noel_2017"].title
 
 
 def test_paths_get_fainter_as_they_get_more() -> None:

@@ -15,7 +15,7 @@ from ....core.reconstruction.trajectory import Reconstruction
 from ....core.simulation.measured_releases import start_times
 from ...scene import models, simulation
 from ...scene.project import load_project
-from . import dressing
+from . import dressing, simulated
 from .engine import use_engine
 
 
@@ -123,7 +123,9 @@ def _simulate(
 ) -> None:
     """Let blocks fall from the starts of the measured ones, and show them."""
     starts = {name: simulation.Origin(name, time_s) for name, time_s in start_times(result).items()}
-    simulation.show(scene, fall_beside(job, project, len(starts), progress), starts)
+    simulations = fall_beside(job, project, len(starts), progress)
+    simulation.show(scene, simulations, starts)
+    simulated.show_structures(scene, simulations[0].ground)
 
 
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:

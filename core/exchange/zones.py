@@ -98,6 +98,23 @@ def read_attribute_zones(
     return _zones(cover, found, models)
 
 
+def zones_with(cover: ZoneCover, properties: Mapping[str, Mapping[str, object]], models: Sequence[str]) -> Zones:
+    """Zones whose properties do not come from a file.
+
+    Parameters
+    ----------
+    properties : zone → its properties.
+
+    Raises
+    ------
+    InputError : a property that is nearly a parameter, a value out of range.
+    """
+    found = _Properties()
+    for name, values in properties.items():
+        _take(found, name, values, models, None)
+    return _zones(cover, found, models)
+
+
 def open_zones(
     path: str | Path,
     attribute: str,
@@ -136,7 +153,9 @@ def _zones(cover: ZoneCover, found: _Properties, models: Sequence[str]) -> Zones
     return Zones(cover.names, cover.of_element, found.parameters, found.friction, tuple(remarks))
 
 
-def _take(found: _Properties, zone: str, properties: Mapping[str, object], models: Sequence[str], path: Path) -> None:
+def _take(
+    found: _Properties, zone: str, properties: Mapping[str, object], models: Sequence[str], path: Path | None
+) -> None:
     """Add what a file says of a zone."""
     for key, value in properties.items():
         if value is None or value == "":
@@ -155,7 +174,7 @@ def _take(found: _Properties, zone: str, properties: Mapping[str, object], model
                 raise _twice(zone, key, path)
 
 
-def _meant(key: str, models: Sequence[str], found: _Properties, path: Path) -> list[tuple[str, str]]:
+def _meant(key: str, models: Sequence[str], found: _Properties, path: Path | None) -> list[tuple[str, str]]:
     """The models and parameters that a property is for."""
     model, point, parameter = key.partition(".")
     if point:
@@ -184,7 +203,7 @@ def _meant(key: str, models: Sequence[str], found: _Properties, path: Path) -> l
     return []
 
 
-def _friction(value: object, zone: str, path: Path) -> float:
+def _friction(value: object, zone: str, path: Path | None) -> float:
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
@@ -196,7 +215,7 @@ def _friction(value: object, zone: str, path: Path) -> float:
     return number
 
 
-def _twice(zone: str, key: str, path: Path) -> InputError:
+def _twice(zone: str, key: str, path: Path | None) -> InputError:
     return InputError(
         f"The polygons of zone {zone} have different values of {key}", file=path, advice="Give them one, or two names"
     )

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..remarks import Remark
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
-from ..vectors import Array, Indices
+from ..vectors import Array, Indices, Mask
 from .ground import element_places
 from .polygons import Polygon
 
@@ -40,24 +40,43 @@ def zones_within(terrain: Surface | Cloud, polygons: Sequence[Polygon]) -> ZoneC
 
     Parameters
     ----------
-    polygons : those of one name are one zone. Where several overlap the first one has the face.
+    polygons : those of one name are one zone. Where several overlap the face is in the first.
 
     Raises
     ------
     InputError : a polygon without a name, or with that of the whole; none of them is on the terrain.
     """
-    names = _checked([polygon.name for polygon in polygons])
     middles = element_places(terrain)[:, :2]
-    zone, overlapping = np.zeros(len(middles), np.int32), np.zeros(len(middles), np.bool_)
-    for polygon in polygons:
-        inside, number = polygon.contains(middles), names.index(polygon.name)
+    return zones_of_parts(
+        terrain,
+        [(polygon.name, polygon.contains(middles)) for polygon in polygons],
+        "Check the coordinates of the polygons",
+    )
+
+
+def zones_of_parts(terrain: Surface | Cloud, parts: Sequence[tuple[str, Mask]], advice: str) -> ZoneCover:
+    """Zones of elements (m,) that were chosen in some way; see `zones_within`.
+
+    Parameters
+    ----------
+    advice : what to do when no element is in any of them.
+
+    Raises
+    ------
+    InputError : a zone without a name, or with that of the whole; no element is in any.
+    """
+    names = _checked([name for name, _ in parts])
+    count = len(element_places(terrain))
+    zone, overlapping = np.zeros(count, np.int32), np.zeros(count, np.bool_)
+    for name, inside in parts:
+        number = names.index(name)
         overlapping |= inside & (zone > 0) & (zone != number)
         zone[inside & (zone == 0)] = number
     remarks = []
     if overlapping.any():
-        text = f"{overlapping.sum()} of {_counted(terrain)} are in more than one zone: the first in the file has them."
+        text = f"{overlapping.sum()} of {_counted(terrain)} are in more than one zone: the first of them counts."
         remarks.append(Remark(text, "warning", "zones"))
-    return _cover(terrain, names, zone, remarks, "Check the coordinates of the polygons")
+    return _cover(terrain, names, zone, remarks, advice)
 
 
 def zones_of_values(
@@ -87,7 +106,7 @@ def face_values(terrain: Surface, vertex_values: Array) -> Array:
     return np.where(b == c, b, a)
 
 
-def nearest_values(places: Array, given: Array, values: Array) -> Array:
+def nearest_values[T: np.generic](places: Array, given: Array, values: NDArray[T]) -> NDArray[T]:
     """(n,) values at places (n, 3): those of the nearest of the given (k, 3)."""
     from scipy.spatial import cKDTree
 

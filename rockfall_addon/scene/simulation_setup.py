@@ -24,6 +24,7 @@ from . import (
     models,
     reconstruction,
     simulated_sources,
+    simulated_zones,
     simulation,
     store,
     terrain,
@@ -75,6 +76,7 @@ def plan(scene: bpy.types.Scene) -> Plan:
         friction=store.double(settings.friction),
         drag=simulated_sources.drag(scene) if settings.use_drag else None,
         gravity_mps2=project.reconstruction.gravity_mps2,
+        zones=simulated_zones.zones_of(scene, surface, names),
         seed=settings.seed,
     )
     measured = None

@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.impact_models.registry import MODELS
-from ...scene import models, simulated_sources, simulation, simulation_setup, store
+from ...scene import models, simulated_sources, simulation, simulation_setup, store, terrain
 from ...view import job, parameters
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 
@@ -112,6 +112,37 @@ class ROCKFALL_PT_simulation_motion(_Sub, bpy.types.Panel):
         layout.prop(settings, "use_drag")
 
 
+class ROCKFALL_PT_simulation_zones(_Sub, bpy.types.Panel):
+    bl_label = "Zones"
+    bl_idname = "ROCKFALL_PT_simulation_zones"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        zones = scene.rockfall_simulation.zones
+        if not zones:
+            paragraph(context, layout, "Parts of the terrain with their own friction and parameters.", "INFO")
+        tile = terrain.active_terrain(scene)
+        for place, zone in enumerate(zones):
+            box = layout.box()
+            row = box.row(align=True)
+            row.prop_search(
+                zone, "name", tile, "vertex_groups", text="", icon="GROUP_VERTEX", results_are_suggestions=True
+            )
+            row.operator("rockfall.remove_zone", text="", icon="X").place = place
+            row = box.row(align=True)
+            row.prop(zone, "use_friction")
+            column = row.column()
+            column.active = zone.use_friction
+            column.prop(zone, "friction", text="")
+            box.prop(zone, "parameters", text="", icon="OPTIONS", placeholder="rt = 0.4")
+        layout.operator("rockfall.add_zone", icon="ADD")
+        if zones:
+            text = (
+                "Assign vertices to the group in Edit Mode, or paint its weights. Where zones overlap the first counts."
+            )
+            paragraph(context, layout, text, "INFO")
+
+
 class ROCKFALL_PT_simulation_parameters(_Sub, bpy.types.Panel):
     bl_label = "Parameters of the models"
     bl_idname = "ROCKFALL_PT_simulation_parameters"
@@ -192,5 +223,6 @@ CLASSES = (
     ROCKFALL_PT_simulation_parameters,
     ROCKFALL_PT_simulation_blocks,
     ROCKFALL_PT_simulation_motion,
+    ROCKFALL_PT_simulation_zones,
     ROCKFALL_PT_simulation_look,
 )

@@ -4,6 +4,7 @@
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -24,6 +25,24 @@ def _look_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> 
 
 def _can_be_source(self: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
     return obj.type in drawn_releases.TYPES and obj.get(store.ROLE, store.RELEASE_ROLE) == store.RELEASE_ROLE
+
+
+class SimulationZone(bpy.types.PropertyGroup):
+    """A part of the terrain with parameters of its own: what the vertex group, or attribute, of its name has."""
+
+    name: StringProperty(
+        name="Zone", description="A vertex group of the terrain, or an attribute of its vertices or faces: half and more",
+    )  # fmt: skip
+    use_friction: BoolProperty(name="Friction", description="The zone has a friction of its own", default=True)
+    friction: FloatProperty(
+        name="Friction", description="Coefficient μ of rolling or sliding in the zone",
+        default=FRICTION, min=0.0, max=5.0, precision=2,
+    )  # fmt: skip
+    parameters: StringProperty(
+        name="Parameters",
+        description="Of the models, in the zone, for example: rt = 0.4, noel_2017.rn_limit = 1. A name alone is for "
+        "every model that has it",
+    )  # fmt: skip
 
 
 class SimulationSettings(bpy.types.PropertyGroup):
@@ -103,6 +122,8 @@ class SimulationSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     use_drag: BoolProperty(name="Air drag", description="Flights with the drag of air (½ρ C_D A v²)", default=False)
 
+    zones: CollectionProperty(type=SimulationZone)
+
     colour_by: EnumProperty(
         name="Colour by", description="What the colours of the simulated paths mean",
         items=[
@@ -125,7 +146,7 @@ class SimulationSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-CLASSES = (SimulationSettings,)
+CLASSES = (SimulationZone, SimulationSettings)
 
 
 def register() -> None:

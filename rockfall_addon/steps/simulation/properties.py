@@ -31,7 +31,7 @@ class SimulationZone(bpy.types.PropertyGroup):
     """A part of the terrain with parameters of its own: what the vertex group, or attribute, of its name has."""
 
     name: StringProperty(
-        name="Zone", description="A vertex group of the terrain, or an attribute of its vertices or faces: half and more",
+        name="Zone", description="A vertex group of the terrain, or an attribute of its vertices or faces",
     )  # fmt: skip
     use_friction: BoolProperty(name="Friction", description="The zone has a friction of its own", default=True)
     friction: FloatProperty(

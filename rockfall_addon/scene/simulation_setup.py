@@ -150,6 +150,7 @@ def fingerprint(scene: bpy.types.Scene) -> str:
         settings.number, settings.seed, names, [sorted(parameters.get(name, {}).items()) for name in names],
         settings.rolling, settings.friction, settings.use_drag, kept.reconstruction, list(scene.get(store.DRAG, ())),
     ]  # fmt: skip
+    parts += simulated_zones.fingerprint(scene)
     return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()
 
 

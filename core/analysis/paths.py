@@ -34,7 +34,7 @@ class Paths:
     beyond : (n,) the block went on from `stop`, over the edge of the terrain: the stop is farther away than that.
     whole : (n,) the pieces reach to the stop.
     run : (k,) place of the run.
-    flies : (k,) the piece is a flight; else straight, at an even change of speed.
+    flies : (k,) the piece is a flight; else on the ground: taken as straight, with an even change of speed.
     time_s, duration_s : (k,) start since the run's own start, and how long [s].
     start, end : (k, 3) of the block's underside, local [m].
     start_velocity, end_velocity : (k, 3) [m/s].

@@ -24,6 +24,7 @@ from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases
+from rockfall.core.terrain.raycast import closest_points
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.terrain.writers import write_ply
 from rockfall.core.vectors import cross, dot, norm, unit
@@ -375,6 +376,20 @@ def test_on_the_plane_it_was_measured_on_the_simulation_gives_back_the_table():
     chi2 = ((counts - 100) ** 2 / 100).sum()
     assert chi2 < 39 + 4 * np.sqrt(2 * 39)
     assert ks_1samp(drawn + np.random.default_rng(0).random(4000), lambda x: x / 40).pvalue > 1e-3
+
+
+def test_a_measured_block_that_went_on_into_the_ground_stays_on_it():
+    """R_N below zero is kept as it was measured; a simulated block then moves along the ground, never below it."""
+    impacts = field(4, 8, seed=7, law=lambda theta, rng: (np.full(theta.size, -0.1), np.full(theta.size, 0.8)))
+    given = measured_rebounds(impacts)
+    np.testing.assert_allclose(given.rn, -0.1, rtol=1e-9)
+    state = blocks(20)
+    v2 = MODEL.rebound(state, rng=np.random.default_rng(1), measured=given).velocity
+    np.testing.assert_allclose(v2[:, 2], -0.4, rtol=1e-9)
+    ground, releases = thrown(20)
+    run = simulate(ground, releases, Settings("observed", measured=given, rolling="coulomb", friction=1.0))
+    assert run.at_rest.all()
+    assert closest_points(ground.surface, run.records.position).distance.min() > 0.2 - 1e-6
 
 
 def test_the_same_bits_for_any_threads_and_in_any_company():

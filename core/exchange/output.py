@@ -5,9 +5,14 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from errno import EDQUOT, EFBIG, ENOSPC
 from pathlib import Path
 
 from ..errors import InputError
+
+FULL = (ENOSPC, EDQUOT, EFBIG)
+"""Errors of a file that is being written when there is no more room; they do not name it."""
+OTHER_FOLDER = "Choose another folder for --out"
 
 
 @contextmanager
@@ -32,7 +37,7 @@ def output_folder(path: str | Path) -> Iterator[Path]:
     except OSError as error:
         _remove_empty(made)
         raise InputError(
-            f"The output folder cannot be made ({error.strerror})", file=path, advice="Choose another folder for --out"
+            f"The output folder cannot be made ({error.strerror})", file=path, advice=OTHER_FOLDER
         ) from error
     complete = False
     try:
@@ -40,10 +45,13 @@ def output_folder(path: str | Path) -> Iterator[Path]:
         _move(staging, path)
         complete = True
     except OSError as error:
-        if error.filename is None or not str(error.filename).startswith((str(staging), str(path))):
+        in_the_way = error.filename is not None and str(error.filename).startswith((str(staging), str(path)))
+        if not in_the_way and error.errno not in FULL:
             raise
         raise InputError(
-            f"The output cannot be written ({error.strerror})", file=path, advice="Choose another folder for --out"
+            f"The output cannot be written ({error.strerror})",
+            file=path,
+            advice="Make room, or choose a folder on another disk" if error.errno in FULL else OTHER_FOLDER,
         ) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)

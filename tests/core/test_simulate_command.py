@@ -198,3 +198,45 @@ def test_bad_structures(terrain: Path, releases: Path, tmp_path: Path, capsys) -
     write_ply(Surface(corners, np.array([[0, 1, 2]], np.int32), GlobalShift(), "far"), far)
     assert main([*argv, "--structure", f"wall={far}"]) == 1
     assert "stands nowhere near the terrain" in capsys.readouterr().err
+
+
+def test_a_full_disk_leaves_nothing(terrain: Path, releases: Path, tmp_path: Path, capsys) -> None:
+    """A real limit on the size of files, which fails in the middle of a table as a full disk does."""
+    resource = pytest.importorskip("resource")
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "noel_2017"]
+    out = tmp_path / "new" / "out"
+    assert main([*argv, "--out", str(tmp_path / "before")]) == 0
+    assert (tmp_path / "before" / "impacts.csv").stat().st_size > 40_000
+    capsys.readouterr()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        status = main([*argv, "--out", str(out)])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert status == 1
+    assert "The output cannot be written" in capsys.readouterr().err
+    assert not out.parent.exists()
+
+
+def test_simulated_impacts_are_read_as_measured_ones_are(terrain: Path, releases: Path, tmp_path: Path) -> None:
+    """Compared with the model that made them, a model without chance repeats each of them, to the written decimals."""
+    simulated = tmp_path / "simulated"
+    argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "pfeiffer_bowen_1989"]
+    assert main([*argv, "--record", "impacts", "--out", str(simulated)]) == 0
+    table, compared = simulated / "impacts.csv", tmp_path / "compared"
+    chosen = ["--model", "pfeiffer_bowen_1989", "--tables-only", "--spin", "table"]
+    assert main(["compare", str(table), *chosen, "--out", str(compared)]) == 0
+    impacts, predicted = rows_of(table), rows_of(compared / "predictions.csv")
+    assert len(predicted) == len(impacts) > 50
+    for name in ("v2x_mps", "v2y_mps", "v2z_mps", "rn", "theta_dev_deg"):
+        made, again = (np.sort([float(row[name]) for row in rows]) for rows in (impacts, predicted))
+        np.testing.assert_allclose(made, again, atol=1e-3 if name == "theta_dev_deg" else 2e-5)
+    fitted = ["--model", "azimi_desvarreux_1977", "--fit", "rn", "--out", str(tmp_path / "fitted")]
+    assert main(["calibrate", str(table), *fitted]) == 0
+    merged = tmp_path / "merged"
+    assert main(["merge", str(table), "--site", "slope", "--out", str(merged)]) == 0
+    kept = rows_of(merged / "impacts.csv")
+    twice = rows_of(merged / "duplicates.csv") if (merged / "duplicates.csv").exists() else []
+    assert len(kept) + len(twice) == len(impacts)
+    assert {"run", "structure"} <= set(kept[0])

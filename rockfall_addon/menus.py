@@ -46,7 +46,7 @@ STEPS = (
     )),
     ("playback", "8  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),
     ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
-    ("share", "10  Share", ("rockfall.export_tables", "rockfall.export_project")),
+    ("share", "10  Share", ("rockfall.export_tables", "rockfall.export_simulation", "rockfall.export_project")),
 )  # fmt: skip
 """Name, title and entries of each menu: an operator, or an operator with its text and properties; None is a line."""
 
@@ -63,6 +63,7 @@ IMPORTS = (
 )
 EXPORTS = (
     ("rockfall.export_tables", "Rockfall Tables (.csv)", {}),
+    ("rockfall.export_simulation", "Rockfall Simulation (.csv)", {}),
     ("rockfall.export_project", "Rockfall Project (.toml)", {}),
 )
 

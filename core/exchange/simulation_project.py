@@ -118,13 +118,28 @@ def release_source(project: Project, terrain: Surface, entry: SimulationEntry) -
     ------
     RockfallError : nothing is measured where that is asked for; blocks that cannot be.
     """
-    releases, seed = entry.releases, entry.seed
+    if entry.releases.source == MEASURED:
+        return measured_source(entry, project.block, _measured(project, terrain, entry.releases))
+    return placed_source(entry, project.block)
+
+
+def measured_source(entry: SimulationEntry, block: BlockEntry, measured: Reconstruction) -> ReleaseSource:
+    """Blocks that start as it was measured. block : the project's, for what the entry does not say."""
+    releases = entry.releases
     given = (releases.shape, releases.diameter, releases.proportions, releases.density)
-    blocks = _blocks(releases, project.block)
-    if releases.source == MEASURED:
-        measured = _measured(project, terrain, releases)
-        own = None if given == (None,) * len(given) else blocks
-        return lambda ground: from_reconstruction(ground, measured, own, releases.number, seed)
+    own = None if given == (None,) * len(given) else _blocks(releases, block)
+    return lambda ground: from_reconstruction(ground, measured, own, releases.number, entry.seed)
+
+
+def placed_source(entry: SimulationEntry, block: BlockEntry) -> ReleaseSource:
+    """Blocks from points, a line, a polygon, steep terrain or a table.
+
+    Raises
+    ------
+    InputError : blocks that cannot be.
+    """
+    releases, seed = entry.releases, entry.seed
+    blocks = _blocks(releases, block)
     if releases.source == STEEP:
         angle = np.radians(releases.steeper_than_deg)
         return lambda ground: steeper_than(ground, angle, blocks, releases.number, seed)

@@ -16,8 +16,8 @@ LEAST = {POINTS: 1, LINE: 2, POLYGON: 3}
 NAMES = {POINTS: "Release points", LINE: "Release line", POLYGON: "Release area"}
 
 
-def make(scene: bpy.types.Scene, kind: str, points: Sequence[Array]) -> bpy.types.Object:
-    """An object of points (n, 3) that were clicked on the terrain.
+def make(scene: bpy.types.Scene, kind: str, points: Sequence[Array], name: str = "") -> bpy.types.Object:
+    """An object of points (n, 3) of the terrain.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def make(scene: bpy.types.Scene, kind: str, points: Sequence[Array]) -> bpy.type
     mesh = bpy.data.meshes.new(NAMES[kind])
     edges = [(i, i + 1) for i in range(n - 1)] if kind != POINTS else []
     mesh.from_pydata([tuple(map(float, point)) for point in points], edges + [(n - 1, 0)] * (kind == POLYGON), [])
-    obj = bpy.data.objects.new(NAMES[kind], mesh)
+    obj = bpy.data.objects.new(name or NAMES[kind], mesh)
     obj[store.ROLE] = store.RELEASE_ROLE
     obj.hide_render = True
     store.collection(scene, "Releases").objects.link(obj)

@@ -22,15 +22,26 @@ from ...core.exchange.project import (
 )
 from ...core.exchange.tables import write_picks
 from ...core.reconstruction.trajectory import Reconstruction
+from ...core.remarks import Remark
 from ...core.terrain.shading import shade
 from ...core.terrain.writers import write_ply
-from . import georeference, models, picks, project_videos, reconstruction, store, terrain
+from . import (
+    georeference,
+    models,
+    picks,
+    project_videos,
+    reconstruction,
+    simulated_sources,
+    simulation_setup,
+    store,
+    terrain,
+)
 
 
 def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True) -> Reconstruction | None:
     """Show a project in a scene: its terrain, its videos, its picks, and what is reconstructed from them.
 
-    Returns None for a project of videos without picks: they are still to be made.
+    Returns None for a project without picks, of videos in which they are still to be made or of a simulation.
 
     Parameters
     ----------
@@ -42,7 +53,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     """
     project = read_project(path)
     parameters = checked_parameters(project.extra["models"], path) if "models" in project.extra else {}
-    if project.picks is None and project.videos and with_videos:
+    if project.picks is None and ((project.videos and with_videos) or project.simulation is not None):
         surface, result = open_terrain(project), None
     else:
         surface, result = open_project(project)
@@ -64,6 +75,10 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
     if result is not None:
         reconstruction.show(scene, result)
+    if project.simulation is not None:
+        left_out = simulated_sources.keep_entry(scene, project.simulation)
+        if left_out:
+            simulation_setup.keep(scene, {}, (Remark(left_out, "warning", "project"),))
     return result
 
 
@@ -74,14 +89,17 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
 
     Raises
     ------
-    RockfallError : there are no picks, two are at one time, or the folder cannot be written.
+    RockfallError : there are neither picks nor terrain, two picks are at one time, or the folder cannot be written.
     """
-    if not picks.objects_of(scene):
-        raise RockfallError("There are no picks to export: import some first, or load the demo.")
-    table, surface, shift = picks.picks_of(scene), reconstruction.ground(scene), georeference.read_shift(scene)
-    settings = reconstruction.project_settings(scene, table.trajectory.tolist())
+    surface, shift = reconstruction.ground(scene), georeference.read_shift(scene)
+    table = picks.picks_of(scene) if picks.objects_of(scene) else None
+    if table is None and surface is None:
+        raise RockfallError("There is nothing to export: import a terrain or picks first, or load the demo.")
+    settings = reconstruction.project_settings(scene, [] if table is None else table.trajectory.tolist())
+    stated = None if surface is None or simulation_setup.missing(scene) else simulated_sources.entry_of(scene)
     with output_folder(folder) as place:
-        write_picks(table, place / "picks.csv")
+        if table is not None:
+            write_picks(table, place / "picks.csv")
         if surface is not None:
             write_ply(surface, place / "terrain.ply")
         source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
@@ -89,12 +107,13 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         project = Project(
             site=Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, ""))),
             terrain=None if surface is None else source,
-            picks=place / "picks.csv",
+            picks=None if table is None else place / "picks.csv",
             block=settings.block,
             blocks=settings.blocks,
             reconstruction=settings.reconstruction,
             videos=project_videos.write_videos(scene, place),
             render=tuple(_preset(values) for values in json.loads(scene.get(store.RENDER_PRESETS, "[]"))),
+            simulation=stated,
             extra={"models": parameters} if parameters else {},
         )
         write_project(project, place / "project.toml")

@@ -1,29 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the scene's simulated blocks come from: what was measured, what is drawn, or what is steep."""
+"""What the scene's settings say of a simulation, as a project states it, and where its blocks come from."""
 
 from collections.abc import Mapping
+from pathlib import Path
+from typing import cast
 
 import bpy
 import numpy as np
 
-from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT
 from ...core.errors import RockfallError
-from ...core.reconstruction.drag import Drag
+from ...core.exchange.simulation_entry import MEASURED, STEEP, ReleaseEntry, SimulationEntry
+from ...core.exchange.simulation_project import measured_source, placed_source
 from ...core.reconstruction.picks import take
 from ...core.reconstruction.trajectory import Reconstruction
-from ...core.simulation.blocks import Blocks
 from ...core.simulation.distributions import Distribution
-from ...core.simulation.measured_releases import from_reconstruction
-from ...core.simulation.polygons import Polygon
-from ...core.simulation.release_sources import in_polygon, on_line, on_points, steeper_than
+from ...core.simulation.engine import Rolling
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ReleaseSource
-from . import drawn_releases, fingerprints, picks, reconstruction, store
+from . import drawn_releases, fingerprints, georeference, models, picks, reconstruction, store
 from .simulation import Origin
 
 FILMED = ("MEASURED", "PICK")
 """Sources that need picks."""
-SAME_TIME_S = 1e-9
+SAME_TIME_S = 1e-6
 
 
 def missing(scene: bpy.types.Scene) -> str:
@@ -38,81 +37,85 @@ def missing(scene: bpy.types.Scene) -> str:
     return ""
 
 
-def source_of(scene: bpy.types.Scene, surface: Surface) -> tuple[ReleaseSource, Mapping[str, Origin]]:
+def entry_of(scene: bpy.types.Scene) -> SimulationEntry:
+    """The scene's settings as a project states them.
+
+    Raises
+    ------
+    RockfallError : a drawing that is none, numbers that no block has.
+    """
+    settings = scene.rockfall_simulation
+    return SimulationEntry(
+        models=tuple(name for name in models.ORDER if name in settings.models),
+        releases=_release_entry(scene),
+        rolling=cast(Rolling, settings.rolling),
+        friction=store.double(settings.friction),
+        drag=settings.use_drag,
+        seed=settings.seed,
+    )
+
+
+def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry) -> str:
+    """Give the scene's settings what a project states; returns what Blender cannot take over, empty if nothing."""
+    settings, releases = scene.rockfall_simulation, entry.releases
+    if entry.models:
+        settings.models = set(entry.models)
+    settings.rolling, settings.friction, settings.use_drag = entry.rolling, entry.friction, entry.drag
+    settings.seed, settings.number = entry.seed, releases.number
+    settings.shape = releases.shape or "sphere"
+    if releases.diameter is not None:
+        settings.diameter_law, settings.diameter_m = releases.diameter.law, releases.diameter.first
+        settings.diameter_second_m = releases.diameter.second or settings.diameter_second_m
+    if releases.density is not None:
+        settings.density_kgpm3 = releases.density.mean
+    if releases.proportions is not None:
+        settings.proportions = releases.proportions
+    if releases.source == MEASURED:
+        settings.source = "PICK" if releases.trajectory else "MEASURED"
+        settings.pick = _pick_at(scene, releases) if releases.trajectory else ""
+    elif releases.source == STEEP:
+        settings.source, settings.steeper_than_deg = "STEEP", releases.steeper_than_deg
+    elif releases.points_m:
+        settings.source = "DRAWN"
+        settings.drawn = _drawing(scene, releases)
+    left_out = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
+    left_out += [f"the structure {each.name}" for each in entry.structures]
+    left_out += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
+    return f"Of the project's simulation Blender leaves out {', '.join(left_out)}." if left_out else ""
+
+
+def source_of(
+    scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface
+) -> tuple[ReleaseSource, Mapping[str, Origin]]:
     """What puts the blocks on the ground, and when the blocks of each release start in the scene.
 
     Raises
     ------
-    RockfallError : a drawing that is none; whatever the reconstruction refuses.
+    RockfallError : whatever the reconstruction refuses.
     """
-    settings = scene.rockfall_simulation
-    number, seed = settings.number, settings.seed
-    if settings.source == "MEASURED":
-        result = reconstruction.reconstruct_scene(scene, surface=surface)
-        return lambda ground: from_reconstruction(ground, result, None, number, seed), _origins(result)
-    if settings.source == "PICK":
-        return _from_pick(scene, surface)
-    blocks = blocks_of(scene)
-    if settings.source == "STEEP":
-        angle = np.radians(store.double(settings.steeper_than_deg))
-        return lambda ground: steeper_than(ground, angle, blocks, number, seed), {}
-    kind, points = drawn_releases.read(drawn(scene))
-    name = drawn(scene).name
-    if kind == drawn_releases.POINTS:
-        names = np.array([f"{name} {i + 1}" for i in range(len(points))] if len(points) > 1 else [name])
-        return lambda ground: on_points(ground, points, blocks, number, seed, names), {}
-    if kind == drawn_releases.LINE:
-        return lambda ground: on_line(ground, [points], blocks, number, seed, names=[name]), {}
-    area = Polygon(name, (points[:, :2],))
-    return lambda ground: in_polygon(ground, [area], blocks, number, seed), {}
+    block = reconstruction.project_settings(scene, []).block
+    if entry.releases.source != MEASURED:
+        return placed_source(entry, block), {}
+    table = picks.picks_of(scene)
+    if entry.releases.trajectory:
+        onward = table.trajectory == entry.releases.trajectory
+        if entry.releases.time_s is not None:
+            onward &= table.time_s >= entry.releases.time_s - SAME_TIME_S
+        table = take(table, onward)
+    measured = reconstruction.reconstruct_scene(scene, table, surface=surface)
+    return measured_source(entry, block, measured), _origins(measured)
 
 
 def fingerprint(scene: bpy.types.Scene) -> str:
-    """Of all that decides where blocks start, and as what."""
-    settings, parts = scene.rockfall_simulation, [scene.rockfall_simulation.source]
-    if settings.source in FILMED:
+    """Of all that decides where blocks start, as what, and how they move."""
+    try:
+        entry: object = entry_of(scene)
+    except RockfallError as error:
+        entry = str(error)
+    parts = [entry]
+    if scene.rockfall_simulation.source in FILMED or "observed" in scene.rockfall_simulation.models:
         parts += [sorted(fingerprints.remembered(scene).items()), scene.get(store.BLOCKS, "")]
-        parts += [reconstruction.project_settings(scene, []).block]
-    if settings.source == "PICK":
-        chosen = selected_pick(scene)
-        parts += [chosen.get(store.ID) if chosen is not None else None]
-    else:
-        parts += [blocks_of(scene)]
-    if settings.source == "STEEP":
-        parts += [settings.steeper_than_deg]
-    if settings.source == "DRAWN" and drawn(scene) is not None:
-        try:
-            kind, points = drawn_releases.read(drawn(scene))
-            parts += [drawn(scene).name, kind, points.tobytes().hex()]
-        except RockfallError as error:
-            parts += [str(error)]
     return repr(parts)
-
-
-def blocks_of(scene: bpy.types.Scene) -> Blocks:
-    """The law of the blocks that nobody has measured.
-
-    Raises
-    ------
-    RockfallError : numbers that no block has.
-    """
-    settings = scene.rockfall_simulation
-    proportions = tuple(store.double(value) for value in settings.proportions)
-    return Blocks(
-        settings.shape,
-        Distribution(
-            settings.diameter_law,
-            store.double(settings.diameter_m),
-            0.0 if settings.diameter_law == "fixed" else store.double(settings.diameter_second_m),
-        ),
-        proportions if settings.shape in ("box", "ellipsoid") else (1.0, 1.0, 1.0),
-        Distribution("fixed", store.double(settings.density_kgpm3)),
-    )
-
-
-def drag(scene: bpy.types.Scene) -> Drag:
-    """The scene's drag of air."""
-    return Drag(*list(scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))))
 
 
 def drawn(scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -131,25 +134,60 @@ def selected_pick(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def _can_start(obj: bpy.types.Object | None) -> bool:
-    return obj is not None and obj.get(store.ROLE) == store.PICK_ROLE and obj.get(store.KIND) in ("release", "impact")
+    is_pick = obj is not None and obj.get(store.ROLE) == store.PICK_ROLE
+    return is_pick and obj.get(store.KIND) in ("release", "impact")
 
 
-def _from_pick(scene: bpy.types.Scene, surface: Surface) -> tuple[ReleaseSource, Mapping[str, Origin]]:
-    settings, obj = scene.rockfall_simulation, selected_pick(scene)
-    number, seed, name = settings.number, settings.seed, obj[store.TRAJECTORY]
-    table = picks.picks_of(scene)
-    onward = (table.trajectory == name) & (table.time_s >= float(obj[store.TIME]) - SAME_TIME_S)
-    result = reconstruction.reconstruct_scene(scene, take(table, onward), surface=surface)
-    return lambda ground: from_reconstruction(ground, result, None, number, seed), _origins(result)
+def _release_entry(scene: bpy.types.Scene) -> ReleaseEntry:
+    settings = scene.rockfall_simulation
+    if settings.source == "MEASURED":
+        return ReleaseEntry(MEASURED, number=settings.number)
+    if settings.source == "PICK":
+        obj = selected_pick(scene)
+        if obj is None:
+            raise RockfallError(missing(scene))
+        return ReleaseEntry(
+            MEASURED, trajectory=obj[store.TRAJECTORY], time_s=float(obj[store.TIME]), number=settings.number
+        )
+    second = 0.0 if settings.diameter_law == "fixed" else store.double(settings.diameter_second_m)
+    is_round = settings.shape in ("sphere", "cube")
+    what = {
+        "number": settings.number,
+        "shape": settings.shape,
+        "diameter": Distribution(settings.diameter_law, store.double(settings.diameter_m), second),
+        "proportions": None if is_round else tuple(store.double(value) for value in settings.proportions),
+        "density": Distribution("fixed", store.double(settings.density_kgpm3)),
+    }
+    if settings.source == "STEEP":
+        return ReleaseEntry(STEEP, steeper_than_deg=store.double(settings.steeper_than_deg), **what)
+    obj = drawn(scene)
+    if obj is None:
+        raise RockfallError(missing(scene))
+    kind, points = drawn_releases.read(obj)
+    survey = georeference.read_shift(scene).to_survey(points)
+    return ReleaseEntry(kind, points_m=tuple(map(tuple, survey.tolist())), name=obj.name, **what)
 
 
-def _origins(result: Reconstruction) -> dict[str, Origin]:
+def _drawing(scene: bpy.types.Scene, entry: ReleaseEntry) -> bpy.types.Object:
+    """The object of a project's points, line or polygon; those without height are put on the terrain by the core."""
+    given = np.array([[*point, np.nan][:3] for point in entry.points_m])
+    local = georeference.read_shift(scene).to_local(given)
+    return drawn_releases.make(scene, entry.source, list(local), entry.name)
+
+
+def _pick_at(scene: bpy.types.Scene, entry: ReleaseEntry) -> str:
+    """Id of the pick of a trajectory from which on a project releases blocks."""
+    own = [obj for obj in store.with_role(scene, store.PICK_ROLE) if obj.get(store.TRAJECTORY) == entry.trajectory]
+    own.sort(key=lambda obj: abs(float(obj[store.TIME]) - (entry.time_s or -np.inf)))
+    return own[0][store.ID] if own else ""
+
+
+def _origins(measured: Reconstruction) -> dict[str, Origin]:
     """When each trajectory begins: at its release, else at its first impact whose velocity is known."""
     found = {}
-    picked, impacts = result.picks, result.impacts
+    picked, impacts = measured.picks, measured.impacts
     for i in picked.group_starts.tolist():
-        name = str(picked.trajectory[i])
-        time_s = float(picked.time_s[i])
+        name, time_s = str(picked.trajectory[i]), float(picked.time_s[i])
         if picked.kind[i] != "release":
             own = np.flatnonzero((impacts.trajectory == name) & np.isfinite(impacts.v2).all(axis=1))
             time_s = float(impacts.time_s[own[0]]) if own.size else time_s

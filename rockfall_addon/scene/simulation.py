@@ -104,6 +104,8 @@ def show_prepared(
     scene: bpy.types.Scene, prepared: Sequence[Prepared], origins: Mapping[str, Origin] | None = None
 ) -> list[bpy.types.Object]:
     """`show` what was prepared before."""
+    if not (store.with_role(scene, store.FLIGHTS_ROLE) or blocks_of(scene)):
+        _choose_sizes(scene.rockfall, prepared)
     remove(scene)
     if store.KEYED_RATE not in scene:  # nothing is measured: time begins at frame 0
         scene[store.KEYED_RATE] = timing.frame_rate(scene)
@@ -244,6 +246,14 @@ def last_moment(scene: bpy.types.Scene) -> float:
         begin, lasts = _read(obj.data, simulated_nodes.BEGIN), _read(obj.data, LASTS)
         last = max(last, float(np.where(lasts < FOREVER_S, begin + lasts, begin).max(initial=0.0)))
     return last
+
+
+def _choose_sizes(settings: bpy.types.PropertyGroup, prepared: Sequence[Prepared]) -> None:
+    """Sizes at which blocks and paths are seen when the whole slope is; to be changed at will."""
+    extent = float(max(np.ptp(each.position, axis=0).max(initial=0.0) for each in prepared))
+    radius = float(np.mean([each.paths.figures["diameter_m"].mean() / 2 for each in prepared]))
+    settings.block_scale = max(1.0, round(0.008 * extent / radius * 2) / 2)
+    settings.trail_radius_m = max(0.1 * radius, 0.001 * extent)
 
 
 def _blocks(prepared: Prepared) -> bpy.types.Object:

@@ -3,20 +3,22 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
-from ...core.impact_models.machinery.measured import MeasuredRebounds
+from ...core.exchange.output import output_folder
+from ...core.exchange.simulation_output import default_records, write_simulations
 from ...core.impact_models.registry import MODELS
 from ...core.progress import Progress
-from ...core.remarks import Remark, from_plain, to_plain
-from ...core.simulation.engine import Rolling
+from ...core.reconstruction.drag import Drag
+from ...core.remarks import Remark, from_plain, gravest_first, to_plain
+from ...core.simulation.engine import Simulation
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import Scenario, ground_of, remarks_of, run_models
 from . import (
@@ -31,6 +33,8 @@ from . import (
 )
 from .simulation import Origin, Prepared
 
+FAR_DIAMETERS = 3.0
+"""A block that ends nearer to its start has hardly moved."""
 MOST_SHOWN = 50_000
 """Blocks of all models together that Blender keeps with all their moments."""
 
@@ -42,13 +46,11 @@ class Plan:
     Attributes
     ----------
     scenario : for the core.
-    measured : what the model `observed` draws from.
     origins : release → when its blocks start in the scene.
     said : the settings in words that a file keeps, and their fingerprint.
     """
 
     scenario: Scenario
-    measured: MeasuredRebounds | None
     origins: Mapping[str, Origin]
     said: dict[str, object]
 
@@ -63,26 +65,25 @@ def plan(scene: bpy.types.Scene) -> Plan:
     lacking = missing(scene)
     if lacking:
         raise RockfallError(lacking)
-    settings, surface = scene.rockfall_simulation, ground(scene)
-    names = [name for name in models.ORDER if name in settings.models]
-    source, origins = simulated_sources.source_of(scene, surface)
-    project = reconstruction.project_settings(scene, [])
-    parameters = models.parameters_of(scene)
+    surface, entry = ground(scene), simulated_sources.entry_of(scene)
+    source, origins = simulated_sources.source_of(scene, entry, surface)
+    how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
+    measured = None
+    if any(MODELS[name].draws_from_impacts for name in entry.models):
+        measured = measured_rebounds(reconstruction.reconstruct_scene(scene, surface=surface).impacts)
     scenario = Scenario(
         surface,
         source,
-        {name: parameters.get(name, {}) for name in names},
-        rolling=cast(Rolling, settings.rolling),
-        friction=store.double(settings.friction),
-        drag=simulated_sources.drag(scene) if settings.use_drag else None,
-        gravity_mps2=project.reconstruction.gravity_mps2,
-        zones=simulated_zones.zones_of(scene, surface, names),
-        seed=settings.seed,
+        {name: parameters.get(name, {}) for name in entry.models},
+        measured,
+        rolling=entry.rolling,
+        friction=entry.friction,
+        drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
+        zones=simulated_zones.zones_of(scene, surface, list(entry.models)),
+        gravity_mps2=how.gravity_mps2,
+        seed=entry.seed,
     )
-    measured = None
-    if any(MODELS[name].draws_from_impacts for name in names):
-        measured = measured_rebounds(reconstruction.reconstruct_scene(scene, surface=surface).impacts)
-    return Plan(scenario, measured, origins, {"print": fingerprint(scene), "models": names})
+    return Plan(scenario, origins, {"print": fingerprint(scene)})
 
 
 def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, ...]]:
@@ -102,10 +103,51 @@ def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, .
             f"{len(releases)} blocks of {len(models)} models are too many to be shown: at most {MOST_SHOWN} together. "
             "Lower the number, or use `rockfall simulate`, which has no such limit."
         )
-    settings = [replace(one, measured=plan.measured) for one in plan.scenario.settings]
-    simulations = run_models(ground, releases, settings, progress=progress)
-    remarks = remarks_of(simulations, models)
-    return [simulation.prepare(one) for one in simulations], remarks
+    simulations = run_models(ground, releases, plan.scenario.settings, progress=progress)
+    remarks = gravest_first([*remarks_of(simulations, models), *_stays(simulations)])
+    return [simulation.prepare(one) for one in simulations], tuple(remarks)
+
+
+def shown_counts(scene: bpy.types.Scene) -> dict[str, int]:
+    """Model → how many runs are shown; fewer than were wanted after a stop."""
+    return {simulation.model_of(obj): len(obj.data.curves) for obj in simulation.paths_of(scene)}
+
+
+def export(plan: Plan, counts: Mapping[str, int], folder: Path, progress: Progress) -> list[str]:
+    """Write the tables of what is shown, which the same seed gives again; returns the names of the files.
+
+    Parameters
+    ----------
+    counts : model → how many runs are shown.
+
+    Raises
+    ------
+    RockfallError : the folder cannot be written.
+    """
+    progress("Preparing the ground", 0, 0)
+    ground = ground_of(plan.scenario)
+    releases = plan.scenario.releases(ground)
+    found = []
+    for one in plan.scenario.settings:
+        if one.model in counts:
+            some = releases.take(slice(0, counts[one.model]))
+            found += run_models(ground, some, [one], progress=progress)
+    with output_folder(folder) as place:
+        records = default_records(len(releases))
+        return write_simulations(found, place, record=records, inputs={}, remarks=remarks_of(found), progress=progress)
+
+
+def _stays(simulations: Sequence[Simulation]) -> list[Remark]:
+    """That most blocks have hardly moved, and what to do about it."""
+    for one in simulations:
+        away = np.hypot(*(one.position - one.releases.position)[:, :2].T)
+        if np.median(away / one.releases.diameter_m) < FAR_DIAMETERS:
+            text = (
+                f"Most blocks with {one.settings.model} stop where they start, within {np.median(away):.1f} m: "
+                "release them where the terrain is steeper, or look at the friction."
+            )
+            return [Remark(text, "advice", "releases")]
+    return []
 
 
 def missing(scene: bpy.types.Scene) -> str:
@@ -142,13 +184,11 @@ _grounds: list[tuple[Surface, Surface]] = []
 
 def fingerprint(scene: bpy.types.Scene) -> str:
     """Of all that decides what is simulated: terrain, source, blocks, models, motion."""
-    settings, names = scene.rockfall_simulation, sorted(scene.rockfall_simulation.models)
-    parameters = models.parameters_of(scene)
-    kept = reconstruction.project_settings(scene, [])
+    parameters, how = models.parameters_of(scene), reconstruction.project_settings(scene, []).reconstruction
+    used = {name: values for name, values in parameters.items() if name in scene.rockfall_simulation.models}
     parts = [
         fingerprints.ground(scene), fingerprints.ground_contents(scene), simulated_sources.fingerprint(scene),
-        settings.number, settings.seed, names, [sorted(parameters.get(name, {}).items()) for name in names],
-        settings.rolling, settings.friction, settings.use_drag, kept.reconstruction, list(scene.get(store.DRAG, ())),
+        json.dumps(used, sort_keys=True), how,
     ]  # fmt: skip
     parts += simulated_zones.fingerprint(scene)
     return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()
@@ -168,10 +208,8 @@ def forget(scene: bpy.types.Scene) -> None:
 def remarks(scene: bpy.types.Scene) -> list[Remark]:
     """What there is to say about the shown simulation, bad news first."""
     kept = json.loads(scene.get(store.SIMULATION, "{}"))
-    if not simulation.blocks_of(scene):
-        return []
     said = list(from_plain(kept.get("remarks", []), "note"))
-    if kept.get("print") != fingerprint(scene):
+    if simulation.blocks_of(scene) and kept.get("print") != fingerprint(scene):
         text = "Terrain, releases, models or settings were changed since: simulate again."
         said.insert(0, Remark(text, "warning", "stale"))
     return said

@@ -92,7 +92,7 @@ def check_motion(part, scene: bpy.types.Scene, simulations: dict[str, object]) -
                     seen += 1
             gone = ~simulation.at_rest & (simulation.time_s < frame / rate - 1e-3)
             assert len(shown) == len(simulation) - gone.sum(), "one block for each run, until it has left"
-    assert seen > 60
+    assert seen > 50
 
 
 def test_blocks_are_where_the_core_says_at_every_frame_rate(drawn: bpy.types.Scene, part) -> None:
@@ -333,3 +333,69 @@ def test_own_drawings_are_read(scan: bpy.types.Scene, part, kind: str) -> None:
             points[[0, -1]][np.argsort(points[[0, -1], 0])],
             sorted([[*expected[1][0][:2], expected[1][0][2] + 1], [*expected[1][-1][:2], expected[1][-1][2] + 1]]),
         )
+
+
+@pytest.mark.parametrize("source", ["line", "pick", "steep"])
+def test_a_project_takes_the_settings_along(drawn: bpy.types.Scene, part, tmp_path: Path, source: str) -> None:
+    if source == "pick":
+        assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
+    scene = bpy.context.scene
+    settings = scene.rockfall_simulation
+    settings.number, settings.seed, settings.friction, settings.rolling = 7, 11, 0.35, "coulomb"
+    settings.diameter_law, settings.diameter_m, settings.diameter_second_m = "lognormal", 0.4, 0.2
+    settings.models, settings.use_drag = MODELS, True
+    if source == "pick":
+        settings.source = "PICK"
+        of_b03 = [obj for obj in scene.objects if obj.get("rockfall_trajectory") == "B03"]
+        bpy.context.view_layer.objects.active = next(o for o in of_b03 if o.get("rockfall_kind") == "impact")
+    elif source == "steep":
+        settings.source, settings.steeper_than_deg = "STEEP", 33.0
+    scene.rockfall_parameters.noel_2017.rt = 0.41
+    sources = part("rockfall_addon.scene.simulated_sources")
+    stated = sources.entry_of(scene)
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    read = part("core.exchange.project").read_project(tmp_path / "out" / "project.toml")
+    assert read.simulation.releases == stated.releases
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "out" / "project.toml")) == {"FINISHED"}
+    scene = bpy.context.scene
+    again = sources.entry_of(scene)
+    if source == "line":
+        np.testing.assert_allclose(again.releases.points_m, stated.releases.points_m, atol=1e-4)
+    else:
+        assert again == stated
+    assert (again.models, again.seed, again.friction, again.rolling) == (
+        stated.models, stated.seed, stated.friction, stated.rolling,
+    )  # fmt: skip
+    assert part("rockfall_addon.scene.models").parameters_of(scene)["noel_2017"] == {"rt": 0.41}
+
+
+def test_tables_are_of_the_shown_runs_in_survey_coordinates(drawn: bpy.types.Scene, part, tmp_path: Path) -> None:
+    assert not bpy.ops.rockfall.export_simulation.poll(), "nothing is shown"
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert bpy.ops.rockfall.export_simulation(directory=str(tmp_path / "tables")) == {"FINISHED"}
+    lines = (tmp_path / "tables" / "runs.csv").read_text(encoding="utf-8").splitlines()
+    names = lines[0].split(",")
+    assert len(lines) == 1 + 2 * 8
+    simulation = exact(part, drawn)["noel_2017"]
+    rows = [dict(zip(names, line.split(","), strict=True)) for line in lines[1:]]
+    of_model = [row for row in rows if row["model"] == "noel_2017"]
+    np.testing.assert_allclose(
+        [float(row["x_m"]) for row in of_model], 2_600_000.0 + simulation.position[:, 0], atol=1e-3
+    )
+    assert {path.name for path in (tmp_path / "tables").iterdir()} == {
+        "runs.csv", "impacts.csv", "trajectories.csv", "summary.json",
+    }  # fmt: skip
+    drawn.rockfall_simulation.seed += 1
+    assert not bpy.ops.rockfall.export_simulation.poll(), "what is shown is not what would be written"
+
+
+def test_what_blender_cannot_take_from_a_project_is_said(drawn: bpy.types.Scene, part, tmp_path: Path) -> None:
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    project = tmp_path / "out" / "project.toml"
+    wall = '\n[[simulation.structures]]\nname = "wall"\nfile = "terrain.ply"\n'
+    project.write_text(project.read_text(encoding="utf-8") + wall, encoding="utf-8")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
+    said = part("rockfall_addon.scene.simulation_setup").remarks(bpy.context.scene)
+    assert "the structure wall" in said[0].text

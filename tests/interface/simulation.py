@@ -19,11 +19,11 @@ def shown(role="simulated_blocks"):
     return [obj for obj in bpy.context.scene.objects if obj.get("rockfall_role") == role]
 
 
-def only_panel(window, name="ROCKFALL_PT_simulation"):
-    """Close the other panels, so that one screen shows this one."""
-    for each in window.area().regions:
-        if each.type == "UI":
-            each.tag_redraw()
+def open_panel(window, y):
+    """Open the panel whose header is at a height of the window, and close the others."""
+    sidebar = window.region("UI")
+    yield from window.click(sidebar.x + 90, y, ctrl=True)
+    yield 1.0
 
 
 def on_window(window, place):
@@ -42,25 +42,27 @@ def case_simulate_from_a_line_on_a_bare_scan(window):
     """Import a scan, draw a line with clicks, simulate, stop, simulate, look at a run, undo, play."""
     yield from window.show_sidebar()
     with window.override():
-        assert bpy.ops.rockfall.import_terrain(filepath=str(DATA / "las_chablais3.laz")) == {"FINISHED"}
-        bpy.ops.rockfall.show_relief()
+        assert bpy.ops.rockfall.import_terrain(filepath=str(DATA / "tschamut_2014_terrain.asc")) == {"FINISHED"}
+        bpy.ops.rockfall.show_relief(frame_all=True)
         bpy.ops.ed.undo_push(message="terrain")
     yield 2.0
+    yield from open_panel(window, 181)
     window.screenshot("1-scan")
     terrain = shown("terrain")[0]
     high = np.array([v.co for v in terrain.data.vertices])
-    top = high[high[:, 2] > np.quantile(high[:, 2], 0.9)].mean(axis=0)
-    x, y = on_window(window, top)
+    level = high[np.abs(high[:, 2] - np.quantile(high[:, 2], 0.85)) < 3.0]
+    spots = np.array([on_window(window, place) for place in level[np.argsort(level[:, 0])]])
+    left, middle, right = (spots[int(part * len(spots))] for part in (0.35, 0.5, 0.65))
     with window.override():
         bpy.ops.rockfall.draw_release("INVOKE_DEFAULT", kind="line")
     yield 0.5
-    for aside in (-60, 0, 60):
-        yield from window.click(x + aside, y)
-    yield from window.move(x + 90, y - 20)
+    for x, y in (left, middle, right):
+        yield from window.click(x, y)
+    yield from window.move(*(right + 30))
     window.screenshot("2-drawing")
-    yield from window.press("BACK_SPACE", x + 90, y)
-    yield from window.click(x + 50, y + 5)
-    yield from window.press("RET", x + 90, y)
+    yield from window.press("BACK_SPACE", *right)
+    yield from window.click(*right)
+    yield from window.press("RET", *right)
     assert settings().source == "DRAWN"
     assert len(settings().drawn.data.vertices) == 3
     yield 0.5
@@ -133,11 +135,11 @@ def case_simulate_beside_the_real_blocks(window):
     yield 1.0
     assert len(shown()) == 2
     window.screenshot("2-redone")
-    settings().number = 2500
+    settings().number = 1600
     with window.override():
         bpy.ops.rockfall.simulate("INVOKE_DEFAULT")
     job = window.part("rockfall_addon.view.job")
-    yield from window.wait_for(lambda: job._running[0].done > 300, 120, "some are finished")
+    yield from window.wait_for(lambda: not job._running or job._running[0].done > 300, 120, "some are finished")
     x, y = window.centre()
     yield from window.press("ESC", x, y)
     yield from window.wait_for(lambda: not job.is_running(), 60, "stopped")

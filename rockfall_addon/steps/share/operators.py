@@ -8,8 +8,10 @@ from bpy.props import StringProperty
 
 from ....core.exchange.output import output_folder
 from ....core.exchange.tables import write_impacts, write_picks, write_trajectories
+from ....core.progress import Progress
 from ....core.reconstruction.sampling import sample_trajectories
-from ...scene import project, reconstruction, store, terrain, trails
+from ...scene import project, reconstruction, simulation, simulation_setup, store, terrain, trails
+from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
 
 
@@ -53,11 +55,48 @@ class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_export_simulation(InBackground, _IntoFolder, bpy.types.Operator):
+    """Write runs.csv, impacts.csv, trajectories.csv and summary.json of the shown simulation, in survey coordinates"""
+
+    bl_idname = "rockfall.export_simulation"
+    bl_label = "Export Simulation"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        scene = context.scene
+        if not possible(cls, simulation.blocks_of(scene), "Nothing simulated is shown: simulate first, in step 7"):
+            return False
+        return possible(cls, not simulation_setup.is_stale(scene), "Settings have changed since: simulate again first")
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return _IntoFolder.invoke(self, context, event)
+
+    def prepare(self, context: bpy.types.Context) -> Work:
+        plan, folder = simulation_setup.plan(context.scene), Path(bpy.path.abspath(self.directory))
+        counts = simulation_setup.shown_counts(context.scene)
+
+        def compute(progress: Progress) -> object:
+            return simulation_setup.export(plan, counts, folder, progress)
+
+        def keep(scene: bpy.types.Scene, written: object) -> str:
+            return f"{', '.join(written)} are in {folder}."
+
+        return Work("share", compute, keep)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return InBackground.execute(self, context) if bpy.app.background else self._begin(context)
+
+
 class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
     """Write project.toml with the picks and the terrain: all that the command line, or another file, needs"""
 
     bl_idname = "rockfall.export_project"
     bl_label = "Export Project"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        there = any(store.with_role(context.scene, role) for role in (store.PICK_ROLE, store.TERRAIN_ROLE))
+        return possible(cls, there, "There is nothing to export: import a terrain or picks first, or load the demo")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -66,4 +105,4 @@ class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_export_tables, ROCKFALL_OT_export_project)
+CLASSES = (ROCKFALL_OT_export_tables, ROCKFALL_OT_export_simulation, ROCKFALL_OT_export_project)

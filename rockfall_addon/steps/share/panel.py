@@ -4,13 +4,17 @@
 import bpy
 
 from ...scene import store
+from ...view import job
 from ...view.panel import RockfallPanel, State, advise
 
 
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
     bl_label = "10  Share"
     bl_idname = "ROCKFALL_PT_share"
-    needs = store.PICK_ROLE
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return any(store.with_role(context.scene, role) for role in (store.PICK_ROLE, store.TERRAIN_ROLE))
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
@@ -19,7 +23,9 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         advise(context, self.layout, True, "Tables in survey coordinates, with units.")
         self.layout.operator("rockfall.export_tables", icon="EXPORT")
+        self.layout.operator("rockfall.export_simulation", icon="EXPORT")
         self.layout.operator("rockfall.export_project", icon="FILE_FOLDER")
+        job.draw(context, self.layout, "share")
 
 
 CLASSES = (ROCKFALL_PT_share,)

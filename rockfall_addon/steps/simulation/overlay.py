@@ -94,7 +94,7 @@ def _batch(lines: simulated_paths.Lines, colours: np.ndarray) -> gpu.types.GPUBa
     shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
     values = {
         "pos": np.ascontiguousarray(lines.position, dtype=np.float32),
-        "color": np.column_stack([colours, np.full(len(colours), opacity)]).astype(np.float32),
+        "color": np.ascontiguousarray(np.column_stack([colours, np.full(len(colours), opacity)]), dtype=np.float32),
     }
     return batch_for_shader(shader, "LINES", values, indices=np.column_stack([start, start + 1]).astype(np.int32))
 

@@ -42,6 +42,8 @@ class ROCKFALL_PT_simulation(RockfallPanel, bpy.types.Panel):
         job.draw(context, layout, "simulation")
         if simulation.blocks_of(scene):
             _draw_result(context, layout, settings)
+        else:
+            show_remarks(context, layout, simulation_setup.remarks(scene))
 
 
 class _Sub(RockfallPanel):

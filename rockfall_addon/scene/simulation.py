@@ -69,8 +69,21 @@ def prepare(simulation: Simulation) -> Prepared:
     number = {name: place for place, name in enumerate(releases)}
     release = np.array([number[name] for name in names.tolist()])
     parabolas = parabolas_of(simulation)
+    attributes = attributes_of(parabolas, release, simulation.releases.axes_m / 2)
+    paths = simulated_paths.prepare(simulation, parabolas, release)
+    return Prepared(simulation.settings.model, releases, parabolas.position, attributes, paths)
+
+
+def attributes_of(parabolas: Parabolas, release: Array, half_axes_m: Array) -> dict[str, tuple[str, Array]]:
+    """Name → type and values of the attributes that the nodes, `follow` and exports read.
+
+    Parameters
+    ----------
+    release : (n,) number of the release of each run.
+    half_axes_m : (n, 3) of its block [m].
+    """
     nowhere = np.full(len(parabolas), np.nan)
-    attributes = {
+    return {
         RUN: ("INT", parabolas.run),
         RELEASE: ("INT", release[parabolas.run]),
         SINCE: ("FLOAT", parabolas.start_s),
@@ -81,10 +94,8 @@ def prepare(simulation: Simulation) -> Prepared:
         simulated_nodes.ACCELERATION: ("FLOAT_VECTOR", parabolas.acceleration),
         simulated_nodes.SPIN: ("FLOAT_VECTOR", parabolas.spin),
         simulated_nodes.TURN: ("QUATERNION", _turns(parabolas)),
-        simulated_nodes.HALF_AXES: ("FLOAT_VECTOR", simulation.releases.axes_m[parabolas.run] / 2),
+        simulated_nodes.HALF_AXES: ("FLOAT_VECTOR", half_axes_m[parabolas.run]),
     }
-    paths = simulated_paths.prepare(simulation, parabolas, release)
-    return Prepared(simulation.settings.model, releases, parabolas.position, attributes, paths)
 
 
 def show(

@@ -79,6 +79,7 @@ def position_at(part, simulation, run: int, time_s: float) -> np.ndarray | None:
 
 def check_motion(part, scene: bpy.types.Scene, simulations: dict[str, object]) -> None:
     rate, seen = scene.render.fps / scene.render.fps_base, 0
+    scene.rockfall.block_scale = 1.0  # larger ones are lifted
     blocks = of_role(scene, "simulated_blocks")
     assert blocks.keys() == simulations.keys()
     for frame in (0, 5, 9, 14, 19, 23, 30, 37, 50, 101, 170, 900, 5000):

@@ -154,6 +154,7 @@ def follow(scene: bpy.types.Scene) -> None:
     """Bring what is shown in line with the scene's playback and the size at which it draws blocks."""
     for obj in blocks_of(scene):
         materials.set_input(obj.modifiers["Blocks"], simulated_nodes.SIZE, scene.rockfall.block_scale)
+        obj.update_tag()
         mesh = obj.data
         begin = release_begins(scene, obj)[_read(mesh, RELEASE, np.int32)] + _read(mesh, SINCE)
         if np.array_equal(begin.astype(np.float32), _read(mesh, simulated_nodes.BEGIN)):

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a frame of simulated blocks takes: Blender's evaluation, in a scene without anything else, and showing them.
 
-Blender as a module is needed: the bpy wheel. With --window, in a real Blender, also a redraw with and without blocks and
-paths:
+Blender as a module is needed: the bpy wheel. With --window, in a real Blender, also a redraw with and without both:
 
     blender --factory-startup --addons bl_ext.user_default.rockfall --python THIS_FILE -- --window 1000 10000
 """

@@ -35,7 +35,7 @@ def on_window(window, place):
 
 def simulated(window):
     job = window.part("rockfall_addon.view.job")
-    return window.wait_for(lambda: shown() and not job.is_running(), 240, "simulated")
+    return window.wait_for(lambda: shown() and not job.is_running(), 360, "simulated")
 
 
 def case_simulate_from_a_line_on_a_bare_scan(window):
@@ -49,8 +49,8 @@ def case_simulate_from_a_line_on_a_bare_scan(window):
     yield from open_panel(window, 181)
     window.screenshot("1-scan")
     terrain = shown("terrain")[0]
-    high = np.array([v.co for v in terrain.data.vertices])
-    level = high[np.abs(high[:, 2] - np.quantile(high[:, 2], 0.85)) < 3.0]
+    steep = np.array([face.center for face in terrain.data.polygons if face.normal.z < 0.8])
+    level = steep[np.abs(steep[:, 2] - np.quantile(steep[:, 2], 0.85)) < 4.0]
     spots = np.array([on_window(window, place) for place in level[np.argsort(level[:, 0])]])
     left, middle, right = (spots[int(part * len(spots))] for part in (0.35, 0.5, 0.65))
     with window.override():

@@ -12,7 +12,7 @@ from ...scene import problems, simulated_paths, simulation, store
 from ...view import legend
 
 WIDTH_PX, SELECTED_PX = 1.4, 4.0
-FAINTEST, ALONE, MANY = 0.25, 0.9, 5000
+FAINTEST, ALONE, MANY = 0.1, 0.9, 5000
 """How opaque paths are: few, and as many as this or more."""
 NEARER = 2e-5
 """Lines are drawn so much nearer, in depth, that the ground that they lie on does not speckle them."""
@@ -90,7 +90,7 @@ def _batch(lines: simulated_paths.Lines, colours: np.ndarray) -> gpu.types.GPUBa
     begins = np.ones(len(lines.position), dtype=bool)
     begins[lines.first[1:] - 1] = False
     start = np.flatnonzero(begins)
-    opacity = np.interp(len(lines.first) - 1, [50, MANY], [ALONE, FAINTEST])
+    opacity = np.interp(np.log(len(lines.first) - 1), np.log([50, MANY]), [ALONE, FAINTEST])
     shader = gpu.shader.from_builtin("POLYLINE_SMOOTH_COLOR")
     values = {
         "pos": np.ascontiguousarray(lines.position, dtype=np.float32),

@@ -297,6 +297,13 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     if through:
         text = f"{through} of {n} blocks with {model} fell through the terrain: it has holes larger than they are."
         remarks.append(Remark(text, "warning", model))
+    stayed = int((simulation.at_rest & (simulation.length_m < 2 * simulation.releases.radius_m)).sum())
+    if stayed:
+        text = (
+            f"{stayed} of {n} blocks with {model} stopped within their own diameter: the ground holds them where they "
+            "are released. Release them from steeper ground, above it, or with a velocity."
+        )
+        remarks.append(Remark(text, "warning" if 2 * stayed > n else "note", model))
     held = {f"structure:{name}": f"held by {name}" for name in simulation.ground.structures}
     words = END_WORDS | held
     ends = zip(simulation.ends, counts.tolist(), strict=True)

@@ -11,7 +11,7 @@ from rockfall.core.progress import CancelledError
 from rockfall.core.simulation import engine, memory
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
-from rockfall.core.simulation.release import Releases, make_releases
+from rockfall.core.simulation.release import Releases, make_releases, placed_on
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.simulation import Scenario, Zones, ground_of, remarks_of, run_models, run_scenario
 
@@ -102,6 +102,21 @@ def test_blocks_that_were_cut_off_are_said_first(scenario: Scenario) -> None:
     assert first.severity == "warning"
     assert "200 of 200 blocks with noel_2017 were cut off at the limit" in first.text
     assert "200 blocks with noel_2017, 200 impacts: 200 were cut off" in second.text
+
+
+def test_blocks_that_stay_where_they_are_released_are_said() -> None:
+    ground = make_ground(sheet())
+    xy = np.array([[10.0, 10.0], [20.0, 20.0], [30.0, 30.0]])
+    place = np.column_stack([xy, placed_on(ground, xy, np.full(3, 0.5))[:, 2]])
+    settings = [Settings("noel_2017", rolling="coulomb", friction=2.0)]
+    still = make_releases(place, diameter_m=0.5)
+    first, *_ = remarks_of(run_models(ground, still, settings))
+    assert first.severity == "warning"
+    assert first.text.startswith("3 of 3 blocks with noel_2017 stopped within their own diameter")
+    one = make_releases(place, velocity=np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]]), diameter_m=0.5)
+    said = [remark for remark in remarks_of(run_models(ground, one, settings)) if "own diameter" in remark.text]
+    assert [remark.text[:6] for remark in said] == ["1 of 3"]
+    assert said[0].severity == "note"
 
 
 @pytest.mark.parametrize(

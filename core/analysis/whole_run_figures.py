@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PLANES = 48
 """Across the axis, at which the simulated runs are looked at for their envelopes."""
-FEWEST_IN_ENVELOPE = 20
+FEWEST_DRAWN = 20
 MOST_IN_ENVELOPE = 1500
 """So many runs of a model show its envelope."""
 ON_A_FLIGHT = 9
@@ -143,13 +143,12 @@ def _curve(axes: "Axes", parts: Sequence[Compared]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     observed = np.sort(parts[0].observed[np.isfinite(parts[0].observed)])
-    spans = [np.quantile(one.simulated, [0.01, 0.99]) for one in parts if one.simulated.size]
-    for one in parts:
-        if one.simulated.size:
-            values = np.sort(one.simulated)
-            axes.plot(
-                values, (np.arange(values.size) + 0.5) / values.size, color=_colour(one.model), linewidth=1.3, zorder=2
-            )
+    drawn = [one for one in parts if one.simulated.size >= FEWEST_DRAWN]
+    spans = [np.quantile(one.simulated, [0.01, 0.99]) for one in drawn]
+    for one in drawn:
+        values = np.sort(one.simulated)
+        share = (np.arange(values.size) + 0.5) / values.size
+        axes.plot(values, share, color=_colour(one.model), linewidth=1.3, zorder=2)
     if observed.size:
         share = np.arange(observed.size + 1) / observed.size
         axes.plot(np.repeat(observed, 2), np.repeat(share, 2)[1:-1], color=MEASURED, linewidth=0.9, zorder=3)
@@ -211,7 +210,7 @@ def _envelope(paths: Paths, axis: Axis, ground: Ground, observed: _Observed) -> 
         piece = np.flatnonzero((start <= plane) & (end > plane))
         _, nearest = np.unique(paths.run[piece], return_index=True)
         piece = piece[nearest]
-        if piece.size < FEWEST_IN_ENVELOPE:
+        if piece.size < FEWEST_DRAWN:
             continue
         share = (plane - start[piece]) / (end[piece] - start[piece])
         place, velocity = paths.states(piece, paths.when_across(piece, share))

@@ -79,6 +79,7 @@ def path_material(opacity: float) -> bpy.types.Material:
         tree.links.new(mix.outputs[0], output.inputs["Surface"])
 
     material = _material(PATH_MATERIAL, build)
+    material.surface_render_method = "BLENDED"  # for EEVEE, which else shows grains
     material.node_tree.nodes["Opacity"].inputs[0].default_value = opacity
     return material
 

@@ -15,6 +15,7 @@ from ...core.reconstruction.picks import take
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.simulation.distributions import Distribution
 from ...core.simulation.engine import Rolling
+from ...core.simulation.measured_releases import start_times
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ReleaseSource
 from . import drawn_releases, fingerprints, georeference, models, picks, reconstruction, store
@@ -183,13 +184,5 @@ def _pick_at(scene: bpy.types.Scene, entry: ReleaseEntry) -> str:
 
 
 def _origins(measured: Reconstruction) -> dict[str, Origin]:
-    """When each trajectory begins: at its release, else at its first impact whose velocity is known."""
-    found = {}
-    picked, impacts = measured.picks, measured.impacts
-    for i in picked.group_starts.tolist():
-        name, time_s = str(picked.trajectory[i]), float(picked.time_s[i])
-        if picked.kind[i] != "release":
-            own = np.flatnonzero((impacts.trajectory == name) & np.isfinite(impacts.v2).all(axis=1))
-            time_s = float(impacts.time_s[own[0]]) if own.size else time_s
-        found[name] = Origin(name, time_s)
-    return found
+    """When the blocks of each trajectory start."""
+    return {name: Origin(name, time_s) for name, time_s in start_times(measured).items()}

@@ -235,6 +235,20 @@ def test_a_still_of_the_end_and_a_picture_of_the_slope(rockfall, part, job) -> N
     assert {f"Simulating {model}" for model in MODELS} <= set(said)
 
 
+def test_what_the_step_hides_is_not_in_the_film(scene: bpy.types.Scene, part) -> None:
+    dressing, known = part("rockfall_addon.steps.film.dressing"), part("core.exchange.project")
+    preset = known.RenderPreset("tiny", width=64, height=36, fps=RATE, stagger_s=STAGGER_S)
+    scene.rockfall_simulation.show_paths = False
+    dressing.set_up_film(scene, preset, "cycles")
+    assert not [obj for obj in scene.objects if obj.name.startswith("Film paths")]
+    assert "Film count measured" in scene.objects
+    scene.rockfall_simulation.show_blocks = False
+    dressing.set_up_film(scene, preset, "cycles")
+    assert "Film count measured" not in scene.objects
+    assert "Film legend title" in scene.objects  # the scale of speeds, as without simulated blocks
+    assert scene.frame_end == int(2.4 * RATE) + 25 + int(STAGGER_S * RATE)
+
+
 def test_structures_of_the_project_stand_in_the_picture_and_hold_blocks(rockfall, part, job, project: Path) -> None:
     """A wall across the foot of the slope: it is drawn, nothing comes past it, and what lies there has stopped."""
     wall = np.array([[16.0, -19.0, -12.0], [16.0, 19.0, -12.0], [16.0, 19.0, 20.0], [16.0, -19.0, 20.0]])

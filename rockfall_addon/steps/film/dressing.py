@@ -111,11 +111,9 @@ def remove_film(scene: bpy.types.Scene) -> None:
     """Take the set-up away: the scene is as it was."""
     _remove_furniture(scene)
     presence.show_always(scene)
-    shown = (store.PICK_ROLE, store.BLOCK_ROLE, store.SIMULATED_BLOCKS_ROLE)
-    for obj in (each for role in shown for each in store.with_role(scene, role)):
+    for obj in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
         obj.hide_render = False
-    for obj in store.with_role(scene, store.SIMULATED_PATHS_ROLE):
-        obj.hide_render = False
+    simulation.look(scene)
     simulated.restore_colours(scene)
     if remembered.is_set_up(scene):
         remembered.put_back(scene)
@@ -236,14 +234,12 @@ def _pixel_m(scene: bpy.types.Scene, view: View, motions: list[Motion]) -> float
 
 def _show_simulated(scene: bpy.types.Scene, *, until_now: bool) -> None:
     """Thin paths in place of those of the step, and the measured blocks in white, where there are simulated ones."""
-    radius = simulated.PATH_PART * scene.rockfall.trail_radius_m
-    paths = simulated.make_paths(scene, radius, until_now=until_now)
-    for obj in paths:
+    for obj in simulated.make_paths(scene, simulated.PATH_PART * scene.rockfall.trail_radius_m, until_now=until_now):
         _add(scene, obj)
-    if paths:
-        simulated.whiten(scene)
-    for obj in store.with_role(scene, store.SIMULATED_PATHS_ROLE):
+    for obj in simulation.paths_of(scene):
         obj.hide_render = True
+    if simulated.groups_of(scene):
+        simulated.whiten(scene)
 
 
 def _sources(names: tuple[str, ...]) -> tuple[LegendEntry, ...]:

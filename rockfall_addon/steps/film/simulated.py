@@ -26,9 +26,9 @@ GROUP = "Rockfall film paths"
 
 
 def groups_of(scene: bpy.types.Scene) -> list[Group]:
-    """The simulated blocks of each model, as they end in the scene's time."""
+    """The simulated blocks of each model, as they end in the scene's time; none where they are not to be seen."""
     groups = []
-    for obj in _paths(scene):
+    for obj in _seen(scene):
         lines = simulated_paths.lines_of(obj)
         end, begin = lines.figures["end"].astype(np.intp), _begins(scene, obj, lines)
         groups.append(
@@ -68,7 +68,9 @@ def show_structures(scene: bpy.types.Scene, ground: Ground) -> None:
 
 def points_of(scene: bpy.types.Scene) -> Array:
     """(n, 3) along the simulated paths, without the few that go farthest aside, up or down."""
-    points = np.vstack([np.empty((0, 3)), *(simulated_paths.lines_of(obj).position for obj in _paths(scene))])
+    points = np.vstack(
+        [np.empty((0, 3)), *(simulated_paths.lines_of(obj).position for obj in simulation.paths_of(scene))]
+    )
     if not len(points):
         return points
     low, high = np.quantile(points, (OUTER, 1 - OUTER), axis=0)
@@ -77,9 +79,11 @@ def points_of(scene: bpy.types.Scene) -> Array:
 
 def make_paths(scene: bpy.types.Scene, radius_m: float, *, until_now: bool) -> list[bpy.types.Object]:
     """Thin paths of the simulated blocks of each model, whole or up to the scene's time."""
-    made = []
-    opacity = path_opacity(sum(len(obj.data.curves) for obj in _paths(scene)))
-    for obj in _paths(scene):
+    made: list[bpy.types.Object] = []
+    if not scene.rockfall_simulation.show_paths:
+        return made
+    opacity = path_opacity(sum(len(obj.data.curves) for obj in simulation.paths_of(scene)))
+    for obj in simulation.paths_of(scene):
         lines = simulated_paths.lines_of(obj)
         time = np.repeat(_begins(scene, obj, lines), np.diff(lines.first)) + _since_release(obj)
         pieces = [(time[i:j], lines.position[i:j], lines.speed_mps[i:j]) for i, j in pairwise(lines.first.tolist())]
@@ -110,8 +114,10 @@ def restore_colours(scene: bpy.types.Scene) -> None:
     trails.paint_observed(scene)
 
 
-def _paths(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    return store.with_role(scene, store.SIMULATED_PATHS_ROLE)
+def _seen(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The objects of the paths of all models, unless neither paths nor blocks are to be seen."""
+    settings = scene.rockfall_simulation
+    return simulation.paths_of(scene) if settings.show_blocks or settings.show_paths else []
 
 
 def _begins(scene: bpy.types.Scene, obj: bpy.types.Object, lines: simulated_paths.Lines) -> Array:

@@ -139,7 +139,7 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
     """The measured runs of a project; options replace what its [simulation] says."""
     from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
-    from ..exchange.simulation_entry import ReleaseEntry, SimulationEntry
+    from ..exchange.simulation_entry import ReleaseEntry
     from ..exchange.simulation_project import open_simulation
     from ..workflow.simulation import ground_of
 
@@ -148,7 +148,7 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
     file = Path(arguments.table)
     project = read_project(file)
-    entry = project.simulation or SimulationEntry()
+    entry = project.stated_simulation
     entry = replace(
         entry,
         models=tuple(arguments.model or entry.models),

@@ -193,7 +193,6 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
 def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
     """A project, in which options replace what its [simulation] says."""
     from ..exchange.project import read_project
-    from ..exchange.simulation_entry import SimulationEntry
     from ..exchange.simulation_project import open_simulation
 
     own = ["--terrain", "--structure", "--gravity", "--zone-attribute", *sources_given(arguments)[1:]]
@@ -202,7 +201,7 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
     file = Path(arguments.releases)
     project = read_project(file)
-    entry = project.simulation or SimulationEntry()
+    entry = project.stated_simulation
     releases = entry.releases if arguments.number is None else replace(entry.releases, number=arguments.number)
     if blocks_said(arguments):
         blocks = blocks_as_asked(arguments)

@@ -197,6 +197,11 @@ class Project:
     simulation: SimulationEntry | None = None
     extra: Extra = field(default_factory=dict)
 
+    @property
+    def stated_simulation(self) -> SimulationEntry:
+        """What it says of a simulation; else one of its measured releases, with the drag of its reconstruction."""
+        return self.simulation or SimulationEntry(drag=self.reconstruction.drag)
+
     def block_of(self, trajectory: str) -> BlockEntry:
         """The block of a trajectory, or the project's default block."""
         return next((block for block in self.blocks if block.name == trajectory), self.block)

@@ -59,7 +59,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         raise InputError(
             "The project names no terrain", file=file, advice='Add [terrain] file = "terrain.ply" to simulate on it'
         )
-    entry = project.simulation or SimulationEntry()
+    entry = project.stated_simulation
     known = checked_parameters(project.extra["models"], file) if "models" in project.extra else {}
     models = entry.models or COMPARED
     inputs = {"project": file, "terrain": source.file}

@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from ..exchange.project import Project
-from ..exchange.simulation_entry import ReleaseEntry, SimulationEntry
+from ..exchange.simulation_entry import ReleaseEntry
 from ..exchange.simulation_project import open_simulation
 from ..progress import Progress, silent
 from ..simulation.engine import Simulation
@@ -28,7 +28,7 @@ def fall_beside(job: FilmJob, project: Project, measured: int, progress: Progres
     RockfallError : too many blocks or none, no terrain, nothing measured that begins with a flight, a bad file.
     """
     check_number(job.number, len(job.simulate), max(measured, 1))
-    stated = project.simulation or SimulationEntry(drag=project.reconstruction.drag)
+    stated = project.stated_simulation
     asked = replace(
         stated, models=job.simulate, releases=ReleaseEntry(number=job.number), seed=job.seed, record=("trajectories",)
     )

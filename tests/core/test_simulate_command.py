@@ -4,11 +4,13 @@
 import csv
 import json
 import re
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rockfall.core.cli import main
+from rockfall.core.commands.progress import PrintedProgress
 from rockfall.core.exchange.tables import read_impacts
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.surface import Surface
@@ -240,3 +242,29 @@ def test_simulated_impacts_are_read_as_measured_ones_are(terrain: Path, releases
     twice = rows_of(merged / "duplicates.csv") if (merged / "duplicates.csv").exists() else []
     assert len(kept) + len(twice) == len(impacts)
     assert {"run", "structure"} <= set(kept[0])
+
+
+def test_an_interrupted_simulation_keeps_and_says_what_is_finished(
+    terrain: Path, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "releases.csv"
+    path.write_text(f"x_m,y_m,number\n{EAST + 10},{NORTH + 40},300\n", encoding="utf-8")
+    argv = ["simulate", str(path), "--terrain", str(terrain), "--model", "noel_2017", "--record", "none"]
+    assert main([*argv, "--out", str(tmp_path / "whole")]) == 0
+
+    def told(self: PrintedProgress, text: str, done: int = 0, total: int = 0) -> None:
+        if total == 300 and done and not interrupted:
+            interrupted.append(done)
+            signal.raise_signal(signal.SIGINT)
+
+    interrupted: list[int] = []
+    monkeypatch.setattr(PrintedProgress, "__call__", told)
+    capsys.readouterr()
+    assert main([*argv, "--threads", "1", "--out", str(tmp_path / "cut")]) == 0
+    runs, whole = (rows_of(tmp_path / name / "runs.csv") for name in ("cut", "whole"))
+    assert 0 < len(runs) < 300
+    assert runs == whole[: len(runs)]
+    said = f"Stopped by you: {len(runs)} of 300 blocks with noel_2017 are finished and kept."
+    assert said in capsys.readouterr().out
+    summary = json.loads((tmp_path / "cut" / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["blocks_wanted"], sum(summary["models"]["noel_2017"]["ends"].values())) == (300, len(runs))

@@ -12,6 +12,7 @@ from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.simulation_project import open_simulation
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.registry import COMPARED
+from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.terrain.writers import write_ply
 from rockfall.core.workflow.simulation import ground_of
@@ -59,6 +60,13 @@ def test_a_project_without_a_simulation_releases_what_was_measured(folder: Path)
     np.testing.assert_allclose(releases.diameter_m, 0.4)
     place = scenario.terrain.shift.to_survey(releases.position)[0] - [EAST + 30, NORTH + 100, 500 - SLOPE * 30]
     np.testing.assert_allclose(place, 0.2 * np.array([SLOPE, 0, 1]) / np.hypot(1, SLOPE), atol=1e-4)
+
+
+def test_what_was_reconstructed_with_drag_falls_with_it_unless_the_project_says_otherwise(folder: Path) -> None:
+    drag = "[reconstruction]\ndrag = true\ndrag_coefficient = 0.7\n"
+    for section, expected in ((drag, Drag(coefficient=0.7)), (f"{drag}[simulation]\nseed = 1", None), ("", None)):
+        path = project(folder, section)
+        assert open_simulation(read_project(path), path)[0].drag == expected
 
 
 def test_the_first_flight_is_the_measured_one(folder: Path) -> None:

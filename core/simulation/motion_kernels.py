@@ -150,22 +150,26 @@ def _write(rows, k, run, what, time, p, v, w, v1, w1, n, place):  # type: ignore
 
 
 @kernel
-def _closest(tree, stack, p, radius, nearby):  # type: ignore[no-untyped-def]
+def _closest(tree, stack, p, radius, nearby, towards, again):  # type: ignore[no-untyped-def]
     """The closest of the ground to a block: see `closest_near` and `point_kernels.closest`."""
     if len(tree) == 5:
-        return closest(tree, stack, p, radius)
+        return closest(tree, stack, p, radius, towards, again)
     if len(tree) == 4:
         return closest_near(tree, stack, p, radius, nearby)
     x, y, z, square, place = closest_near(tree[0], stack, p, radius, nearby)
-    qx, qy, qz, other, found = closest(tree[1], stack, p, radius)
+    qx, qy, qz, other, found = closest(tree[1], stack, p, radius, towards, again)
     if found >= 0 and other < square:
         return qx, qy, qz, other, tree[0][3].shape[0] + found
     return x, y, z, square, place
 
 
 @kernel
-def _touching(tree, stack, p, v, radius, nearby):  # type: ignore[no-untyped-def]
+def _touching(tree, stack, p, v, radius, nearby, towards):  # type: ignore[no-untyped-def]
     """The centre moved out of the ground, and the contacts that moved it.
+
+    Parameters
+    ----------
+    towards : the normal of the ground where the block was.
 
     Returns
     -------
@@ -176,7 +180,7 @@ def _touching(tree, stack, p, v, radius, nearby):  # type: ignore[no-untyped-def
     """
     distance, support, place, against, other, most = inf, (0.0, 0.0, -2.0), -1, (0.0, 0.0, 1.0), -1, -inf
     for k in range(MOST_AT_ONCE):
-        qx, qy, qz, square, found = _closest(tree, stack, p, radius, nearby)
+        qx, qy, qz, square, found = _closest(tree, stack, p, radius, nearby, towards, k > 0)
         if found < 0:
             break
         d = sqrt(square)
@@ -366,12 +370,12 @@ def run_block(  # type: ignore[no-untyped-def]
             t, q, turned, stop = leg(tree, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time)
             moves, at_edge = t > 0.0, stop != ON_TRIANGLE
             if stop == AT_ANOTHER:
-                q = _touching(tree, stack, q, turned, radius, nearby)[0]
+                q = _touching(tree, stack, q, turned, radius, nearby, n)[0]
         if not moves:
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
             pull = -gravity * factor * dt
             ahead = _along((v[0], v[1], v[2] + pull), n)
-            away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby)
+            away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby, n)
             if distance > radius + TOUCHING_M:
                 t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
                 q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)

@@ -223,15 +223,18 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
 
 
 @kernel
-def patch(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
-    """The plane of the points that a sphere at p touches, on the side of the direction `towards` (to its centre).
+def gather(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
+    """The points that a sphere at p touches.
 
     Returns
     -------
-    normal, height : of the centre above it [m].
+    sums : over those on the side of the direction `towards` (to the centre), each by how deep it is in the band: their
+        weights; directions to the centre; differences to it; products of these.
+    square, place : squared distance and place of the nearest point, on any side.
     """
     bounds, first, count, points, spacing = tree
     reach = radius + band_of(radius, spacing)
+    best, place = reach * reach, -1
     total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
     sx, sy, sz = 0.0, 0.0, 0.0
     xx, yy, zz, xy, yz, zx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -251,6 +254,8 @@ def patch(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
             square = x * x + y * y + z * z
             if square >= reach * reach:
                 continue
+            if square < best:
+                best, place = square, i
             d = sqrt(square)
             if x * towards[0] + y * towards[1] + z * towards[2] <= FACING * d:
                 continue
@@ -261,6 +266,24 @@ def patch(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
             sx, sy, sz = sx + w * x, sy + w * y, sz + w * z
             xx, yy, zz = xx + w * x * x, yy + w * y * y, zz + w * z * z
             xy, yz, zx = xy + w * x * y, yz + w * y * z, zx + w * z * x
+    return (total, mx, my, mz, sx, sy, sz, xx, yy, zz, xy, yz, zx), best, place
+
+
+@kernel
+def patch(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
+    """The plane of the points that a sphere at p touches, on the side of the direction `towards` (to its centre).
+
+    Returns
+    -------
+    normal, height : of the centre above it [m].
+    """
+    return fitted(gather(tree, stack, p, radius, towards)[0], radius, towards)
+
+
+@kernel
+def fitted(sums, radius, towards):  # type: ignore[no-untyped-def]
+    """The plane of points from the sums of `gather`: see `patch`."""
+    total, mx, my, mz, sx, sy, sz, xx, yy, zz, xy, yz, zx = sums
     size = sqrt(mx * mx + my * my + mz * mz)
     if size == 0.0:
         return towards, radius
@@ -291,21 +314,34 @@ def patch(tree, stack, p, radius, towards):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def closest(tree, stack, p, radius):  # type: ignore[no-untyped-def]
+def closest(tree, stack, p, radius, towards, again):  # type: ignore[no-untyped-def]
     """The ground below a sphere that touches points, or nearly: (x, y, z, squared distance, place), place −1 when none.
 
     It is the place below the centre in the plane of the points that the sphere touches, or higher where the nearest
     point stands out of that plane.
+
+    Parameters
+    ----------
+    towards : where the ground was, as its normal.
+    again : asks for what else there is when the sphere was moved out of that: points that are deeper in it than they
+        may be.
     """
-    square, place = nearest(tree, stack, p, radius + band_of(radius, tree[4]))
+    points = tree[3]
+    if again:
+        square, place = nearest(tree, stack, p, core_of(radius, tree[4]))
+        sums = (0.0,) * 13
+    else:
+        sums, square, place = gather(tree, stack, p, radius, towards)
     if place < 0:
         return 0.0, 0.0, 0.0, inf, -1
     d = sqrt(square)
     if d == 0.0:
         return p[0], p[1], p[2], 0.0, place
-    points = tree[3]
     x, y, z = p[0] - points[place, 0], p[1] - points[place, 1], p[2] - points[place, 2]
-    n, height = patch(tree, stack, p, radius, (x / d, y / d, z / d))
+    if again or x * towards[0] + y * towards[1] + z * towards[2] <= FACING * d:
+        n, height = patch(tree, stack, p, radius, (x / d, y / d, z / d))
+    else:
+        n, height = fitted(sums, radius, towards)
     along = x * n[0] + y * n[1] + z * n[2]
     d = min(height, radius + along - sqrt(max(radius * radius - square + along * along, 0.0)))
     return p[0] - d * n[0], p[1] - d * n[1], p[2] - d * n[2], d * d, place

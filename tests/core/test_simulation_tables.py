@@ -2,7 +2,7 @@
 """What is read off a simulation: hits of structures, who holds a block, and the tables' numbers."""
 
 import csv
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from rockfall.core.exchange.simulated_motion import write_simulated_impacts, wri
 from rockfall.core.exchange.tables import read_impacts, write_impacts, write_trajectories
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.convergence import convergence
-from rockfall.core.simulation.engine import Settings, Simulation, simulate
+from rockfall.core.simulation.engine import ENDED, IMPACT, RELEASED, Records, Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.hits import hits_of
 from rockfall.core.simulation.release import make_releases
@@ -111,6 +111,35 @@ def test_a_block_passes_that_goes_on_beyond() -> None:
     assert set(run[on_road].tolist()) == {1}
     assert hits.passes[on_road].all() == (simulation.position[1, 0] > 73.3)
     np.testing.assert_allclose(hits.up_m[on_road], 0.05, atol=1e-6)
+
+
+@pytest.mark.parametrize(("end_x", "passes"), [(55.0, [True, False]), (60.2, [True, False]), (75.0, [True, True])])
+def test_only_what_comes_after_a_hit_tells_whether_the_block_passes(end_x: float, passes: list[bool]) -> None:
+    """Over the wall, from a rock beyond it back against its front, and to an end: written by hand."""
+    ground = make_ground(plane(), {"wall": wall((60, 20), (60, 100), 0.0, 2.0)})
+    made = thrown_at(ground, [5.0])
+    panel = int(np.flatnonzero(ground.owner == 1)[0])
+    x = np.array([50.0, 59.9, 65.0, 59.7, end_x])
+    what = np.array([RELEASED, IMPACT, IMPACT, IMPACT, ENDED], np.int8)
+    moving = np.tile([1.0, 0.0, -1.0], (5, 1))
+    records = Records(
+        run=np.zeros(5, np.intp),
+        what=what,
+        time_s=np.arange(5.0),
+        position=np.column_stack([x, np.full(5, 60.0), np.full(5, 1.0)]),
+        v2=moving,
+        omega2=moving,
+        v1=moving,
+        omega1=moving,
+        normal=np.tile([-1.0, 0.0, 0.0], (5, 1)),
+        face=np.array([-1, panel, 0, panel, 0]),
+    )
+    hits = hits_of(replace(made, records=records))
+    assert hits.record.tolist() == [1, 3]
+    assert hits.passes.tolist() == passes
+    np.testing.assert_allclose(hits.along_m, 40.0)
+    np.testing.assert_allclose(hits.up_m, 1.0)
+    np.testing.assert_allclose(np.degrees(hits.angle), 45.0)
 
 
 def test_a_block_that_comes_to_rest_against_a_wall_is_held_by_it() -> None:

@@ -42,7 +42,7 @@ STEPS = (
         ("rockfall.draw_release", "Draw Release Line", {"kind": "line"}),
         ("rockfall.draw_release", "Draw Release Area", {"kind": "polygon"}),
         ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}), None,
-        "rockfall.simulate", "rockfall.stop_job", "rockfall.select_run", "rockfall.remove_simulation",
+        "rockfall.simulate", "rockfall.select_run", "rockfall.remove_simulation",
     )),
     ("playback", "8  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),
     ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),

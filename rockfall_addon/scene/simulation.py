@@ -19,7 +19,7 @@ from ...core.simulation.engine import Simulation
 from ...core.simulation.parabolas import Parabolas, parabolas_of
 from ...core.simulation.results import release_names
 from ...core.vectors import Array
-from . import materials, simulated_nodes, simulated_paths, store, timing, trajectories
+from . import materials, simulated_nodes, simulated_paths, store, timing, trails, trajectories
 
 COLLECTION = "Simulation"
 SINCE, LASTS, RUN, RELEASE = "since_release_s", "lasts_s", "run", "release"
@@ -143,6 +143,7 @@ def remove(scene: bpy.types.Scene) -> None:
     roles = (store.SIMULATED_BLOCKS_ROLE, store.SIMULATED_PATHS_ROLE, store.SIMULATED_PATTERN_ROLE)
     store.remove_objects([obj for role in roles for obj in store.with_role(scene, role)])
     store.remove_collection(scene, COLLECTION)
+    trails.paint_observed(scene)
 
 
 def blocks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -175,6 +176,7 @@ def look(scene: bpy.types.Scene) -> None:
         obj.hide_render = not settings.show_paths
         lines = simulated_paths.lines_of(obj)
         simulated_paths.paint(obj, simulated_paths.colours_of(lines, settings.colour_by, *tops), path_radius(scene))
+    trails.paint_observed(scene)
 
 
 def paths_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:

@@ -107,11 +107,11 @@ def paint(mesh: bpy.types.Mesh, colours: Array) -> None:
 
 
 def paint_observed(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None) -> None:
-    """Colour the real flights as the scene's settings say; all in the real blocks' colour while models are shown.
+    """Colour the real flights as the scene's settings say; all in the real blocks' colour beside those of models.
 
     What passes below the terrain is red in any case, flights that are not up to date are grey.
     """
-    models_shown = bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE))
+    models_shown = bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE)) or beside_models(scene)
     for obj in store.with_role(scene, store.FLIGHTS_ROLE) if objects is None else objects:
         mesh = obj.data
         if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
@@ -125,6 +125,13 @@ def paint_observed(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] |
             if BELOW_ATTRIBUTE in mesh.attributes:
                 colours[_read(mesh, BELOW_ATTRIBUTE).astype(bool)] = BELOW_COLOUR
             paint(mesh, colours)
+
+
+def beside_models(scene: bpy.types.Scene) -> bool:
+    """Whether simulated paths are shown in the colours of their models, so that colours do not mean speeds."""
+    settings = scene.rockfall_simulation
+    coloured = settings.show_paths and settings.colour_by == "MODEL"
+    return coloured and bool(store.with_role(scene, store.SIMULATED_PATHS_ROLE))
 
 
 def set_tops(scene: bpy.types.Scene) -> bool:

@@ -93,7 +93,7 @@ def check_motion(part, scene: bpy.types.Scene, simulations: dict[str, object]) -
                     seen += 1
             gone = ~simulation.at_rest & (simulation.time_s < frame / rate - 1e-3)
             assert len(shown) == len(simulation) - gone.sum(), "one block for each run, until it has left"
-    assert seen > 50
+    assert seen > 40, "eight are in flight at times, and all lie at the end"
 
 
 def test_blocks_are_where_the_core_says_at_every_frame_rate(drawn: bpy.types.Scene, part) -> None:

@@ -118,6 +118,11 @@ def case_simulate_beside_the_real_blocks(window):
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="demo")
     yield 1.0
+    sidebar = window.region("UI")
+    yield from open_panel(window, 733)
+    for y in (733, 509):  # closed again: all are; then this step's
+        yield from window.click(sidebar.x + 90, y)
+        yield 0.7
     settings().number = 5
     settings().models = {"noel_2017", "observed"}
     with window.override():
@@ -126,6 +131,14 @@ def case_simulate_beside_the_real_blocks(window):
     bpy.context.scene.frame_set(130)
     yield 2.0
     window.screenshot("1-demo")
+    light = Path(bpy.utils.system_resource("SCRIPTS")) / "presets" / "interface_theme" / "Blender_Light.xml"
+    with window.override():
+        bpy.ops.script.execute_preset(filepath=str(light), menu_idname="USERPREF_MT_interface_theme_presets")
+    yield 1.0
+    window.screenshot("1-light")
+    with window.override():
+        bpy.ops.preferences.reset_default_theme()
+    yield 0.5
     with window.override():
         bpy.ops.ed.undo()
     yield 1.0
@@ -134,7 +147,7 @@ def case_simulate_beside_the_real_blocks(window):
         bpy.ops.ed.redo()
     yield 1.0
     assert len(shown()) == 2
-    window.screenshot("2-redone")
+    yield from pick_a_path(window, "2-redone")
     settings().number = 1600
     with window.override():
         bpy.ops.rockfall.simulate("INVOKE_DEFAULT")

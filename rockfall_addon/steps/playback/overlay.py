@@ -37,7 +37,7 @@ def _draw() -> None:
     if shown:
         rows = [("observed", OBSERVED_COLOUR), *((MODELS[name].title, MODELS[name].colour) for name in shown)]
         legend.swatches(left, scale, rows, "Real blocks, and where models send them from the same impacts")
-    else:
+    elif not trails.beside_models(scene):
         _draw_speeds(settings, left, scale)
     legend.end()
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The simulated paths over the 3-D view, the selected run, and what their colours mean."""
 
+import blf
 import bpy
 import gpu
 import numpy as np
@@ -17,6 +18,8 @@ FAINTEST, ALONE, MANY = 0.1, 0.9, 5000
 NEARER = 2e-5
 """Lines are drawn so much nearer, in depth, that the ground that they lie on does not speckle them."""
 LEGEND_WIDTH = 250
+CARD_WIDTH, CARD_BELOW = 330, 110
+"""The card of the selected run, and how far below the upper edge it is [px at interface scale 1]."""
 
 _handles: list[object] = []
 _batches: dict[str, tuple[tuple, gpu.types.GPUBatch]] = {}  # by model: what it was made of
@@ -112,11 +115,35 @@ def _draw_selected(points: np.ndarray, scale: float) -> None:
             batch.draw(shader)
 
 
+def _draw_numbers(context: bpy.types.Context, rows: list[tuple[str, str]]) -> None:
+    """What is known of the selected run, on a card in the upper left corner."""
+    scale, theme = context.preferences.system.ui_scale, context.preferences.themes[0].user_interface
+    step, width = 1.5 * legend.TEXT * scale, CARD_WIDTH * scale
+    left = legend.MARGIN * scale + legend.covered_left(context.area)
+    top = context.region.height - CARD_BELOW * scale
+    bottom = top - (len(rows) + 0.6) * step
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    gpu.state.blend_set("ALPHA")
+    shader.uniform_float("color", (*theme.panel_back[:3], 0.9))
+    corners = [(left, bottom), (left + width, bottom), (left, top), (left + width, top)]
+    batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
+    blf.size(0, legend.TEXT * scale)
+    blf.color(0, *theme.panel_text[:3], 1.0)
+    for i, (name, value) in enumerate(rows):
+        y = round(top - (i + 1.1) * step)
+        legend.text(round(left + 0.5 * step), y, name)
+        legend.text(round(left + 0.5 * width), y, value)
+    gpu.state.blend_set("NONE")
+
+
 @problems.guarded
 def _draw_legend() -> None:
     context = bpy.context
     scene = context.scene
     objects = simulation.paths_of(scene)
+    rows = simulation.selected_run(scene)
+    if rows is not None and _shown(context):
+        _draw_numbers(context, rows)
     if not objects or not scene.rockfall.show_legend or not context.space_data.overlay.show_overlays:
         return
     settings, scale = scene.rockfall_simulation, context.preferences.system.ui_scale

@@ -12,6 +12,8 @@ from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 
+import numpy as np
+
 from ..errors import InputError
 from ..impact_models.registry import MODELS, find_model
 from ..remarks import Remark
@@ -24,6 +26,7 @@ from ..vectors import Array
 from ..workflow.simulation import Zones
 from .csv_text import read_table
 from .map_shapes import polygon_of, read_polygons
+from .tables import Columns, write_columns
 
 FRICTION = "friction"
 VALUE_REQUIRED = ("value",)
@@ -113,6 +116,28 @@ def zones_with(cover: ZoneCover, properties: Mapping[str, Mapping[str, object]],
     for name, values in properties.items():
         _take(found, name, values, models, None)
     return _zones(cover, found, models)
+
+
+def write_attribute_zones(zones: Zones, path: str | Path) -> None:
+    """Write the table that `read_attribute_zones` reads, for an attribute that has the zones' numbers from 1 on."""
+    keys = list(
+        dict.fromkeys(
+            f"{model}.{name}"
+            for models in zones.parameters.values()
+            for model, values in models.items()
+            for name in values
+        )
+    )
+    columns: Columns = {
+        "value": [str(number) for number in range(1, len(zones.names))],
+        "name": list(zones.names[1:]),
+        FRICTION: np.array([zones.friction.get(name, np.nan) for name in zones.names[1:]]),
+    }
+    for key in keys:
+        model, _, parameter = key.partition(".")
+        own = [zones.parameters.get(name, {}).get(model, {}) for name in zones.names[1:]]
+        columns[key] = [str(values.get(parameter, "")) for values in own]
+    write_columns(path, columns)
 
 
 def open_zones(

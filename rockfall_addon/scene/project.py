@@ -2,7 +2,7 @@
 """Between project.toml and the scene: what *Load demo* and a film without a window have in common, and the way back."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import bpy
@@ -20,11 +20,16 @@ from ...core.exchange.project import (
     read_project,
     write_project,
 )
+from ...core.exchange.simulation_entry import ZonesEntry
 from ...core.exchange.tables import write_picks
+from ...core.exchange.zones import open_zones, write_attribute_zones
+from ...core.impact_models.registry import COMPARED
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
 from ...core.terrain.shading import shade
+from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
+from ...core.workflow.simulation import Zones
 from . import (
     georeference,
     models,
@@ -32,10 +37,14 @@ from . import (
     project_videos,
     reconstruction,
     simulated_sources,
+    simulated_zones,
     simulation_setup,
     store,
     terrain,
 )
+
+ZONE = "zone"
+"""Attribute of the written terrain's faces: 0 where there is no zone."""
 
 
 def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True) -> Reconstruction | None:
@@ -57,6 +66,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         surface, result = open_terrain(project), None
     else:
         surface, result = open_project(project)
+    zones = _zones(project, surface)
     shading = None if surface is None else shade(surface)
     known = surface.shift if surface is not None else None if result is None else result.picks.shift
     found = project_videos.read_videos(project, known) if with_videos else []
@@ -71,7 +81,9 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in project.render])
     models.keep_parameters(scene, parameters)
     if surface is not None and shading is not None:
-        terrain.add_terrain(scene, surface, shading)
+        tile = terrain.add_terrain(scene, surface, shading)
+        if zones is not None:
+            simulated_zones.keep(scene, zones, tile)
     project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
     if result is not None:
         reconstruction.show(scene, result)
@@ -97,11 +109,17 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         raise RockfallError("There is nothing to export: import a terrain or picks first, or load the demo.")
     settings = reconstruction.project_settings(scene, [] if table is None else table.trajectory.tolist())
     stated = None if surface is None or simulation_setup.missing(scene) else simulated_sources.entry_of(scene)
+    zones = None
+    if surface is not None and stated is not None:
+        zones = simulated_zones.zones_of(scene, surface, stated.models)
     with output_folder(folder) as place:
         if table is not None:
             write_picks(table, place / "picks.csv")
         if surface is not None:
-            write_ply(surface, place / "terrain.ply")
+            write_ply(surface, place / "terrain.ply", None if zones is None else {ZONE: zones.of_face})
+        if zones is not None and stated is not None:
+            write_attribute_zones(zones, place / "zones.csv")
+            stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
         source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
         parameters = models.parameters_of(scene)
         project = Project(
@@ -118,6 +136,16 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         )
         write_project(project, place / "project.toml")
     return folder / "project.toml"
+
+
+def _zones(project: Project, surface: Surface | None) -> Zones | None:
+    entry, source = project.simulation, project.terrain
+    if entry is None or entry.zones is None or surface is None or source is None:
+        return None
+    return open_zones(
+        entry.zones.file, entry.zones.attribute, surface, entry.models or COMPARED,
+        terrain_file=source.file, up=source.up, unit_m=source.unit_m,
+    )  # fmt: skip
 
 
 def _preset(values: dict) -> RenderPreset:

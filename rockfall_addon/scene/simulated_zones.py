@@ -62,6 +62,20 @@ def properties_of(row: bpy.types.PropertyGroup) -> dict[str, object]:
     return found
 
 
+def keep(scene: bpy.types.Scene, zones: Zones, tile: bpy.types.Object) -> None:
+    """The zones of a project as attributes of the faces of its terrain, with their parameters."""
+    rows = scene.rockfall_simulation.zones
+    rows.clear()
+    for number, name in enumerate(zones.names[1:], start=1):
+        attribute = tile.data.attributes.new(name, "BOOLEAN", "FACE")
+        attribute.data.foreach_set("value", zones.of_face == number)
+        row = rows.add()
+        row.name, row.use_friction = attribute.name, name in zones.friction
+        row.friction = zones.friction.get(name, row.friction)
+        values = zones.parameters.get(name, {})
+        row.parameters = ", ".join(f"{model}.{key} = {values[model][key]}" for model in values for key in values[model])
+
+
 def fingerprint(scene: bpy.types.Scene) -> list[object]:
     """Of the zones, their parameters and where they are."""
     found: list[object] = []

@@ -86,6 +86,33 @@ def test_zones_that_change_make_the_result_stale(scan: bpy.types.Scene, part) ->
     assert not setup.is_stale(scan)
 
 
+def test_a_project_keeps_the_zones(scan: bpy.types.Scene, part, tmp_path) -> None:
+    project = part("rockfall_addon.scene.project")
+    tile, settings = tile_of(scan), scan.rockfall_simulation
+    place = np.array([vertex.co for vertex in tile.data.vertices])
+    for friction, parameters, chosen in ((0.8, "rt = 0.4", place[:, 0] > 25), (0.25, "", place[:, 1] < 6)):
+        assert bpy.ops.rockfall.add_zone() == {"FINISHED"}
+        settings.zones[-1].friction, settings.zones[-1].parameters = friction, parameters
+        tile.vertex_groups[settings.zones[-1].name].add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
+    part("rockfall_addon.scene.terrain_mesh").mistrust(tile.data)
+    before = plan(part, scan).scenario
+    path = project.save_project(scan, tmp_path / "project")
+
+    core = part("core.exchange.simulation_project")
+    stated = core.open_simulation(part("core.exchange.project").read_project(path), path)[0]
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    project.load_project(bpy.context.scene, path)
+    after = plan(part, bpy.context.scene).scenario
+    for scenario in (stated, after):
+        assert scenario.zones.names == before.zones.names
+        assert scenario.zones.parameters == before.zones.parameters
+        assert scenario.zones.friction == pytest.approx(before.zones.friction)
+        np.testing.assert_array_equal(
+            scenario.zones.of_face[np.lexsort(middles(scenario.terrain).round(3).T)],
+            before.zones.of_face[np.lexsort(middles(before.terrain).round(3).T)],
+        )
+
+
 def test_zones_that_make_no_sense_are_refused(scan: bpy.types.Scene, part) -> None:
     error = part("core.errors").RockfallError
     assert bpy.ops.rockfall.add_zone() == {"FINISHED"}

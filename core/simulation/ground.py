@@ -15,7 +15,7 @@ from ..remarks import Remark
 from ..terrain.cloud import Cloud, PointIndex, build_point_index, heights_above_points, nearest_points
 from ..terrain.index import TriangleIndex, build_index
 from ..terrain.joining import moved
-from ..terrain.raycast import closest_points, heights_above
+from ..terrain.raycast import cast_rays, closest_points, heights_above
 from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
 from .ground_faults import GroundFaults, ground_faults
@@ -127,6 +127,16 @@ class Ground:
         if isinstance(self.terrain, Cloud):
             return heights_above_points(self.terrain, places)
         return heights_above(self.terrain, places)
+
+    def heights_in_flight(self, places: Array) -> Array:
+        """Height of (n, 3) places of flying blocks over the terrain vertically below them [m], NaN where there is none.
+
+        That they are in the open needs no look upward, and is so for triangles of any winding.
+        """
+        if isinstance(self.terrain, Cloud):
+            return heights_above_points(self.terrain, places)
+        height = cast_rays(self.terrain, places, (0, 0, -1)).distance
+        return np.where(np.isfinite(height), height, np.nan)
 
     def distance(self, places: Array) -> Array:
         """(n,) [m] from the terrain's nearest triangle or point."""

@@ -138,7 +138,7 @@ def sample_runs(simulation: Simulation, step_s: float = STEP_S, progress: Progre
         time_s=time,
         position=position,
         velocity=speed,
-        height_m=simulation.ground.heights_above(position),
+        height_m=simulation.ground.heights_in_flight(position),
         kinetic_j=0.5 * mass * dot(speed, speed),
         shift=simulation.ground.terrain.shift,
     )
@@ -164,6 +164,6 @@ def _greatest_heights(simulation: Simulation) -> Array:
         parts = np.tile(np.linspace(0.0, 1.0, MOMENTS), longest.size)
         start, whole = np.repeat(rows[longest], MOMENTS), np.repeat(duration[longest], MOMENTS)
         place, _ = _on_flight(simulation, start, parts * whole)
-        above = simulation.ground.heights_above(place)
+        above = simulation.ground.heights_in_flight(place)
         np.maximum.at(heights, simulation.records.run[start], np.where(np.isnan(above), -np.inf, above))
     return np.where(np.isfinite(heights), heights, np.nan)

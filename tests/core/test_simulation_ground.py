@@ -9,6 +9,7 @@ from rockfall.core.simulation.engine import IMPACT, Settings, Simulation, simula
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.ground_faults import ground_faults
 from rockfall.core.simulation.release import make_releases
+from rockfall.core.simulation.results import run_figures
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.simulation import remarks_of
 
@@ -70,6 +71,9 @@ def test_both_sides_of_a_triangle_stop_a_block() -> None:
     assert ground_faults(turned).opposed_edges == 15
     run = fall(make_ground(turned))
     same(run, fall(make_ground(surface)))
+    np.testing.assert_allclose(
+        run_figures(run).height_max_m, run_figures(fall(make_ground(surface))).height_max_m, atol=0.05
+    )
     assert "15 edges join triangles of opposite winding; blocks meet both sides alike." in texts(run)
     same(fall(make_ground(sheet(faces=surface.faces[:, ::-1].copy()))), run)
 

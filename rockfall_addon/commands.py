@@ -34,12 +34,12 @@ def run(arguments: list[str]) -> int:
         inside_blender.reset(token)
 
 
-def _make(job: FilmJob, progress: Progress) -> None:
+def _make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     from .steps.film.render import make
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     with _quiet():
-        make(job, progress)
+        return make(job, progress)
 
 
 def _probe_command() -> tuple[str, ...]:

@@ -112,6 +112,8 @@ def run(arguments: argparse.Namespace) -> int:
             parameters=parameters,
         )
         done = maker.film(job, progress)
+    for remark in done.remarks:
+        print(remark)
     print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")
     print(f"Written: {Path(arguments.out) / name}")
     return 0

@@ -20,20 +20,28 @@ LINES_TOLD = 5
 
 
 @dataclass(frozen=True)
+class Film:
+    """What was made: the engine that was used, and sentences on what a user should know of it."""
+
+    engine: str
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class FilmMaker:
     """Who makes films.
 
     Attributes
     ----------
-    make : does a job whose engine is chosen.
+    make : does a job whose engine is chosen; returns the remarks.
     probe : command that runs a Python text, ``{probe}``, in another Blender.
     """
 
-    make: Callable[[FilmJob, Progress], None]
+    make: Callable[[FilmJob, Progress], tuple[str, ...]]
     probe: tuple[str, ...]
 
-    def film(self, job: FilmJob, progress: Progress = silent) -> FilmJob:
-        """Do a job; returns it with the engine that was used.
+    def film(self, job: FilmJob, progress: Progress = silent) -> Film:
+        """Do a job.
 
         Raises
         ------
@@ -42,8 +50,7 @@ class FilmMaker:
         """
         require_blender_libraries()
         chosen = job.with_engine(choose_engine(job.engine, self.probe))
-        self.make(chosen, progress)
-        return chosen
+        return Film(chosen.engine, self.make(chosen, progress))
 
 
 def film_maker() -> FilmMaker:
@@ -67,14 +74,16 @@ inside_blender: ContextVar[FilmMaker | None] = ContextVar("inside_blender", defa
 """Set by the add-on while Blender itself runs a command."""
 
 
-def run_job(command: Sequence[str], name: str, progress: Progress) -> None:
+def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str, ...]:
     """Run a process that makes the file `name`; its standard output tells how far it is (see `film/__main__.py`).
+
+    Returns its remarks.
 
     Raises
     ------
     RockfallError : with what the process says is wrong, or the last lines that it printed when it crashed.
     """
-    problem = ""
+    problem, remarks = "", []
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, encoding="utf-8", errors="replace") as child:
             try:
@@ -84,6 +93,8 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> None:
                     if word == "progress":
                         done, total, text = rest.split(maxsplit=2)
                         progress(text, int(done), int(total))
+                    elif word == "remark":
+                        remarks.append(rest)
                     elif word == "error":
                         problem = rest
                 status = child.wait()
@@ -97,8 +108,10 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> None:
             lines = [line.strip() for line in log if line.strip() and "EGL" not in line][-LINES_TOLD:]
             said = f" It said: {' / '.join(lines)}." if lines else ""
             raise RockfallError(CRASHED.format(name=name, status=status, said=said))
+    return tuple(remarks)
 
 
-def _make(job: FilmJob, progress: Progress) -> None:
+def _make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     package = __name__.partition(".core.")[0]
-    run_job([sys.executable, "-m", f"{package}.rockfall_addon.steps.film", job.to_json()], job.out.name, progress)
+    command = [sys.executable, "-m", f"{package}.rockfall_addon.steps.film", job.to_json()]
+    return run_job(command, job.out.name, progress)

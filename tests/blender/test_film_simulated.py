@@ -229,7 +229,8 @@ def test_a_still_of_the_end_and_a_picture_of_the_slope(rockfall, part, job) -> N
     render, said = part("rockfall_addon.steps.film.render"), []
     for kind in ("still", "slope"):
         made = replace(job, kind=kind, out=job.out.with_name(f"{kind}.png"))
-        render.make(made, lambda *words: said.append(words[0]))
+        remarks = render.make(made, lambda *words: said.append(words[0]))
+        assert all(any(f"6 blocks with {model}" in remark for remark in remarks) for model in MODELS)
         picture = bpy.data.images.load(str(made.out))
         assert tuple(picture.size) == (64, 36)
     assert {f"Simulating {model}" for model in MODELS} <= set(said)

@@ -141,6 +141,7 @@ def test_a_picture_of_the_terrain_is_made_unless_it_is_not_wanted(terrain, tmp_p
     def make(job, progress):
         assert (job.kind, job.source.name, job.title) == ("terrain", "terrain.ply", "plane.asc")
         job.out.write_bytes(b"a picture")
+        return ()
 
     monkeypatch.setattr("rockfall.core.film.maker.require_blender_libraries", lambda: None)
     token = inside_blender.set(FilmMaker(make, ("/no/such/program",)))

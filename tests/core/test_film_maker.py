@@ -56,8 +56,11 @@ def test_the_probe_gets_the_script() -> None:
 
 def test_the_progress_of_a_process_is_reported() -> None:
     seen = []
-    script = "print('progress 0 9 Simulating a model'); print('progress 2 2 Rendering')"
-    run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said))
+    script = (
+        "print('progress 0 9 Simulating a model'); print('progress 2 2 Rendering'); print('remark 3 blocks stopped.')"
+    )
+    remarks = run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said))
+    assert remarks == ("3 blocks stopped.",)
     assert seen == [("Simulating a model", 0, 9), ("Rendering", 2, 2)]
 
 
@@ -110,9 +113,10 @@ def test_a_film_that_succeeds_is_moved_into_place(
 ) -> None:
     jobs = []
 
-    def make(job: FilmJob, report: object) -> None:
+    def make(job: FilmJob, report: object) -> tuple[str, ...]:
         jobs.append(job)
         job.out.write_bytes(b"a film")
+        return ()
 
     monkeypatch.setattr(maker_module, "require_blender_libraries", lambda: None)
     out = project.parent / "film"

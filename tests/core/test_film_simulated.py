@@ -112,9 +112,10 @@ def jobs(monkeypatch: pytest.MonkeyPatch):
     """What Blender is asked to make, which is made at once."""
     asked = []
 
-    def make(job: FilmJob, report: object) -> None:
+    def make(job: FilmJob, report: object) -> tuple[str, ...]:
         asked.append(job)
         job.out.write_bytes(b"a film")
+        return ("2 of 9 blocks were cut off.",)
 
     monkeypatch.setattr(maker_module, "require_blender_libraries", lambda: None)
     token = inside_blender.set(FilmMaker(make, ("/no/such/program",)))
@@ -122,12 +123,15 @@ def jobs(monkeypatch: pytest.MonkeyPatch):
     inside_blender.reset(token)
 
 
-def test_the_command_asks_for_simulated_blocks(project: Path, jobs: list[FilmJob]) -> None:
+def test_the_command_asks_for_simulated_blocks(
+    project: Path, jobs: list[FilmJob], capsys: pytest.CaptureFixture
+) -> None:
     out = str(project.parent / "film")
     asked = ["--simulate", "noel_2017", "--simulate", "stevens_1998", "--simulate", "noel_2017"]
     assert cli.main(["render", str(project), *asked, "--set", "noel_2017.rt=0.5", "--out", out]) == 0
     assert cli.main(["render", str(project), *asked[:2], "--number", "5", "--seed", "9", "--slope", "--out", out]) == 0
     first, second = jobs
+    assert capsys.readouterr().out.startswith("2 of 9 blocks were cut off.")
     assert (first.kind, first.simulate, first.number, first.seed) == ("film", ("noel_2017", "stevens_1998"), 20, 0)
     assert {name: float(value) for name, value in first.parameters["noel_2017"].items()} == {"rt": 0.5}
     assert (second.kind, second.simulate, second.number, second.seed) == ("slope", ("noel_2017",), 5, 9)

@@ -2,7 +2,7 @@
 """Blender as a module, in a process of its own: one job, given as JSON.
 
 Blender prints a lot, so its standard output goes to the error stream. What the parent process reads from our standard
-output are lines "progress DONE TOTAL TEXT", and "error TEXT" for what the user can put right.
+output are lines "progress DONE TOTAL TEXT", "remark TEXT", and "error TEXT" for what the user can put right.
 """
 
 import os
@@ -31,7 +31,10 @@ def main(text: str) -> NoReturn:
     try:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         rockfall_addon.register()
-        make(FilmJob.from_json(text), lambda what, done=0, total=0: say(f"progress {done} {total} {what}"))
+        for remark in make(
+            FilmJob.from_json(text), lambda what, done=0, total=0: say(f"progress {done} {total} {what}")
+        ):
+            say(f"remark {remark}".replace("\n", " "))
     except RockfallError as error:
         say(f"error {error}".replace("\n", " "))
         status = 1

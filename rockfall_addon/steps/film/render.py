@@ -13,20 +13,21 @@ from ....core.film.presets import HD, FilmTiming, find_preset
 from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
 from ....core.simulation.measured_releases import start_times
+from ....core.workflow.simulation import remarks_of
 from ...scene import models, simulation
 from ...scene.project import load_project
 from . import dressing, simulated
 from .engine import use_engine
 
 
-def make(job: FilmJob, progress: Progress) -> None:
-    """Do a job in an empty file, which is filled.
+def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
+    """Do a job in an empty file, which is filled; returns what a user should know of it.
 
     Raises
     ------
     RockfallError : the project is bad, has nothing to show, or the file cannot be written.
     """
-    scene = bpy.context.scene
+    scene, remarks = bpy.context.scene, ()
     if job.kind == "terrain":
         _show_terrain(scene, job)
     else:
@@ -36,7 +37,7 @@ def make(job: FilmJob, progress: Progress) -> None:
         if job.models:
             models.show_models(scene, result, job.models, job.parameters)
         if job.simulate:
-            _simulate(scene, job, project, result, progress)
+            remarks = _simulate(scene, job, project, result, progress)
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:
@@ -49,6 +50,7 @@ def make(job: FilmJob, progress: Progress) -> None:
             scene.frame_set(min(job.frames[0] if job.frames else scene.frame_end, scene.frame_end))
         render_picture(scene, job.out)
         progress("Rendering", 1, 1)
+    return remarks
 
 
 def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | None, progress: Progress) -> None:
@@ -120,12 +122,13 @@ def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Recons
 
 def _simulate(
     scene: bpy.types.Scene, job: FilmJob, project: Project, result: Reconstruction, progress: Progress
-) -> None:
-    """Let blocks fall from the starts of the measured ones, and show them."""
+) -> tuple[str, ...]:
+    """Let blocks fall from the starts of the measured ones, and show them; returns what became of them."""
     starts = {name: simulation.Origin(name, time_s) for name, time_s in start_times(result).items()}
     simulations = fall_beside(job, project, len(starts), progress)
     simulation.show(scene, simulations, starts)
     simulated.show_structures(scene, simulations[0].ground)
+    return tuple(map(str, remarks_of(simulations)))
 
 
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:

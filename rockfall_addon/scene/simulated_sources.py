@@ -81,6 +81,7 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry) -> str:
         settings.drawn = _drawing(scene, releases)
     left_out = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
     left_out += [f"the structure {each.name}" for each in entry.structures]
+    left_out += ["contact with points"] if entry.contact == "points" else []
     left_out += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
     return f"Of the project's simulation Blender leaves out {', '.join(left_out)}." if left_out else ""
 

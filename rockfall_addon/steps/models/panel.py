@@ -5,6 +5,7 @@ import bpy
 
 from ....core.impact_models.registry import MODELS
 from ...scene import models, store
+from ...view import parameters
 from ...view.panel import RockfallPanel, State, paragraph
 
 QUESTION = "Where would the blocks fly if a model were right? Same impacts, same incident velocity."
@@ -40,6 +41,11 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
         own = models.parameters_of(context.scene)
         if own:
             paragraph(context, layout, f"Own parameters: {', '.join(MODELS[name].title for name in own)}", "INFO")
+        for name in shown:
+            header, body = layout.panel(f"ROCKFALL_shown_parameters_{name}", default_closed=True)
+            header.label(text=f"Parameters: {MODELS[name].title}")
+            if body is not None:
+                parameters.draw(body, context.scene, name)
         layout.operator("rockfall.load_parameters", icon="IMPORT")
         if shown:
             layout.operator("rockfall.remove_models", icon="X")

@@ -69,6 +69,13 @@ class Paths:
         return np.searchsorted(self.run, np.arange(len(self) + 1))
 
     @property
+    def struck_piece(self) -> Indices:
+        """(n,) the piece that ends in the first impact of each run; behind all pieces for a run without one."""
+        struck = np.full(len(self), self.run.size)
+        struck[self.run[self.impact_piece][::-1]] = self.impact_piece[::-1]
+        return struck
+
+    @property
     def plan_m(self) -> Array:
         """(k,) length of each piece in plan [m]."""
         return np.hypot(*(self.end - self.start)[:, :2].T)

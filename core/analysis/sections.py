@@ -136,10 +136,7 @@ def crossings(paths: Paths, section: Section, axis: Axis) -> Crossings:
         passages = np.bincount(paths.run[below & (paths.start[:, 2] + rise >= z)], minlength=n)
     runs, nearest = np.unique(paths.run[piece], return_index=True)
     piece = piece[nearest]
-    struck = np.full(n, paths.run.size)
-    hits = paths.impact_piece
-    struck[paths.run[hits][::-1]] = hits[::-1]
-    counts = piece > struck[runs]
+    counts = piece > paths.struck_piece[runs]
     given[runs[~counts]] = True
     crosses = np.zeros(n, dtype=np.bool_)
     crosses[runs[counts]] = True
@@ -189,12 +186,12 @@ def heights_at(ground: Ground, places: Sequence[Array]) -> list[Array]:
 
 @dataclass(frozen=True, eq=False)
 class Extremes:
-    """Of n runs, on the first metres of each.
+    """Of n runs, on the first metres of each, from its first impact on.
 
     Attributes
     ----------
-    v_max_mps, height_max_m : (n,) greatest speed, and greatest height of the underside above the terrain; NaN for the
-        latter without a flight over the terrain.
+    v_max_mps, height_max_m : (n,) greatest speed, and greatest height of the underside above the terrain; NaN for a run
+        without an impact there, and for the latter without a flight over the terrain.
     """
 
     v_max_mps: Array
@@ -202,15 +199,15 @@ class Extremes:
 
 
 def extremes(paths: Paths, length_m: Array, ground: Ground) -> Extremes:
-    """The greatest speed and height of each run on its first (n,) metres in plan."""
+    """The greatest speed and height of each run on its first (n,) metres in plan, without the flight that is given."""
     n, plan, travelled = len(paths), paths.plan_m, paths.travelled_m
     reach = length_m[paths.run]
-    inside = np.flatnonzero((travelled < reach) | (paths.time_s == 0))
+    inside = np.flatnonzero((travelled < reach) & (np.arange(paths.run.size) > paths.struck_piece[paths.run]))
     share = np.clip((reach - travelled)[inside] / np.where(plan > 0, plan, np.inf)[inside], 0.0, 1.0)
     share[plan[inside] == 0] = 1.0
     until = paths.when_across(inside, share)
     _, last = paths.states(inside, until)
-    v_max = np.zeros(n)
+    v_max = np.full(n, -np.inf)
     np.maximum.at(v_max, paths.run[inside], np.maximum(norm(paths.start_velocity[inside]), norm(last)))
     flying = paths.flies[inside] & (until > 0)
     rows, lasts = inside[flying], until[flying]
@@ -224,7 +221,7 @@ def extremes(paths: Paths, length_m: Array, ground: Ground) -> Extremes:
     (above,) = heights_at(ground, [place])
     height = np.full(n, -np.inf)
     np.maximum.at(height, paths.run[piece], np.where(np.isnan(above), -np.inf, above))
-    return Extremes(v_max, np.where(np.isfinite(height), height, np.nan))
+    return Extremes(*(np.where(np.isfinite(each), each, np.nan) for each in (v_max, height)))
 
 
 def impacts_apart(paths: Paths, shortest_s: float) -> Indices:

@@ -194,9 +194,11 @@ def test_greatest_values_on_the_stretch_that_was_seen(ground: Ground) -> None:
     whole = extremes(paths, np.array([99.0]), make_ground(flat))
     assert whole.height_max_m == pytest.approx(G * 4 / 8)
     assert whole.v_max_mps == pytest.approx(np.hypot(4.0, G))
-    part = extremes(paths, np.array([4.0]), make_ground(flat))
-    assert part.height_max_m == pytest.approx(G / 8)
-    assert part.v_max_mps == pytest.approx(np.hypot(4.0, G / 2))
+    part = extremes(paths, np.array([6.0]), make_ground(flat))  # half a second of the second hop
+    assert part.height_max_m == pytest.approx(G * 0.5 - G / 8)
+    assert part.v_max_mps == pytest.approx(np.hypot(4.0, G))
+    first = extremes(paths, np.array([4.0]), make_ground(flat))  # which is given, and says nothing of a model
+    assert np.isnan([first.v_max_mps, first.height_max_m]).all()
 
 
 def test_simulated_flights_through_air_end_where_the_simulation_says(ground: Ground) -> None:

@@ -262,6 +262,16 @@ def test_what_cannot_be_is_refused_in_words_and_changes_nothing(drawn: bpy.types
     assert not of_role(drawn, "simulated_blocks")
 
 
+def test_a_deleted_terrain_leaves_what_is_shown_and_says_so(drawn: bpy.types.Scene, part) -> None:
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    bpy.data.objects.remove(next(obj for obj in drawn.objects if obj.get("rockfall_role") == "terrain"))
+    assert len(of_role(drawn, "simulated_blocks")) == 2
+    assert part("rockfall_addon.scene.simulation_setup").is_stale(drawn)
+    assert bpy.types.ROCKFALL_PT_simulation.poll(bpy.context)
+    assert bpy.ops.rockfall.remove_simulation() == {"FINISHED"}
+    assert not bpy.types.ROCKFALL_PT_simulation.poll(bpy.context)
+
+
 def test_without_terrain_there_is_nothing_to_fall_on(drawn: bpy.types.Scene) -> None:
     terrain = next(obj for obj in drawn.objects if obj.get("rockfall_role") == "terrain")
     bpy.data.objects.remove(terrain)

@@ -15,7 +15,11 @@ class ROCKFALL_PT_simulation(RockfallPanel, bpy.types.Panel):
     bl_label = "7  Simulation"
     bl_idname = "ROCKFALL_PT_simulation"
     bl_options = {"DEFAULT_CLOSED"}
-    needs = store.TERRAIN_ROLE
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        roles = (store.TERRAIN_ROLE, store.SIMULATED_BLOCKS_ROLE)  # what is shown can be removed without a terrain
+        return any(store.with_role(context.scene, role) for role in roles)
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

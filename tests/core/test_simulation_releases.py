@@ -19,6 +19,7 @@ from rockfall.core.simulation.release import placed_on
 from rockfall.core.simulation.release_sources import in_polygon, on_line, on_points, steeper_than
 from rockfall.core.terrain.raycast import closest_points, heights_above
 from rockfall.core.terrain.surface import Surface
+from scipy import stats
 
 SMALL = block_of("sphere", 0.2, 0.2, 0.2)
 
@@ -80,6 +81,19 @@ def test_a_wall_of_85_degrees_has_as_many_on_a_square_metre_as_a_slope_of_45(cli
     per_m2 = counts / (np.array([30, 30, 10]) * 40)
     np.testing.assert_allclose(per_m2 / per_m2.mean(), 1.0, atol=0.05)
     assert made.position[abs(dip - 110) < 1, 2].max() < -40  # below the overhang's face, not on top
+
+
+def test_places_are_uniform_within_large_triangles() -> None:
+    """Two triangles of 40 m and their parts in a polygon: both coordinates are uniform, and do not go together."""
+    ground = make_ground(strip([(0.0, 0.0), (40.0, -40.0)], steps=1, cuts=1))
+    lift = 0.1 / np.sqrt(2)
+    everywhere = steeper_than(ground, np.radians(40), SMALL, 4000, 3).position - [lift, 0, 0]
+    some = in_polygon(ground, [square(10, 5, 30, 35)], SMALL, 4000, 3).position - [lift, 0, 0]
+    for places, low, high in ((everywhere, (0, 0), (40, 40)), (some, (10, 5), (30, 35))):
+        for axis in range(2):
+            law = stats.uniform(low[axis], high[axis] - low[axis])
+            assert stats.kstest(places[:, axis], law.cdf).pvalue > 1e-3
+        assert abs(np.corrcoef(places[:, :2].T)[0, 1]) < 0.06
 
 
 def test_polygons_have_as_many_on_each_square_metre_of_the_terrain(cliff: Ground) -> None:

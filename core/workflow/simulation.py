@@ -244,15 +244,15 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
 def _fault_sentences(ground: Ground) -> list[str]:
     """What is wrong with the triangles, and how blocks meet them."""
     faults = ground.faults
-    counted = [(ground.flat, "triangles without area were left out.")]
+    counted = [(ground.flat, "Triangles without area", "they were left out")]
     if faults is not None:
         counted += [
-            (faults.twice, "triangles are there twice; blocks meet them as one."),
-            (faults.opposed_edges, "edges join triangles of opposite winding; blocks meet both sides alike."),
-            (faults.branching_edges, "edges belong to more than two triangles; blocks meet each of them."),
-            (faults.spikes, "vertices stick out as spikes; blocks meet them as they are."),
+            (faults.twice, "Triangles that are there twice", "blocks meet them as one"),
+            (faults.opposed_edges, "Edges between triangles of opposite winding", "blocks meet both sides alike"),
+            (faults.branching_edges, "Edges of more than two triangles", "blocks meet each of them"),
+            (faults.spikes, "Spikes in the terrain", "blocks meet them as they are"),
         ]
-    return [f"{count} {text}" for count, text in counted if count]
+    return [f"{what}: {count}; {treatment}." for count, what, treatment in counted if count]
 
 
 def _not_met(simulations: Sequence[Simulation]) -> list[str]:

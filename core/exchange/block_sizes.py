@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..simulation.block_shapes import Shape
 from ..simulation.blocks import Blocks, MeasuredSizes, block_of
-from ..simulation.distributions import parse_distribution
+from ..simulation.distributions import Distribution, parse_distribution
 from ..vectors import Mask
 from .csv_text import read_table
 
@@ -55,7 +55,7 @@ def parse_blocks(diameter: str, density: str, shape: Shape | None) -> Blocks:
     ------
     InputError : none of these forms; see `Distribution`, `Blocks`, `read_sizes`.
     """
-    dense = parse_distribution(density)
+    dense = _law("density", density)
     three = THREE.match(diameter)
     if three:
         try:
@@ -69,4 +69,11 @@ def parse_blocks(diameter: str, density: str, shape: Shape | None) -> Blocks:
         sizes = read_sizes(diameter)
         solid = bool((sizes.axes_m != sizes.axes_m[:, :1]).any())
         return Blocks(shape or ("ellipsoid" if solid else "sphere"), density=dense, measured=sizes)
-    return Blocks(shape or "sphere", parse_distribution(diameter), density=dense)
+    return Blocks(shape or "sphere", _law("diameter", diameter), density=dense)
+
+
+def _law(what: str, text: str) -> Distribution:
+    try:
+        return parse_distribution(text)
+    except InputError as error:
+        raise InputError(f"The {what} cannot be {text}. {error.problem}", advice=error.advice) from error

@@ -160,7 +160,7 @@ def test_zones_have_parameters_of_their_own(simulate, tmp_path: Path, capsys) ->
         (("--steeper-than", "50", "--diameter", "normal:0.1,1"), "below a tenth of its mean"),
         (("--steeper-than", "50", "--diameter", "1x2"), "no number and no law"),
         (("--steeper-than", "50", "--diameter", "1x2xwide"), "not three diameters"),
-        (("--steeper-than", "50", "--density", "0"), "not above zero"),
+        (("--steeper-than", "50", "--density", "0"), "The density cannot be 0. The value of 0 is not above zero"),
         (("--steeper-than", "50", "--shape", "cube", "--proportions", "3:2:1"), "three equal diameters"),
         (("--steeper-than", "50", "--shape", "box", "--proportions", "3:2"), "not three numbers"),
         (("--steeper-than", "50", "--evenly"), "--evenly goes with --from-line"),

@@ -8,7 +8,11 @@ import numpy as np
 
 from ..core.constants import GRAVITY_MPS2
 from ..core.georeference import GlobalShift
+from ..core.impact_models.registry import COMPARED
 from ..core.reconstruction.free_flight import fly
+from ..core.simulation.engine import Settings, simulate
+from ..core.simulation.ground import make_ground
+from ..core.simulation.release import make_releases, placed_on
 from ..core.terrain.orientation import block_scale_normals
 from ..core.terrain.raycast import cast_rays, closest_points
 from ..core.terrain.surface import Surface
@@ -31,3 +35,6 @@ def _compile() -> None:
     closest_points(plane, above)
     block_scale_normals(plane, above, 0.3)
     fly(above, above, np.ones(1), GRAVITY_MPS2, np.ones(1))
+    ground = make_ground(plane)
+    place = placed_on(ground, above[:, :2], np.array([0.1]))
+    simulate(ground, make_releases(place, diameter_m=0.1), Settings(COMPARED[0]), threads=1)

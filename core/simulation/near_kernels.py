@@ -11,7 +11,7 @@ from math import inf, sqrt
 
 from ..compiled import kernel
 from ..terrain.kernels import box_distance2, closest_on_triangle, nearest_point
-from .contact_kernels import enter_node, first_root, prepared, touch, triangle_box
+from .contact_kernels import TOUCHING_M, enter_node, first_root, prepared, touch, triangle_box
 
 NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD, MOST_NEIGHBOURHOOD = 6.0, 2.5, 100.0
 """How many radii around a block are looked up: the first time, at least, at most."""
@@ -86,14 +86,14 @@ def inside(nearby, p, speed, bend, radius):  # type: ignore[no-untyped-def]
 
 @kernel
 def closest_near(tree, stack, p, radius, nearby):  # type: ignore[no-untyped-def]
-    """The closest point of the terrain within twice the radius: (x, y, z, squared distance, place)."""
+    """Where the terrain is closest to a sphere that touches it: (x, y, z, squared distance, place), place −1 if not."""
     near, boxes, around = nearby
     if around[0] < 0.0 or away(around, p) + 2.0 * radius > around[4]:
         look_around(tree, stack, p, radius, nearby)
         if around[0] < 0.0:
-            return nearest_point(tree, stack, p, 2.0 * radius)
+            return nearest_point(tree, stack, p, radius + 2.0 * TOUCHING_M)
     corners = tree[3]
-    best, place = 4.0 * radius * radius, -1
+    best, place = (radius + 2.0 * TOUCHING_M) ** 2, -1
     qx, qy, qz = 0.0, 0.0, 0.0
     for k in range(int(around[0])):
         if box_distance2(boxes, k, p[0], p[1], p[2]) < best:

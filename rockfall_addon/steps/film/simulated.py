@@ -6,6 +6,7 @@ from itertools import pairwise
 import bpy
 import numpy as np
 
+from ....core.film.engines import IDENTIFIERS
 from ....core.film.simulated import MEASURED_COLOUR, Group, group_name, path_opacity
 from ....core.impact_models.registry import find_model
 from ....core.simulation.engine import ENDS, LEFT_TERRAIN, STOPPED
@@ -18,6 +19,8 @@ from .motions import Motion
 PATH_PART = 0.35
 """Width of a simulated path, as a part of that of a measured one."""
 COLOUR, STRUCTURE_COLOUR = "colour", (0.72, 0.74, 0.80)
+OPAQUE_PART = 0.5
+"""In Workbench, which lets nothing through, paths are thinner by this."""
 OUTER = 0.02
 """Part of the simulated paths' points that may be outside of the picture on each side."""
 SIDES = 3
@@ -82,6 +85,8 @@ def make_paths(scene: bpy.types.Scene, radius_m: float, *, until_now: bool) -> l
     made: list[bpy.types.Object] = []
     if not scene.rockfall_simulation.show_paths:
         return made
+    if scene.render.engine == IDENTIFIERS["workbench"]:
+        radius_m *= OPAQUE_PART
     opacity = path_opacity(sum(len(obj.data.curves) for obj in simulation.paths_of(scene)))
     for obj in simulation.paths_of(scene):
         lines = simulated_paths.lines_of(obj)

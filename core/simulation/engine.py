@@ -78,8 +78,8 @@ class Settings:
 class Records:
     """k moments of all runs, in the order of the runs and of time.
 
-    Between two of them a block flies. Only before an `ON_GROUND`, where all is recorded, its acceleration is constant:
-    from v2 of the first to v1 of the second.
+    Between two of them a block flies; before an `ON_GROUND` it keeps to the ground. There, where all is recorded, its
+    acceleration is nearly constant from v2 of the first to v1 of the second; `parabolas` follows it.
 
     Attributes
     ----------

@@ -2,7 +2,7 @@
 """What blocks fall on: the terrain, structures that stand on it, and zones with parameters of their own."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -89,10 +89,10 @@ class Ground:
 
     @cached_property
     def point_index(self) -> PointIndex:
-        """The spatial index of all points; the terrain's own where nothing was added."""
+        """The spatial index of all points, with the spacing of the coarsest cloud; the terrain's own if it is alone."""
         if isinstance(self.terrain, Cloud) and self.points is self.terrain.points:
             return self.terrain.index
-        return build_point_index(self.points)
+        return replace(build_point_index(self.points), spacing_m=max(self.spacing_m.values()))
 
     @property
     def tree(self) -> Any:

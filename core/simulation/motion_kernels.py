@@ -386,6 +386,8 @@ def run_block(  # type: ignore[no-untyped-def]
                     if record >= IMPACTS:
                         _write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
                         count += 1
+                    if drag > 0.0:  # from off the ground: where it touches, its flight would end at once
+                        p, v, time, length = free, falling, time + dt, length + speed * dt
                     continue
                 turned, at_edge = _along(turned, e), False
         if moves:

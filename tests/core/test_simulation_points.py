@@ -12,6 +12,7 @@ from rockfall.core.errors import InputError
 from rockfall.core.exchange.csv_text import read_table
 from rockfall.core.exchange.project import read_project, write_project
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import ENDS, IMPACT, Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
@@ -213,11 +214,18 @@ def one_surface(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ground]:
     return {"mesh": make_ground(mesh), "cloud": make_ground(cloud), "grid": make_ground(grid)}
 
 
-def fall_on(ground: Ground, model: str = "noel_2017", count: int = 400, diameter: float = 1.5, **more) -> Simulation:
+def fall_on(
+    ground: Ground,
+    model: str = "noel_2017",
+    count: int = 400,
+    diameter: float = 1.5,
+    drag: Drag | None = None,
+    **more,
+) -> Simulation:
     rng = np.random.default_rng(1)
     plan = rng.uniform([6, 8], [20, WIDTH - 8], (count, 2))
     start = np.column_stack([plan, survey_height(*plan.T) + diameter + 0.5])
-    return simulate(ground, make_releases(start, diameter_m=diameter), Settings(model, seed=3), **more)
+    return simulate(ground, make_releases(start, diameter_m=diameter), Settings(model, drag=drag, seed=3), **more)
 
 
 def run_out(run: Simulation) -> np.ndarray:
@@ -235,6 +243,10 @@ def test_mesh_cloud_and_grid_of_one_surface_give_the_same_run_out(one_surface: d
     for name in ("cloud", "grid"):
         assert ks_2samp(run_out(runs[name]), run_out(runs["mesh"])).pvalue > 0.05
         assert np.median(run_out(runs[name])) == pytest.approx(np.median(run_out(runs["mesh"])), rel=0.03)
+    thick = Drag(air_density=200.0)  # that of air is hardly felt on such a slope
+    slowed = {name: fall_on(one_surface[name], drag=thick) for name in ("cloud", "mesh")}
+    assert ks_2samp(run_out(slowed["cloud"]), run_out(slowed["mesh"])).pvalue > 0.05
+    assert np.median(slowed["mesh"].v_max_mps) < 0.9 * np.median(runs["mesh"].v_max_mps)
     small = fall_on(one_surface["cloud"], diameter=0.5)
     assert ks_2samp(run_out(small), run_out(runs["mesh"])).pvalue < 1e-3
 

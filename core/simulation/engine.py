@@ -215,6 +215,7 @@ def simulate(
 
     from .motion_kernels import COLUMNS
 
+    progress("Compiling where needed, then simulating", 0, n)
     run_blocks = _compiled_runs(tree)
     columns = (
         releases.position, releases.velocity, releases.angular_velocity, releases.radius_m, releases.mass_kg,

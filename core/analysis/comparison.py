@@ -43,6 +43,7 @@ class Predictions:
     skipped : (row, reason) of the impacts that could not be compared.
     measured : what the models that draw from measured impacts drew from; None without such a model. No impact is
         predicted from its own trajectory.
+    runs : column → (m,) which run of a simulation each impact is of, as in `Impacts.runs`.
     beyond : (m,) whether an impact is beyond the conditions that these were measured under; None without such a model.
     """
 
@@ -67,6 +68,7 @@ class Predictions:
     skipped: tuple[tuple[int, str], ...] = ()
     measured: MeasuredRebounds | None = None
     beyond: Mask | None = None
+    runs: Mapping[str, Names] = field(default_factory=dict)
 
     @property
     def replicates(self) -> int:
@@ -103,7 +105,7 @@ def compare(
     models : names.
     replicates : runs with chance, besides the mean.
     seed : not negative. A trajectory's random numbers depend on it, on the model and on the names of site and
-        trajectory: not on the other models and trajectories, nor on their order, and with more replicates the first
+        trajectory (and run): not on the other models and trajectories, nor on their order, and with more replicates the first
         ones stay.
     spin, radius_m : see `find_courses`.
     measured : what a model that draws from measured impacts draws from, None for the compared impacts themselves. The
@@ -151,7 +153,7 @@ def predict(
     else:
         measured = None
     for i, model in enumerate(chosen):
-        draws = random_numbers(model, courses, site, trajectory, replicates if model.is_random else 0, seed)
+        draws = random_numbers(model, courses, impacts, replicates if model.is_random else 0, seed)
         if measured is not None and model.draws_from_impacts:
             found = chain_from_others(model, settings[model.name], measured, courses, site, trajectory, draws)
             omega1[i], v2[i], omega2[i], beyond = found
@@ -186,17 +188,19 @@ def predict(
         skipped=courses.skipped,
         measured=measured,
         beyond=beyond,
+        runs={name: column[courses.row] for name, column in impacts.runs.items()},
     )
 
 
-def random_numbers(
-    model: ImpactModel, courses: Courses, site: Names, trajectory: Names, replicates: int, seed: int
-) -> Array:
-    """(1 + replicates, m, draws) uniform numbers, one stream for each trajectory; the first run is NaN, the mean."""
+def random_numbers(model: ImpactModel, courses: Courses, impacts: Impacts, replicates: int, seed: int) -> Array:
+    """(1 + replicates, m, draws) uniform numbers, one stream for each fall; the first run is NaN, the mean."""
     draws = np.full((1 + replicates, len(courses), model.draws), np.nan)
     if replicates:
+        runs = impacts.runs.values()
         for start, stop in zip(courses.first[:-1], courses.first[1:], strict=True):
-            name = "\0".join((model.name, str(site[start]), str(trajectory[start])))
+            row = courses.row[start]
+            run = (str(column[row]) for column in runs if column[row] != "")
+            name = "\0".join((model.name, str(impacts.site[row]), str(impacts.trajectory[row]), *run))
             words = np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")
             stream = np.random.default_rng([seed, *words.tolist()])
             draws[1:, start:stop] = stream.random((replicates, stop - start, model.draws))

@@ -117,9 +117,9 @@ def find_courses(impacts: Impacts, spin: Spin = "rolling", radius_m: float | Non
 
 
 def _in_time(impacts: Impacts) -> tuple[Indices, Mask]:
-    """The rows grouped by site and trajectory and in time order; whether a row has the trajectory of the one before."""
-    number: dict[tuple[str, str], int] = {}
-    names = zip(impacts.site.tolist(), impacts.trajectory.tolist(), strict=True)
+    """The rows grouped by fall and in time order; whether a row is of the fall of the one before."""
+    number: dict[tuple[str, ...], int] = {}
+    names = zip(*(column.tolist() for column in impacts.falls), strict=True)
     code = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
     order = np.lexsort((impacts.impact, impacts.time_s, code))
     return order, np.r_[False, np.diff(code[order]) == 0]

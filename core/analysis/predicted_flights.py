@@ -5,7 +5,7 @@ The comparison of Noël et al. 2018, § 5, flight by flight: same impact, same i
 restituted velocity instead of the measured one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -43,6 +43,7 @@ class PredictedFlights:
     measured_duration_s, measured_height_m : (n,) of the real flight; NaN where the next impact is not known.
     measured_landing : (n, 3) the next measured impact [m].
     shift : of the local frame.
+    runs : column → (n,) which run of a simulation the impact is of, as in `Impacts.runs`.
     """
 
     model: Names
@@ -62,6 +63,7 @@ class PredictedFlights:
     measured_landing: Array
     measured_height_m: Array
     shift: GlobalShift = field(default_factory=GlobalShift)
+    runs: Mapping[str, Names] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return self.time_s.size
@@ -198,6 +200,7 @@ def fly_predictions(
         measured_landing=measured_landing[rows],
         measured_height_m=np.tile(measured_height, kinds),
         shift=surface.shift,
+        runs={name: column[rows] for name, column in impacts.runs.items()},
     )
 
 
@@ -208,7 +211,8 @@ def select(flights: PredictedFlights, which: Indices | Mask) -> PredictedFlights
         name: value[which] for name, value in vars(flights).items() if isinstance(value, np.ndarray)
     }
     launches = Launches(start.position[which], start.velocity[which], start.drag_per_m[which], start.gravity_mps2)
-    return replace(flights, launches=launches, **arrays)
+    runs = {name: column[which] for name, column in flights.runs.items()}
+    return replace(flights, launches=launches, runs=runs, **arrays)
 
 
 def score_landings(flights: PredictedFlights) -> tuple[LandingScore, ...]:
@@ -229,12 +233,12 @@ def _measured_flights(impacts: Impacts) -> tuple[Array, Indices]:
     """(n,) duration of the real flight from each impact to the next [s], and the next one's row; NaN and −1 without."""
     n = len(impacts)
     duration, follower = np.full(n, np.nan), np.full(n, -1, dtype=np.intp)
-    keys = zip(impacts.site.tolist(), impacts.trajectory.tolist(), impacts.impact.tolist(), strict=True)
+    keys = zip(*(column.tolist() for column in impacts.falls), impacts.impact.tolist(), strict=True)
     place = {key: i for i, key in enumerate(keys)}
     known1, known2 = (np.isfinite(norm(values)) for values in (impacts.v1, impacts.v2))
     gap = impacts.flags["gap"]
-    for (site, trajectory, number), i in place.items():
-        j = place.get((site, trajectory, number + 1), -1)
+    for (*fall, number), i in place.items():
+        j = place.get((*fall, number + 1), -1)
         if j >= 0 and known2[i] and known1[j] and not gap[i] and not gap[j]:
             duration[i], follower[i] = impacts.time_s[j] - impacts.time_s[i], j
     return duration, follower

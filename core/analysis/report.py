@@ -88,7 +88,8 @@ def looks() -> dict[str, Any]:
 def summary(predictions: Predictions, total: int, origin: str = "", chance: bool = True) -> str:
     """One sentence on what is compared; with the number of replicates, if `chance`."""
     drawn = f", and {predictions.replicates} replicates" if chance and predictions.replicates else ""
-    runs = len(set(zip(predictions.site.tolist(), predictions.trajectory.tolist(), strict=True)))
+    columns = (predictions.site, predictions.trajectory, *predictions.runs.values())
+    runs = len(set(zip(*(column.tolist() for column in columns), strict=True)))
     of = f" of {origin}" if origin else ""
     models = len(predictions.models)
     return (

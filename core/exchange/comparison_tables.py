@@ -11,7 +11,7 @@ import tomli_w
 from ..analysis.comparison import Predictions
 from ..analysis.scores import Score
 from ..errors import InputError
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import RUN, Impacts
 from ..vectors import Array
 from .csv_text import TextTable, read_table
 
@@ -19,27 +19,27 @@ V2 = ("v2x_mps", "v2y_mps", "v2z_mps")
 OMEGA2 = ("omega2x_radps", "omega2y_radps", "omega2z_radps")
 SCALARS = ("vn2_mps", "vt2_mps", "rn", "rt", "r", "theta_dev_deg")
 PREDICTIONS_COLUMNS = ("model", "replicate", "trajectory", "impact", *V2, *OMEGA2, *SCALARS, "flags")
-"""The columns of predictions.csv; a table of several sites has one more, site."""
+"""The columns of predictions.csv; a table of several sites has one more, site, one of simulated impacts `RUN`."""
 INTO_GROUND = "into_ground"
 
 
 def write_predictions(predictions: Predictions, path: str | Path) -> None:
     """Write predictions.csv, model by model and run by run."""
     several = len(set(predictions.site.tolist())) > 1
-    places = zip(predictions.trajectory.tolist(), predictions.impact.tolist(), predictions.site.tolist(), strict=True)
-    names = [(str(trajectory), str(impact), str(site)) for trajectory, impact, site in places]
+    last = ({"site": predictions.site} if several else {}) | dict(predictions.runs)
+    places = (predictions.trajectory, predictions.impact, *last.values())
+    names = list(zip(*(column.tolist() for column in places), strict=True))
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow((*PREDICTIONS_COLUMNS, "site") if several else PREDICTIONS_COLUMNS)
+        writer.writerow((*PREDICTIONS_COLUMNS, *last))
         for i, model in enumerate(predictions.models):
             for run in range(1 + predictions.replicates):
                 columns = _columns(predictions, i, run)
                 flags = [INTO_GROUND if into else "" for into in predictions.into_ground[i, run].tolist()]
-                for (trajectory, impact, site), cells, flag in zip(
+                for (trajectory, impact, *more), cells, flag in zip(
                     names, zip(*columns, strict=True), flags, strict=True
                 ):
-                    row = (model, run, trajectory, impact, *cells, flag)
-                    writer.writerow((*row, site) if several else row)
+                    writer.writerow((model, run, trajectory, impact, *cells, flag, *more))
 
 
 def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
@@ -50,7 +50,7 @@ def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
     InputError : anything that is wrong with the table; a row that belongs to no impact; a model that has not the same
         runs and impacts as the first.
     """
-    table = read_table(path, PREDICTIONS_COLUMNS[:4] + V2, (*PREDICTIONS_COLUMNS, "site"))
+    table = read_table(path, PREDICTIONS_COLUMNS[:4] + V2, (*PREDICTIONS_COLUMNS, "site", *RUN))
     where = _rows_of_impacts(table, impacts)
     names, replicate = table.text("model"), table.numbers("replicate", required=True).astype(np.intp)
     models = tuple(dict.fromkeys(names))
@@ -90,6 +90,7 @@ def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
         rt=of(table.numbers("rt")),
         r=of(table.numbers("r")),
         theta_dev=np.radians(of(table.numbers("theta_dev_deg"))),
+        runs={name: column[rows] for name, column in impacts.runs.items()},
     )
 
 
@@ -125,15 +126,15 @@ def _columns(predictions: Predictions, i: int, run: int) -> list[list[str]]:
 
 def _rows_of_impacts(table: TextTable, impacts: Impacts) -> np.ndarray:
     """(n,) row of the impact that each row of the table belongs to."""
-    sites = impacts.site.tolist() if "site" in table.columns else [""] * len(impacts)
-    keys = zip(sites, impacts.trajectory.tolist(), impacts.impact.tolist(), strict=True)
+    last = {name: column for name, column in ({"site": impacts.site} | impacts.runs).items() if name in table.columns}
+    keys = zip(*(one.tolist() for one in (impacts.impact, impacts.trajectory, *last.values())), strict=True)
     known = {key: i for i, key in enumerate(keys)}
     numbers = table.numbers("impact", required=True)
     where = np.empty(len(table), dtype=np.intp)
-    for i, (site, name) in enumerate(zip(table.text("site"), table.text("trajectory"), strict=True)):
-        key = (site, name, int(numbers[i]))
+    for i, names in enumerate(zip(*map(table.text, ("trajectory", *last)), strict=True)):
+        key = (int(numbers[i]), *names)
         if key not in known:
-            raise table.error(i, f"There is no impact {key[2]} in the table of impacts", "Give the impacts they are of")
+            raise table.error(i, f"There is no impact {key[0]} in the table of impacts", "Give the impacts they are of")
         where[i] = known[key]
     return where
 

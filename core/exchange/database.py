@@ -110,6 +110,8 @@ def read_source(path: str | Path, site: str = "", licence: str = "") -> Database
     if (sites == "").any():
         raise InputError("There is a row that names no site", file=path, advice="Fill the column site, or give --site")
     extra = {name: cells for name, cells in impacts.extra.items() if name != SOURCE}
+    if "run" in extra and SOURCE in impacts.extra:
+        extra.setdefault("simulated_with", impacts.extra[SOURCE])
     source = Source(
         path.name,
         digest(path),

@@ -112,8 +112,9 @@ def read_package(path: str | Path) -> Database:
 
 
 def _primary_key(database: Database) -> dict[str, list[str]]:
-    key = ("site", "trajectory", "impact")
-    unique = len(codes(*(getattr(database.impacts, name) for name in key))[0]) == len(database)
+    impacts = database.impacts
+    key = ("site", "trajectory", *impacts.runs, "impact")
+    unique = len(codes(*impacts.falls, impacts.impact)[0]) == len(database)
     return {"primaryKey": list(key)} if unique else {}
 
 

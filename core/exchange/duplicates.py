@@ -40,9 +40,9 @@ def find_duplicates(impacts: Impacts) -> Duplicates:
     """All rows that repeat an earlier one.
 
     Two impacts are the same when site, trajectory, time and place agree (`SAME_TIME_S`, `SAME_PLACE_M`); or, under any
-    names, when both velocities and the normal do, to `EXACT`.
+    names, when both velocities and the normal do, to `EXACT`. Those of different runs of a simulation never are.
     """
-    _, code = codes(impacts.site, impacts.trajectory)
+    _, code = codes(*impacts.falls)
     first = np.arange(len(impacts), dtype=np.intp)
     for found in (_same_values(impacts), _same_place(impacts, code)):
         first = np.minimum(first, found)
@@ -62,6 +62,9 @@ def _same_values(impacts: Impacts) -> Indices:
     values = np.concatenate([impacts.v1, impacts.v2, impacts.normal], axis=1)
     known = np.flatnonzero(np.isfinite(values).all(axis=1))
     whole = np.round(values[known] / EXACT).astype(np.int64)
+    if impacts.runs:
+        _, run = codes(*impacts.runs.values())
+        whole = np.column_stack([whole, run[known]])
     order = np.argsort(_hashed(whole), kind="stable")
     near = (np.diff(whole[order], axis=0) == 0).all(axis=1)
     first = np.arange(len(impacts), dtype=np.intp)

@@ -34,5 +34,6 @@ def write_predicted_flights(flights: PredictedFlights, path: str | Path) -> None
         "measured_height_m": flights.measured_height_m,
         **{name: getattr(flights, name) for name in DERIVED},
         "flags": [";".join(name for name, here in zip(FLAGS, row, strict=True) if here) for row in marks],
+        **flights.runs,
     }
     write_columns(path, columns)

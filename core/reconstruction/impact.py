@@ -25,6 +25,9 @@ FLAGS = (
 """In the order in which they are written. The last four say why a part is undefined, or repeat the pick's status."""
 
 DeviationForm = Literal["signed", "as_printed"]
+RUN = ("run", "source", "simulated_with")
+"""Further columns of a table with simulated blocks: the run, and its model, in a database simulated_with."""
+
 CACHED_ROWS = 4096
 """Rows whose intermediate results stay in the processor's cache."""
 
@@ -165,6 +168,19 @@ class Impacts:
     def complete(self) -> Mask:
         """(n,) impacts whose R_N, R_T, R, θ1 and θ_dev are all defined."""
         return np.isfinite(self.rn) & np.isfinite(self.rt) & np.isfinite(self.r)
+
+    @property
+    def runs(self) -> dict[str, Names]:
+        """Columns of `RUN` as far as there are; empty texts for blocks without a run, none in a table without runs."""
+        if "run" not in self.extra:
+            return {}
+        simulated = self.extra["run"] != ""
+        return {name: np.where(simulated, self.extra[name], "") for name in RUN if name in self.extra}
+
+    @property
+    def falls(self) -> tuple[Names, ...]:
+        """Columns (n,) whose values together say of which fall an impact is: site and trajectory, then `runs`."""
+        return (self.site, self.trajectory, *self.runs.values())
 
     def flag_text(self) -> list[str]:
         """(n,) the flags as they are written, joined by ";"."""

@@ -105,8 +105,8 @@ def compare(
     models : names.
     replicates : runs with chance, besides the mean.
     seed : not negative. A trajectory's random numbers depend on it, on the model and on the names of site and
-        trajectory (and run): not on the other models and trajectories, nor on their order, and with more replicates the first
-        ones stay.
+        trajectory (and run): not on the other models and trajectories, nor on their order, and with more replicates the
+        first ones stay.
     spin, radius_m : see `find_courses`.
     measured : what a model that draws from measured impacts draws from, None for the compared impacts themselves. The
         impacts of a trajectory are always drawn from those of the others.

@@ -30,6 +30,7 @@ from ..simulation.engine import (
     simulate,
 )
 from ..simulation.ground import Ground, make_ground
+from ..simulation.hits import hits_of
 from ..simulation.release import Releases
 from ..simulation.results import fell_through
 from ..terrain.cloud import Cloud
@@ -310,6 +311,7 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     ended = ", ".join(f"{count} {words[name]}" for name, count in ends if count)
     text = f"{n} blocks with {model}, {simulation.impacts.sum()} impacts: {ended}."
     remarks.append(Remark(text, "note", model))
+    remarks += _hit_structures(simulation)
     flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
     text = (
         f"Run-out in plan {np.median(flat):.1f} m (median), {flat.max():.1f} m at most; speeds up to "
@@ -320,6 +322,24 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     if measured is not None and find_model(model).draws_from_impacts:
         remarks.append(Remark(measured_sentence(measured), "note", model))
         remarks += _beyond(simulation, measured)
+    return remarks
+
+
+def _hit_structures(simulation: Simulation) -> list[Remark]:
+    """How many blocks hit each structure, as far as impacts were recorded."""
+    structures = simulation.ground.structures
+    if not structures or np.count_nonzero(simulation.records.what == IMPACT) < simulation.impacts.sum():
+        return []
+    hits, remarks = hits_of(simulation), []
+    run = simulation.records.run[hits.record]
+    for place, name in enumerate(structures):
+        own = hits.structure == place
+        if own.any():
+            blocks, beyond = np.unique(run[own]).size, np.unique(run[own & hits.passes]).size
+            text = (
+                f"{blocks} of {len(simulation)} blocks with {simulation.settings.model} hit {name}, {own.sum()} times"
+            )
+            remarks.append(Remark(f"{text}; {beyond} of them went on beyond it.", "note", name))
     return remarks
 
 

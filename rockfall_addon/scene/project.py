@@ -2,6 +2,7 @@
 """Between project.toml and the scene: what *Load demo* and a film without a window have in common, and the way back."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -20,12 +21,13 @@ from ...core.exchange.project import (
     read_project,
     write_project,
 )
-from ...core.exchange.simulation_entry import ZonesEntry
+from ...core.exchange.simulation_entry import SimulationEntry, StructureEntry, ZonesEntry
 from ...core.exchange.tables import write_picks
 from ...core.exchange.zones import open_zones, write_attribute_zones
 from ...core.impact_models.registry import COMPARED
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
+from ...core.terrain.readers import read_structure
 from ...core.terrain.shading import shade
 from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
@@ -40,6 +42,7 @@ from . import (
     simulated_zones,
     simulation_setup,
     store,
+    structures,
     terrain,
 )
 
@@ -67,6 +70,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     else:
         surface, result = open_project(project)
     zones = _zones(project, surface)
+    solid, left_out = _structures(project, surface)
     shading = None if surface is None else shade(surface)
     known = surface.shift if surface is not None else None if result is None else result.picks.shift
     found = project_videos.read_videos(project, known) if with_videos else []
@@ -84,18 +88,20 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         tile = terrain.add_terrain(scene, surface, shading)
         if zones is not None:
             simulated_zones.keep(scene, zones, tile)
+    for name, structure in solid.items():
+        structures.make(scene, name, structure)
     project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
     if result is not None:
         reconstruction.show(scene, result)
     if project.simulation is not None:
-        left_out = simulated_sources.keep_entry(scene, project.simulation)
-        if left_out:
-            simulation_setup.keep(scene, {}, (Remark(left_out, "warning", "project"),))
+        said = simulated_sources.keep_entry(scene, project.simulation, left_out)
+        if said:
+            simulation_setup.keep(scene, {}, (Remark(said, "warning", "project"),))
     return result
 
 
 def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
-    """Write project.toml, picks.csv and, when there is one, the terrain; `load_project` then gives the same again.
+    """Write project.toml, picks.csv and, when there are, terrain and structures; `load_project` reads them again.
 
     Several tiles are written as one terrain. Returns the path of project.toml.
 
@@ -112,6 +118,9 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
     zones = None
     if surface is not None and stated is not None:
         zones = simulated_zones.zones_of(scene, surface, stated.models)
+    solid = structures.surfaces_of(scene)
+    if solid and stated is None:
+        stated = SimulationEntry()
     with output_folder(folder) as place:
         if table is not None:
             write_picks(table, place / "picks.csv")
@@ -120,6 +129,8 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         if zones is not None and stated is not None:
             write_attribute_zones(zones, place / "zones.csv")
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
+        if stated is not None:
+            stated = replace(stated, structures=_write_structures(solid, place))
         source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
         parameters = models.parameters_of(scene)
         project = Project(
@@ -136,6 +147,26 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         )
         write_project(project, place / "project.toml")
     return folder / "project.toml"
+
+
+def _structures(project: Project, surface: Surface | None) -> tuple[dict[str, Surface], list[str]]:
+    """The structures that Blender can hold, by name, and those that it leaves out: clouds have no faces."""
+    entry, source = project.simulation, project.terrain
+    if entry is None or surface is None or source is None:
+        return {}, [] if entry is None else [f"the structure {each.name}" for each in entry.structures]
+    read = {each.name: read_structure(each.file, up=source.up, unit_m=source.unit_m) for each in entry.structures}
+    solid = {name: structure for name, structure in read.items() if isinstance(structure, Surface)}
+    return solid, [f"the structure {name}, a cloud without faces" for name in read if name not in solid]
+
+
+def _write_structures(solid: Mapping[str, Surface], place: Path) -> tuple[StructureEntry, ...]:
+    """Names are free, and may be none of a file: the files are numbered."""
+    entries = []
+    for number, (name, structure) in enumerate(solid.items(), start=1):
+        file = place / f"structure_{number}.ply"
+        write_ply(structure, file)
+        entries.append(StructureEntry(name, file))
+    return tuple(entries)
 
 
 def _zones(project: Project, surface: Surface | None) -> Zones | None:

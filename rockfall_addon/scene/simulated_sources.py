@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the scene's settings say of a simulation, as a project states it, and where its blocks come from."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
@@ -56,8 +56,13 @@ def entry_of(scene: bpy.types.Scene) -> SimulationEntry:
     )
 
 
-def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry) -> str:
-    """Give the scene's settings what a project states; returns what Blender cannot take over, empty if nothing."""
+def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequence[str] = ()) -> str:
+    """Give the scene's settings what a project states; returns what Blender cannot take over, empty if nothing.
+
+    Parameters
+    ----------
+    left_out : what is known to be left out, besides.
+    """
     settings, releases = scene.rockfall_simulation, entry.releases
     if entry.models:
         settings.models = set(entry.models)
@@ -79,11 +84,11 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry) -> str:
     elif releases.points_m:
         settings.source = "DRAWN"
         settings.drawn = _drawing(scene, releases)
-    left_out = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
-    left_out += [f"the structure {each.name}" for each in entry.structures]
-    left_out += ["contact with points"] if entry.contact == "points" else []
-    left_out += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
-    return f"Of the project's simulation Blender leaves out {', '.join(left_out)}." if left_out else ""
+    absent = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
+    absent += ["contact with points"] if entry.contact == "points" else []
+    absent += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
+    absent += left_out
+    return f"Of the project's simulation Blender leaves out {', '.join(absent)}." if absent else ""
 
 
 def source_of(

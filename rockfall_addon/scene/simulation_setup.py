@@ -29,6 +29,7 @@ from . import (
     simulated_zones,
     simulation,
     store,
+    structures,
     terrain,
 )
 from .simulation import Origin, Prepared
@@ -76,6 +77,7 @@ def plan(scene: bpy.types.Scene) -> Plan:
         source,
         {name: parameters.get(name, {}) for name in entry.models},
         measured,
+        structures=structures.surfaces_of(scene),
         rolling=entry.rolling,
         friction=entry.friction,
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
@@ -159,7 +161,7 @@ def missing(scene: bpy.types.Scene) -> str:
         return "Choose at least one model."
     if "observed" in settings.models and not store.with_role(scene, store.PICK_ROLE):
         return "The model of measured rebounds needs measured impacts: pick some, or leave it out."
-    return simulated_sources.missing(scene)
+    return simulated_sources.missing(scene) or structures.problem(scene)
 
 
 def ground(scene: bpy.types.Scene) -> Surface:
@@ -183,14 +185,14 @@ _grounds: list[tuple[Surface, Surface]] = []
 
 
 def fingerprint(scene: bpy.types.Scene) -> str:
-    """Of all that decides what is simulated: terrain, source, blocks, models, motion."""
+    """Of all that decides what is simulated: terrain, structures, source, blocks, models, motion."""
     parameters, how = models.parameters_of(scene), reconstruction.project_settings(scene, []).reconstruction
     used = {name: values for name, values in parameters.items() if name in scene.rockfall_simulation.models}
     parts = [
         fingerprints.ground(scene), fingerprints.ground_contents(scene), simulated_sources.fingerprint(scene),
         json.dumps(used, sort_keys=True), how,
     ]  # fmt: skip
-    parts += simulated_zones.fingerprint(scene)
+    parts += [*simulated_zones.fingerprint(scene), *structures.fingerprint(scene)]
     return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()
 
 
@@ -210,7 +212,7 @@ def remarks(scene: bpy.types.Scene) -> list[Remark]:
     kept = json.loads(scene.get(store.SIMULATION, "{}"))
     said = list(from_plain(kept.get("remarks", []), "note"))
     if simulation.blocks_of(scene) and kept.get("print") != fingerprint(scene):
-        text = "Terrain, releases, models or settings were changed since: simulate again."
+        text = "Terrain, structures, releases, models or settings were changed since: simulate again."
         said.insert(0, Remark(text, "warning", "stale"))
     return said
 

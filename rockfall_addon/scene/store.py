@@ -15,6 +15,7 @@ MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"
 SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
 RELEASE_ROLE = "release"  # a drawn line, area or points
+STRUCTURE_ROLE = "structure"  # a mesh that blocks meet beside the terrain
 CAMERA_ROLE = "camera"
 COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
 

@@ -84,6 +84,8 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
                 anywhere = True
                 if update.is_updated_geometry:
                     terrain_mesh.mistrust(obj.original.data)
+            elif role == store.STRUCTURE_ROLE and update.is_updated_geometry:
+                terrain_mesh.mistrust(obj.original.data)
         elif isinstance(obj, bpy.types.Collection) or (
             isinstance(obj, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
         ):

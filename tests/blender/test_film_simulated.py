@@ -264,7 +264,7 @@ def test_structures_of_the_project_stand_in_the_picture_and_hold_blocks(rockfall
     render = part("rockfall_addon.steps.film.render")
     render.make(replace(job, kind="slope", out=job.out.with_name("wall.png")), lambda *_: None)
     scene = bpy.context.scene
-    drawn = shape(scene.objects["Structure wall"])
+    drawn = shape(scene.objects["wall"])
     np.testing.assert_allclose(sorted(map(tuple, drawn.tolist())), sorted(map(tuple, wall.tolist())), atol=1e-5)
     for group in part("rockfall_addon.steps.film.simulated").groups_of(scene):
         assert group.left == 0

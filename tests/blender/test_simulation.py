@@ -401,14 +401,3 @@ def test_tables_are_of_the_shown_runs_in_survey_coordinates(drawn: bpy.types.Sce
     }  # fmt: skip
     drawn.rockfall_simulation.seed += 1
     assert not bpy.ops.rockfall.export_simulation.poll(), "what is shown is not what would be written"
-
-
-def test_what_blender_cannot_take_from_a_project_is_said(drawn: bpy.types.Scene, part, tmp_path: Path) -> None:
-    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
-    project = tmp_path / "out" / "project.toml"
-    wall = '\n[[simulation.structures]]\nname = "wall"\nfile = "terrain.ply"\n'
-    project.write_text(project.read_text(encoding="utf-8") + wall, encoding="utf-8")
-    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
-    assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
-    said = part("rockfall_addon.scene.simulation_setup").remarks(bpy.context.scene)
-    assert "the structure wall" in said[0].text

@@ -16,7 +16,7 @@ from ....core.simulation.measured_releases import start_times
 from ....core.workflow.simulation import remarks_of
 from ...scene import models, simulation
 from ...scene.project import load_project
-from . import dressing, simulated
+from . import dressing
 from .engine import use_engine
 
 
@@ -127,7 +127,6 @@ def _simulate(
     starts = {name: simulation.Origin(name, time_s) for name, time_s in start_times(result).items()}
     simulations = fall_beside(job, project, len(starts), progress)
     simulation.show(scene, simulations, starts)
-    simulated.show_structures(scene, simulations[0].ground)
     return tuple(map(str, remarks_of(simulations)))
 
 

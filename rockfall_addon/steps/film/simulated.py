@@ -10,7 +10,6 @@ from ....core.film.engines import IDENTIFIERS
 from ....core.film.simulated import MEASURED_COLOUR, Group, group_name, path_opacity
 from ....core.impact_models.registry import find_model
 from ....core.simulation.engine import ENDS, LEFT_TERRAIN, STOPPED
-from ....core.simulation.ground import TERRAIN, Ground
 from ....core.vectors import Array
 from ...scene import materials, simulated_paths, simulation, store, trails, trajectories
 from . import presence
@@ -18,7 +17,6 @@ from .motions import Motion
 
 PATH_PART = 0.35
 """Width of a simulated path, as a part of that of a measured one."""
-COLOUR, STRUCTURE_COLOUR = "colour", (0.72, 0.74, 0.80)
 OPAQUE_PART = 0.5
 """In Workbench, which lets nothing through, paths are thinner by this."""
 OUTER = 0.02
@@ -52,21 +50,6 @@ def measured(scene: bpy.types.Scene, motions: list[Motion]) -> Group:
     stopped = np.array([motion.name in resting for motion in motions], dtype=bool)
     ends = np.array([float(motion.time_s[-1]) for motion in motions])
     return Group("measured", MEASURED_COLOUR, ends, stopped, lost=int(np.count_nonzero(~stopped)))
-
-
-def show_structures(scene: bpy.types.Scene, ground: Ground) -> None:
-    """Walls, fences, houses: what stands on the terrain and is not in its picture."""
-    for owner, name in enumerate(ground.structures, TERRAIN + 1):
-        corners, faces = np.unique(ground.faces[ground.owner == owner], return_inverse=True)
-        if not len(corners):
-            continue  # a cloud of points has no faces to show
-        mesh = bpy.data.meshes.new(f"Structure {name}")
-        mesh.from_pydata(ground.vertices[corners].tolist(), [], faces.reshape(-1, 3).tolist())
-        colours = np.tile(materials.linear_colour(STRUCTURE_COLOUR), len(corners)).astype(np.float32)
-        mesh.attributes.new(COLOUR, "FLOAT_COLOR", "POINT").data.foreach_set("color", colours)
-        mesh.attributes.active_color_name = mesh.attributes.default_color_name = COLOUR
-        mesh.materials.append(materials.shaded_material("Rockfall structure", COLOUR))
-        scene.collection.objects.link(bpy.data.objects.new(mesh.name, mesh))
 
 
 def points_of(scene: bpy.types.Scene) -> Array:

@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.impact_models.registry import MODELS
-from ...scene import models, simulated_sources, simulation, simulation_setup, store, terrain
+from ...scene import models, simulated_sources, simulation, simulation_setup, store, structures, terrain
 from ...view import job, parameters
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 
@@ -149,6 +149,23 @@ class ROCKFALL_PT_simulation_zones(_Sub, bpy.types.Panel):
             paragraph(context, layout, text, "INFO")
 
 
+class ROCKFALL_PT_simulation_structures(_Sub, bpy.types.Panel):
+    bl_label = "Structures"
+    bl_idname = "ROCKFALL_PT_simulation_structures"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, found = self.layout, structures.objects_of(context.scene)
+        if not found:
+            text = "Walls, fences, ditches, roads, houses: meshes of your own that blocks meet. Select them."
+            paragraph(context, layout, text, "INFO")
+        column = layout.column(align=True)
+        for obj in found:
+            row = column.row(align=True)
+            row.prop(obj, "name", text="", icon="MESH_CUBE")
+            row.operator("rockfall.remove_structure", text="", icon="X").name = obj.name
+        layout.operator("rockfall.use_as_structure", icon="ADD")
+
+
 class ROCKFALL_PT_simulation_parameters(_Sub, bpy.types.Panel):
     bl_label = "Parameters of the models"
     bl_idname = "ROCKFALL_PT_simulation_parameters"
@@ -230,5 +247,6 @@ CLASSES = (
     ROCKFALL_PT_simulation_blocks,
     ROCKFALL_PT_simulation_motion,
     ROCKFALL_PT_simulation_zones,
+    ROCKFALL_PT_simulation_structures,
     ROCKFALL_PT_simulation_look,
 )

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Marked meshes hold blocks where they stand; they are saved, undone, and go along with a project."""
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+WALL_X = 70.0
+
+
+@pytest.fixture
+def slope(part) -> bpy.types.Scene:
+    """A rough slope to x = 60 that runs out, and a line near its top, from which eight blocks start."""
+    line = np.linspace(0.0, 118.0, 60)
+    x, y = (values.ravel() for values in np.meshgrid(line, line, indexing="ij"))
+    z = 100 - 1.4 * np.minimum(x, 60) + 0.02 * np.maximum(x - 60, 0) + 0.4 * np.sin(x / 3) * np.cos(y / 4)
+    corner = (np.arange(59)[:, None] * 60 + np.arange(59)).ravel()
+    ring = np.column_stack([corner, corner + 60, corner + 61, corner + 1])
+    faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
+    shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
+    surface = part("core.terrain.surface").Surface(np.column_stack([x, y, z]), faces, shift, "scan", ())
+    scene = bpy.context.scene
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
+    settings = scene.rockfall_simulation
+    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scene, "line", points)
+    settings.number, settings.seed, settings.models = 8, 3, {"noel_2017"}
+    return scene
+
+
+@pytest.fixture
+def wall(slope: bpy.types.Scene) -> bpy.types.Object:
+    """A board of 1 m × 2 m, turned and enlarged to stand high and wide across the foot of the slope; not marked."""
+    mesh = bpy.data.meshes.new("board")
+    mesh.from_pydata([(0, -1, -0.5), (0, 1, -0.5), (0, 1, 0.5), (0, -1, 0.5)], [], [(0, 1, 2, 3)])
+    obj = bpy.data.objects.new("wall", mesh)
+    slope.collection.objects.link(obj)
+    obj.location, obj.scale = (WALL_X, 59.0, 30.0), (1.0, 65.0, 100.0)
+    bpy.context.view_layer.update()
+    return obj
+
+
+def use(*objects: bpy.types.Object) -> set[str]:
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj in objects)
+    return bpy.ops.rockfall.use_as_structure()
+
+
+def farthest(scene: bpy.types.Scene) -> float:
+    """Greatest x of all shown paths."""
+    paths = next(obj for obj in scene.objects if obj.get("rockfall_role") == "simulated_paths")
+    values = np.empty(3 * len(paths.data.points), dtype=np.float32)
+    paths.data.attributes["position"].data.foreach_get("vector", values)
+    return float(values[0::3].max())
+
+
+def said(part, scene: bpy.types.Scene) -> str:
+    return " ".join(remark.text for remark in part("rockfall_addon.scene.simulation_setup").remarks(scene))
+
+
+def test_a_structure_across_the_slope_holds_blocks(slope: bpy.types.Scene, wall: bpy.types.Object, part) -> None:
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert farthest(slope) > WALL_X + 1, "an object that is not marked is no obstacle"
+    assert use(wall) == {"FINISHED"}
+    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert farthest(slope) < WALL_X + 1e-3
+    simulations = part("core.workflow.simulation").run_scenario(
+        part("rockfall_addon.scene.simulation_setup").plan(slope).scenario
+    )
+    assert simulations[0].ends[-1] == "structure:wall"
+    records = simulations[0].records
+    owner = simulations[0].ground.owner[records.face]
+    impact = (records.what == part("core.simulation.engine").IMPACT) & (owner == 1)
+    blocks, times = len(set(records.run[impact].tolist())), int(impact.sum())
+    assert blocks > 0
+    assert f"{blocks} of 8 blocks with noel_2017 hit wall, {times} times; 0 of them went on" in said(part, slope)
+    wall.location.x += 200.0
+    bpy.context.view_layer.update()
+    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    with pytest.raises(RuntimeError, match="structure wall stands nowhere near"):
+        bpy.ops.rockfall.simulate()
+    wall.location.x -= 200.0
+    bpy.context.view_layer.update()
+    assert not part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    wall.data.vertices[0].co.z -= 0.1
+    wall.data.update()
+    bpy.context.view_layer.update()
+    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope), "its mesh was edited"
+    assert bpy.ops.rockfall.remove_structure(name="wall") == {"FINISHED"}
+    assert wall.name in slope.objects
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert farthest(slope) > WALL_X + 1
+
+
+def test_a_structure_is_taken_where_its_matrix_puts_it(slope: bpy.types.Scene, wall: bpy.types.Object, part) -> None:
+    use(wall)
+    structure = part("rockfall_addon.scene.simulation_setup").plan(slope).scenario.structures["wall"]
+    corners = {(WALL_X, y, z) for y in (59.0 - 65.0, 59.0 + 65.0) for z in (-20.0, 80.0)}
+    assert {tuple(corner) for corner in structure.vertices.tolist()} == corners
+    assert len(structure.faces) == 2
+
+
+def test_structures_are_saved_and_undone(slope: bpy.types.Scene, wall: bpy.types.Object, part, tmp_path: Path) -> None:
+    structures, setup = part("rockfall_addon.scene.structures"), part("rockfall_addon.scene.simulation_setup")
+    bpy.ops.ed.undo_push(message="before")
+    use(wall)
+    bpy.ops.ed.undo_push(message="marked")
+    assert [obj.name for obj in structures.objects_of(bpy.context.scene)] == ["wall"]
+    bpy.ops.ed.undo()
+    assert not structures.objects_of(bpy.context.scene)
+    bpy.ops.ed.redo()
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    before = farthest(bpy.context.scene)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    scene = bpy.context.scene
+    assert not setup.is_stale(scene)
+    assert [obj.name for obj in structures.objects_of(scene)] == ["wall"]
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert farthest(scene) == before < WALL_X + 1e-3
+
+
+@pytest.mark.parametrize("with_releases", [True, False])
+def test_a_project_takes_structures_along(
+    slope: bpy.types.Scene, wall: bpy.types.Object, part, tmp_path: Path, with_releases: bool
+) -> None:
+    use(wall)
+    if not with_releases:
+        slope.rockfall_simulation.drawn = None
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    project = tmp_path / "out" / "project.toml"
+    (entry,) = part("core.exchange.project").read_project(project).simulation.structures
+    read = part("core.terrain.readers").read_structure(entry.file, up="z")
+    survey = read.shift.to_survey(read.vertices)
+    np.testing.assert_allclose(survey.min(axis=0), [2_600_000.0 + WALL_X, 1_200_000.0 - 6.0, -20.0], atol=1e-9)
+    np.testing.assert_allclose(survey.max(axis=0), [2_600_000.0 + WALL_X, 1_200_000.0 + 124.0, 80.0], atol=1e-9)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
+    scene = bpy.context.scene
+    again = part("rockfall_addon.scene.structures").surfaces_of(scene)
+    assert list(again) == ["wall"]
+    np.testing.assert_allclose(again["wall"].bounds, [[WALL_X, -6.0, -20.0], [WALL_X, 124.0, 80.0]], atol=1e-5)
+    if with_releases:
+        assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+        assert farthest(scene) < WALL_X + 1e-3
+
+
+def test_what_blender_cannot_take_from_a_project_is_said(slope: bpy.types.Scene, part, tmp_path: Path) -> None:
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    project = tmp_path / "out" / "project.toml"
+    points = "\n".join(f"{2_600_070.0},{1_200_000.0 + y},{10.0 + y % 7}" for y in range(60))
+    (tmp_path / "out" / "net.xyz").write_text(points.replace(",", " ") + "\n", encoding="utf-8")
+    net = '\n[[simulation.structures]]\nname = "net"\nfile = "net.xyz"\n'
+    project.write_text(project.read_text(encoding="utf-8") + net, encoding="utf-8")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
+    assert "leaves out the structure net, a cloud" in said(part, bpy.context.scene)
+
+
+def test_what_cannot_be_a_structure_is_refused(slope: bpy.types.Scene, wall: bpy.types.Object, part) -> None:
+    terrain = next(obj for obj in slope.objects if obj.get("rockfall_role") == "terrain")
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(obj == terrain)
+    assert not bpy.ops.rockfall.use_as_structure.poll(), "terrain is no structure"
+    empty = bpy.data.objects.new("empty", bpy.data.meshes.new("empty"))
+    slope.collection.objects.link(empty)
+    with pytest.raises(RuntimeError, match="no faces"):
+        use(wall, empty)
+    assert not part("rockfall_addon.scene.structures").objects_of(slope), "all or none"
+    use(wall)
+    wall.modifiers.new("thick", "SOLIDIFY")
+    assert "Apply the modifiers" in part("rockfall_addon.scene.simulation_setup").missing(slope)
+    assert not bpy.ops.rockfall.simulate.poll()

@@ -19,6 +19,7 @@ from ..terrain.raycast import cast_rays, closest_points, heights_above
 from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
 from .ground_faults import GroundFaults, ground_faults
+from .holes import rims_of_holes
 
 Contact = Literal["mesh", "points"]
 CONTACTS: tuple[Contact, ...] = ("mesh", "points")
@@ -113,6 +114,11 @@ class Ground:
     def faults(self) -> GroundFaults | None:
         """What is wrong with the terrain's triangles, counted; None where it is a cloud."""
         return ground_faults(self.terrain) if isinstance(self.terrain, Surface) else None
+
+    @cached_property
+    def rims(self) -> Array:
+        """(e, 4) x, y of both ends of the edges around the terrain's holes; none where it is a cloud."""
+        return rims_of_holes(self.terrain) if isinstance(self.terrain, Surface) else np.empty((0, 4))
 
     @property
     def highest_m(self) -> float:

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
-from rockfall.core.simulation.engine import IMPACT, Settings, Simulation, simulate
+from rockfall.core.simulation.engine import ENDS, IMPACT, Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.ground_faults import ground_faults
+from rockfall.core.simulation.holes import rims_of_holes
 from rockfall.core.simulation.release import make_releases
-from rockfall.core.simulation.results import run_figures
+from rockfall.core.simulation.results import fell_through, run_figures
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.simulation import remarks_of
 
@@ -149,6 +150,36 @@ def test_a_block_falls_through_a_hole_that_is_larger_and_rides_over_a_smaller_on
         run = simulate(make_ground(holed), make_releases(start, velocity=drift, diameter_m=diameter), SETTINGS)
         assert any("fell through the terrain" in text for text in texts(run)) == falls
         assert (run.impacts[0] == 0) == falls
+
+
+@pytest.mark.parametrize("winding", ["alike", "mixed"])
+def test_a_block_that_ends_below_a_hole_fell_through_and_one_beyond_the_outline_did_not(winding: str) -> None:
+    """Straight down through two holes of one square each, and over each side of the outline."""
+    surface = sheet()
+    middle = surface.vertices[surface.faces].mean(axis=1)
+    open_ = np.zeros(len(middle), np.bool_)
+    for x in (21.0, 31.0):
+        open_ |= (np.abs(middle[:, 0] - x) < 1.1) & (np.abs(middle[:, 1] - 21.0) < 1.1)
+    faces = surface.faces[~open_]
+    if winding == "mixed":
+        faces[::7] = faces[::7, ::-1]
+    ground = make_ground(sheet(faces=faces))
+    assert len(ground.rims) == 8
+    plan = np.array([[21.0, 21.0], [31.0, 21.0], [39.5, 20.0], [20.0, 39.5], [20.0, 0.5], [0.5, 20.0]])
+    velocity = 6.0 * np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0.5], [0, 1, 0.5], [0, -1, 0.5], [-1, 0, 0.5]])
+    start = np.column_stack([plan, 3.0 - 0.7 * plan[:, 0]])
+    run = simulate(ground, make_releases(start, velocity=velocity, diameter_m=0.4), SETTINGS)
+    assert (run.end == ENDS.index("left_terrain")).all()
+    assert np.isnan(ground.heights_above(run.position[:2])).all()  # nothing above them tells
+    assert fell_through(run).tolist() == [True, True, False, False, False, False]
+    assert any(text.startswith("2 of 6 blocks") and "fell through the terrain" in text for text in texts(run))
+
+
+def test_a_surface_without_a_hole_or_a_border_has_no_rims() -> None:
+    assert len(make_ground(sheet()).rims) == 0
+    corners = np.array([[0.0, 0, 0], [9, 0, 0], [0, 9, 0], [0, 0, 9]])
+    closed = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)
+    assert rims_of_holes(Surface(corners, closed, GlobalShift(), "closed")).shape == (0, 4)
 
 
 def test_a_structure_that_no_block_meets_is_said() -> None:

@@ -20,6 +20,7 @@ from .options import (
     whole,
 )
 from .progress import PrintedProgress, stopped_by_interrupt
+from .release_options import add_zone_options, zones_as_asked
 
 if TYPE_CHECKING:
     from ..analysis.observed_runs import Observed
@@ -82,6 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     block = parser.add_argument_group("blocks of which the table does not say; not for a project")
     block.add_argument("--diameter", type=positive, metavar="M", help=f"[m] (default {DIAMETER_M:g})")
     block.add_argument("--density", type=positive, metavar="RHO", help=f"[kg/m³] (default {ROCK_DENSITY_KGPM3:g})")
+    add_zone_options(parser)
     parser.add_argument("--tables-only", action="store_true", help="no figures")
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
     add_terrain_options(parser)
@@ -143,8 +145,8 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
     from ..exchange.simulation_project import open_simulation
     from ..workflow.simulation import ground_of
 
-    for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density"):
-        if getattr(arguments, option.strip("-")) is not None:
+    for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density", "--zone-attribute"):
+        if getattr(arguments, option.strip("-").replace("-", "_")) is not None:
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
     file = Path(arguments.table)
     project = read_project(file)
@@ -160,7 +162,10 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
     )
     scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
     known = model_parameters(arguments, list(scenario.models), scenario.models)
-    scenario = replace(scenario, models={name: known.get(name, {}) for name in scenario.models})
+    models = {name: known.get(name, {}) for name in scenario.models}
+    zones, zone_files = zones_as_asked(arguments, scenario.terrain, list(models))
+    scenario = replace(scenario, models=models, zones=scenario.zones if zones is None else zones)
+    inputs = inputs | zone_files
     ground = ground_of(scenario)
     progress("Reconstructing")
     return _measured(arguments, scenario, ground, reconstruct_project(project, ground.surface), inputs)
@@ -189,6 +194,7 @@ def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case
     diameter = DIAMETER_M if arguments.diameter is None else arguments.diameter
     density = ROCK_DENSITY_KGPM3 if arguments.density is None else arguments.density
     surface = terrain_as_asked(arguments, arguments.terrain, progress)
+    zones, zone_files = zones_as_asked(arguments, surface, [model.name for model in models])
     progress(f"Reading {arguments.table}")
     scenario = Scenario(
         surface,
@@ -199,12 +205,13 @@ def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case
             number=arguments.number,
         ),
         {model.name: parameters.get(model.name, {}) for model in models},
+        zones=zones,
         drag=Drag() if arguments.drag else None,
         gravity_mps2=gravity,
         seed=arguments.seed or 0,
         **given,
     )
-    inputs = {"observed": Path(arguments.table), "terrain": Path(arguments.terrain)}
+    inputs = {"observed": Path(arguments.table), "terrain": Path(arguments.terrain), **zone_files}
     drawing = [model.name for model in models if model.draws_from_impacts]
     ground = ground_of(scenario)
     if arguments.stops:

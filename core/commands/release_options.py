@@ -76,6 +76,11 @@ def add_release_options(parser: argparse.ArgumentParser) -> None:
         help="of the solid, for mass and inertia; all touch the ground as the sphere of the mean diameter (default "
         "sphere, ellipsoid with three diameters)",
     )
+    add_zone_options(parser)
+
+
+def add_zone_options(parser: argparse.ArgumentParser) -> None:
+    """Zones of the ground."""
     zones = parser.add_argument_group("zones of the ground with parameters of their own")
     zones.add_argument(
         "--zones",

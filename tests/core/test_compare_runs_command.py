@@ -144,9 +144,36 @@ def test_a_project_says_it_all(site: Path, tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("observed", ["picks.csv", "releases.csv", "zoned.toml"])
+def test_zones_have_parameters_of_their_own(site: Path, tmp_path: Path, observed: str) -> None:
+    """Blocks of picks, stops and a project that come east of x = 40 stop there; without the zone they go on."""
+    bog = tmp_path / "bog.csv"
+    corners = [(40, -1), (121, -1), (121, 121), (40, 121)]
+    rows = [f"bog,{EAST + x},{NORTH + y},9.0,0.05,0,0.1" for x, y in corners]
+    names = "name,x_m,y_m,friction,noel_2017.rt,noel_2017.rt_sd,noel_2017.rn_limit"
+    bog.write_text("\n".join([names, *rows]), encoding="utf-8")
+    (site / "zoned.toml").write_text(
+        'schema = 1\n[terrain]\nfile = "slope.ply"\n[picks]\nfile = "picks.csv"\n', encoding="utf-8"
+    )
+    given = [] if observed.endswith("toml") else ["--terrain", str(site / "slope.ply"), "--diameter", "0.5"]
+    given += ["--stops", str(site / "stops.csv")] if observed == "releases.csv" else []
+    argv = ["compare-runs", str(site / observed), *given, "--model", "noel_2017", "--number", "10", "--tables-only"]
+    reach = []
+    for more in ([], ["--zones", str(bog)]):
+        out = tmp_path / f"out{len(more)}"
+        assert main([*argv, *more, "--out", str(out)]) == 0
+        reach.append([float(row["x_m"]) - EAST for row in rows_of(out / "runs.csv")])
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert summary["inputs"]["zones"]["file"] == "bog.csv"
+    assert summary["models"]["noel_2017"]["zone_friction"] == {"bog": 9.0}
+    assert np.mean(reach[0]) > 60
+    assert np.mean(reach[1]) < 50
+
+
 @pytest.mark.parametrize(
     ("more", "problem"),
     [
+        (["--zone-attribute", "soil"], "--zone-attribute says which values, not what they mean"),
         (["--number", "0"], "0 blocks cannot be released|number of blocks"),
         (["--contours", "900"], "--contours has 900, where there is no terrain"),
         (["--contours", "high"], "--contours has 'high'"),

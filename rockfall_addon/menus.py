@@ -41,7 +41,7 @@ STEPS = (
     ("simulation", "7  Simulation", (
         ("rockfall.draw_release", "Draw Release Line", {"kind": "line"}),
         ("rockfall.draw_release", "Draw Release Area", {"kind": "polygon"}),
-        ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}), None,
+        ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}), "rockfall.use_as_structure", None,
         "rockfall.simulate", "rockfall.select_run", "rockfall.remove_simulation",
     )),
     ("playback", "8  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),

@@ -11,7 +11,7 @@ POINTED = {"rockfall.mark_pair", "rockfall.drag_pick"}
 """What only the tools call: they need a mouse on the terrain or the footage."""
 WITH_PANEL = {
     "rockfall.sort_impacts", "rockfall.remove_video", "rockfall.choose_simulated_model", "rockfall.next_run",
-    "rockfall.add_zone", "rockfall.remove_zone", "rockfall.reset_parameter",
+    "rockfall.add_zone", "rockfall.remove_zone", "rockfall.remove_structure", "rockfall.reset_parameter",
 }  # fmt: skip
 """What works on a row of a panel's list, or is another name of what the menu has."""
 LARGEST_WORKSPACE_BYTES = 200_000

@@ -275,14 +275,13 @@ def joined(parts: Sequence[Simulation], releases: Releases) -> Simulation:
         name: np.concatenate([getattr(part.records, name) for part in parts]) for name in Records.__dataclass_fields__
     }
     runs = [part.records.run + begin for part, begin in zip(parts, begins.tolist(), strict=False)]
-    names = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position")
     return replace(
         first,
         releases=releases,
         records=Records(**(columns | {"run": np.concatenate(runs)})),
         wanted=sum(part.wanted for part in parts),
         seconds=sum(part.seconds for part in parts),
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names},
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _OF_RUNS},
     )
 
 

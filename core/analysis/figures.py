@@ -5,7 +5,7 @@ Text stays text in SVG and PDF. The two series differ in colour (the paper's red
 and in shape, so that they are told apart without colour too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -115,13 +115,18 @@ def save_figures(
     DependencyError : Matplotlib is not installed.
     """
     demand(FIGURES)
+    figures = [("all_models", sheet_figure(sheet)), *((graphs[0].model, model_figure(graphs)) for graphs in sheet)]
+    return save_named(figures, folder, formats)
+
+
+def save_named(
+    figures: "Iterable[tuple[str, Figure]]", folder: str | Path, formats: Sequence[str] = FORMATS
+) -> tuple[Path, ...]:
+    """Write (name, figure) pairs into a folder, each in all formats; returns the files."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, figure in (
-        ("all_models", sheet_figure(sheet)),
-        *((graphs[0].model, model_figure(graphs)) for graphs in sheet),
-    ):
+    for name, figure in figures:
         for kind in formats:
             written.append(folder / f"{name}.{kind}")
             save_figure(figure, written[-1])

@@ -13,7 +13,7 @@ from ..impact_models.registry import find_model
 from ..simulation.ground import Ground
 from ..vectors import Array, norm
 from .extras import FIGURES, demand
-from .figures import FORMATS, MEASURED, MUTED, PAGE_IN, STYLE, save_figure
+from .figures import FORMATS, MEASURED, MUTED, PAGE_IN, STYLE, save_named
 from .paths import Paths
 from .sections import Axis
 from .whole_runs import AT_SECTIONS, OF_RUNS, Compared, Quantity, WholeRuns
@@ -43,14 +43,7 @@ def save_whole_run_figures(
     DependencyError : Matplotlib is not installed.
     """
     demand(FIGURES)
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for name, figure in _figures(comparison, ground):
-        for kind in formats:
-            written.append(folder / f"{name}.{kind}")
-            save_figure(figure, written[-1])
-    return tuple(written)
+    return save_named(_figures(comparison, ground), folder, formats)
 
 
 def _figures(comparison: WholeRuns, ground: Ground) -> "Iterator[tuple[str, Figure]]":

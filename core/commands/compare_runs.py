@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from .options import (
+    add_motion_options,
     add_out,
     add_parameter_options,
     add_terrain_options,
     model_parameters,
-    not_negative,
     positive,
     terrain_as_asked,
     whole,
@@ -70,13 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--section", action="append", default=[], metavar="NAME=FILE", help="a line in plan, a table of x_m, y_m"
     )
     motion = parser.add_argument_group("motion (default: as the project says)")
-    motion.add_argument("--drag", action="store_true", help="flights with the drag of air")
-    motion.add_argument(
-        "--rolling",
-        choices=("azzoni_1995", "coulomb", "none"),
-        help="on the ground: rolling (default), sliding, a stop",
-    )
-    motion.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
+    add_motion_options(motion)
     motion.add_argument(
         "--gravity", type=positive, metavar="G", help=f"[m/s²] (default {GRAVITY_MPS2:g}); not for a project"
     )

@@ -93,6 +93,17 @@ def naming(file: str) -> Iterator[None]:
         ) from error
 
 
+def add_motion_options(group: "argparse._ArgumentGroup") -> None:
+    """How simulated blocks move between and after their impacts."""
+    group.add_argument("--drag", action="store_true", help="flights with the drag of air")
+    group.add_argument(
+        "--rolling",
+        choices=("azzoni_1995", "coulomb", "none"),
+        help="on the ground: rolling (default), sliding, or a stop where a block would begin to",
+    )
+    group.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
+
+
 def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     """How to read a terrain file."""
     group = parser.add_argument_group("reading the terrain")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
 from .options import (
+    add_motion_options,
     add_observed_option,
     add_out,
     add_parameter_options,
@@ -16,7 +17,6 @@ from .options import (
     known_names,
     measured_as_asked,
     model_parameters,
-    not_negative,
     positive,
     reading_as_asked,
     terrain_as_asked,
@@ -62,13 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
     add_release_options(parser)
     motion = parser.add_argument_group("motion")
-    motion.add_argument("--drag", action="store_true", help="flights with the drag of air")
-    motion.add_argument(
-        "--rolling",
-        choices=("azzoni_1995", "coulomb", "none"),
-        help="on the ground: rolling (default), sliding, or a stop where a block would begin to",
-    )
-    motion.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
+    add_motion_options(motion)
     motion.add_argument("--gravity", type=positive, metavar="G", help=f"[m/s²] (default {GRAVITY_MPS2:g})")
     motion.add_argument(
         "--structure",

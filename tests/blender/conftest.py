@@ -12,6 +12,7 @@ from types import ModuleType
 
 import addon_utils
 import bpy
+import numpy as np
 import pytest
 
 NAME = "bl_ext.user_default.rockfall" if bpy.app.binary_path else "rockfall"
@@ -184,3 +185,19 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 def part(rockfall: ModuleType, installation: Installation) -> Callable[[str], ModuleType]:
     """``part("core.terrain.readers")`` is that module of the registered package."""
     return installation.part
+
+
+@pytest.fixture
+def scan(part) -> bpy.types.Scene:
+    """A rough slope that runs out, without any footage."""
+    line = np.linspace(0.0, 118.0, 60)
+    x, y = (values.ravel() for values in np.meshgrid(line, line, indexing="ij"))
+    z = 100 - 1.4 * np.minimum(x, 60) + 0.02 * np.maximum(x - 60, 0) + 0.4 * np.sin(x / 3) * np.cos(y / 4)
+    corner = (np.arange(59)[:, None] * 60 + np.arange(59)).ravel()
+    ring = np.column_stack([corner, corner + 60, corner + 61, corner + 1])
+    faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
+    shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
+    surface = part("core.terrain.surface").Surface(np.column_stack([x, y, z]), faces, shift, "scan", ())
+    scene = bpy.context.scene
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    return scene

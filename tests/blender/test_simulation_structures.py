@@ -11,23 +11,13 @@ WALL_X = 70.0
 
 
 @pytest.fixture
-def slope(part) -> bpy.types.Scene:
-    """A rough slope to x = 60 that runs out, and a line near its top, from which eight blocks start."""
-    line = np.linspace(0.0, 118.0, 60)
-    x, y = (values.ravel() for values in np.meshgrid(line, line, indexing="ij"))
-    z = 100 - 1.4 * np.minimum(x, 60) + 0.02 * np.maximum(x - 60, 0) + 0.4 * np.sin(x / 3) * np.cos(y / 4)
-    corner = (np.arange(59)[:, None] * 60 + np.arange(59)).ravel()
-    ring = np.column_stack([corner, corner + 60, corner + 61, corner + 1])
-    faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
-    shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
-    surface = part("core.terrain.surface").Surface(np.column_stack([x, y, z]), faces, shift, "scan", ())
-    scene = bpy.context.scene
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+def slope(scan: bpy.types.Scene, part) -> bpy.types.Scene:
+    """The rough slope, which runs out from x = 60 on, and a line near its top, from which eight blocks start."""
     points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
-    settings = scene.rockfall_simulation
-    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scene, "line", points)
+    settings = scan.rockfall_simulation
+    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scan, "line", points)
     settings.number, settings.seed, settings.models = 8, 3, {"noel_2017"}
-    return scene
+    return scan
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from ..vectors import Array
 from .comparison import Predictions
 from .figures import LINK, MEASURED, MODELLED
 from .graphs import PAPER_GRAPHS, Graph, GraphSpec, axis_limits, make_graph
-from .variables import VARIABLES, Variable, find_variable, measured_values, model_values
+from .variables import VARIABLES, Variable, find_variable, known_variables, measured_values, model_values
 
 WEB = Path(__file__).parents[2] / "assets" / "report"
 FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
@@ -73,7 +73,7 @@ def link_graphs(
     )
     fitted = curve_tables(impacts, predictions, model, run, specs)
     curves = {name: ColumnDataSource(table) for name, table in fitted.items()}
-    variables = {name: _facts(variable, impacts, predictions) for name, variable in VARIABLES.items()}
+    variables = {name: _facts(VARIABLES[name], impacts, predictions) for name in known_variables(impacts)}
     blocks = [_block(spec, variables, source, curves[spec.name], sheet) for spec in specs]
     selection = Div(text="", name="selection", disable_math=True, stylesheets=[sheet], sizing_mode="stretch_width")
     update = CustomJS(
@@ -112,7 +112,7 @@ def measured_columns(impacts: Impacts, predictions: Predictions) -> dict[str, An
         "trajectory": predictions.trajectory.tolist(),
         "impact": predictions.impact.tolist(),
     }
-    for name in VARIABLES:
+    for name in known_variables(impacts):
         columns[f"m_{name}"] = measured_values(impacts, predictions.row, name)
     return columns
 
@@ -120,7 +120,7 @@ def measured_columns(impacts: Impacts, predictions: Predictions) -> dict[str, An
 def model_columns(impacts: Impacts, predictions: Predictions, model: str, run: int) -> dict[str, Array]:
     """Values of one model and run."""
     which = predictions.index(model)
-    return {f"p_{name}": model_values(impacts, predictions, which, run, name) for name in VARIABLES}
+    return {f"p_{name}": model_values(impacts, predictions, which, run, name) for name in known_variables(impacts)}
 
 
 def curve_tables(
@@ -240,7 +240,7 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
     fitted = plot.multi_line("xs", "ys", source=curves, line_color="colour", line_width=1.8)
     plot.add_tools(HoverTool(tooltips=_tooltip(), renderers=[measured, modelled], point_policy="snap_to_data"))
 
-    names = [(name, variable.label) for name, variable in VARIABLES.items()]
+    names = [(name, VARIABLES[name].label) for name in variables]
     common: dict[str, Any] = {"options": names, "stylesheets": [sheet], "sizing_mode": "stretch_width"}
     y, x = Select(value=spec.y, name=f"{spec.name}_y", **common), Select(value=spec.x, name=f"{spec.name}_x", **common)
     active = [i for i, log in enumerate((spec.x_log, spec.y_log)) if log]

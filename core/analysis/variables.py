@@ -2,6 +2,7 @@
 """What can stand on an axis: the characteristics of an impact, measured and as a model has them."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -63,15 +64,30 @@ VARIABLES: Mapping[str, Variable] = MappingProxyType(
             Variable("theta_dev_deg", "Deviation", "θdev", r"$\theta_{dev}$", "°", restituted=True),
             Variable("kinetic1_j", "Incident kinetic energy", "E₁", r"$E_1$", "J"),
             Variable("kinetic2_j", "Restituted kinetic energy", "E₂", r"$E_2$", "J", restituted=True),
+            Variable("kinetic_n1_j", "Incident normal energy", "Eɴ₁", r"$E_{N1}$", "J"),
+            Variable("kinetic_t1_j", "Incident tangential energy", "Eᴛ₁", r"$E_{T1}$", "J"),
+            Variable("kinetic_n2_j", "Restituted normal energy", "Eɴ₂", r"$E_{N2}$", "J", restituted=True),
+            Variable("kinetic_t2_j", "Restituted tangential energy", "Eᴛ₂", r"$E_{T2}$", "J", restituted=True),
+            Variable("rotational1_j", "Incident rotational energy", "Eω₁", r"$E_{\omega 1}$", "J"),
+            Variable("rotational2_j", "Restituted rotational energy", "Eω₂", r"$E_{\omega 2}$", "J", restituted=True),
+            Variable("omega1_radps", "Incident angular speed", "|ω₁|", r"$|\omega_1|$", "rad/s"),
+            Variable("slope_deg", "Slope of the ground", "β", r"$\beta$", "°"),
+            Variable("normal_spread_deg", "Roughness of the ground", "σₙ", r"$\sigma_n$", "°"),
             Variable("diameter_m", "Block diameter", "d", r"$d$", "m"),
             Variable("mass_kg", "Block mass", "m", r"$m$", "kg"),
             Variable("bounce_height_m", "Bounce height", "h", r"$h$", "m"),
+            Variable("chord_height_m", "Height above the chord", "f", r"$f$", "m"),
+            Variable("scar_depth_m", "Depth of the scar", "", "", "m"),
+            Variable("scar_length_m", "Length of the scar", "", "", "m"),
             Variable("time_s", "Time", "t", r"$t$", "s"),
             Variable("impact", "Impact number", "", ""),
         )
     }
 )
 """Name → variable, in the order of menus."""
+
+APPARENT = tuple(VARIABLES)[: tuple(VARIABLES).index("theta_dev_deg") + 1]
+"""Those of eq. 7–10, which every table of impacts has."""
 
 
 def find_variable(name: str) -> Variable:
@@ -86,22 +102,65 @@ def find_variable(name: str) -> Variable:
     raise InputError(f"There is no variable {name!r} to plot", advice=suggestion(name, VARIABLES))
 
 
+def known_variables(impacts: Impacts) -> tuple[str, ...]:
+    """The variables that a table has anything of, in the order of menus."""
+    row = np.arange(len(impacts))
+    return tuple(
+        name for name in VARIABLES if name in APPARENT or np.isfinite(measured_values(impacts, row, name)).any()
+    )
+
+
 def measured_values(impacts: Impacts, row: Indices, name: str) -> Array:
-    """(m,) measured values of some rows, in the variable's unit; NaN where undefined."""
+    """(m,) measured values of some rows, in the variable's unit; NaN where undefined.
+
+    Depth and length of the scar are further columns of the table that was read, when it has them.
+    """
     find_variable(name)
     if name in ("v1_mps", "v2_mps"):
         return norm(getattr(impacts, name.removesuffix("_mps"))[row])
+    if name.startswith("scar_"):
+        return _numbers(impacts, row, name)
+    if name == "omega1_radps":
+        return norm(impacts.angular_velocity[row])
+    if name == "slope_deg":
+        normal = impacts.normal[row]
+        return np.degrees(np.arctan2(np.hypot(normal[:, 0], normal[:, 1]), normal[:, 2]))
+    if name in _ENERGY_OF:
+        return 0.5 * impacts.mass_kg[row] * getattr(impacts, _ENERGY_OF[name])[row] ** 2
     values = getattr(impacts, name.removesuffix("_mps").removesuffix("_deg"))[row]
     return np.degrees(values) if name.endswith("_deg") else np.asarray(values, dtype=np.float64)
 
 
 def model_values(impacts: Impacts, predictions: Predictions, model: int, run: int, name: str) -> Array:
-    """(m,) values of one model and run; the measured ones where the model does not change them."""
+    """(m,) values of one model and run; the measured ones where the model does not change them.
+
+    Rotational energy needs the moment of inertia, which the measured spin and its energy give.
+    """
     row = predictions.row
     if not find_variable(name).restituted:
         return measured_values(impacts, row, name)
     if name in ("v2_mps", "kinetic2_j"):
         speed = norm(predictions.v2[model, run])
         return speed if name == "v2_mps" else 0.5 * impacts.mass_kg[row] * speed**2
+    if name in _ENERGY_OF:
+        part: Array = getattr(predictions, _ENERGY_OF[name])[model, run]
+        return 0.5 * impacts.mass_kg[row] * part**2
+    if name == "rotational2_j":
+        spin, incident = norm(predictions.omega2[model, run]), norm(impacts.angular_velocity[row])
+        ratio = np.divide(spin, incident, out=np.full_like(spin, np.nan), where=incident > 0)
+        return impacts.rotational1_j[row] * ratio**2
     values: Array = getattr(predictions, name.removesuffix("_mps").removesuffix("_deg"))[model, run]
     return np.degrees(values) if name.endswith("_deg") else values
+
+
+_ENERGY_OF = {f"kinetic_{part}_j": f"v{part}" for part in ("n1", "t1", "n2", "t2")}
+"""Energy of a part of the velocity → that part."""
+
+
+def _numbers(impacts: Impacts, row: Indices, name: str) -> Array:
+    """(m,) numbers of a further column; NaN without the column, and where its cell is no number."""
+    numbers = np.full(row.size, np.nan)
+    for i, cell in enumerate(impacts.extra[name][row].tolist() if name in impacts.extra else ()):
+        with suppress(ValueError):
+            numbers[i] = float(cell)
+    return numbers

@@ -171,10 +171,10 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> None:
         if curve is not None:
             axes.plot(curve.x, curve.y, color="white", linewidth=1.9 * size, zorder=4)
             axes.plot(curve.x, curve.y, color=colour, linewidth=1.2 * size, zorder=5)
-            notes.append((curve_text(curve, graph), colour))
+            notes.append((curve_text(curve, graph, full=size == 1.0), colour))
     notes += [(line, MUTED) for line in beyond_lines(graph)]
     font = 6.0 if size == 1.0 else 5.0
-    rising = graph.spec.trend == "origin"  # which leaves the upper left corner free
+    rising = graph.spec.fitted == "origin"  # which leaves the upper left corner free
     for i, (text, colour) in enumerate(notes):
         axes.annotate(
             text,
@@ -191,10 +191,11 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> None:
         )
 
 
-def curve_text(curve: Curve, graph: Graph) -> str:
-    """Equation and R² of a graph's curve, in TeX."""
+def curve_text(curve: Curve, graph: Graph, full: bool = True) -> str:
+    """Equation and R² of a graph's curve, in TeX; if `full` with rank correlation and number of points."""
     slope = r"$R_T$" if (graph.spec.x, graph.spec.y) == ("vt1_mps", "vt2_mps") else ""
-    return curve.text(find_variable(graph.spec.y).tex, find_variable(graph.spec.x).tex, slope, "$^{{{}}}$")
+    y, x = (variable.tex or variable.title for variable in map(find_variable, (graph.spec.y, graph.spec.x)))
+    return curve.text(y, x, slope, "$^{{{}}}$", full)
 
 
 def beyond_lines(graph: Graph) -> list[str]:

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices, Mask
 from .comparison import Predictions
-from .curves import Curve, Trend, fit_curve
+from .curves import Curve, Trend, fit_curve, trend_of
 from .variables import find_variable, measured_values, model_values
 
 Limits = tuple[float, float]
@@ -38,7 +38,7 @@ class GraphSpec:
     x, y : variables.
     x_log, y_log : logarithmic axes.
     x_limits, y_limits : of the axes; None takes them from the points.
-    trend : the kind of curve that is fitted to the points.
+    trend : the kind of curve that is fitted to the points; "auto" for the one that suits the variables and axes.
     """
 
     name: str
@@ -48,7 +48,7 @@ class GraphSpec:
     y_log: bool = False
     x_limits: Limits | None = None
     y_limits: Limits | None = None
-    trend: Trend = "none"
+    trend: Trend = "auto"
 
     def __post_init__(self) -> None:
         find_variable(self.x)
@@ -59,12 +59,17 @@ class GraphSpec:
             if limits is not None and log and limits[0] <= 0:
                 raise InputError(f"A logarithmic axis cannot start at {limits[0]:g}", advice="Start it above zero")
 
+    @property
+    def fitted(self) -> Trend:
+        """The kind of curve, where "auto" is resolved."""
+        return trend_of(self.x, self.y, self.x_log, self.y_log) if self.trend == "auto" else self.trend
+
 
 PAPER_GRAPHS = (
-    GraphSpec("rn_theta1", "theta1_deg", "rn", y_limits=(0.0, 5.0), trend="power"),
+    GraphSpec("rn_theta1", "theta1_deg", "rn", y_limits=(0.0, 5.0)),
     GraphSpec("rn_vn1", "vn1_mps", "rn", y_limits=(0.0, 5.0)),
-    GraphSpec("vt2_vt1", "vt1_mps", "vt2_mps", trend="origin"),
-    GraphSpec("r_theta_dev", "theta_dev_deg", "r", trend="line"),
+    GraphSpec("vt2_vt1", "vt1_mps", "vt2_mps"),
+    GraphSpec("r_theta_dev", "theta_dev_deg", "r"),
 )
 """The graphs of Noël et al. 2018, Fig. 8, whose R_N axis ends at 5; what lies beyond is listed."""
 
@@ -100,7 +105,8 @@ class Graph:
     row : (m,) rows of the table of impacts.
     measured, modelled : (m, 2) x and y in the variables' units; NaN where undefined.
     x_limits, y_limits : of the axes.
-    measured_curve, modelled_curve : the fitted trends; None where there is none.
+    measured_curve, modelled_curve : the fitted trends; None where none is wanted or there are no points. That of the
+        model has no interval.
     """
 
     spec: GraphSpec
@@ -265,11 +271,13 @@ def _placed(values: Array, limits: Limits, log: bool) -> Array:
 
 
 def _with_curves(graph: Graph) -> Graph:
-    curves = [
-        fit_curve(graph.spec.trend, points[_finite(points)], graph.x_limits, graph.y_limits)
-        for _, points in graph.series
-    ]
-    return replace(graph, measured_curve=curves[0], modelled_curve=curves[1])
+    measured, modelled = (
+        fit_curve(
+            graph.spec.fitted, points[_finite(points)], graph.x_limits, graph.y_limits, interval=name == "measured"
+        )
+        for name, points in graph.series
+    )
+    return replace(graph, measured_curve=measured, modelled_curve=modelled)
 
 
 def _finite(points: Array) -> Mask:

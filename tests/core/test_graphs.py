@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy.stats
 from rockfall.core.analysis.comparison import compare
-from rockfall.core.analysis.curves import fit_curve
+from rockfall.core.analysis.curves import PAIRS, fit_curve, number, trend_of
 from rockfall.core.analysis.graphs import (
     PAPER_GRAPHS,
     GraphSpec,
@@ -191,6 +192,8 @@ def test_bad_input(impacts, predictions) -> None:
         ("line", lambda x: 1.0 + 2.0 * x, (2.0, 7.0)),
         ("origin", lambda x: 2.0 * x, (1.0, 7.0)),
         ("power", lambda x: 3.0 * x**-1.2, (2.0, 7.0)),
+        ("exponential", lambda x: 3.0 * np.exp(0.4 * x), (2.0, 7.0)),
+        ("logarithm", lambda x: 3.0 + 2.0 * np.log(x), (2.0, 7.0)),
     ],
 )
 def test_a_curve_is_that_of_its_points(trend, law, ends):
@@ -206,3 +209,76 @@ def test_a_curve_is_that_of_its_points(trend, law, ends):
     assert 0 < cut.x.size < 60
     assert ((cut.x > 2.99) & (cut.x < 4.01)).all()
     assert fit_curve("none", np.stack([x, law(x)], axis=1), (1.0, 9.0), (0.0, 100.0)) is None
+
+
+def test_any_pair_has_a_fit_that_is_straight_as_drawn() -> None:
+    pairs = {(x, y) for x in VARIABLES for y in VARIABLES} - PAIRS.keys()
+    for x, y in pairs:
+        assert [trend_of(x, y, *log) for log in ((0, 0), (1, 1), (0, 1), (1, 0))] == [
+            "line",
+            "power",
+            "exponential",
+            "logarithm",
+        ]
+    assert trend_of("vt1_mps", "vt2_mps", True, True) == "origin"
+    assert GraphSpec("any", "mass_kg", "kinetic2_j", x_log=True, y_log=True).fitted == "power"
+    assert GraphSpec("any", "mass_kg", "kinetic2_j", trend="none").fitted == "none"
+
+
+@pytest.mark.parametrize("trend", ["origin", "line", "power", "exponential", "logarithm"])
+def test_a_fit_has_the_numbers_of_scipy(trend) -> None:
+    """Of scattered points with ties, and with some that have no place on a logarithmic axis."""
+    rng = np.random.default_rng(8)
+    x = np.round(rng.uniform(-1.0, 9.0, 300), 1)
+    y = np.round(0.5 + 0.3 * np.abs(x) + rng.normal(size=300), 1)
+    u, v = x, y
+    keep = np.ones(300, dtype=bool)
+    if trend in ("power", "logarithm"):
+        keep &= x > 0
+    if trend in ("power", "exponential"):
+        keep &= y > 0
+    u = np.log(x[keep]) if trend in ("power", "logarithm") else x[keep]
+    v = np.log(y[keep]) if trend in ("power", "exponential") else y[keep]
+    if trend == "origin":
+        slope, intercept = np.linalg.lstsq(u[:, None], v)[0][0], 0.0
+    elif trend == "power":
+        slope, intercept = scipy.stats.theilslopes(v, u)[:2]
+    else:
+        slope, intercept = scipy.stats.linregress(u, v)[:2]
+    curve = fit_curve(trend, np.stack([x, y], axis=1), (0.1, 10.0), (0.0, 100.0))
+    assert (curve.fit.slope, curve.fit.intercept) == pytest.approx((slope, intercept))
+    assert curve.fit.r2 == pytest.approx(1 - np.var(v - intercept - slope * u) / np.var(v), abs=0.02)
+    if trend in ("line", "exponential", "logarithm"):
+        assert curve.fit.r2 == pytest.approx(scipy.stats.pearsonr(u, v).statistic ** 2)
+    assert curve.rank == pytest.approx(scipy.stats.spearmanr(x, y).statistic)
+    assert (curve.n, curve.fit.n) == (300, keep.sum())
+    said = curve.text("y", "x")
+    assert f"R² = {curve.fit.r2:.2f}, ρ = {curve.rank:.2f}, n = {keep.sum()}" in said.replace("−", "-")
+    assert "ρ" not in curve.text("y", "x", full=False)
+
+
+@pytest.mark.parametrize(
+    ("trend", "points", "words"),
+    [
+        ("line", [[1.0, 2.0]], "too few points for a fit, n = 1"),
+        ("line", [[1.0, 2.0], [2.0, 2.0]], "too few points for a fit, n = 2"),
+        ("line", [[1.0, 2.0], [1.0, 3.0], [1.0, 4.0]], "no fit: all points have one abscissa, n = 3"),
+        ("power", [[-1.0, 2.0], [0.0, 3.0], [1.0, 4.0]], "too few points for a fit above zero, ρ = 1.00, n = 3"),
+    ],
+)
+def test_why_there_is_no_fit_is_said(trend, points, words) -> None:
+    curve = fit_curve(trend, np.array(points), (0.1, 10.0), (0.0, 10.0))
+    assert not curve.is_fitted
+    assert curve.x.size == curve.y.size == 0
+    assert curve.text("y", "x") == words
+
+
+def test_a_constant_ordinate_has_a_line_and_no_correlation() -> None:
+    points = np.array([[1.0, 2.0], [2.0, 2.0], [4.0, 2.0]])
+    assert fit_curve("line", points, (0.0, 5.0), (0.0, 5.0)).text("y", "x") == "y = 2.00 + 0.00 x, n = 3"
+    assert fit_curve("line", np.empty((0, 2)), (0.0, 5.0), (0.0, 5.0)) is None
+
+
+def test_numbers_for_people() -> None:
+    texts = {0.55: "0.550", -1.034: "−1.03", 123456.0: "1.23·10⁵", 123.0: "123", 4e-5: "4.00·10⁻⁵", np.nan: "–"}
+    assert [number(value) for value in texts] == list(texts.values())

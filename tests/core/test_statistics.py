@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 import scipy.stats
+from rockfall.core.analysis.robust_slope import theil_sen
 from rockfall.core.analysis.statistics import (
     ImpactStatistics,
     impact_statistics,
@@ -135,3 +136,20 @@ def test_too_few_impacts_give_no_numbers_and_no_warnings() -> None:
     same = line(np.ones(5), np.arange(5.0))
     assert np.isnan(same.slope)
     assert np.isnan(power_law(np.full(4, 10.0), np.ones(4)).slope)
+
+
+@pytest.mark.parametrize("case", ["scattered", "few abscissae", "few abscissae and ordinates", "a law", "two clusters"])
+def test_the_robust_slope_of_many_points_is_that_of_all_pairs(case) -> None:
+    rng = np.random.default_rng(2)
+    x = rng.normal(size=1500)
+    y = 2 * x + rng.standard_t(1.5, size=1500)
+    if case.startswith("few"):
+        x, y = np.round(x, 1), np.round(y, 0 if case.endswith("ordinates") else 9)
+    if case == "a law":
+        y = 3.0 - 2.0 * x
+    if case == "two clusters":
+        x = np.r_[np.zeros(1490), np.ones(10)]
+    reference = scipy.stats.theilslopes(y, x, 0.95)
+    half = np.subtract(*np.quantile(y, [0.75, 0.25])) / np.std(x)
+    np.testing.assert_allclose(theil_sen(x, y, 0.95), reference, atol=1e-4 * half)
+    assert np.isnan(theil_sen(x, y, 0.95, interval=False)[2:]).all()

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Theil–Sen slope and its interval: the median of the slopes between all pairs of points.
+
+For a few points all slopes are listed. For many, the slopes below a number b are counted without listing them: they are
+the pairs whose order in y − b·x is not their order in x, found by merge sort in n log n steps (Cole, Salowe, Steiger &
+Szemerédi 1989), and b is moved until the wanted number of slopes lies below it.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..vectors import Array
+
+LISTED = 600
+"""Up to so many points, the slopes of all pairs are listed."""
+SAMPLED = 20_000
+"""Pairs that say where to look."""
+NEAR = 1e-6
+"""How near the slope is found, in parts of the middle half of all slopes."""
+
+
+def theil_sen(x: Array, y: Array, confidence: float, interval: bool = True) -> tuple[float, float, float, float]:
+    """Slope, intercept (median y − slope · median x), and the interval of the slope (Sen 1968).
+
+    Parameters
+    ----------
+    x, y : (n,) finite, n ≥ 2, not all x equal. Pairs with equal x have no slope and do not count.
+    confidence : of the interval, as 0.95.
+    interval : whether it is wanted; it takes twice as long as the slope, and is NaN where it is not.
+    """
+    if x.size <= LISTED:
+        from scipy.stats import theilslopes
+
+        found = theilslopes(y, x, confidence)
+        ends = (float(found.low_slope), float(found.high_slope)) if interval else (np.nan, np.nan)
+        return float(found.slope), float(found.intercept), *ends
+    order = np.lexsort((y, x))
+    x, y = np.ascontiguousarray(x[order]), np.ascontiguousarray(y[order])
+    pairs = x.size * (x.size - 1) // 2 - sum(k * (k - 1) // 2 for k in _repeats(x))
+    slope = _slope_of_rank(x, y, pairs / 2, pairs)
+    low = high = np.nan
+    if interval:
+        reach = _reach(x, y, pairs, confidence)
+        low, high = (_slope_of_rank(x, y, pairs / 2 + side * reach, pairs) for side in (-1, 1))
+    return slope, float(np.median(y) - slope * np.median(x)), low, high
+
+
+def _reach(x: Array, y: Array, pairs: int, confidence: float) -> float:
+    """How many slopes lie between the median and each end of its interval: the normal deviate of Kendall's count."""
+    from scipy.stats import norm
+
+    def ties(values: Array) -> float:
+        return float(sum(k * (k - 1) * (2 * k + 5) for k in _repeats(values)))
+
+    n = float(x.size)
+    variance = (n * (n - 1) * (2 * n + 5) - ties(x) - ties(np.sort(y))) / 18
+    return min(float(norm.ppf(0.5 + confidence / 2)) * variance**0.5 / 2, pairs / 2 - 1)
+
+
+def _repeats(ordered: Array) -> list[int]:
+    """How often each value occurs that does so more than once."""
+    ends = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1], True])
+    often = np.diff(ends)
+    repeated: list[int] = often[often > 1].tolist()
+    return repeated
+
+
+def _slope_of_rank(x: Array, y: Array, rank: float, pairs: int) -> float:
+    """The slope that `rank` of all slopes lie below; x is ordered, and y where x is equal."""
+    from scipy.optimize import brentq
+
+    from .robust_slope_kernels import count_inversions
+
+    turned, room = np.empty_like(y), np.empty_like(y)
+
+    def above(slope: float) -> float:
+        np.multiply(x, -slope, out=turned)
+        np.add(turned, y, out=turned)
+        return float(count_inversions(turned, room) - rank)
+
+    low, high, scale = _bracket(x, y, rank / pairs, above)
+    return low if low == high else float(brentq(above, low, high, xtol=max(NEAR * scale, 1e-300), rtol=1e-14))
+
+
+def _bracket(x: Array, y: Array, part: float, above: Callable[[float], float]) -> tuple[float, float, float]:
+    """Slopes below and above the wanted one, and the middle half of all slopes, from some of the pairs."""
+    rng = np.random.default_rng(0)
+    one, other = rng.integers(x.size, size=(2, SAMPLED))
+    apart = x[one] != x[other]
+    slopes = (y[one] - y[other])[apart] / (x[one] - x[other])[apart]
+    first, third = np.quantile(slopes, [0.25, 0.75])
+    margin = 3 / slopes.size**0.5
+    for _ in range(20):
+        low, high = (float(v) for v in np.quantile(slopes, [max(part - margin, 0.0), min(part + margin, 1.0)]))
+        low, high = low - NEAR * (third - first), high + NEAR * (third - first)
+        if low == high or above(low) <= 0.0 < above(high):
+            return low, high, float(third - first)
+        if margin > 1.0:
+            break
+        margin *= 2
+    width = (third - first) or max(abs(low), abs(high), 1.0)
+    while above(low) > 0.0:
+        low, width = low - width, 2 * width
+    while above(high) <= 0.0:
+        high, width = high + width, 2 * width
+    return low, high, float(third - first)

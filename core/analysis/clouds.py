@@ -177,7 +177,7 @@ def make_contest(model: ImpactModel, impacts: Impacts, target: Target, replicate
             advice=f"Choose one of {', '.join(FORMULAS)}; compare {model.name} with other bandwidths by --set",
         )
     courses = target.courses
-    draws = random_numbers(model, courses, impacts, replicates if model.is_random else 0, seed)
+    draws = random_numbers(model, courses, impacts, replicates, seed)
     return Contest(model, target, draws[1:] if model.is_random else draws)
 
 

@@ -129,8 +129,14 @@ def predict(
     replicates: int = 0,
     seed: int = 0,
     measured: MeasuredRebounds | None = None,
+    draws: Mapping[str, Array] | None = None,
 ) -> Predictions:
-    """As `compare`, for courses that were found once: what a slider or a calibration calls again and again."""
+    """As `compare`, for courses that were found once: what a slider or a calibration calls again and again.
+
+    Parameters
+    ----------
+    draws : model → its `random_numbers` for these replicates and this seed, where they were drawn before.
+    """
     if replicates < 0 or seed < 0:
         raise InputError("The number of replicates and the seed are whole numbers of zero or more")
     if (1 + replicates) * len(models) * len(courses) > MOST_PREDICTIONS:
@@ -153,13 +159,15 @@ def predict(
     else:
         measured = None
     for i, model in enumerate(chosen):
-        draws = random_numbers(model, courses, impacts, replicates if model.is_random else 0, seed)
+        uniform = (draws or {}).get(model.name)
+        if uniform is None:
+            uniform = random_numbers(model, courses, impacts, replicates, seed)
         if measured is not None and model.draws_from_impacts:
-            found = chain_from_others(model, settings[model.name], measured, courses, site, trajectory, draws)
+            found = chain_from_others(model, settings[model.name], measured, courses, site, trajectory, uniform)
             omega1[i], v2[i], omega2[i], beyond = found
         else:
             numbers = model.numbers(settings[model.name])
-            omega1[i], v2[i], omega2[i] = model.chain(courses.incident, courses.follows, numbers, draws)
+            omega1[i], v2[i], omega2[i] = model.chain(courses.incident, courses.follows, numbers, uniform)
 
     state = courses.incident
     v1, normal = (
@@ -193,9 +201,12 @@ def predict(
 
 
 def random_numbers(model: ImpactModel, courses: Courses, impacts: Impacts, replicates: int, seed: int) -> Array:
-    """(1 + replicates, m, draws) uniform numbers, one stream for each fall; the first run is NaN, the mean."""
-    draws = np.full((1 + replicates, len(courses), model.draws), np.nan)
-    if replicates:
+    """(1 + replicates, m, draws) uniform numbers, one stream for each fall; the first run is NaN, the mean.
+
+    A model without chance has its mean alone: (1, m, 0).
+    """
+    draws = np.full((1 + replicates if model.is_random else 1, len(courses), model.draws), np.nan)
+    if model.is_random and replicates:
         runs = impacts.runs.values()
         for start, stop in zip(courses.first[:-1], courses.first[1:], strict=True):
             row = courses.row[start]

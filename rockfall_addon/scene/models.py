@@ -26,6 +26,8 @@ CHOICES = [
     for i, name in enumerate(ORDER)
 ]
 """Items of a property that holds some of the models."""
+PARAMETER_SETS = {"A": store.MODEL_PARAMETERS, "B": store.OTHER_PARAMETERS}
+"""Where each set of parameters is kept."""
 LINGER_S = 0.2
 """How long a predicted block lies where it has landed."""
 
@@ -35,14 +37,17 @@ def shown_models(scene: bpy.types.Scene) -> tuple[str, ...]:
     return tuple(filter(None, str(scene.get(store.SHOWN_MODELS, "")).split(" ")))
 
 
-def parameters_of(scene: bpy.types.Scene) -> dict[str, dict[str, Value]]:
-    """Model → parameter → value, where the scene has another than the default."""
-    return json.loads(scene.get(store.MODEL_PARAMETERS, "{}"))
+def parameters_of(scene: bpy.types.Scene, which: str = "A") -> dict[str, dict[str, Value]]:
+    """Model → parameter → value, where a set of parameters has another than the default.
+
+    which : "A", the scene's parameters, or "B", the second set that graphs can show.
+    """
+    return json.loads(scene.get(PARAMETER_SETS[which], "{}"))
 
 
-def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]]) -> None:
-    """Store parameters with the scene: as text, which keeps every digit."""
-    scene[store.MODEL_PARAMETERS] = json.dumps({name: dict(values) for name, values in parameters.items()})
+def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]], which: str = "A") -> None:
+    """Store a set of parameters with the scene: as text, which keeps every digit."""
+    scene[PARAMETER_SETS[which]] = json.dumps({name: dict(values) for name, values in parameters.items()})
 
 
 def show_models(

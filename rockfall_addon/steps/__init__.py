@@ -7,7 +7,7 @@ from types import ModuleType
 import bpy
 
 from .. import view
-from ..scene import model_parameters, settings
+from ..scene import comparison_settings, model_parameters, settings
 from ..view.reporting import leave_newer_alone
 
 STEPS = (
@@ -32,10 +32,11 @@ _registered_tools: list[type] = []
 
 def parts() -> list[ModuleType]:
     """All modules that register something: first the properties, which the rest reads; then step by step."""
-    found = [settings, model_parameters, *view.PARTS]
+    first = [settings, model_parameters, comparison_settings]
+    found = [*first, *view.PARTS]
     for name in STEPS:
         found += import_module(f".{name}", __name__).PARTS
-    return sorted(found, key=lambda part: not part.__name__.endswith((".settings", ".model_parameters", ".properties")))
+    return sorted(found, key=lambda part: part not in first and not part.__name__.endswith(".properties"))
 
 
 def classes() -> list[type]:

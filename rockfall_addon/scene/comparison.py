@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene's impacts beside what the models make of them, as the graphs, the scores and the blocks show them.
+
+Computed when asked for, from what the scene stores, so it is right after an undo, too. Kept until something of that
+changes, and only what depends on the change is computed again: for a slider, one model with the same draws.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import count
+
+import bpy
+
+from ...core.analysis.comparison import Predictions, predict, random_numbers
+from ...core.analysis.courses import Courses, find_courses
+from ...core.errors import RockfallError
+from ...core.exchange.selection import joined
+from ...core.impact_models.registry import MODELS
+from ...core.reconstruction.impact import Impacts
+from ...core.reconstruction.trajectory import Reconstruction
+from ...core.vectors import Array
+from . import databases, fingerprints, models, picks, reconstruction, store, timing
+from .databases import OtherSites
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What was measured in the scene.
+
+    Attributes
+    ----------
+    impacts : n rows; None without a reconstructed trajectory.
+    pick : (n,) id of the pick of each row, see `picks.with_id`.
+    courses : the impacts that models can be asked about; None without one.
+    reconstruction : of all trajectories; None where one of them has a problem.
+    problems : sentences about what is missing.
+    """
+
+    impacts: Impacts | None = None
+    pick: tuple[str, ...] = ()
+    courses: Courses | None = None
+    reconstruction: Reconstruction | None = None
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class SceneComparison:
+    """What the graphs show.
+
+    Attributes
+    ----------
+    version : another one whenever anything in here is another.
+    measured : the scene's own impacts.
+    models : names of the chosen models, in the order of lists.
+    predictions : set of parameters that is shown ("A", "B") → model → its predictions, each of that model alone
+        (place 0 on their first axis); a model that cannot be asked is not among them. One that did not change is the
+        same object as before.
+    runs : which runs of a model's predictions are its points: 0 is the mean.
+    others : tables of other sites.
+    problems : sentences about what is not shown, and why.
+    """
+
+    version: int
+    measured: Measured
+    models: tuple[str, ...]
+    predictions: Mapping[str, Mapping[str, Predictions]]
+    runs: tuple[int, ...]
+    others: tuple[OtherSites, ...]
+    problems: tuple[str, ...]
+
+    @property
+    def impacts(self) -> Impacts | None:
+        """The scene's own impacts; None without a reconstructed trajectory."""
+        return self.measured.impacts
+
+    @property
+    def pick(self) -> tuple[str, ...]:
+        """(n,) id of the pick of each row of `impacts`."""
+        return self.measured.pick
+
+
+@dataclass(eq=False)
+class _Kept:
+    """What was found for a scene, and what for."""
+
+    key: object = None
+    found: SceneComparison | None = None
+    measured_key: object = None
+    measured: Measured = field(default_factory=Measured)
+    draws: dict[tuple[str, int, int], Array] = field(default_factory=dict)
+    predictions: dict[tuple[str, int, int, str], Predictions] = field(default_factory=dict)
+
+
+_kept: dict[int, _Kept] = {}  # session_uid of a scene
+_versions = count(1)
+
+
+def comparison_of(scene: bpy.types.Scene) -> SceneComparison:
+    """The comparison of a scene as it is now."""
+    kept, settings = _of(scene), scene.rockfall_comparison
+    others = databases.of_scene(scene)
+    chosen = tuple(name for name in models.ORDER if name in settings.models)
+    sets = tuple(models.PARAMETER_SETS) if settings.sets == "BOTH" else (settings.sets,)
+    texts = tuple(scene.get(key, "{}") for key in models.PARAMETER_SETS.values())
+    measured = measured_of(scene)
+    key = (measured, chosen, sets, settings.points, settings.replicates, settings.seed, texts, others)
+    if kept.found is None or kept.key != key:
+        problems = [*measured.problems, *(one.problem for one in others if one.problem)]
+        predictions = _predictions(scene, kept, measured, chosen, sets, problems)
+        runs = {"MEAN": (0,), "DRAW": (1,), "ALL": tuple(range(1, 1 + settings.replicates))}[settings.points]
+        kept.found = SceneComparison(
+            version=next(_versions),
+            measured=measured,
+            models=chosen,
+            predictions=predictions,
+            runs=runs if settings.replicates else (0,),
+            others=others,
+            problems=tuple(dict.fromkeys(problems)),
+        )
+        kept.key = key
+    return kept.found
+
+
+def measured_of(scene: bpy.types.Scene) -> Measured:
+    """The scene's own impacts as they are now."""
+    kept, key = _of(scene), _measured_key(scene)
+    if kept.measured_key != key:
+        kept.measured, kept.measured_key = _measure(scene), key
+        kept.draws.clear()
+        kept.predictions.clear()
+    return kept.measured
+
+
+def predictions_of(scene: bpy.types.Scene, model: str, which: str = "A") -> Predictions | None:
+    """What a model makes of the scene's impacts with a set of parameters, with the graphs' replicates and seed.
+
+    Raises
+    ------
+    RockfallError : a parameter that cannot be, too few impacts to draw from.
+    """
+    kept, measured, settings = _of(scene), measured_of(scene), scene.rockfall_comparison
+    impacts, courses = measured.impacts, measured.courses
+    if impacts is None or courses is None:
+        return None
+    replicates, seed = settings.replicates, settings.seed
+    given = models.parameters_of(scene, which).get(model, {})
+    key = model, replicates, seed, json.dumps(given, sort_keys=True)
+    if key not in kept.predictions:
+        drawn = model, replicates, seed
+        if drawn not in kept.draws:
+            for other in [one for one in kept.draws if one[0] == model]:
+                del kept.draws[other]
+            kept.draws[drawn] = random_numbers(MODELS[model], courses, impacts, replicates, seed)
+        draws = {model: kept.draws[drawn]}
+        for other in [one for one in kept.predictions if one[0] == model and not _is_used(scene, one)]:
+            del kept.predictions[other]
+        kept.predictions[key] = predict(
+            impacts, courses, [model], {model: given}, replicates=replicates, seed=seed, draws=draws
+        )
+    return kept.predictions[key]
+
+
+def _is_used(scene: bpy.types.Scene, key: tuple[str, int, int, str]) -> bool:
+    """Whether one of the sets has these parameters."""
+    texts = [
+        json.dumps(models.parameters_of(scene, which).get(key[0], {}), sort_keys=True)
+        for which in models.PARAMETER_SETS
+    ]
+    return key[3] in texts
+
+
+def _predictions(
+    scene: bpy.types.Scene,
+    kept: _Kept,
+    measured: Measured,
+    chosen: tuple[str, ...],
+    sets: tuple[str, ...],
+    problems: list[str],
+) -> Mapping[str, Mapping[str, Predictions]]:
+    found: dict[str, dict[str, Predictions]] = {which: {} for which in sets}
+    for which in sets:
+        for model in chosen:
+            try:
+                predictions = predictions_of(scene, model, which)
+            except RockfallError as error:
+                problems.append(f"{MODELS[model].title}: {error}")
+                continue
+            if predictions is not None:
+                found[which][model] = predictions
+    return found
+
+
+def _measure(scene: bpy.types.Scene) -> Measured:
+    """Of each trajectory that can be reconstructed its impacts."""
+    problems: list[str] = []
+    tables, result = [], None
+    try:
+        result = reconstruction.reconstruct_scene(scene)
+        tables = [result.impacts]
+    except RockfallError:
+        for members in fingerprints.by_trajectory(picks.ordered(scene, picks.objects_of(scene))).values():
+            try:
+                part = reconstruction.reconstruct_scene(scene, picks.read(scene, members))
+                tables.append(part.impacts)
+            except RockfallError as error:
+                problems.append(str(error))
+    tables = [table for table in tables if len(table)]
+    if not tables:
+        return Measured(problems=tuple(problems))
+    impacts = tables[0] if len(tables) == 1 else joined(tables)
+    try:
+        courses = find_courses(impacts, scene.rockfall_comparison.spin)
+    except RockfallError as error:
+        problems.append(str(error))
+        courses = None
+    return Measured(impacts, _pick_ids(scene, impacts), courses, result, tuple(problems))
+
+
+def _pick_ids(scene: bpy.types.Scene, impacts: Impacts) -> tuple[str, ...]:
+    """(n,) the pick of each impact, found by trajectory and time."""
+    rate = timing.keyed_rate(scene)
+    known = {(o[store.TRAJECTORY], picks.time_of(o, rate)): str(o.get(store.ID, "")) for o in picks.objects_of(scene)}
+    places = zip(impacts.trajectory.tolist(), impacts.time_s.tolist(), strict=True)
+    return tuple(known.get(place, "") for place in places)
+
+
+def _measured_key(scene: bpy.types.Scene) -> object:
+    """All that the scene's impacts depend on: what is shown of the picks, and the settings."""
+    settings = scene.rockfall
+    kept = (
+        store.SHOWN, store.GROUND, store.GROUND_CONTENTS, store.SITE, store.GRAVITY, store.BLOCKS, store.NORMAL_RADIUS,
+    )  # fmt: skip
+    arrays = (store.DRAG, store.DEFAULT_BLOCK)
+    return (
+        *(scene.get(key) for key in kept),
+        *(tuple(scene.get(key, ())) for key in arrays),
+        settings.block_diameter_m,
+        settings.density_kgpm3,
+        settings.normal_radius_m,
+        settings.use_drag,
+        settings.flights_join,
+        scene.rockfall_comparison.spin,
+    )
+
+
+def _of(scene: bpy.types.Scene) -> _Kept:
+    if scene.session_uid not in _kept:
+        for gone in _kept.keys() - {one.session_uid for one in bpy.data.scenes}:
+            del _kept[gone]
+        _kept[scene.session_uid] = _Kept()
+    return _kept[scene.session_uid]

@@ -32,15 +32,15 @@ def kernel(function: Callable[..., Any], *, inline: bool = False) -> Any:
     return dispatcher
 
 
-def in_chunks(function: Callable[[int, int], None], rows: int) -> None:
+def in_chunks(function: Callable[[int, int], None], rows: int, chunk: int = CHUNK_ROWS) -> None:
     """Call ``function(start, stop)`` over ``range(rows)`` in chunks, on all cores."""
-    starts = range(0, rows, CHUNK_ROWS)
+    starts = range(0, rows, chunk)
     if len(starts) <= 1:
         if rows:
             function(0, rows)
         return
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        list(pool.map(lambda start: function(start, min(start + CHUNK_ROWS, rows)), starts))
+        list(pool.map(lambda start: function(start, min(start + chunk, rows)), starts))
 
 
 def as_rows(points: Any) -> np.ndarray:

@@ -137,6 +137,7 @@ def fly_predictions(
     gravity_mps2: float = GRAVITY_MPS2,
     drag: Drag | None = None,
     runs: Sequence[int] | None = (0,),
+    beside: bool = True,
     step_s: float = STEP_S,
     limit_s: float = LIMIT_S,
 ) -> PredictedFlights:
@@ -147,6 +148,8 @@ def fly_predictions(
     impacts : the measured ones that `predictions` is of, in the terrain's frame or any other.
     drag : of air; None for parabolas.
     runs : which of the predictions' runs, 0 being the mean; None for all.
+    beside : whether to find what the real flights are compared by: their durations, landings and heights, and the
+        heights of the predicted ones. These are NaN without, which is quick.
     step_s, limit_s : see `find_landings`.
 
     Raises
@@ -170,18 +173,20 @@ def fly_predictions(
     clearing = np.where(np.isfinite(impacts.diameter_m), impacts.diameter_m / 2, DEFAULT_CLEARING_M)[rows]
 
     duration, landing, velocity = np.zeros(rows.size), launches.position.copy(), v2.copy()
-    left, height = np.zeros(rows.size, dtype=np.bool_), np.zeros(rows.size)
+    left, height = np.zeros(rows.size, dtype=np.bool_), np.full(rows.size, 0.0 if beside else np.nan)
     free = np.flatnonzero(~into)
     flown = Launches(launches.position[free], v2[free], launches.drag_per_m[free], gravity_mps2)
     ends = find_landings(flown, surface, clearing[free], step_s=step_s, limit_s=limit_s)
     duration[free], landing[free], velocity[free] = ends.duration_s, ends.position, ends.velocity
     into[free], left[free] = ends.into_ground, ends.left_terrain
-    height[free] = greatest_heights(flown, ends.duration_s, surface)
-
-    measured_duration, follower = _measured_flights(impacts)
-    real = Launches(position[row], np.nan_to_num(impacts.v2[row]), drag_per_m[row], gravity_mps2)
-    measured_height = greatest_heights(real, measured_duration[row], surface)
-    measured_landing = np.where((follower >= 0)[:, None], position[follower], np.nan)
+    measured_duration, measured_height = np.full(len(impacts), np.nan), np.full(len(impacts), np.nan)
+    measured_landing = np.full((len(impacts), 3), np.nan)
+    if beside:
+        height[free] = greatest_heights(flown, ends.duration_s, surface)
+        measured_duration, follower = _measured_flights(impacts)
+        real = Launches(position[row], np.nan_to_num(impacts.v2[row]), drag_per_m[row], gravity_mps2)
+        measured_height[row] = greatest_heights(real, measured_duration[row], surface)
+        measured_landing = np.where((follower >= 0)[:, None], position[follower], np.nan)
     return PredictedFlights(
         model=np.repeat(np.array(predictions.models), len(runs) * row.size),
         replicate=np.tile(np.repeat(np.array(runs, dtype=np.intp), row.size), len(predictions.models)),
@@ -198,7 +203,7 @@ def fly_predictions(
         left_terrain=left,
         measured_duration_s=measured_duration[rows],
         measured_landing=measured_landing[rows],
-        measured_height_m=np.tile(measured_height, kinds),
+        measured_height_m=measured_height[rows],
         shift=surface.shift,
         runs={name: column[rows] for name, column in impacts.runs.items()},
     )

@@ -6,6 +6,8 @@ import numpy as np
 from ..errors import RockfallError
 from ..vectors import Array
 
+UNFLYABLE = "A flight with drag cannot be integrated. Check its duration, and the block's size and density."
+
 
 def restituted_velocity(displacement: Array, duration_s: Array, gravity_mps2: float | Array) -> Array:
     """Velocity at the start of a free flight, (n, 3) [m/s]: Noël et al. 2018, eq. 5.
@@ -71,8 +73,6 @@ def fly(
             np.arange(rows.size), elapsed_s[rows], velocity[rows], drag_per_m[rows], gravity, states
         )
         if np.isnan(states).any():
-            raise RockfallError(
-                "A flight with drag cannot be integrated. Check its duration, and the block's size and density."
-            )
+            raise RockfallError(UNFLYABLE)
         later[rows], faster[rows] = position[rows] + states[:, :3], states[:, 3:]
     return later, faster

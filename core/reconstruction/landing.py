@@ -5,18 +5,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..compiled import in_chunks
 from ..errors import RockfallError
-from ..terrain.raycast import cast_rays, heights_above
+from ..terrain.raycast import heights_above
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask, dot, norm
-from .free_flight import fly
+from .free_flight import UNFLYABLE, fly
 
-FIRST_STEP_S, STEP_S = 0.001, 0.02
-"""Chords of the curved path, short at its start, where it may be a hop. The longest leaves the path by g·t²/8 = 0.5 mm;
-the landing is refined on the path itself."""
+STEP_S = 0.02
+"""Longest chord of the curved path, which it leaves by g·t²/8 = 0.5 mm; the first ones are shorter, as the path may be
+a hop. The landing is refined on the path itself."""
 LIMIT_S = 60.0
-ON_SURFACE_M = 1e-6
-"""Nearer to the terrain than this is on it; a ray goes on so far behind a face that it has passed."""
+CHUNK_FLIGHTS = 256
 REFINEMENTS = 5
 PROFILE_POINTS = 33
 
@@ -95,46 +95,26 @@ def find_landings(
     """
     if not (np.isfinite(step_s) and step_s > 0 and np.isfinite(limit_s) and limit_s > 0):
         raise RockfallError(f"The time step ({step_s} s) and the limit ({limit_s} s) must be positive numbers.")
+    from . import landing_kernels as kernels
+
     n = len(launches.position)
-    clearing = np.broadcast_to(np.asarray(clearing_m, dtype=np.float64), n)
-    inside = heights_above(surface, launches.position) < -ON_SURFACE_M if n else np.zeros(0, dtype=np.bool_)
+    clearing = np.ascontiguousarray(np.broadcast_to(np.asarray(clearing_m, dtype=np.float64), n))
+    inside = heights_above(surface, launches.position) < -kernels.ON_SURFACE_M if n else np.zeros(0, dtype=np.bool_)
     lowest = float(surface.bounds[0, 2])
     duration, face = np.zeros(n), np.full(n, -1, dtype=np.intp)  # of the landing, or of the last touch near the start
     left = np.zeros(n, dtype=np.bool_)
-    flying, here, velocity, time = np.arange(n), launches.position, launches.velocity, 0.0
-    while flying.size:
-        step = min(step_s, max(time, FIRST_STEP_S), limit_s - time)
-        elapsed = np.full(flying.size, step)
-        there, falling = fly(here, velocity, elapsed, launches.gravity_mps2, launches.drag_per_m[flying])
-        landed = np.zeros(flying.size, dtype=np.bool_)
-        todo, origin = np.arange(flying.size), here.copy()
-        while todo.size:
-            way = there[todo] - origin[todo]
-            length = norm(way)
-            moves = length > ON_SURFACE_M
-            todo, way, length = todo[moves], way[moves], length[moves]
-            hits = cast_rays(surface, origin[todo], way, float(length.max(initial=0.0)))
-            met = hits.distance <= length
-            todo, way, length = todo[met], way[met], length[met]
-            place, struck = hits.point[met], hits.face[met].astype(np.intp)
-            flight = flying[todo]
-            enters = dot(way, surface.face_normals[struck]) < 0
-            far = norm(place - launches.position[flight]) > clearing[flight]
-            inside[flight] = enters
-            entered = flight[enters]
-            chord = norm(there[todo] - here[todo])
-            duration[entered] = time + (step * norm(place - here[todo]) / chord)[enters]
-            face[entered] = struck[enters]
-            landed[todo] = enters & far
-            origin[todo] = place + way * (ON_SURFACE_M / length)[:, None]
-            todo = todo[~(enters & far)]
-        time += step
-        gone = ~landed & (((there[:, 2] < lowest) & (falling[:, 2] < 0)) | (time >= limit_s))
-        away = flying[gone & ~inside[flying]]
-        left[away], face[away] = True, -1
-        duration[away] = time
-        going = ~(landed | gone)
-        flying, here, velocity = flying[going], there[going], falling[going]
+    starts = np.column_stack([launches.position, launches.velocity, launches.drag_per_m])
+    ground = surface.index.tree, surface.index.face, surface.face_normals, lowest
+    steps, gravity = (float(step_s), float(limit_s)), float(launches.gravity_mps2)
+    in_chunks(
+        lambda i, j: kernels.fly_to_ground(
+            *ground, starts, gravity, clearing, steps, inside, duration, face, left, i, j
+        ),
+        n,
+        CHUNK_FLIGHTS,
+    )
+    if np.isnan(duration).any():
+        raise RockfallError(UNFLYABLE)
 
     refined = np.flatnonzero(face >= 0)
     corner = surface.vertices[surface.faces[face[refined], 0]]
@@ -142,7 +122,7 @@ def find_landings(
     cut = np.flatnonzero(left & (launches.states(np.arange(n), duration)[0][:, 2] < lowest))
     floor = np.tile((0.0, 0.0, lowest), (cut.size, 1))
     duration[cut] = _crossings(launches, cut, duration[cut], floor, np.tile((0.0, 0.0, 1.0), (cut.size, 1)))
-    never = inside & (duration * norm(launches.velocity) < ON_SURFACE_M)
+    never = inside & (duration * norm(launches.velocity) < kernels.ON_SURFACE_M)
     position, velocity = launches.states(np.arange(n), duration)
     return Landings(duration, position, velocity, never, left)
 

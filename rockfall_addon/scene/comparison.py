@@ -20,7 +20,7 @@ from ...core.impact_models.registry import MODELS
 from ...core.reconstruction.impact import Impacts
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.vectors import Array
-from . import databases, fingerprints, models, picks, reconstruction, store, timing
+from . import databases, fingerprints, model_blocks, models, picks, reconstruction, store, timing
 from .databases import OtherSites
 
 
@@ -159,6 +159,23 @@ def predictions_of(scene: bpy.types.Scene, model: str, which: str = "A") -> Pred
             impacts, courses, [model], {model: given}, replicates=replicates, seed=seed, draws=draws
         )
     return kept.predictions[key]
+
+
+def follow_parameters(scene: bpy.types.Scene, model: str) -> None:
+    """Bring the blocks of a model, if it has any in the 3-D view, in line with its parameters.
+
+    Raises
+    ------
+    RockfallError : as `predictions_of`, and without a terrain.
+    """
+    measured = measured_of(scene)
+    if model not in models.shown_models(scene) or measured.reconstruction is None:
+        return
+    predictions = predictions_of(scene, model)
+    if predictions is not None:
+        flights = models.fly(scene, measured.reconstruction, predictions, beside=False)
+        offsets = timing.shown_offsets(scene, measured.reconstruction.picks)
+        model_blocks.show(scene, flights, offsets, keep_blocks=True)
 
 
 def _is_used(scene: bpy.types.Scene, key: tuple[str, int, int, str]) -> bool:

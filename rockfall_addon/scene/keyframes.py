@@ -115,11 +115,11 @@ def write_visibility_keys(obj: bpy.types.Object, spans_s: Sequence[tuple[float, 
     for name in ("hide_viewport", "hide_render"):
         curve = bag.fcurves.find(name) or bag.fcurves.new(name)
         points = curve.keyframe_points
-        points.clear()
-        points.add(len(changes))
+        if len(points) != len(changes):
+            points.clear()
+            points.add(len(changes))
         points.foreach_set("co", [value for time, hidden in changes for value in (time * rate, hidden)])
-        for point in points:
-            point.interpolation = "CONSTANT"
+        points.foreach_set("interpolation", np.full(len(changes), CONSTANT, dtype=np.int32))
         curve.update()
 
 

@@ -4,15 +4,16 @@
 They hold nothing themselves: they read and write the scene's one set of parameters (`models.parameters_of`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import bpy
 from bpy.props import EnumProperty, FloatProperty, PointerProperty
 
+from ...core.errors import RockfallError
 from ...core.impact_models.machinery.base import ImpactModel
 from ...core.impact_models.machinery.parameters import ParameterSpec, Value
 from ...core.impact_models.registry import MODELS
-from . import models, store, sync
+from . import comparison, models, store, sync
 
 LARGEST = 1e30  # of a single-precision property
 
@@ -42,7 +43,15 @@ def keep(scene: bpy.types.Scene, model: str, name: str, value: Value | None) -> 
     if value is not None and (value != spec.default or spec.follows is not None):
         own[name] = value
     models.keep_parameters(scene, {name: values for name, values in parameters.items() if values})
-    if models.shown_models(scene):
+    follow(scene, [model])
+
+
+def follow(scene: bpy.types.Scene, changed: Iterable[str]) -> None:
+    """Bring the blocks of these models in the 3-D view in line; where that cannot be, everything, which says why."""
+    try:
+        for model in changed:
+            comparison.follow_parameters(scene, model)
+    except RockfallError:
         sync.recompute(scene)
 
 

@@ -5,6 +5,8 @@ All of it is stored in ID properties: they hold doubles, are saved in the file a
 right is what saved files contain and never changes; `migration` says what is done when the meaning does.
 """
 
+from collections.abc import Collection
+
 import bpy
 
 # of any object
@@ -43,6 +45,7 @@ PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems
 SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
 OTHER_PARAMETERS = "rockfall_other_parameters"  # of the models: the second set, for the graphs
 MODEL = "rockfall_model"  # of what a model predicts
+LANE = "rockfall_lane"  # of a model's block: number among those of a trajectory
 SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
 
@@ -123,12 +126,16 @@ def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
     return parent
 
 
-def remove_collection(scene: bpy.types.Scene, name: str) -> None:
-    """Remove a collection below "Rockfall" with those in it; their objects must be gone."""
+def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = ()) -> None:
+    """Remove a collection below "Rockfall" with those in it; their objects must be gone.
+
+    but : names of collections in it that stay, and it with them.
+    """
     ours = next((c for c in scene.collection.children if c.get(COLLECTION_NAME) == "Rockfall"), None)
-    for child in ours.children if ours is not None else ():
+    for child in list(ours.children) if ours is not None else ():
         if child.get(COLLECTION_NAME) == name:
-            for each in (*child.children_recursive, child):
+            inner = [each for each in child.children_recursive if each.get(COLLECTION_NAME) not in but]
+            for each in (*inner, *(() if but else (child,))):
                 bpy.data.collections.remove(each)
             return
 

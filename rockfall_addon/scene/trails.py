@@ -19,8 +19,23 @@ BELOW_ATTRIBUTE, DOUBT_ATTRIBUTE = "below_terrain", "doubt"
 DOUBTFUL_SIGMA = 0.2
 """Relative standard deviation of the speed that counts as full doubt."""
 
-Piece = tuple[Array, Array, Array]
-"""Of one flight: (m,) display times [s], (m, 3) positions [m], (m,) speeds [m/s]."""
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """The flights of a trail, one after the other.
+
+    Attributes
+    ----------
+    count : (k,) points of each flight.
+    time_s : (points,) display times [s].
+    position : (points, 3) [m].
+    speed : (points,) [m/s].
+    """
+
+    count: Array
+    time_s: Array
+    position: Array
+    speed: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +50,16 @@ class Marks:
 def moments(start_s: float, end_s: float) -> Array:
     """Times at which a flight is sampled, its ends among them."""
     return np.linspace(start_s, end_s, max(2, int(np.ceil((end_s - start_s) / SAMPLE_STEP_S)) + 1))
+
+
+def parts(duration_s: Array, step_s: Array | float) -> tuple[Array, Array]:
+    """Flights cut into equal parts of at most a step: (k,) how many points each has, (points,) times since its start.
+
+    duration_s : (k,), step_s : (k,) or one; all above zero.
+    """
+    count = np.maximum(2, np.ceil(duration_s / step_s).astype(np.intp) + 1)
+    number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    return count, number * np.repeat(duration_s / (count - 1), count)
 
 
 def moments_with_ticks(start_s: float, end_s: float, offset_s: float, rate: float) -> tuple[Array, Array]:
@@ -58,14 +83,13 @@ def moments_with_ticks(start_s: float, end_s: float, offset_s: float, rate: floa
 def trail(
     name: str,
     role: str,
-    pieces: Sequence[Piece],
+    lines: Lines,
     marks: Marks | None = None,
     obj: bpy.types.Object | None = None,
 ) -> bpy.types.Object:
     """An object of the flights, new or brought in line; `paint` gives it its colours, `set_trails` its thickness."""
-    counts = np.array([len(time) for time, _, _ in pieces])
-    time, place, speed = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    last = np.cumsum(counts) - 1
+    time, place, speed = lines.time_s, lines.position, lines.speed
+    last = np.cumsum(lines.count) - 1
     first = np.setdiff1d(np.arange(len(time)), last)
     edges = np.column_stack([first, first + 1]).astype(np.int32).ravel()
     if obj is None:

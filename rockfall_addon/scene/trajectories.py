@@ -142,9 +142,7 @@ def _show_flights(
     counts = np.array([len(clock) for clock, _ in sampled])
     clock = np.concatenate([clock for clock, _ in sampled])
     position, velocity = flight_states(flights, np.repeat(which, counts), clock)
-    edges = np.cumsum(counts)[:-1]
-    speed = norm(velocity)
-    pieces = list(zip(np.split(clock - offset, edges), np.split(position, edges), np.split(speed, edges), strict=True))
+    lines = trails.Lines(counts, clock - offset, position, norm(velocity))
     marks = trails.Marks(
         below=_below(result, name, position, surface),
         doubt=np.repeat(_doubt(result, which), counts),
@@ -152,7 +150,7 @@ def _show_flights(
     )
     new = obj is None
     bare = new or "Trail" not in obj.modifiers or obj.modifiers["Trail"].node_group is None
-    obj = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, pieces, marks, obj)
+    obj = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, lines, marks, obj)
     obj[store.TRAJECTORY] = name
     obj[store.MASS] = _block_of(result, name).mass_kg
     ends = np.vstack([flights.start_velocity[which], flights.end_velocity[which]])

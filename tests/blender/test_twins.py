@@ -57,7 +57,7 @@ def expected(part, scene: bpy.types.Scene):
 def check_motion(part, scene: bpy.types.Scene) -> None:
     """Every flight of every twin is flown, by a block of its own that is hidden when it does not fly."""
     twins = expected(part, scene)
-    linger = part("rockfall_addon.scene.models").LINGER_S
+    linger = part("rockfall_addon.scene.model_blocks").LINGER_S
     rate = scene.render.fps / scene.render.fps_base
     begin = twins.time_s - np.where(twins.trajectory == "A", TIMES[0], TIMES[0] + 30.0 - scene.rockfall.stagger_s)
     end = begin + twins.duration_s

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated blocks in a film: who they are, and thin paths behind them; the measured blocks are white beside them."""
 
-from itertools import pairwise
-
 import bpy
 import numpy as np
 
@@ -74,8 +72,8 @@ def make_paths(scene: bpy.types.Scene, radius_m: float, *, until_now: bool) -> l
     for obj in simulation.paths_of(scene):
         lines = simulated_paths.lines_of(obj)
         time = np.repeat(_begins(scene, obj, lines), np.diff(lines.first)) + _since_release(obj)
-        pieces = [(time[i:j], lines.position[i:j], lines.speed_mps[i:j]) for i, j in pairwise(lines.first.tolist())]
-        path = trails.trail(f"Film paths {lines.model}", store.MODEL_FLIGHTS_ROLE, pieces)
+        flights = trails.Lines(np.diff(lines.first), time, lines.position, lines.speed_mps)
+        path = trails.trail(f"Film paths {lines.model}", store.MODEL_FLIGHTS_ROLE, flights)
         trails.paint(path.data, np.array(find_model(lines.model).colour))
         modifier = path.modifiers["Trail"]
         modifier.node_group = _thin_trails(modifier.node_group, opacity)

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The objects that show what a model predicts: its flight curves, and blocks that appear, fly and vanish.
+
+Of each trajectory a block, and where one still flies when the next one starts, a second block takes over. Objects that
+are there already are brought in line, so that a parameter can be changed while one looks.
+"""
+
+from collections.abc import Collection, Mapping
+
+import bpy
+import numpy as np
+
+from ...core.analysis.predicted_flights import PredictedFlights
+from ...core.impact_models.registry import find_model
+from ...core.vectors import Array, Indices, norm
+from . import keyframes, store, timing, trails, trajectories
+
+LINGER_S = 0.2
+"""How long a predicted block lies where it has landed."""
+COLLECTION = "Twins"
+
+
+def show(
+    scene: bpy.types.Scene, predicted: PredictedFlights, offsets: Mapping[str, float], *, keep_blocks: bool = False
+) -> None:
+    """Bring the objects of the models that `predicted` is of in line.
+
+    offsets : see `timing.shown_offsets`.
+    keep_blocks : those that are not needed now are hidden, not removed: more may be needed in a moment.
+    """
+    begin_s = _begins(predicted, offsets)
+    reals = {obj[store.TRAJECTORY]: obj for obj in store.with_role(scene, store.BLOCK_ROLE)}
+    there = {_name_of(obj): obj for obj in store.with_role(scene, store.MODEL_BLOCK_ROLE)}
+    curves = {obj[store.MODEL]: obj for obj in store.with_role(scene, store.MODEL_FLIGHTS_ROLE)}
+    rate = timing.keyed_rate(scene)
+    for model in predicted.models:
+        which = np.flatnonzero((predicted.model == model) & (predicted.duration_s > 0))
+        _show_flights(scene, model, predicted, which, begin_s, curves.get(model))
+        used = set()
+        for name, own in _by_trajectory(predicted, which).items():
+            if name not in reals:
+                continue
+            for number, lane in enumerate(_lanes(begin_s[own], predicted.duration_s[own])):
+                key = model, name, number
+                block = there.get(key) or _new_block(scene, *key)
+                _key_block(block, reals[name], predicted, own[lane], begin_s, rate)
+                used.add(key)
+        spare = [obj for key, obj in there.items() if key[0] == model and key not in used]
+        if keep_blocks:
+            for obj in spare:
+                keyframes.write_visibility_keys(obj, [], rate)
+        else:
+            store.remove_objects(spare)
+
+
+def remove(scene: bpy.types.Scene, but: Collection[str] = ()) -> None:
+    """Remove the objects of all models but these."""
+    objects = store.with_role(scene, store.MODEL_BLOCK_ROLE) + store.with_role(scene, store.MODEL_FLIGHTS_ROLE)
+    store.remove_objects([obj for obj in objects if obj[store.MODEL] not in but])
+    store.remove_collection(scene, COLLECTION, [find_model(name).title for name in but])
+
+
+def _name_of(obj: bpy.types.Object) -> tuple[str, str, int]:
+    return obj[store.MODEL], obj[store.TRAJECTORY], int(obj.get(store.LANE, 0))
+
+
+def _begins(predicted: PredictedFlights, offsets: Mapping[str, float]) -> Array:
+    """(n,) when the flights begin in the scene [s]."""
+    names, place = np.unique(predicted.trajectory, return_inverse=True)
+    return predicted.time_s - np.array([offsets[name] for name in names.tolist()], dtype=np.float64)[place]
+
+
+def _by_trajectory(predicted: PredictedFlights, which: Indices) -> dict[str, Indices]:
+    """Trajectory → its flights among `which`."""
+    names, place = np.unique(predicted.trajectory[which], return_inverse=True)
+    order = np.argsort(place, kind="stable")
+    edges = np.cumsum(np.bincount(place, minlength=len(names)))[:-1]
+    return dict(zip(names.tolist(), np.split(which[order], edges), strict=True)) if which.size else {}
+
+
+def _show_flights(
+    scene: bpy.types.Scene,
+    model: str,
+    predicted: PredictedFlights,
+    which: Indices,
+    begin_s: Array,
+    obj: bpy.types.Object | None,
+) -> None:
+    if not which.size:
+        store.remove_objects([obj] if obj is not None else [])
+        return
+    count, clock = trails.parts(predicted.duration_s[which], trails.SAMPLE_STEP_S)
+    flight = np.repeat(which, count)
+    position, velocity = predicted.launches.states(flight, clock)
+    lines = trails.Lines(count, begin_s[flight] + clock, position, norm(velocity))
+    new = obj is None
+    obj = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, lines, obj=obj)
+    trails.paint(obj.data, np.array(find_model(model).colour))
+    if new:
+        obj[store.MODEL] = model
+        _link(scene, obj, model)
+        trails.set_trail(scene.rockfall, obj)
+
+
+def _new_block(scene: bpy.types.Scene, model: str, trajectory: str, number: int) -> bpy.types.Object:
+    obj = bpy.data.objects.new(
+        f"{trajectory} {model}{f' {number + 1}' if number else ''}",
+        trajectories.block_mesh(f"Rockfall twin {model}", find_model(model).colour),
+    )
+    obj[store.ROLE], obj[store.MODEL], obj[store.TRAJECTORY] = store.MODEL_BLOCK_ROLE, model, trajectory
+    obj[store.LANE] = number
+    _link(scene, obj, model)
+    return obj
+
+
+def _key_block(
+    obj: bpy.types.Object,
+    real: bpy.types.Object,
+    predicted: PredictedFlights,
+    which: Indices,
+    begin_s: Array,
+    rate: float,
+) -> None:
+    """Let a block fly the flights `which`, which follow each other without overlap."""
+    if obj.scale != real.scale or obj.delta_location != real.delta_location:
+        obj.scale, obj.delta_location = real.scale, real.delta_location
+    keyframes.write_location_keys(obj, _keys(predicted, which, begin_s), rate)
+    ends = begin_s[which] + predicted.duration_s[which] + LINGER_S
+    ends[:-1] = np.minimum(ends[:-1], begin_s[which[1:]])
+    keyframes.write_visibility_keys(obj, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
+
+
+def _keys(predicted: PredictedFlights, which: Indices, begin_s: Array) -> keyframes.Keys:
+    """Of each flight its ends, which make the parabola; with drag, more of them."""
+    dragged = predicted.launches.drag_per_m[which] > 0
+    count, clock = trails.parts(predicted.duration_s[which], np.where(dragged, keyframes.DRAG_KEY_STEP_S, np.inf))
+    flight = np.repeat(which, count)
+    position, velocity = predicted.launches.states(flight, clock)
+    held = np.zeros(flight.size, dtype=np.bool_)
+    held[np.cumsum(count) - 1] = True
+    return keyframes.Keys(begin_s[flight] + clock, position, velocity, velocity, held)
+
+
+def _lanes(begin_s: Array, duration_s: Array) -> list[list[int]]:
+    """The flights of each block, so that no block flies twice at a time and there are as few blocks as can be."""
+    lanes: list[list[int]] = []
+    free_at: list[float] = []
+    begins, durations = begin_s.tolist(), duration_s.tolist()
+    for i in np.argsort(begin_s).tolist():
+        lane = next((j for j, free in enumerate(free_at) if free <= begins[i]), len(lanes))
+        if lane == len(lanes):
+            lanes.append([])
+            free_at.append(0.0)
+        lanes[lane].append(i)
+        free_at[lane] = begins[i] + durations[i]
+    return lanes
+
+
+def _link(scene: bpy.types.Scene, obj: bpy.types.Object, model: str) -> None:
+    store.collection(scene, COLLECTION, find_model(model).title).objects.link(obj)

@@ -77,7 +77,7 @@ def find_courses(impacts: Impacts, spin: Spin = "rolling", radius_m: float | Non
     order, same = _in_time(impacts)
     v1, v2 = impacts.v1[order], impacts.v2[order]
     normal = _unit_normals(impacts)[order]
-    flagged = (impacts.flags["departing"] | impacts.flags["discarded"])[order]
+    flagged = impacts.refused[order]
     reasons = _reasons(v1, normal, flagged, impacts.angular_velocity[order] if spin == "table" else None)
     used = reasons < 0
     skipped = tuple((int(row), REASONS[reason]) for row, reason in zip(order[~used], reasons[~used], strict=True))

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from ..vectors import Array, Mask
-from .statistics import LineFit, line, line_through_origin, power_law
+from .line_fits import LineFit, line, line_through_origin, power_law
 
 Trend = Literal["auto", "none", "origin", "line", "power", "exponential", "logarithm"]
 """That of the pair of variables (`trend_of`), no curve, y = a·x, a + b·x, a·x^b, a·e^(b·x), a + b·ln x."""

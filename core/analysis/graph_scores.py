@@ -9,7 +9,7 @@ from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices
 from .curves import number
 from .graphs import Graph
-from .statistics import CONFIDENCE
+from .line_fits import CONFIDENCE
 from .variables import find_variable
 
 

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The statistics of a table of impacts that Noël et al. 2018 print, and their published values beside them."""
+"""The statistics of measured impacts, of a table and of its groups, with the values of Noël et al. 2018 beside."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
+from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
 from ..remarks import Remark
-from ..vectors import Array, Mask, norm
-from .robust_slope import theil_sen
+from ..vectors import Array, Indices, Mask
+from .graph_scores import fall_numbers
+from .line_fits import FEWEST, LineFit, interval_by_cluster, line, line_through_origin, power_law
+from .variables import APPARENT, VARIABLES, known_variables, measured_values
 
 PUBLISHED_RT_SLOPE = 0.66
 PUBLISHED_RT_R2 = 0.31
@@ -18,38 +21,23 @@ PUBLISHED_RT_R2 = 0.31
 PUBLISHED_RN_ANGLE_DEG = 20.0
 """Noël et al. 2018: R_N exceeds 1 where the incident angle is below about 20°."""
 
-CONFIDENCE = 0.95
-FEWEST = 3
-"""With fewer impacts no line is fitted."""
+CLASS_DEG = 10.0
+CLASSES = 9
+"""Classes of the incident angle, from 0 to 90°; the last holds 90°, too."""
+COUNTERS = ("time_s", "impact")
+"""Variables whose spread says nothing."""
+DOUBTS = ("into_ground", "below_terrain", "contact", "shattered", "doubtful")
+"""Flags of impacts that enter and deserve a look, the gravest first."""
 
 Row = tuple[str, float, str, str]
 """Name, value, unit and note: a row of statistics.csv."""
 
 
 @dataclass(frozen=True)
-class LineFit:
-    """A fitted line y = intercept + slope · x.
-
-    Attributes
-    ----------
-    slope, low, high : the slope, and its confidence interval (95 %).
-    intercept : 0 for a line through the origin.
-    r2 : 1 − Σ(y − fit)²/Σ(y − mean)², for every kind of line; below zero for a line that is worse than the mean.
-    n : number of points.
-    """
-
-    slope: float
-    low: float
-    high: float
-    intercept: float
-    r2: float
-    n: int
-
-
-@dataclass(frozen=True)
 class Spread:
-    """Quantiles of one quantity: the least, 10 %, the median, 90 %, and the greatest."""
+    """How one quantity is spread: how many values, the least, 10 %, the median, 90 %, and the greatest."""
 
+    n: int
     least: float
     low: float
     median: float
@@ -57,49 +45,107 @@ class Spread:
     greatest: float
 
 
+PARTS = (0.0, 0.1, 0.5, 0.9, 1.0)
+"""The quantiles of a `Spread`."""
+
+
+@dataclass(frozen=True)
+class AngleClass:
+    """Impacts with an incident angle from `low_deg` to below `high_deg`, and those of them with R_N > 1."""
+
+    low_deg: float
+    high_deg: float
+    n: int
+    above_one: int
+
+    @property
+    def share(self) -> float:
+        """Part with R_N > 1; NaN without impacts."""
+        return self.above_one / self.n if self.n else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """That part's 95 % interval (Wilson 1927), for impacts that are independent; NaN without impacts."""
+        if not self.n:
+            return float("nan"), float("nan")
+        z = 1.959963984540054
+        middle = self.share + z**2 / (2 * self.n)
+        reach = z * (self.share * (1 - self.share) / self.n + z**2 / (4 * self.n**2)) ** 0.5
+        low, high = ((middle + side * reach) / (1 + z**2 / self.n) for side in (-1, 1))
+        return low if self.above_one else 0.0, high if self.above_one < self.n else 1.0
+
+
 @dataclass(frozen=True)
 class ImpactStatistics:
-    """What a table of impacts says as a whole.
+    """What a table of impacts, or a group of them, says as a whole.
 
     Attributes
     ----------
-    impacts : number of impacts in the table.
-    used : how many of them have R_N, R_T, R, θ1 and θ_dev, and enter here.
+    impacts : number of impacts.
+    used : how many of them have R_N, R_T, R, θ1 and θ_dev and are not discarded, and enter here.
+    trajectories : how many falls these are of.
+    doubts : flag → how many of those that enter have it.
     rt : |v_T2| on |v_T1| through the origin: the slope is the table's R_T.
-    rt_free : the same with a free intercept [m/s].
+    rt_by_trajectory : 95 % interval of that slope when the impacts of a trajectory may depend on each other.
+    rt_free : the same line with a free intercept [m/s].
     r_deviation : R on θ_dev, per degree; its intercept is R of an undeflected block.
+    r_deviation_by_trajectory : 95 % interval of that slope when the impacts of a trajectory may depend on each other.
     rn_angle : ln R_N on ln θ1 [°] by Theil–Sen, so R_N = a·θ1^b with b the slope and a = exp(intercept).
-    rn_above_one, rn_above_one_grazing : impacts with R_N > 1, and those of them with θ1 below 20°.
-    grazing : impacts with θ1 below 20°.
-    spreads : by name and unit, (name, unit) → quantiles.
+    classes : R_N > 1 by incident angle.
+    spreads : variable → how its values are spread, for the variables that the table has anything of.
     """
 
     impacts: int
     used: int
+    trajectories: int
+    doubts: dict[str, int]
     rt: LineFit
+    rt_by_trajectory: tuple[float, float]
     rt_free: LineFit
     r_deviation: LineFit
+    r_deviation_by_trajectory: tuple[float, float]
     rn_angle: LineFit
-    rn_above_one: int
-    rn_above_one_grazing: int
-    grazing: int
-    spreads: dict[tuple[str, str], Spread]
+    classes: tuple[AngleClass, ...]
+    spreads: dict[str, Spread]
 
     @property
     def rn_factor(self) -> float:
         """a of R_N = a·θ1^b, θ1 in degrees."""
         return float(np.exp(self.rn_angle.intercept))
 
+    @property
+    def rn_above_one(self) -> int:
+        """Impacts with R_N > 1."""
+        return sum(one.above_one for one in self.classes)
+
+    @property
+    def grazing(self) -> int:
+        """Impacts with θ1 below 20°."""
+        return sum(one.n for one in self._grazing)
+
+    @property
+    def rn_above_one_grazing(self) -> int:
+        """Impacts with θ1 below 20° and R_N > 1."""
+        return sum(one.above_one for one in self._grazing)
+
+    @property
+    def _grazing(self) -> tuple[AngleClass, ...]:
+        return tuple(one for one in self.classes if one.high_deg <= PUBLISHED_RN_ANGLE_DEG)
+
     def as_rows(self) -> list[Row]:
         """The rows of statistics.csv."""
         rows: list[Row] = [
             ("impacts", self.impacts, "", "in the table"),
-            ("impacts_used", self.used, "", "with all coefficients defined"),
+            ("impacts_used", self.used, "", "with all coefficients defined, not discarded"),
+            ("trajectories", self.trajectories, "", "that these are of"),
         ]
+        rows += [(f"impacts_{flag}", number, "", "of those used") for flag, number in self.doubts.items()]
         published = f"Noël et al. 2018: {PUBLISHED_RT_SLOPE}, R² {PUBLISHED_RT_R2}"
         rows += _line_rows("rt_slope", self.rt, "", f"|v_T2| on |v_T1| through the origin; {published}", False)
+        rows += _cluster_rows("rt_slope", self.rt_by_trajectory, "")
         rows += _line_rows("rt_slope_free", self.rt_free, "", "|v_T2| on |v_T1| with an intercept", True, "m/s")
         rows += _line_rows("r_deviation_slope", self.r_deviation, "1/deg", "R on θ_dev; intercept is R at 0°", True)
+        rows += _cluster_rows("r_deviation_slope", self.r_deviation_by_trajectory, "1/deg")
         rows += [
             ("rn_angle_factor", self.rn_factor, "", "a of R_N = a·θ1^b, θ1 in degrees, Theil–Sen on logarithms"),
             ("rn_angle_exponent", self.rn_angle.slope, "", "b of R_N = a·θ1^b"),
@@ -110,39 +156,76 @@ class ImpactStatistics:
             ("rn_above_one_below_20_deg", self.rn_above_one_grazing, "", "of these, with θ1 < 20°"),
             ("impacts_below_20_deg", self.grazing, "", "impacts with θ1 < 20°"),
         ]
-        for (name, unit), spread in self.spreads.items():
+        for name, spread in self.spreads.items():
+            unit = VARIABLES[name].unit.replace("°", "deg")
             for part in ("least", "low", "median", "high", "greatest"):
                 note = {"low": "10 % quantile", "high": "90 % quantile"}.get(part, "")
-                rows.append((f"{name}_{part}", getattr(spread, part), unit, note))
+                rows.append((f"{stem(name)}_{part}", getattr(spread, part), unit, note))
         return rows
 
     def remarks(self) -> list[Remark]:
-        """The same for people, with the published values beside."""
+        """The same for people, with the published values beside; what is doubtful first."""
         if self.used < FEWEST:
             text = f"{self.used} of {self.impacts} impacts have all coefficients: too few for statistics."
             return [Remark(text, "problem", "impacts")]
         rt, trend, spreads = self.rt, self.r_deviation, self.spreads
-        before, angle = spreads["v1", "m/s"], spreads["theta1", "deg"]
-        texts = {
-            "impacts": f"{self.used} of {self.impacts} impacts have all coefficients "
-            f"(incident speed {before.median:.1f} m/s in the median, {before.greatest:.1f} at most; "
-            f"incident angle {angle.median:.0f}°, {angle.low:.0f}–{angle.high:.0f}° for the middle 80 %).",
-            "rt": f"R_T = {rt.slope:.2f} ({rt.low:.2f}–{rt.high:.2f}), R² {rt.r2:.2f}: slope of |v_T2| on |v_T1| "
-            f"through the origin. Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
-            "rn": f"R_N = {self.rn_factor:.1f}·θ1^{self.rn_angle.slope:.2f} (θ1 in degrees): hyperbolic, as published. "
-            f"R_N > 1 at {self.rn_above_one} impacts, {self.rn_above_one_grazing} of them below "
-            f"{PUBLISHED_RN_ANGLE_DEG:.0f}° (published: below about {PUBLISHED_RN_ANGLE_DEG:.0f}°)."
-            if self.rn_angle.high < 0
-            else f"R_N shows no clear fall with the incident angle (exponent {self.rn_angle.slope:.2f}, "
-            f"{self.rn_angle.low:.2f} to {self.rn_angle.high:.2f}). R_N > 1 at {self.rn_above_one} impacts.",
-            "r": f"R {'falls' if trend.slope < 0 else 'rises'} by {abs(trend.slope) * 10:.3f} per 10° of deviation, "
-            f"from {trend.intercept:.2f} at 0° (R² {trend.r2:.2f}). Published: falls about linearly from 1.",
-        }
-        return [Remark(text, "note", about) for about, text in texts.items()]
+        before, angle = spreads["v1_mps"], spreads["theta1_deg"]
+        slope, exponent = f"{trend.slope * 10:.3f}", f"{self.rn_angle.slope:.2f}".replace("-", "−")
+        falls = slope.startswith("-")
+        hyperbolic = (
+            f"R_N = {self.rn_factor:.1f}·θ1^{exponent} (θ1 in degrees; exponent {_span(self.rn_angle)}): "
+            f"hyperbolic, as published. R_N > 1 at {self.rn_above_one} impacts, {self.rn_above_one_grazing} of them "
+            f"below {PUBLISHED_RN_ANGLE_DEG:.0f}° (published: below about {PUBLISHED_RN_ANGLE_DEG:.0f}°)."
+        )
+        unclear = (
+            f"R_N shows no clear fall with the incident angle (exponent {exponent}, {_span(self.rn_angle)}). "
+            f"R_N > 1 at {self.rn_above_one} impacts."
+        )
+        texts = [
+            (
+                "impacts",
+                before.median,
+                f"{self.used} of {self.impacts} impacts have all coefficients "
+                f"(incident speed {before.median:.1f} m/s in the median, {before.greatest:.1f} at most; "
+                f"incident angle {angle.median:.0f}°, {angle.low:.0f}–{angle.high:.0f}° for the middle 80 %).",
+            ),
+            (
+                "rt",
+                rt.slope,
+                f"R_T = {rt.slope:.3f} ({rt.low:.3f}–{rt.high:.3f}{_together(self.rt_by_trajectory)}), "
+                f"R² {rt.r2:.3f}: slope of |v_T2| on |v_T1| through the origin. "
+                f"Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
+            ),
+            ("rn", self.rn_angle.slope, hyperbolic if self.rn_angle.high < 0 else unclear),
+            (
+                "r",
+                trend.slope,
+                f"R {'falls' if falls else 'rises'} by {slope.removeprefix('-')} per 10° of deviation "
+                f"({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {trend.r2:.2f}). "
+                "Published: falls about linearly from 1.",
+            ),
+        ]
+        return [*self._doubtful(), *(Remark(text, "note", about) for about, known, text in texts if known == known)]
+
+    def _doubtful(self) -> list[Remark]:
+        if not self.doubts:
+            return []
+        flags = ", ".join(f"{flag} {number}" for flag, number in self.doubts.items())
+        return [Remark(f"Flagged among the {self.used} impacts used: {flags}.", "warning", "flags")]
+
+
+def usable(impacts: Impacts) -> Mask:
+    """(n,) impacts that enter: R_N, R_T, R, θ1 and θ_dev are defined, and they are not discarded.
+
+    First, last and departing impacts have no coefficients and drop out by themselves. Doubtful picks count like the
+    others.
+    """
+    known = impacts.complete & np.isfinite(impacts.theta1) & np.isfinite(impacts.theta_dev)
+    return known & ~impacts.refused
 
 
 def impact_statistics(impacts: Impacts, among: Mask | None = None) -> ImpactStatistics:
-    """The statistics of all impacts whose coefficients are defined.
+    """The statistics of all impacts that are `usable`.
 
     Parameters
     ----------
@@ -150,116 +233,95 @@ def impact_statistics(impacts: Impacts, among: Mask | None = None) -> ImpactStat
 
     Notes
     -----
-    First, last and departing impacts have no coefficients and drop out by themselves. Doubtful picks count like the
-    others. Angles enter the fits in degrees, as in the paper's figures.
+    Angles enter the fits in degrees, as in the paper's figures.
     """
-    among = np.ones(len(impacts), dtype=np.bool_) if among is None else among
-    used = among & impacts.complete & np.isfinite(impacts.theta1) & np.isfinite(impacts.theta_dev)
-    vt1, vt2 = impacts.vt1[used], impacts.vt2[used]
-    rn, r = impacts.rn[used], impacts.r[used]
-    theta1_deg, deviation_deg = np.degrees(impacts.theta1[used]), np.degrees(impacts.theta_dev[used])
-    grazing = theta1_deg < PUBLISHED_RN_ANGLE_DEG
-    quantities = {
-        ("v1", "m/s"): norm(impacts.v1[used]),
-        ("v2", "m/s"): norm(impacts.v2[used]),
-        ("rn", ""): rn,
-        ("rt", ""): impacts.rt[used],
-        ("r", ""): r,
-        ("theta1", "deg"): theta1_deg,
-        ("theta_dev", "deg"): deviation_deg,
-    }
-    return ImpactStatistics(
-        impacts=int(among.sum()),
-        used=int(used.sum()),
-        rt=line_through_origin(vt1, vt2),
-        rt_free=line(vt1, vt2),
-        r_deviation=line(deviation_deg, r),
-        rn_angle=power_law(theta1_deg, rn),
-        rn_above_one=int((rn > 1.0).sum()),
-        rn_above_one_grazing=int(((rn > 1.0) & grazing).sum()),
-        grazing=int(grazing.sum()),
-        spreads={key: _spread(values) for key, values in quantities.items()},
-    )
+    number = np.zeros(len(impacts), dtype=np.intp) if among is None else np.where(among, 0, -1)
+    return statistics_by_number(impacts, number, 1)[0]
 
 
-def group_statistics(impacts: Impacts, column: str) -> dict[str, ImpactStatistics]:
-    """The statistics of each group of impacts, by the text in a column.
+def statistics_by_number(
+    impacts: Impacts, number: Indices, groups: int, progress: Progress = silent
+) -> tuple[ImpactStatistics, ...]:
+    """The statistics of each group.
 
     Parameters
     ----------
-    column : "site", "trajectory", a number of the table ("diameter_m", "impact", …), a flag ("doubtful": the groups
-        are "yes" and "no"), or one of the further columns of the table that was read.
-
-    Raises
-    ------
-    InputError : there is no such column; those that there are, are named.
+    number : (n,) of each impact's group, from 0; −1 for none.
+    groups : how many there are.
     """
-    plain = {one.name: getattr(impacts, one.name) for one in fields(Impacts)}
-    groups = {name: values for name, values in plain.items() if np.ndim(values) == 1}
-    groups |= {name: np.where(marked, "yes", "no") for name, marked in impacts.flags.items()}
-    groups |= dict(impacts.extra)
-    if column not in groups:
-        raise InputError(f"There is no column {column!r} to group by", advice=f"There are {', '.join(groups)}")
-    texts = np.array([f"{value:g}" if isinstance(value, float) else str(value) for value in groups[column].tolist()])
-    return {str(text): impact_statistics(impacts, texts == text) for text in dict.fromkeys(texts.tolist())}
+    total = np.bincount(number[number >= 0], minlength=groups).tolist()
+    row = np.flatnonzero(usable(impacts) & (number >= 0))
+    row = row[np.argsort(number[row], kind="stable")]
+    of = number[row]
+    ends = np.searchsorted(of, np.arange(groups + 1)).tolist()
+    values = {name: measured_values(impacts, row, name) for name in known_variables(impacts)}
+    spreads = {name: _spreads(column, of, groups) for name, column in values.items() if name not in COUNTERS}
+    fall = fall_numbers(impacts)[row]
+    theta1, deviation, vt1, vt2, rn, r = (
+        values[name] for name in ("theta1_deg", "theta_dev_deg", "vt1_mps", "vt2_mps", "rn", "r")
+    )
+    cell = of * CLASSES + np.minimum(theta1 / CLASS_DEG, CLASSES - 1).astype(np.intp)
+    counts, above = (np.bincount(one, minlength=groups * CLASSES).reshape(groups, -1) for one in (cell, cell[rn > 1.0]))
+    flags = {flag: np.bincount(of[impacts.flags[flag][row]], minlength=groups) for flag in DOUBTS}
+    found = []
+    for i in range(groups):
+        progress("Fitting", i, groups)
+        here = slice(ends[i], ends[i + 1])
+        falls, cluster = np.unique(fall[here], return_inverse=True)
+        found.append(
+            ImpactStatistics(
+                impacts=total[i],
+                used=ends[i + 1] - ends[i],
+                trajectories=falls.size,
+                doubts={flag: int(one[i]) for flag, one in flags.items() if one[i]},
+                rt=line_through_origin(vt1[here], vt2[here]),
+                rt_by_trajectory=interval_by_cluster(vt1[here], vt2[here], cluster, origin=True),
+                rt_free=line(vt1[here], vt2[here]),
+                r_deviation=line(deviation[here], r[here]),
+                r_deviation_by_trajectory=interval_by_cluster(deviation[here], r[here], cluster, origin=False),
+                rn_angle=power_law(theta1[here], rn[here]),
+                classes=_classes(counts[i], above[i]),
+                spreads={name: columns[i] for name, columns in spreads.items() if columns[i].n or name in APPARENT},
+            )
+        )
+    return tuple(found)
 
 
-def line_through_origin(x: Array, y: Array) -> LineFit:
-    """Least squares y = slope · x, (n,) each; the interval is Student's with n − 1 degrees of freedom."""
-    from scipy.stats import t
-
-    if x.size < FEWEST or not np.any(x):
-        return _no_line(x.size)
-    slope = float(x @ y / (x @ x))
-    error = np.sqrt(np.sum((y - slope * x) ** 2) / (x.size - 1) / (x @ x))
-    reach = float(t.ppf(0.5 + CONFIDENCE / 2, x.size - 1) * error)
-    return LineFit(slope, slope - reach, slope + reach, 0.0, _r2(y, slope * x), x.size)
+def stem(variable: str) -> str:
+    """A variable's name without its unit: theta1, kinetic_n1."""
+    return variable if variable in ("rn", "rt", "r", "impact") else variable.rpartition("_")[0]
 
 
-def line(x: Array, y: Array) -> LineFit:
-    """Least squares y = intercept + slope · x, (n,) each; the interval is Student's with n − 2 degrees of freedom."""
-    from scipy.stats import t
-
-    if x.size < FEWEST or np.ptp(x) == 0.0:
-        return _no_line(x.size)
-    centred = x - x.mean()
-    slope = float(centred @ (y - y.mean()) / (centred @ centred))
-    intercept = float(y.mean() - slope * x.mean())
-    fitted = intercept + slope * x
-    error = np.sqrt(np.sum((y - fitted) ** 2) / (x.size - 2) / (centred @ centred))
-    reach = float(t.ppf(0.5 + CONFIDENCE / 2, x.size - 2) * error)
-    return LineFit(slope, slope - reach, slope + reach, intercept, _r2(y, fitted), x.size)
+def _classes(counts: Indices, above: Indices) -> tuple[AngleClass, ...]:
+    return tuple(
+        AngleClass(i * CLASS_DEG, (i + 1) * CLASS_DEG, n, more)
+        for i, (n, more) in enumerate(zip(counts.tolist(), above.tolist(), strict=True))
+    )
 
 
-def power_law(x: Array, y: Array, interval: bool = True) -> LineFit:
-    """y = exp(intercept) · x^slope for positive values: Theil–Sen on logarithms, which a few outliers do not move.
-
-    Without `interval`, which takes twice as long as the rest, its ends are NaN.
-
-    R_N at grazing incidence is the quotient of two small numbers, so its outliers are large (the paper has 24, 8, 5).
-    """
-    positive = (x > 0.0) & (y > 0.0)
-    log_x, log_y = np.log(x[positive]), np.log(y[positive])
-    if log_x.size < FEWEST or np.ptp(log_x) == 0.0:
-        return _no_line(log_x.size)
-    slope, intercept, low, high = theil_sen(log_x, log_y, CONFIDENCE, interval)
-    return LineFit(slope, low, high, intercept, _r2(log_y, intercept + slope * log_x), log_x.size)
-
-
-def _no_line(n: int) -> LineFit:
-    nan = float("nan")
-    return LineFit(nan, nan, nan, nan, nan, n)
+def _spreads(values: Array, of: Indices, groups: int) -> list[Spread]:
+    """How the defined values (n,) of each group are spread; quantiles between two values are on the line between."""
+    known = np.isfinite(values)
+    values, of = values[known], of[known]
+    counts = np.bincount(of, minlength=groups)
+    quantiles = np.full((groups, len(PARTS)), np.nan)
+    some = np.flatnonzero(counts)
+    if some.size:
+        ordered, first = values[np.lexsort((values, of))], (np.cumsum(counts) - counts)[some, None]
+        place = np.array(PARTS) * (counts[some, None] - 1)
+        below = np.floor(place).astype(np.intp)
+        low, high = ordered[first + below], ordered[first + np.ceil(place).astype(np.intp)]
+        quantiles[some] = low + (high - low) * (place - below)
+    return [Spread(n, *parts) for n, parts in zip(counts.tolist(), quantiles.tolist(), strict=True)]
 
 
-def _r2(y: Array, fitted: Array) -> float:
-    total = float(np.sum((y - y.mean()) ** 2))
-    return 1.0 - float(np.sum((y - fitted) ** 2)) / total if total > 0.0 else float("nan")
+def _span(fit: LineFit, times: float = 1.0) -> str:
+    return f"{times * fit.low:.2f} to {times * fit.high:.2f}".replace("-", "−")
 
 
-def _spread(values: Array) -> Spread:
-    if not values.size:
-        return Spread(*[float("nan")] * 5)
-    return Spread(*np.quantile(values, [0.0, 0.1, 0.5, 0.9, 1.0]).tolist())
+def _together(interval: tuple[float, float]) -> str:
+    low, high = interval
+    return f"; {low:.3f}–{high:.3f} if the impacts of a trajectory depend on each other" if np.isfinite(low) else ""
 
 
 def _line_rows(name: str, fit: LineFit, unit: str, note: str, free: bool, intercept_unit: str = "") -> list[Row]:
@@ -272,3 +334,10 @@ def _line_rows(name: str, fit: LineFit, unit: str, note: str, free: bool, interc
     if free:
         rows.append((f"{name}_intercept", fit.intercept, intercept_unit, ""))
     return rows
+
+
+def _cluster_rows(name: str, interval: Sequence[float], unit: str) -> list[Row]:
+    note = "95 % confidence when the impacts of a trajectory may depend on each other (jackknife)"
+    return [
+        (f"{name}_{end}_by_trajectory", value, unit, note) for end, value in zip(("low", "high"), interval, strict=True)
+    ]

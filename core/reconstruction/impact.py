@@ -24,6 +24,9 @@ FLAGS = (
 )
 """In the order in which they are written. The last four say why a part is undefined, or repeat the pick's status."""
 
+REFUSED = ("departing", "discarded")
+"""Flags of impacts that neither comparisons nor statistics take: no impact at all, or none that counts."""
+
 DeviationForm = Literal["signed", "as_printed"]
 RUN = ("run", "source", "simulated_with")
 """Further columns of a table with simulated blocks: the run, and its model, in a database simulated_with."""
@@ -168,6 +171,11 @@ class Impacts:
     def complete(self) -> Mask:
         """(n,) impacts whose R_N, R_T, R, θ1 and θ_dev are all defined."""
         return np.isfinite(self.rn) & np.isfinite(self.rt) & np.isfinite(self.r)
+
+    @property
+    def refused(self) -> Mask:
+        """(n,) impacts with a flag of `REFUSED`."""
+        return np.asarray(np.any([self.flags[name] for name in REFUSED], axis=0))
 
     @property
     def runs(self) -> dict[str, Names]:

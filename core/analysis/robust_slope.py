@@ -30,11 +30,7 @@ def theil_sen(x: Array, y: Array, confidence: float, interval: bool = True) -> t
     interval : whether it is wanted; it takes twice as long as the slope, and is NaN where it is not.
     """
     if x.size <= LISTED:
-        from scipy.stats import theilslopes
-
-        found = theilslopes(y, x, confidence)
-        ends = (float(found.low_slope), float(found.high_slope)) if interval else (np.nan, np.nan)
-        return float(found.slope), float(found.intercept), *ends
+        return _of_all_pairs(x, y, confidence, interval)
     order = np.lexsort((y, x))
     x, y = np.ascontiguousarray(x[order]), np.ascontiguousarray(y[order])
     pairs = x.size * (x.size - 1) // 2 - sum(k * (k - 1) // 2 for k in _repeats(x))
@@ -46,16 +42,29 @@ def theil_sen(x: Array, y: Array, confidence: float, interval: bool = True) -> t
     return slope, float(np.median(y) - slope * np.median(x)), low, high
 
 
+def _of_all_pairs(x: Array, y: Array, confidence: float, interval: bool) -> tuple[float, float, float, float]:
+    one, other = np.triu_indices(x.size, 1)
+    run = x[other] - x[one]
+    apart = run != 0.0
+    slopes = np.sort((y[other] - y[one])[apart] / run[apart])
+    slope, low, high = float(np.median(slopes)), np.nan, np.nan
+    if interval:
+        middle, reach = slopes.size / 2, _reach(np.sort(x), y, slopes.size, confidence)
+        low = float(slopes[max(round(middle - reach) - 1, 0)])
+        high = float(slopes[min(round(middle + reach), slopes.size - 1)])
+    return slope, float(np.median(y) - slope * np.median(x)), low, high
+
+
 def _reach(x: Array, y: Array, pairs: int, confidence: float) -> float:
     """How many slopes lie between the median and each end of its interval: the normal deviate of Kendall's count."""
-    from scipy.stats import norm
+    from scipy.special import ndtri
 
     def ties(values: Array) -> float:
         return float(sum(k * (k - 1) * (2 * k + 5) for k in _repeats(values)))
 
     n = float(x.size)
     variance = (n * (n - 1) * (2 * n + 5) - ties(x) - ties(np.sort(y))) / 18
-    return min(float(norm.ppf(0.5 + confidence / 2)) * variance**0.5 / 2, pairs / 2 - 1)
+    return min(float(ndtri(0.5 + confidence / 2)) * variance**0.5 / 2, pairs / 2 - 1)
 
 
 def _repeats(ordered: Array) -> list[int]:

@@ -15,7 +15,6 @@ from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.graphs import GraphSpec, make_graph, make_sheet
 from rockfall.core.analysis.scores import scores
-from rockfall.core.analysis.statistics import group_statistics, impact_statistics
 from rockfall.core.cli import main
 from rockfall.core.errors import DependencyError, InputError
 from rockfall.core.exchange.parameters import read_parameters, write_parameters
@@ -260,15 +259,3 @@ def test_sliders_hold_the_default_and_stay_in_range() -> None:
                 start, end, step = slider_range(spec)
                 assert spec.minimum == start <= spec.default <= end <= spec.maximum, (name, spec.name)
                 assert (end - start) / 1000 <= step <= (end - start) / 100
-
-
-def test_statistics_by_group(impacts) -> None:
-    groups = group_statistics(impacts, "trajectory")
-    assert list(groups) == ["a<b>&", "b"]
-    assert sum(one.impacts for one in groups.values()) == len(impacts)
-    of_b = impacts.trajectory == "b"
-    assert groups["b"].rt == impact_statistics(impacts, of_b).rt
-    assert groups["b"].rt.slope != groups["a<b>&"].rt.slope
-    assert sum(one.impacts for one in group_statistics(impacts, "last").values()) == len(impacts)
-    with pytest.raises(InputError, match="trajectory"):
-        group_statistics(impacts, "soil")

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Statistics of impacts: analytic tables, and scipy and numpy as independent implementations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.stats
+from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.line_fits import interval_by_cluster, line, line_through_origin, power_law
 from rockfall.core.analysis.robust_slope import theil_sen
-from rockfall.core.analysis.statistics import (
-    ImpactStatistics,
-    impact_statistics,
-    line,
-    line_through_origin,
-    power_law,
-)
+from rockfall.core.analysis.statistics import AngleClass, ImpactStatistics, impact_statistics
 from rockfall.core.reconstruction.impact import Impacts
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -57,11 +55,11 @@ def test_counts_and_quantiles(exact: ImpactStatistics) -> None:
     rn = 12.0 * theta1_deg**-1.1
     assert exact.rn_above_one == (rn > 1).sum() == exact.rn_above_one_grazing
     assert exact.grazing == (theta1_deg < 20).sum()
-    spread = exact.spreads["theta1", "deg"]
+    spread = exact.spreads["theta1_deg"]
     assert (spread.least, spread.greatest) == (pytest.approx(6.0), pytest.approx(60.0))
     assert spread.median == pytest.approx(33.0)
     assert spread.low == pytest.approx(np.quantile(theta1_deg, 0.1))
-    assert exact.spreads["rt", ""].median == pytest.approx(0.66)
+    assert exact.spreads["rt"].median == pytest.approx(0.66)
 
 
 def test_free_line_against_scipy() -> None:
@@ -99,6 +97,40 @@ def test_the_interval_holds_the_true_slope_as_often_as_it_says() -> None:
     assert held / 2000 == pytest.approx(0.95, abs=0.015)
 
 
+@pytest.mark.parametrize("origin", [True, False])
+def test_interval_by_cluster_against_fits_without_each(origin: bool) -> None:
+    cluster = RNG.integers(0, 7, 90)
+    x = RNG.uniform(2, 18, 90)
+    y = 0.6 * x + RNG.standard_normal(7)[cluster] * x + 5.0 * (not origin) + 0.3 * RNG.standard_normal(90)
+
+    def slope(keep: np.ndarray) -> float:
+        if origin:
+            return float(np.linalg.lstsq(x[keep, None], y[keep])[0][0])
+        return float(np.polyfit(x[keep], y[keep], 1)[0])
+
+    full = slope(np.full(90, True))
+    error = np.sqrt(6 / 7 * sum((slope(cluster != k) - full) ** 2 for k in range(7)))
+    reach = scipy.stats.t.ppf(0.975, 6) * error
+    found = interval_by_cluster(x, y, cluster, origin=origin)
+    assert found == pytest.approx((full - reach, full + reach), rel=1e-9)
+    assert np.isnan(interval_by_cluster(x, y, np.zeros(90, dtype=int), origin=origin)).all()
+
+
+def test_the_interval_by_trajectory_holds_where_students_does_not() -> None:
+    """Ten trajectories of eight impacts, each trajectory with an R_T of its own: what Student's interval denies."""
+    cluster = np.repeat(np.arange(10), 8)
+    held, by_student = 0, 0
+    for _ in range(1500):
+        x = RNG.uniform(4, 18, 80)
+        y = (0.6 + 0.1 * RNG.standard_normal(10)[cluster]) * x + 0.3 * RNG.standard_normal(80)
+        low, high = interval_by_cluster(x, y, cluster, origin=True)
+        fit = line_through_origin(x, y)
+        held += low <= 0.6 <= high
+        by_student += fit.low <= 0.6 <= fit.high
+    assert held / 1500 == pytest.approx(0.95, abs=0.02)
+    assert by_student / 1500 < 0.75
+
+
 def test_power_law_is_not_moved_by_the_papers_outliers() -> None:
     theta1_deg = np.concatenate([RNG.uniform(6, 60, 100), [0.3, 1.1, 4.3]])
     rn = 12.0 * theta1_deg**-1.1 * np.exp(0.15 * RNG.standard_normal(103))
@@ -108,6 +140,39 @@ def test_power_law_is_not_moved_by_the_papers_outliers() -> None:
     assert fit.low < -1.1 < fit.high
     reference = scipy.stats.theilslopes(np.log(rn), np.log(theta1_deg), 0.95)
     assert (fit.slope, fit.low, fit.high) == pytest.approx((reference[0], reference[2], reference[3]))
+
+
+def test_classes_of_the_incident_angle_and_their_intervals() -> None:
+    theta1_deg = np.array([4.0, 10.0, 12.0, 19.9, 20.0, 35.0, 36.0, 88.0])
+    rn = np.array([3.0, 1.2, 0.9, 1.1, 1.0, 0.4, 1.3, 0.2])
+    found = impact_statistics(impacts_with(theta1_deg, rn, np.full(8, 0.6), np.full(8, 9.0)))
+    assert [(one.n, one.above_one) for one in found.classes] == [
+        (1, 1), (3, 2), (1, 0), (2, 1), (0, 0), (0, 0), (0, 0), (0, 0), (1, 0)
+    ]  # fmt: skip
+    assert (found.rn_above_one, found.grazing, found.rn_above_one_grazing) == (4, 4, 3)
+    for n, above in ((8, 8), (41, 19), (10, 0), (1, 1)):
+        reference = scipy.stats.binomtest(above, n).proportion_ci(0.95, "wilson")
+        assert AngleClass(0, 10, n, above).interval == pytest.approx((reference.low, reference.high), abs=1e-12)
+    assert np.isnan(AngleClass(0, 10, 0, 0).interval).all()
+
+
+def test_discarded_and_departing_impacts_do_not_enter_as_in_a_comparison() -> None:
+    impacts = impacts_with(np.linspace(10, 40, 12), np.full(12, 0.8), np.full(12, 0.6), np.full(12, 9.0))
+    marks = {name: mask.copy() for name, mask in impacts.flags.items()}
+    row = np.flatnonzero(impacts.complete)
+    marks["discarded"][row[:3]], marks["doubtful"][row[2:5]], marks["into_ground"][row[6]] = True, True, True
+    marked = replace(impacts, flags=marks)
+    found = impact_statistics(marked)
+    assert found.used == 9
+    assert found.doubts == {"into_ground": 1, "doubtful": 2}
+    compared = compare(marked, ["wyllie_2014"]).row
+    assert not set(row[:3]) & set(compared)
+    assert set(row[3:]) <= set(compared)
+    warning = found.remarks()[0]
+    assert (warning.severity, warning.text) == (
+        "warning",
+        "Flagged among the 9 impacts used: into_ground 1, doubtful 2.",
+    )
 
 
 def test_rows_and_sentences(exact: ImpactStatistics) -> None:
@@ -120,9 +185,10 @@ def test_rows_and_sentences(exact: ImpactStatistics) -> None:
     assert values["theta1_median"] == pytest.approx(33.0)
     texts = {remark.about: remark.text for remark in exact.remarks()}
     assert texts["impacts"].startswith("40 of 120 impacts have all coefficients (incident speed ")
-    assert texts["rt"].startswith("R_T = 0.66 (0.66–0.66), R² 1.00: slope of |v_T2| on |v_T1| through the origin. ")
+    assert texts["rt"].startswith("R_T = 0.660 (0.660–0.660; 0.660–0.660 if the impacts of a trajectory depend on")
+    assert "R² 1.000: slope of |v_T2| on |v_T1| through the origin. " in texts["rt"]
     assert texts["rt"].endswith("Published: 0.66, R² 0.31.")
-    assert "·θ1^-1.10 (θ1 in degrees): hyperbolic, as published. R_N > 1 at " in texts["rn"]
+    assert "·θ1^−1.10 (θ1 in degrees; exponent −1.10 to −1.10): hyperbolic, as published. R_N > 1 at " in texts["rn"]
     assert texts["r"].startswith("R falls by ")
     assert {remark.severity for remark in exact.remarks()} == {"note"}
 

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Any column of a table of impacts: what graphs colour their points by, and filter them by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..impact_models.machinery.parameters import suggestion
+from ..reconstruction.impact import Impacts
+from ..vectors import Array, Mask, Names
+from .variables import VARIABLES, measured_values
+
+TEXT_COLUMNS = {"site": "Site", "trajectory": "Trajectory", "flags": "Flags"}
+FEWEST_NUMBERS = 6
+"""A further column with fewer different numbers is taken for names of groups: 1 and 2 of a phase of a campaign."""
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of n impacts: numbers, or texts.
+
+    Attributes
+    ----------
+    name, title : for files, and in words with the unit.
+    numbers : (n,) NaN where empty; None for texts.
+    texts : (n,); None for numbers.
+    """
+
+    name: str
+    title: str
+    numbers: Array | None = None
+    texts: Names | None = None
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The different texts in the order of their first appearance; none for numbers."""
+        return () if self.texts is None else tuple(dict.fromkeys(self.texts.tolist()))
+
+
+@dataclass(frozen=True)
+class Filter:
+    """What a column must have: a number from `low` to `high`, or one of `texts`."""
+
+    column: str
+    low: float = -np.inf
+    high: float = np.inf
+    texts: frozenset[str] = frozenset()
+
+
+def column_titles(tables: Sequence[Impacts]) -> dict[str, str]:
+    """Name → title of each column that one of the tables has."""
+    further = {name: name for table in tables for name in table.extra}
+    return {**TEXT_COLUMNS, **{name: one.label for name, one in VARIABLES.items()}, **further}
+
+
+def find_column(impacts: Impacts, name: str) -> Column:
+    """A column of a table.
+
+    Raises
+    ------
+    InputError : there is none; the nearest is suggested.
+    """
+    titles = column_titles([impacts])
+    if name in VARIABLES:
+        return Column(name, titles[name], measured_values(impacts, np.arange(len(impacts)), name))
+    if name in ("site", "trajectory"):
+        return Column(name, titles[name], texts=getattr(impacts, name).astype(str))
+    if name == "flags":
+        return Column(name, titles[name], texts=np.array(impacts.flag_text(), dtype=np.str_))
+    if name in impacts.extra:
+        return _further(name, impacts.extra[name])
+    raise InputError(f"There is no column {name!r}", advice=suggestion(name, titles))
+
+
+def passing(impacts: Impacts, filters: Sequence[Filter]) -> Mask:
+    """(n,) the impacts that have what all filters ask for; one whose column is empty, or lacking, has it not."""
+    found = np.ones(len(impacts), dtype=np.bool_)
+    for one in filters:
+        if one.column not in column_titles([impacts]):
+            found[:] = False
+            continue
+        column = find_column(impacts, one.column)
+        if column.numbers is not None:
+            found &= (column.numbers >= one.low) & (column.numbers <= one.high)
+        elif one.texts:
+            found &= np.isin(column.texts, sorted(one.texts))
+    return found
+
+
+def _further(name: str, texts: Names) -> Column:
+    """A column of a table that was read: numbers if all its texts are, and they are many."""
+    filled = np.char.strip(texts.astype(str)) != ""
+    try:
+        values = np.full(texts.size, np.nan)
+        values[filled] = texts[filled].astype(np.float64)
+    except ValueError:
+        return Column(name, name, texts=texts.astype(str))
+    if np.unique(values[filled]).size < FEWEST_NUMBERS:
+        return Column(name, name, texts=texts.astype(str))
+    return Column(name, name, values)

@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Areas, lines, points of several shapes, and text, in pixels of a region or in batches that are kept."""
+
+import functools
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import blf
+import gpu
+import numpy as np
+from gpu_extras.batch import batch_for_shader
+from mathutils import Matrix
+
+from ....core.analysis.axes import Axis
+from ....core.analysis.graph_layout import Frame, Rectangle
+from .look import FONT, Look, Rgb, Rgba, alpha
+
+SHAPES = ("circle", "diamond", "square", "triangle", "down", "cross", "plus", "hexagon", "star", "ring")
+"""By number, as the shader knows them."""
+
+VERTEX = """
+void main() {
+  shade = color;
+  diameter = size * scale;
+  gl_PointSize = diameter;
+  bool seen = all(greaterThanEqual(pos, bounds.xy)) && all(lessThanEqual(pos, bounds.zw));
+  gl_Position = seen ? ModelViewProjectionMatrix * vec4(pos, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+}
+"""
+FRAGMENT = """
+float away(vec2 p) {  /* from the shape's edge, in parts of the half width; negative inside */
+  if (shape == 1) { return (abs(p.x) + abs(p.y)) * 0.7071 - 0.66; }
+  if (shape == 2) { return max(abs(p.x), abs(p.y)) - 0.74; }
+  if (shape == 3 || shape == 4) {
+    vec2 q = vec2(abs(p.x), shape == 3 ? p.y : -p.y);
+    return max(q.x * 0.866 - (q.y + 0.1) * 0.5 - 0.42, q.y - 0.66);
+  }
+  if (shape == 5 || shape == 6) {
+    vec2 q = shape == 5 ? abs(mat2(0.7071, 0.7071, -0.7071, 0.7071) * p) : abs(p);
+    return max(min(q.x, q.y) - 0.2, max(q.x, q.y) - 0.9);
+  }
+  if (shape == 7) { vec2 q = abs(p); return max(q.x * 0.866 + q.y * 0.5, q.y) - 0.78; }
+  if (shape == 8) {
+    float turn = mod(atan(p.x, -p.y) + 0.6283, 1.2566) - 0.6283;
+    vec2 q = length(p) * vec2(cos(turn), abs(sin(turn)));
+    return (q.x - 0.95) * 0.588 + q.y * 0.809;
+  }
+  if (shape == 9) { return abs(length(p) - 0.8) - 0.16; }
+  return length(p) - 0.82;
+}
+
+void main() {
+  float reach = away(gl_PointCoord * 2.0 - 1.0) * diameter * 0.5;  /* [px] */
+  float cover = clamp(0.5 - reach, 0.0, 1.0);
+  if (cover <= 0.0) { discard; }
+  float inner = clamp(0.5 - (reach + rim), 0.0, 1.0);
+  fragColor = vec4(mix(edge.rgb, shade.rgb, rim > 0.0 ? inner : 1.0), shade.a * cover);
+}
+"""
+
+
+@functools.cache
+def point_shader() -> gpu.types.GPUShader:
+    """Points of a shape, cut off at bounds: made once, with the first window."""
+    between = gpu.types.GPUStageInterfaceInfo("rockfall_point")
+    between.flat("VEC4", "shade")
+    between.flat("FLOAT", "diameter")
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("MAT4", "ModelViewProjectionMatrix")
+    info.push_constant("VEC4", "bounds")
+    info.push_constant("VEC4", "edge")
+    info.push_constant("FLOAT", "scale")
+    info.push_constant("FLOAT", "rim")
+    info.push_constant("INT", "shape")
+    for place, (kind, name) in enumerate((("VEC2", "pos"), ("VEC4", "color"), ("FLOAT", "size"))):
+        info.vertex_in(place, kind, name)
+    info.vertex_out(between)
+    info.fragment_out(0, "VEC4", "fragColor")
+    info.vertex_source(VERTEX)
+    info.fragment_source(FRAGMENT)
+    return gpu.shader.create_from_info(info)
+
+
+def forget() -> None:
+    """Nothing of the graphics card is to be held any more."""
+    point_shader.cache_clear()
+
+
+class Points:
+    """A kept batch of points.
+
+    Parameters
+    ----------
+    places : (n, 2); rows with NaN are left out.
+    colour : (n, 3 or 4), or one colour.
+    size : (n,) or one, in parts of the usual diameter.
+    shape : one of `SHAPES`.
+    """
+
+    def __init__(
+        self,
+        places: np.ndarray,
+        colour: np.ndarray | Sequence[float],
+        size: np.ndarray | float = 1.0,
+        shape: str = "circle",
+    ) -> None:
+        kept = np.isfinite(places).all(axis=1)
+        self.count = int(kept.sum())
+        self.shape = SHAPES.index(shape)
+        colours = np.ones((len(places), 4), dtype=np.float32)
+        colour = np.asarray(colour, dtype=np.float32)
+        colours[:, : colour.shape[-1]] = colour
+        values = {
+            "pos": np.ascontiguousarray(places[kept], dtype=np.float32),
+            "color": np.ascontiguousarray(colours[kept]),
+            "size": np.ascontiguousarray(np.broadcast_to(np.float32(size), len(places))[kept], dtype=np.float32),
+        }
+        self.batch = batch_for_shader(point_shader(), "POINTS", values) if self.count else None
+
+    def draw(
+        self,
+        diameter: float,
+        bounds: tuple[float, float, float, float],
+        edge: Rgb = (0.0, 0.0, 0.0),
+        rim: float = 0.0,
+    ) -> None:
+        """Draw those whose centre is within `bounds` (least x and y, greatest x and y), in the batch's units.
+
+        edge, rim : colour and width of their outline [px].
+        """
+        if self.batch is None:
+            return
+        shader = point_shader()
+        shader.bind()
+        shader.uniform_float("bounds", bounds)
+        shader.uniform_float("edge", alpha(edge))
+        shader.uniform_float("scale", diameter)
+        shader.uniform_float("rim", rim)
+        shader.uniform_int("shape", self.shape)
+        gpu.state.blend_set("ALPHA")
+        gpu.state.program_point_size_set(True)
+        self.batch.draw(shader)
+        gpu.state.program_point_size_set(False)
+
+
+class Lines:
+    """A kept batch of segments (k, 2, 2), or of a line (k, 2) through points."""
+
+    def __init__(self, places: np.ndarray) -> None:
+        places = np.asarray(places, dtype=np.float64)
+        if places.ndim == 2:
+            places = np.stack([places[:-1], places[1:]], axis=1)
+        places = places[np.isfinite(places).all(axis=(1, 2))]
+        flat = np.zeros((2 * len(places), 3), dtype=np.float32)
+        flat[:, :2] = places.reshape(-1, 2)
+        self.batch = batch_for_shader(_line_shader(), "LINES", {"pos": flat}) if len(flat) else None
+
+    def draw(self, colour: Rgba, width: float) -> None:
+        if self.batch is None:
+            return
+        shader = _line_shader()
+        shader.bind()
+        shader.uniform_float("lineWidth", width)
+        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+        shader.uniform_float("color", colour)
+        gpu.state.blend_set("ALPHA")
+        self.batch.draw(shader)
+
+
+def fill(area: Rectangle, colour: Rgb | Rgba) -> None:
+    """A rectangle in one colour."""
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.bind()
+    shader.uniform_float("color", colour if len(colour) == 4 else alpha(colour))
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "TRI_STRIP", {"pos": _corners(area)}).draw(shader)
+
+
+def outline(area: Rectangle, colour: Rgba, width: float) -> None:
+    """The border of a rectangle."""
+    a, b, c, d = _corners(area)
+    lines(np.array([(a, b), (b, d), (d, c), (c, a)]), colour, width)
+
+
+def lines(places: np.ndarray, colour: Rgba, width: float) -> None:
+    """Segments (k, 2, 2), or a line (k, 2) through points, in pixels."""
+    Lines(places).draw(colour, width)
+
+
+def text(
+    x: float,
+    y: float,
+    words: str,
+    size: float,
+    colour: Rgb,
+    anchor: tuple[float, float] = (0.0, 0.0),
+    *,
+    upright: bool = False,
+) -> float:
+    """Words at a pixel; their width.
+
+    anchor : the place within the words that lies there, from 0 to 1 along and across them.
+    upright : read from below.
+    """
+    blf.size(FONT, size)
+    width, height = float(blf.dimensions(FONT, words)[0]), 0.72 * size
+    along, across = anchor[0] * width, anchor[1] * height
+    if upright:
+        blf.enable(FONT, blf.ROTATION)
+        blf.rotation(FONT, np.pi / 2)
+        blf.position(FONT, round(x + across), round(y - along), 0)
+    else:
+        blf.position(FONT, round(x - along), round(y - across), 0)
+    blf.color(FONT, *colour, 1.0)
+    blf.draw(FONT, words)
+    if upright:
+        blf.disable(FONT, blf.ROTATION)
+    gpu.state.blend_set("ALPHA")  # blf leaves it at NONE
+    return width
+
+
+def card(place: tuple[float, float], rows: Sequence[str], look: Look, within: Rectangle) -> None:
+    """Lines of text in a box beside a pixel, where there is room; the first line is the title."""
+    pad, step = 0.7 * look.text, 1.35 * look.text
+    width = max(look.measure(row) for row in rows) + 2 * pad
+    height = step * len(rows) + pad
+    away = 1.2 * look.point
+    left = place[0] + away if place[0] + away + width <= within.right else place[0] - away - width
+    bottom = place[1] + away if place[1] + away + height <= within.top else place[1] - away - height
+    left = max(min(left, within.right - width), within.left)
+    bottom = max(min(bottom, within.top - height), within.bottom)
+    area = Rectangle(round(left), round(bottom), round(width), round(height))
+    fill(area, alpha(look.card, 0.95))
+    outline(area, alpha(look.faint, 0.6), look.line)
+    for i, row in enumerate(rows):
+        text(area.left + pad, area.top - pad / 2 - (i + 0.8) * step, row, look.text, look.ink if i else look.chosen)
+
+
+@contextmanager
+def clipped(area: Rectangle) -> Iterator[None]:
+    """Draw within a rectangle only."""
+    before = gpu.state.scissor_get()
+    left, bottom, _, _ = gpu.state.viewport_get()
+    gpu.state.scissor_set(round(left + area.left), round(bottom + area.bottom), round(area.width), round(area.height))
+    gpu.state.scissor_test_set(True)
+    try:
+        yield
+    finally:
+        gpu.state.scissor_set(*before)
+        gpu.state.scissor_test_set(False)
+
+
+@contextmanager
+def in_axes(frame: Frame, x: Axis, y: Axis) -> Iterator[tuple[float, float, float, float]]:
+    """Draw what was placed along the axes `x` and `y` (from 0 to 1) where the frame shows it now.
+
+    Gives the bounds of what is seen, in the same units, for `Points.draw`.
+    """
+    low, high = frame.x.places(np.array(x.limits)), frame.y.places(np.array(y.limits))
+    wide, tall = low[1] - low[0], high[1] - high[0]
+    plot = frame.plot
+    matrix = Matrix.Translation((plot.left + low[0] * plot.width, plot.bottom + high[0] * plot.height, 0.0))
+    matrix @= Matrix.Diagonal((wide * plot.width, tall * plot.height, 1.0, 1.0))
+    with gpu.matrix.push_pop():
+        gpu.matrix.multiply_matrix(matrix)
+        yield -low[0] / wide, -high[0] / tall, (1 - low[0]) / wide, (1 - high[0]) / tall
+
+
+@functools.cache
+def _line_shader() -> gpu.types.GPUShader:
+    return gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
+
+
+def _corners(area: Rectangle) -> list[tuple[float, float]]:
+    return [(area.left, area.bottom), (area.right, area.bottom), (area.left, area.top), (area.right, area.top)]

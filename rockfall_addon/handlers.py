@@ -4,8 +4,20 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .scene import footage, impact_rows, migration, problems, store, sync, terrain_mesh, timing, video_files
+from .scene import (
+    footage,
+    graph_settings,
+    impact_rows,
+    migration,
+    problems,
+    store,
+    sync,
+    terrain_mesh,
+    timing,
+    video_files,
+)
 from .view import job
+from .view.graphs import impact_sheet, selection
 
 _owner = object()
 
@@ -23,6 +35,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _keep_rate(scene)
     footage.follow(scene)
     sync.notice(scene, depsgraph)
+    _selected_otherwise()
 
 
 @persistent
@@ -32,6 +45,8 @@ def _loaded(_path: str, _unused: object = None) -> None:
     video_files.forget_files()
     problems.forget()
     job.forget()
+    impact_sheet.forget()
+    selection.forget()
     _listen()  # subscriptions do not survive loading
     _catch_up()
 
@@ -44,6 +59,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     _keep_rate(scene)
     footage.follow(scene)
     sync.sync(scene, undone=True)
+    _selected_otherwise()
 
 
 @persistent
@@ -78,6 +94,12 @@ def _catch_up() -> None:
     for scene in bpy.data.scenes:
         migration.migrate(scene)
         sync.touch(scene)
+
+
+def _selected_otherwise() -> None:
+    """Graphs show what is selected in the scene."""
+    selection.notice()
+    graph_settings.redraw()
 
 
 def _keep_rate(scene: bpy.types.Scene) -> None:

@@ -37,7 +37,9 @@ STEPS = (
     ("refinement", "5  Refinement", (
         "rockfall.refine", "rockfall.apply_refinement", "rockfall.discard_refinement",
     )),
-    ("models", "6  Models", ("rockfall.show_models", "rockfall.load_parameters", "rockfall.remove_models")),
+    ("models", "6  Models", (
+        "rockfall.open_graphs", None, "rockfall.show_models", "rockfall.load_parameters", "rockfall.remove_models",
+    )),
     ("simulation", "7  Simulation", (
         ("rockfall.draw_release", "Draw Release Line", {"kind": "line"}),
         ("rockfall.draw_release", "Draw Release Area", {"kind": "polygon"}),

@@ -84,7 +84,7 @@ def passing(impacts: Impacts, filters: Sequence[Filter]) -> Mask:
         column = find_column(impacts, one.column)
         if column.numbers is not None:
             found &= (column.numbers >= one.low) & (column.numbers <= one.high)
-        elif one.texts:
+        elif column.texts is not None and one.texts:
             found &= np.isin(column.texts, sorted(one.texts))
     return found
 

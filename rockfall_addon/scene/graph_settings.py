@@ -114,8 +114,8 @@ class GraphFilter(bpy.types.PropertyGroup):
     used: BoolProperty(name="Use", description="Hide the impacts that do not pass", default=True, update=_changed)
 
 
-class GraphSettings(bpy.types.PropertyGroup):
-    """What all graphs of impacts share; `graph_1` to `graph_4` are added when it is registered."""
+class _Shared:
+    """Mix-in: what all graphs share."""
 
     count: IntProperty(name="Graphs", description="How many graphs are shown", default=4, min=1, max=MOST_GRAPHS,
                        update=_changed)  # fmt: skip
@@ -149,9 +149,15 @@ class GraphSettings(bpy.types.PropertyGroup):
     filters: CollectionProperty(type=GraphFilter)
 
 
-GraphSettings.__annotations__ |= {
-    f"graph_{number + 1}": bpy.props.PointerProperty(type=cls) for number, cls in enumerate(GRAPHS)
-}
+GraphSettings = type(
+    "GraphSettings",
+    (_Shared, bpy.types.PropertyGroup),
+    {
+        "__annotations__": {f"graph_{i + 1}": bpy.props.PointerProperty(type=cls) for i, cls in enumerate(GRAPHS)},
+        "__module__": __name__,
+        "__doc__": "The graphs of impacts of a scene.",
+    },
+)
 CLASSES = (*GRAPHS, GraphFilter, GraphSettings)
 
 
@@ -190,13 +196,19 @@ def spec_of(graph: bpy.types.PropertyGroup, number: int = 0) -> GraphSpec:
     )
 
 
-def set_limits(graph: bpy.types.PropertyGroup, x: Limits | None, y: Limits | None) -> None:
-    """Give the axes limits; None for those of the points."""
+def set_limits(scene: bpy.types.Scene, number: int, x: Limits | None, y: Limits | None) -> None:
+    """Give the axes of a graph limits; None leaves those that an axis has."""
+    one = graph(scene, number)
     if x is not None:
-        graph.x_limits = x
+        one.x_limits, one.x_fixed = x, True
     if y is not None:
-        graph.y_limits = y
-    graph.x_fixed, graph.y_fixed = x is not None, y is not None
+        one.y_limits, one.y_fixed = y, True
+
+
+def reset(scene: bpy.types.Scene, number: int) -> None:
+    """Give the axes of a graph the limits that suit their points."""
+    one = graph(scene, number)
+    one.x_fixed = one.y_fixed = False
 
 
 def filters_of(scene: bpy.types.Scene) -> tuple[Filter, ...]:
@@ -215,7 +227,9 @@ def filters_of(scene: bpy.types.Scene) -> tuple[Filter, ...]:
 
 def chosen_elsewhere(scene: bpy.types.Scene) -> frozenset[tuple[str, int]]:
     """The selected impacts of other sites: file and row."""
-    return frozenset((path, row) for path, rows in json.loads(scene.get(store.GRAPH_CHOSEN, "{}")).items() for row in rows)
+    return frozenset(
+        (path, row) for path, rows in json.loads(scene.get(store.GRAPH_CHOSEN, "{}")).items() for row in rows
+    )
 
 
 def choose_elsewhere(scene: bpy.types.Scene, chosen: frozenset[tuple[str, int]]) -> None:

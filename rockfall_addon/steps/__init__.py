@@ -7,7 +7,7 @@ from types import ModuleType
 import bpy
 
 from .. import view
-from ..scene import comparison_settings, model_parameters, settings
+from ..scene import comparison_settings, graph_settings, model_parameters, settings
 from ..view.reporting import leave_newer_alone
 
 STEPS = (
@@ -19,6 +19,7 @@ STEPS = (
     "impacts",
     "refinement",
     "models",
+    "graphs",
     "simulation",
     "playback",
     "film",
@@ -32,7 +33,7 @@ _registered_tools: list[type] = []
 
 def parts() -> list[ModuleType]:
     """All modules that register something: first the properties, which the rest reads; then step by step."""
-    first = [settings, model_parameters, comparison_settings]
+    first = [settings, model_parameters, comparison_settings, graph_settings]
     found = [*first, *view.PARTS]
     for name in STEPS:
         found += import_module(f".{name}", __name__).PARTS

@@ -54,6 +54,7 @@ void main() {
   float cover = clamp(0.5 - reach, 0.0, 1.0);
   if (cover <= 0.0) { discard; }
   float inner = clamp(0.5 - (reach + rim), 0.0, 1.0);
+  if (hollow > 0.0) { cover *= 1.0 - clamp(0.5 - (reach + hollow), 0.0, 1.0); }
   fragColor = vec4(mix(edge.rgb, shade.rgb, rim > 0.0 ? inner : 1.0), shade.a * cover);
 }
 """
@@ -71,6 +72,7 @@ def point_shader() -> gpu.types.GPUShader:
     info.push_constant("VEC4", "edge")
     info.push_constant("FLOAT", "scale")
     info.push_constant("FLOAT", "rim")
+    info.push_constant("FLOAT", "hollow")
     info.push_constant("INT", "shape")
     for place, (kind, name) in enumerate((("VEC2", "pos"), ("VEC4", "color"), ("FLOAT", "size"))):
         info.vertex_in(place, kind, name)
@@ -123,10 +125,12 @@ class Points:
         bounds: tuple[float, float, float, float],
         edge: Rgb = (0.0, 0.0, 0.0),
         rim: float = 0.0,
+        hollow: float = 0.0,
     ) -> None:
         """Draw those whose centre is within `bounds` (least x and y, greatest x and y), in the batch's units.
 
         edge, rim : colour and width of their outline [px].
+        hollow : width of the line along their shape [px]; 0 for full ones.
         """
         if self.batch is None:
             return
@@ -136,6 +140,7 @@ class Points:
         shader.uniform_float("edge", alpha(edge))
         shader.uniform_float("scale", diameter)
         shader.uniform_float("rim", rim)
+        shader.uniform_float("hollow", hollow)
         shader.uniform_int("shape", self.shape)
         gpu.state.blend_set("ALPHA")
         gpu.state.program_point_size_set(True)

@@ -1,0 +1,283 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Graphs of impacts: measured points, those of the models, links between them, fits. Batches are kept.
+
+A graph's points are placed along axes that hold them all; zooming and panning change a matrix, not the batches.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import bpy
+import numpy as np
+
+from ....core.analysis.axes import Axis, Limits
+from ....core.analysis.colouring import model_colours, model_shape
+from ....core.analysis.curves import Curve, fit_curve
+from ....core.analysis.graph_layout import Frame, in_box, in_lasso, nearest_place
+from ....core.analysis.graph_series import (
+    Series,
+    beyond,
+    measured_series,
+    model_series,
+    pair_links,
+    usual_limits,
+    whole_limits,
+)
+from ....core.analysis.graphs import GraphSpec
+from ....core.analysis.variable_sigma import measured_sigma
+from ....core.analysis.variables import VARIABLES
+from ....core.impact_models.registry import MODELS
+from ....core.vectors import Array, Mask
+from ...scene import graph_settings
+from ...scene.comparison import SceneComparison
+from .drawing import Lines, Points
+from .look import Look, Rgb, mixed
+from .point_colours import PointColours
+from .selection import Chosen
+
+MANY = 2000
+"""With more points they are drawn smaller and less opaque."""
+POWER = "\ue000{}\ue001"
+"""How an exponent is marked until it is raised."""
+RAISED = str.maketrans("0123456789.−", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻")
+REACH = 9.0
+"""How far from the mouse a point is still hit, at interface scale 1 [px]."""
+
+
+@dataclass(eq=False)
+class Drawn:
+    """The points of one source as they are drawn.
+
+    Attributes
+    ----------
+    series : what they are.
+    colour, shape, hollow : how they look.
+    points : batch.
+    links : from the measured points, for a model.
+    curve : fitted; its batch `line`.
+    start : place of its first point among all of the graph.
+    """
+
+    series: Series
+    colour: Rgb
+    shape: str
+    hollow: bool
+    points: Points
+    links: Lines | None
+    curve: Curve | None
+    line: Lines | None
+    start: int
+
+
+@dataclass(eq=False)
+class ImpactGraph:
+    """One graph, ready to be drawn.
+
+    Attributes
+    ----------
+    spec : what it shows; its limits are not used.
+    x, y : axes that hold all points, along which `places` count.
+    drawn : by source; models first, the scene's own measured impacts last and on top.
+    places : (n, 2) of all points, those of each source together, single precision.
+    bars : error bars of all measured points; None until they are wanted.
+    ring : what is selected, and for which selection.
+    """
+
+    spec: GraphSpec
+    x: Axis
+    y: Axis
+    drawn: list[Drawn]
+    places: np.ndarray
+    bars: Lines | None = None
+    ring: tuple[Chosen, Points] | None = None
+    outside: dict[tuple[Limits, Limits], list[tuple[float, int, int]]] = field(default_factory=dict)
+
+    @property
+    def measured(self) -> list[Drawn]:
+        return [one for one in self.drawn if not one.series.model]
+
+    def axes(self, spec: GraphSpec) -> tuple[Axis, Axis]:
+        """The axes as they are to be shown."""
+        x, y = usual_limits(spec, (self.x.limits, self.y.limits))
+        return replace(self.x, limits=x), replace(self.y, limits=y)
+
+    def pixels(self, frame: Frame) -> np.ndarray:
+        """(n, 2) where the points are in a frame [px]; NaN outside of its axes."""
+        corner = frame.to_pixels(np.array([[self.x.limits[0], self.y.limits[0]], [self.x.limits[1], self.y.limits[1]]]))
+        spots = (self.places * (corner[1] - corner[0]) + corner[0]).astype(np.float32)
+        plot = frame.plot
+        with np.errstate(invalid="ignore"):
+            inside = (spots[:, 0] >= plot.left) & (spots[:, 0] <= plot.right)
+            inside &= (spots[:, 1] >= plot.bottom) & (spots[:, 1] <= plot.top)
+        spots[~inside] = np.nan
+        return spots
+
+    def hit(self, frame: Frame, x: float, y: float, scale: float) -> tuple[int, int] | None:
+        """The point under a pixel: place in `drawn`, and in its series."""
+        found = nearest_place(self.pixels(frame), x, y, REACH * scale)
+        if found < 0:
+            return None
+        which = max(i for i, one in enumerate(self.drawn) if one.start <= found)
+        return which, found - self.drawn[which].start
+
+    def within(self, frame: Frame, band: Array, lasso: bool) -> Chosen:
+        """The impacts with a point in a box (two corners) or an outline (k, 2) [px]."""
+        spots = self.pixels(frame)
+        inside = in_lasso(spots, band) if lasso else in_box(spots, tuple(band[0]), tuple(band[-1]))
+        return frozenset(
+            (one.series.source, int(row))
+            for one in self.drawn
+            for row in one.series.row[inside[one.start : one.start + one.series.row.size]]
+        )
+
+    def all_impacts(self) -> Chosen:
+        """The measured impacts that have a point."""
+        return frozenset(
+            (one.series.source, int(row)) for one in self.measured for row in one.series.row[one.series.defined]
+        )
+
+    def beyond(self, x: Axis, y: Axis) -> list[tuple[float, int, int]]:
+        """Value of y, source and row of each measured point outside of the axes, the greatest first."""
+        key = x.limits, y.limits
+        if key not in self.outside:
+            found = [
+                (float(one.series.points[i, 1]), one.series.source, int(one.series.row[i]))
+                for one in self.measured
+                for i in beyond(one.series, *key)
+            ]
+            self.outside = {key: sorted(found, reverse=True)}
+        return self.outside[key]
+
+    def chosen_ring(self, chosen: Chosen, colour: Rgb) -> Points:
+        """Rings about the points of the selected impacts, the models' too."""
+        if self.ring is None or self.ring[0] != chosen:
+            rows: dict[int, list[int]] = {}
+            for source, row in chosen:
+                rows.setdefault(source, []).append(row)
+            spots, sizes = [np.empty((0, 2), dtype=np.float32)], [np.empty(0)]
+            for one in self.drawn:
+                of_it = np.isin(one.series.row, rows.get(one.series.source, []))
+                spots.append(self.places[one.start : one.start + of_it.size][of_it])
+                sizes.append(np.full(int(of_it.sum()), 1.5 if one.series.model else 2.1))
+            self.ring = chosen, Points(np.concatenate(spots), colour, np.concatenate(sizes), "ring")
+        return self.ring[1]
+
+    def error_bars(self, compared: SceneComparison) -> Lines:
+        """Error bars of all measured points."""
+        if self.bars is None:
+            pieces = [self.bar(compared, one, np.arange(one.series.row.size)) for one in self.measured]
+            self.bars = Lines(np.concatenate([np.empty((0, 2, 2)), *pieces]))
+        return self.bars
+
+    def bar(self, compared: SceneComparison, one: Drawn, which: np.ndarray) -> Array:
+        """(k, 2, 2) along the axes: error bars of some points of measured impacts."""
+        series = one.series
+        impacts = compared.impacts if series.source == 0 else compared.others[series.source - 1].impacts
+        points, found = series.points[which], []
+        for i, (axis, name) in enumerate(((self.x, self.spec.x), (self.y, self.spec.y))):
+            sigma = measured_sigma(impacts, series.row[which], name)
+            ends = np.stack([points, points], axis=1)
+            ends[:, 0, i] -= sigma
+            ends[:, 1, i] += sigma
+            if axis.log:
+                ends[:, 0, i] = np.maximum(ends[:, 0, i], axis.limits[0] * 1e-3)
+            found.append(np.stack([self.x.places(ends[:, :, 0]), self.y.places(ends[:, :, 1])], axis=2))
+        return np.concatenate(found)
+
+
+def symbol(name: str) -> str:
+    """Of a variable: its symbol, or its name in words."""
+    return VARIABLES[name].symbol or VARIABLES[name].title
+
+
+def axis_of(name: str, limits: Limits, log: bool) -> Axis:
+    """The axis of a variable."""
+    variable = VARIABLES[name]
+    return Axis(limits, log, variable.label, f"{symbol(name)} [{variable.unit or '–'}]")
+
+
+def curve_text(curve: Curve, spec: GraphSpec, full: bool = True) -> str:
+    """Equation and numbers of a fit."""
+    slope = VARIABLES["rt"].symbol if (spec.x, spec.y) == ("vt1_mps", "vt2_mps") else ""
+    text = curve.text(symbol(spec.y), symbol(spec.x), slope, POWER, full)
+    before, _, rest = text.partition(POWER[0])
+    exponent, _, after = rest.partition(POWER[-1])
+    return f"{before}{exponent.translate(RAISED)}{after}"
+
+
+def build(
+    scene: bpy.types.Scene,
+    spec: GraphSpec,
+    compared: SceneComparison,
+    kept: list[Mask],
+    colours: PointColours,
+    look: Look,
+) -> ImpactGraph:
+    """The graph of what is compared.
+
+    kept : of the scene's own impacts, and of each other table, those that pass the filters.
+    """
+    settings = scene.rockfall_graphs
+    drawn = _series(spec, compared, kept, colours, look)
+    every = [series for series, *_ in drawn]
+    whole = whole_limits(every, (spec.x_log, spec.y_log))
+    x, y = axis_of(spec.x, whole[0], spec.x_log), axis_of(spec.y, whole[1], spec.y_log)
+    own = next((series for series in every if not series.model and series.source == 0), None)
+    found, pieces, start = [], [np.empty((0, 2), dtype=np.float32)], 0
+    for series, colour, each, shape, hollow in drawn:
+        places = np.stack([x.places(series.points[:, 0]), y.places(series.points[:, 1])], axis=1)
+        opacity = min(1.0, max(0.45, (MANY / max(len(places), 1)) ** 0.25))
+        shades = np.ones((len(places), 4))
+        shades[:, :3], shades[:, 3] = (colour if each is None else each), opacity
+        links = None
+        if series.model and own is not None and settings.links:
+            pairs = pair_links(own, series)
+            links = Lines(np.stack([x.places(pairs[:, :, 0]), y.places(pairs[:, :, 1])], axis=2))
+        curve = None
+        if settings.fits and (series.model or series.source == 0):
+            curve = fit_curve(spec.fitted, series.points[series.defined], *whole, interval=False)
+        line = None
+        if curve is not None and curve.is_fitted:
+            line = Lines(np.stack([x.places(curve.x), y.places(curve.y)], axis=1))
+        points = Points(places, shades, opacity if opacity < 1 else 1.0, shape)
+        found.append(Drawn(series, colour, shape, hollow, points, links, curve, line, start))
+        pieces.append(places.astype(np.float32))
+        start += len(places)
+    return ImpactGraph(spec, x, y, found, np.concatenate(pieces))
+
+
+def _series(
+    spec: GraphSpec, compared: SceneComparison, kept: list[Mask], colours: PointColours, look: Look
+) -> list[tuple[Series, Rgb, Array | None, str, bool]]:
+    """Series, colour, colours of each point or None, shape, and whether it is hollow; what is on top comes last."""
+    found: list[tuple[Series, Rgb, Array | None, str, bool]] = []
+    impacts, several = compared.impacts, len(compared.predictions) > 1
+    hues = model_colours(compared.models)
+    if impacts is not None:
+        for which, predictions in compared.predictions.items():
+            for model, predicted in predictions.items():
+                title = f"{MODELS[model].title}{f', {which}' if several else ''}"
+                series = model_series(impacts, predicted, model, compared.runs, spec.x, spec.y, kept[0], title)
+                colour = shade(hues[model], look)
+                found.append((series, colour, None, model_shape(model), several and which == "B"))
+    for i, other in enumerate(compared.others):
+        if other.impacts is not None:
+            rows = np.flatnonzero(kept[i + 1])
+            title = ", ".join(other.sites[:3]) or other.path.name
+            series = measured_series(other.impacts, spec.x, spec.y, rows, title, i + 1)
+            found.append((series, mixed(look.plot, look.measured, 0.6), colours.of(i + 1, rows), "circle", True))
+    if impacts is not None:
+        rows = np.flatnonzero(kept[0])
+        series = measured_series(impacts, spec.x, spec.y, rows, "measured")
+        found.append((series, look.measured, colours.of(0, rows), "circle", False))
+    return found
+
+
+def shade(colour: Rgb, look: Look) -> Rgb:
+    """A model's colour, so that it stands out from the background."""
+    return mixed(colour, look.measured, 0.18)
+
+
+def specs_key(scene: bpy.types.Scene, number: int) -> tuple[object, ...]:
+    """All that the batches of a graph depend on, of its settings."""
+    graph, settings = graph_settings.graph(scene, number), scene.rockfall_graphs
+    return graph.x, graph.y, graph.x_log, graph.y_log, graph.trend, settings.links, settings.fits

@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The editor of impact graphs as it is drawn: legend, graphs beside each other, the card under the mouse; what is kept.
+
+What a graph is made of is in `impact_graphs`; here is when it is made again, and where it lies.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+
+from ....core.analysis.columns import passing
+from ....core.analysis.graph_layout import Frame, Rectangle, frame, tiles
+from ....core.analysis.variable_sigma import measured_sigma
+from ....core.analysis.variables import VARIABLES, measured_values
+from ....core.reconstruction.impact import Impacts
+from ....core.vectors import Mask
+from ...scene import comparison, graph_settings
+from . import drawing, empty, legend, selection
+from .axes import draw_axes
+from .editor import Canvas
+from .impact_graphs import Drawn, ImpactGraph, build, curve_text, specs_key
+from .look import Look, alpha, mixed
+from .point_colours import PointColours, find_colours
+
+LINE = 1.35
+"""From one line of text to the next, in heights of the text."""
+FULL_HEIGHT = 16
+"""A graph of so many heights of the text has room for the fits of several models."""
+
+
+class Hit(NamedTuple):
+    """A point under the mouse: its source and row, the series in the graph and its place there."""
+
+    source: int
+    row: int
+    series: int
+    place: int
+
+
+@dataclass(eq=False)
+class _Kept:
+    """What was made for a scene, and what for."""
+
+    rows_key: object = None
+    rows: list[Mask] = field(default_factory=list)
+    colours_key: object = None
+    colours: PointColours = field(default_factory=lambda: PointColours(None, {}))
+    graphs: dict[int, tuple[object, ImpactGraph]] = field(default_factory=dict)
+
+
+_scenes: dict[int, _Kept] = {}
+
+
+def forget() -> None:
+    """Another file was opened, or the graphics card is left."""
+    _scenes.clear()
+
+
+def draw(context: bpy.types.Context, canvas: Canvas) -> None:
+    """Draw all graphs of a scene, or what to do when there is nothing to be drawn."""
+    scene, look = context.scene, canvas.look
+    compared = comparison.comparison_of(scene)
+    said = empty.nothing(scene, compared, rows_of(scene, compared))
+    if said is not None:
+        empty.draw(canvas, said)
+        return
+    graphs = {number: graph_of(scene, number, compared, look) for number in graph_settings.shown(scene)}
+    room = canvas.room.shrunk(0.5 * look.text)
+    if scene.rockfall_graphs.legend:
+        taken = legend.draw(room, look, compared, next(iter(graphs.values())), _kept(scene).colours)
+        room = Rectangle(room.left, room.bottom, room.width, max(room.height - taken, 1.0))
+    chosen = selection.selected(context)
+    for tile, (number, graph) in zip(tiles(room, len(graphs), 0.6 * look.text), graphs.items(), strict=True):
+        _draw_graph(scene, canvas, number, graph, tile, compared, chosen)
+    if canvas.hit is not None and canvas.graph in graphs and canvas.pointer is not None:
+        _draw_card(canvas, graphs[canvas.graph], canvas.hit, compared)
+
+
+def point(context: bpy.types.Context, canvas: Canvas) -> Hit | None:
+    """The point under the mouse."""
+    graph, seen = drawn_graph(context.scene, canvas.graph), canvas.frames.get(canvas.graph)
+    if graph is None or seen is None or canvas.pointer is None:
+        return None
+    found = graph.hit(seen, *canvas.pointer, canvas.look.scale)
+    if found is None:
+        return None
+    series = graph.drawn[found[0]].series
+    return Hit(series.source, int(series.row[found[1]]), *found)
+
+
+def drawn_graph(scene: bpy.types.Scene, number: int) -> ImpactGraph | None:
+    """A graph as it was drawn last."""
+    return _kept(scene).graphs.get(number, (None, None))[1]
+
+
+def graph_of(scene: bpy.types.Scene, number: int, compared: comparison.SceneComparison, look: Look) -> ImpactGraph:
+    """A graph with its batches; made again when something that it shows has changed."""
+    kept, settings = _kept(scene), scene.rockfall_graphs
+    rows = rows_of(scene, compared)
+    colours_key = compared.version, settings.colour_by, look.dark
+    if kept.colours_key != colours_key:
+        kept.colours = find_colours(_tables(compared), settings.colour_by, look.dark)
+        kept.colours_key = colours_key
+    key = compared.version, kept.rows_key, colours_key, look.measured, look.plot, specs_key(scene, number)
+    if kept.graphs.get(number, (None,))[0] != key:
+        spec = graph_settings.spec_of(graph_settings.graph(scene, number), number)
+        kept.graphs[number] = key, build(scene, spec, compared, rows, kept.colours, look)
+    return kept.graphs[number][1]
+
+
+def rows_of(scene: bpy.types.Scene, compared: comparison.SceneComparison) -> list[Mask]:
+    """Of the scene's own impacts, and of each other table, those that pass the filters."""
+    kept, filters = _kept(scene), graph_settings.filters_of(scene)
+    if kept.rows_key != (compared.version, filters):
+        tables = _tables(compared)
+        kept.rows = [
+            passing(tables[source], filters) if source in tables else np.zeros(0, dtype=np.bool_)
+            for source in range(1 + len(compared.others))
+        ]
+        kept.rows_key = compared.version, filters
+    return kept.rows
+
+
+def _kept(scene: bpy.types.Scene) -> _Kept:
+    if scene.session_uid not in _scenes:
+        for gone in _scenes.keys() - {one.session_uid for one in bpy.data.scenes}:
+            del _scenes[gone]
+        _scenes[scene.session_uid] = _Kept()
+    return _scenes[scene.session_uid]
+
+
+def _tables(compared: comparison.SceneComparison) -> dict[int, Impacts]:
+    """Source → its impacts."""
+    found = {i + 1: one.impacts for i, one in enumerate(compared.others) if one.impacts is not None}
+    return found if compared.impacts is None else {0: compared.impacts, **found}
+
+
+def _draw_graph(
+    scene: bpy.types.Scene,
+    canvas: Canvas,
+    number: int,
+    graph: ImpactGraph,
+    tile: Rectangle,
+    compared: comparison.SceneComparison,
+    chosen: selection.Chosen,
+) -> None:
+    look, settings = canvas.look, scene.rockfall_graphs
+    x, y = graph.axes(graph_settings.spec_of(graph_settings.graph(scene, number), number))
+    fits = [one for one in reversed(graph.drawn) if one.curve is not None]
+    most = 1 + (len(fits) - 1 if tile.height > FULL_HEIGHT * look.text else 0)
+    most = min(most, max(1, int(0.25 * tile.height / (LINE * look.text))))
+    lines = max(min(most, len(fits)), 1)
+    seen = frame(tile, x, y, look.text, look.measure, lines * LINE * look.text + 0.3 * look.text)
+    canvas.frames[number] = seen
+    pointed = canvas.part if canvas.graph == number else ""
+    draw_axes(seen, look, pointed)
+    rim = 0.0 if len(graph.places) > 5000 else 0.9 * look.scale
+    with drawing.in_axes(seen, graph.x, graph.y) as bounds:
+        with drawing.clipped(seen.plot):
+            for one in graph.drawn:
+                if one.links is not None:
+                    one.links.draw(alpha(look.faint, 0.35), look.line)
+            if settings.error_bars == "ALWAYS":
+                graph.error_bars(compared).draw(alpha(look.faint, 0.8), look.line)
+            for one in graph.drawn:
+                if one.line is not None:
+                    one.line.draw(alpha(mixed(one.colour, look.plot, 0.15)), 1.6 * look.scale)
+        for one in graph.drawn:
+            hollow = 1.6 * look.scale if one.hollow else 0.0
+            one.points.draw(look.point * (1.15 if one.series.model else 1.0), bounds, look.plot, rim, hollow)
+        if chosen:
+            graph.chosen_ring(chosen, look.chosen).draw(look.point, bounds)
+        if pointed and canvas.hit is not None:
+            _draw_pointed(canvas, graph, compared, seen.plot, bounds)
+    _draw_title(canvas, graph, fits[:lines], seen, tile)
+    said = empty.in_graph(graph, compared)
+    if said:
+        empty.draw_in_plot(seen.plot, look, said)
+
+
+def _draw_pointed(
+    canvas: Canvas,
+    graph: ImpactGraph,
+    compared: comparison.SceneComparison,
+    plot: Rectangle,
+    bounds: tuple[float, float, float, float],
+) -> None:
+    """The point under the mouse, its error bars, and all other points of the same impact."""
+    hit, look = canvas.hit, canvas.look
+    if hit.series >= len(graph.drawn):
+        return
+    one = graph.drawn[hit.series]
+    if not one.series.model and bpy.context.scene.rockfall_graphs.error_bars != "NEVER":
+        with drawing.clipped(plot):
+            drawing.Lines(graph.bar(compared, one, np.array([hit.place]))).draw(alpha(look.ink), look.line)
+    same = [
+        graph.places[each.start : each.start + each.series.row.size][each.series.row == hit.row]
+        for each in graph.drawn
+        if each.series.source == hit.source
+    ]
+    drawing.Points(np.concatenate(same), look.ink, 2.0, "ring").draw(look.point, bounds)
+
+
+def _draw_title(canvas: Canvas, graph: ImpactGraph, fits: list[Drawn], seen: Frame, tile: Rectangle) -> None:
+    """Above the plot: what lies beyond the axes to the right, the fits to the left."""
+    look, plot = canvas.look, seen.plot
+    base = plot.top + 0.45 * look.text
+    room = plot.width
+    outside = graph.beyond(seen.x, seen.y)
+    if outside:
+        words = _beyond_text(outside, look, 0.5 * plot.width if fits else plot.width)
+        room -= drawing.text(plot.right, base, words, look.text, look.faint, (1.0, 0.0)) + look.text
+    for i, one in enumerate(reversed(fits)):
+        texts = [curve_text(one.curve, graph.spec), curve_text(one.curve, graph.spec, full=False)]
+        texts.append(f"R² = {one.curve.fit.r2:.2f}".replace("-", "−") if one.curve.is_fitted else "")
+        space = room if i == 0 else plot.width
+        words = next((text for text in texts if look.measure(text) <= space), "")
+        drawing.text(plot.left, base + i * LINE * look.text, words, look.text, one.colour)
+
+
+def _beyond_text(outside: list[tuple[float, int, int]], look: Look, room: float) -> str:
+    """As many of the values beyond the axes as there is room for, the largest first."""
+    values = [f"{value:.3g}".replace("-", "−") for value, _, _ in outside]
+    for count in range(len(values), 0, -1):
+        if count > 12:
+            continue
+        more = f" + {len(values) - count}" if count < len(values) else ""
+        words = f"beyond: {', '.join(values[:count])}{more}"
+        if look.measure(words) <= room:
+            return words
+    return f"{len(values)} beyond"
+
+
+def _draw_card(canvas: Canvas, graph: ImpactGraph, hit: Hit, compared: comparison.SceneComparison) -> None:
+    """What is known of the impact under the mouse."""
+    tables = _tables(compared)
+    if hit.source not in tables or hit.series >= len(graph.drawn):
+        return
+    impacts, drawn, row = tables[hit.source], graph.drawn[hit.series], np.array([hit.row])
+    name = f"{impacts.trajectory[hit.row]}, impact {impacts.impact[hit.row]}"
+    rows = [name if hit.source == 0 else f"{impacts.site[hit.row]}: {name}"]
+    for axis, variable in ((0, graph.spec.y), (1, graph.spec.x)):
+        value = float(measured_values(impacts, row, variable)[0])
+        sigma = float(measured_sigma(impacts, row, variable)[0])
+        rows.append(f"{VARIABLES[variable].title}: {_quantity(value, sigma, VARIABLES[variable].unit)}")
+        if drawn.series.model and VARIABLES[variable].restituted:
+            model = float(drawn.series.points[hit.place, 1 - axis])
+            rows.append(f"    {drawn.series.title}: {_quantity(model, np.nan, VARIABLES[variable].unit)}")
+    flags = impacts.flag_text()[hit.row] if len(impacts) < 20_000 else ""
+    if flags:
+        rows.append(f"Flags: {flags.replace(';', ', ').replace('_', ' ')}")
+    drawing.card(canvas.pointer, rows, canvas.look, canvas.room)
+
+
+def _quantity(value: float, sigma: float, unit: str) -> str:
+    """A number for people, with its standard deviation and unit."""
+    if not np.isfinite(value):
+        return "not defined"
+    space = "" if unit in ("", "°") else " "
+    if np.isfinite(sigma) and sigma > 0:
+        digits = max(0, 1 - int(np.floor(np.log10(sigma))))
+        return f"{value:.{digits}f} ± {sigma:.{digits}f}{space}{unit}".replace("-", "−")
+    text = f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+    return f"{text}{space}{unit}".replace("-", "−")

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the colours and shapes of the graphs mean, in one or two lines above them."""
+
+import numpy as np
+
+from ....core.analysis.graph_layout import Rectangle
+from ....core.colours import SPEED_SCALE
+from ...scene.comparison import SceneComparison
+from . import drawing
+from .impact_graphs import ImpactGraph
+from .look import Look, Rgb
+from .point_colours import PointColours
+
+STEP = 1.7
+MOST_LINES = 2
+UNIT = (-1e9, -1e9, 1e9, 1e9)
+
+Entry = tuple[str, Rgb, str, bool]
+"""Text, colour, shape, hollow."""
+
+
+def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGraph, colours: PointColours) -> float:
+    """Draw the legend at the top of a room; the height that it takes [px]."""
+    own = next((one for one in graph.drawn if not one.series.model and one.series.source == 0), None)
+    entries: list[Entry] = []
+    for one in ([own] if own else []) + [each for each in graph.drawn if each is not own]:
+        count = f" ({int(one.series.defined.sum())})" if not one.series.model else ""
+        entries.append((f"{one.series.title}{count}", one.colour, one.shape, one.hollow))
+    if compared.impacts is not None and not compared.models:
+        entries.append(("no model: choose some in the sidebar (N)", look.faint, "", False))
+    if colours.colouring is not None:
+        entries.append((f"   {colours.colouring.title.split(' [')[0]}:", look.faint, "", False))
+        entries += [(text or "empty", colour, "circle", False) for text, colour in colours.colouring.groups]
+    lines = _lines(entries, look, room.width)
+    top = room.top - 0.5 * STEP * look.text
+    for i, line in enumerate(lines):
+        x = room.left + look.text
+        for text, colour, shape, hollow in line:
+            x = _entry(x, top - i * STEP * look.text, text, colour, shape, hollow, look)
+        if i == len(lines) - 1 and colours.colouring is not None and colours.colouring.ends is not None:
+            _bar(x, top - i * STEP * look.text, colours.colouring.ends, look)
+    return len(lines) * STEP * look.text
+
+
+def _lines(entries: list[Entry], look: Look, width: float) -> list[list[Entry]]:
+    """Entries line by line; those without room are counted."""
+    lines: list[list[Entry]] = [[]]
+    used, rest = look.text, look.measure("+ 100 more") + 2 * look.text
+    for number, entry in enumerate(entries):
+        wide = look.measure(entry[0]) + (2.4 if entry[2] else 1.2) * look.text
+        last = number == len(entries) - 1
+        full = used + wide + (0 if last else rest) > width
+        if full and len(lines) < MOST_LINES and lines[-1]:
+            lines.append([])
+            used, full = look.text, False
+        if full and lines[-1]:
+            lines[-1].append((f"+ {len(entries) - number} more", look.faint, "", False))
+            break
+        lines[-1].append(entry)
+        used += wide
+    return lines
+
+
+def _entry(x: float, y: float, text: str, colour: Rgb, shape: str, hollow: bool, look: Look) -> float:
+    if shape:
+        spot = drawing.Points(np.array([[x + 0.5 * look.text, y]]), colour, 1.2, shape)
+        spot.draw(look.point, UNIT, look.back, 0.0, 1.6 * look.scale if hollow else 0.0)
+        x += 1.2 * look.text
+    return x + drawing.text(x, y, text, look.text, look.ink if shape else look.faint, (0.0, 0.5)) + 1.2 * look.text
+
+
+def _bar(x: float, y: float, ends: tuple[float, float], look: Look) -> None:
+    low, high = (f"{value:.3g}".replace("-", "−") for value in ends)
+    x += drawing.text(x, y, low, look.text, look.ink, (0.0, 0.5)) + 0.5 * look.text
+    width = 7 * look.text / len(SPEED_SCALE)
+    for i, colour in enumerate(SPEED_SCALE):
+        part = Rectangle(x + i * width, y - 0.4 * look.text, width + 1, 0.8 * look.text)
+        drawing.fill(part, (float(colour[0]), float(colour[1]), float(colour[2])))
+    drawing.text(x + 7.5 * look.text, y, high, look.text, look.ink, (0.0, 0.5))

@@ -10,9 +10,9 @@ from ..vectors import Array
 Limits = tuple[float, float]
 
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-NARROWEST = 1e-6
+NARROWEST = 1e-5
 """The least length of an axis, as a part of its greatest value: single precision draws no finer."""
-LONGEST_LOG = 300.0
+LONGEST_LOG = 30.0
 """A logarithmic axis stays within so many powers of ten about 1."""
 
 
@@ -42,7 +42,8 @@ class Axis:
         """The inverse of `places`."""
         low, high = self._scaled(np.array(self.limits))
         found = low + np.asarray(places, dtype=np.float64) * (high - low)
-        return np.asarray(10.0**found if self.log else found)
+        with np.errstate(over="ignore"):
+            return np.asarray(10.0**found if self.log else found)
 
     def zoomed(self, factor: float, about: float) -> "Axis":
         """The axis `factor` times as long, with the value at the place `about` (from 0 to 1) where it is."""

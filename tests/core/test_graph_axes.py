@@ -31,11 +31,11 @@ def test_zooming_keeps_the_value_under_the_mouse() -> None:
 
 
 def test_an_axis_stays_one_that_can_be_drawn() -> None:
-    axis, log = Axis((1.0, 2.0)), Axis((1e-290, 1e290), log=True)
+    axis, log = Axis((1.0, 2.0)), Axis((1e-29, 1e29), log=True)
     for _ in range(200):
         axis, log = axis.zoomed(0.5, 0.3), log.zoomed(2.0, 0.5)
-    assert axis.limits[1] - axis.limits[0] > 1e-6
-    assert 0 < log.limits[0] < log.limits[1] < np.inf
+    assert axis.limits[1] - axis.limits[0] > 1e-5
+    assert 0 < log.limits[0] < log.limits[1] < 1e30
 
 
 def test_ticks_are_round_and_few() -> None:
@@ -60,7 +60,9 @@ def test_ticks_of_a_logarithmic_axis() -> None:
     assert len(ticks(Axis((3.0, 4.0), log=True), 5).values) >= 2, "too short for powers of ten: linear ticks"
 
 
-@pytest.mark.parametrize(("least", "expected"), [(0.9, 1.0), (1.0, 1.0), (1.1, 2.0), (2.2, 2.5), (30.0, 50.0), (7e-4, 1e-3)])
+@pytest.mark.parametrize(
+    ("least", "expected"), [(0.9, 1.0), (1.0, 1.0), (1.1, 2.0), (2.2, 2.5), (30.0, 50.0), (7e-4, 1e-3)]
+)
 def test_round_step(least: float, expected: float) -> None:
     assert round_step(least) == pytest.approx(expected)
 
@@ -75,8 +77,10 @@ def test_tiles_fill_the_room_without_overlap() -> None:
             assert all(room.bottom - 1e-9 <= one.bottom and one.top <= room.top + 1e-9 for one in found)
             for i, one in enumerate(found):
                 for other in found[i + 1 :]:
-                    assert one.right <= other.left + 1e-9 or other.right <= one.left + 1e-9 or (
-                        one.bottom >= other.top - 1e-9 or other.bottom >= one.top - 1e-9
+                    assert (
+                        one.right <= other.left + 1e-9
+                        or other.right <= one.left + 1e-9
+                        or (one.bottom >= other.top - 1e-9 or other.bottom >= one.top - 1e-9)
                     )
     shapes = {size: tiles(Rectangle(0, 0, *size), 4) for size in ((800, 600), (300, 900), (1500, 250))}
     assert [len({one.left for one in found}) for found in shapes.values()] == [2, 1, 4]

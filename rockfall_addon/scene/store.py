@@ -45,4 +45,110 @@ PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems
 SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
 OTHER_PARAMETERS = "rockfall_other_parameters"  # of the models: the second set, for the graphs
 MODEL = "rockfall_model"  # of what a model predicts
+LANE = "rockfall_lane"  # of a model's block: number among those of a trajectory
 GRAPH_CHOSEN = "rockfall_graph_chosen"  # impacts of other sites that are selected: file → rows, as text
+SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
+MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
+
+# of simulated blocks and paths
+ENDS = "rockfall_ends"  # of paths: the ways to end, as text
+RELEASES = "rockfall_releases"  # name, trajectory and clock time of each, as text
+
+# of a pick; blocks and flights have the trajectory, too
+TRAJECTORY, TIME, POSITION = "rockfall_trajectory", "rockfall_time_s", "rockfall_position_m"
+NORMAL, SPIN = "rockfall_normal", "rockfall_angular_velocity_radps"
+KIND, STATUS = "rockfall_kind", "rockfall_status"
+SIGMA_TIME, SIGMA_POSITION = "rockfall_sigma_time_s", "rockfall_sigma_position_m"
+ROW, EXTRA = "rockfall_row", "rockfall_extra"  # where it stood in a table, and the table's other columns
+KEY_FRAME, PICK_SHIFT = "rockfall_key_frame", "rockfall_pick_shift_m"
+SEEN = "rockfall_seen"  # id of a video → frame and pixel in it
+RESULT = "rockfall_result"
+
+# of picks, of what is shown of a run, and of the actions of both; 0.1.0 had none of these
+WRITTEN = "rockfall_written"  # how often something was written: the older of two was brought back by an undo
+PRINT = "rockfall_print"  # fingerprint of the picks that this shows
+BLOCK_KEYS = "rockfall_block_keys"  # of a block's action: frame, place and pick of each key, as text
+
+# of a tile of the terrain
+TERRAIN_FILE, TERRAIN_SUMMARY = "rockfall_file", "rockfall_summary"
+THIN_SHARE, REACH = "rockfall_thin_share", "rockfall_reach_m"
+COARSE_VIEW_OF = "rockfall_view_of"  # of the full mesh: vertices, triangles, triangles that were wanted, checksums
+
+# of the scene: its videos
+KNOWN_VIDEOS, ACTIVE_CAMERA = (
+    "rockfall_known_videos",
+    "rockfall_active_camera",
+)  # id → file of the cameras it has had: tells a deletion
+EVENTS, EVENTS_FILE = "rockfall_events", "rockfall_events_file"
+SYNCHRONISED, REFERENCE_CAMERA = "rockfall_synchronised", "rockfall_reference_camera"
+
+# of a camera: its video
+VIDEO_FILE, VIDEO_FACTS = "rockfall_video_file", "rockfall_video_facts"
+VIDEO_TIMES, VIDEO_SIZE = "rockfall_video_times_s", "rockfall_video_size"
+CLOCK, CAPTURE_RATE, ROW_TIME = "rockfall_clock", "rockfall_capture_rate_hz", "rockfall_row_time_s"
+IMAGE_BLEND = "rockfall_blend"  # that comes back when the wipe ends
+STILL = "rockfall_still"  # of an image: the number of the picture that it holds
+
+# of a camera: where it stood and how it looked
+CAMERA, SOLVED, RMSE = "rockfall_camera", "rockfall_solved", "rockfall_rmse_px"
+POSE_TIMES, POSES = "rockfall_pose_times_s", "rockfall_poses"
+POSE_SIGMA, POSE_COVARIANCE = "rockfall_pose_sigma", "rockfall_pose_covariance"
+CAMERA_SHIFT, ASPECT, REFERENCE_POSE = "rockfall_camera_shift_m", "rockfall_aspect", "rockfall_reference_pose"
+CAMERA_KEYED = "rockfall_camera_keyed"  # clock, origin and rate that its keys were written with
+PAIRS, OPEN_PAIR, SOLUTION = "rockfall_pairs", "rockfall_open_pair", "rockfall_solution"
+KNOWN_LENS, PLACED, FOLLOWED = "rockfall_known_lens", "rockfall_placed", "rockfall_followed"
+
+# of a camera: where a block is seen, and what its refinement proposes
+TRACK_NAMES, TRACK_ROWS = "rockfall_track_names", "rockfall_track"
+PROPOSAL, PROPOSAL_PATH = "rockfall_proposal", "rockfall_proposal_path"
+PROPOSAL_ROWS, PROPOSAL_POSES = "rockfall_proposal_rows", "rockfall_proposal_poses"
+
+
+def double(value: float) -> float:
+    """The double nearest to what the user typed into a single-precision property (0.35, not 0.3499999940)."""
+    return float(f"{value:.7g}")
+
+
+def with_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
+    """The scene's objects of one role, by name."""
+    return sorted((o for o in scene.objects if o.get(ROLE) == role), key=lambda o: o.name)
+
+
+def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
+    """The collection at a path below "Rockfall", created where it is missing."""
+    parent = scene.collection
+    for name in ("Rockfall", *path):
+        child = next((c for c in parent.children if c.get(COLLECTION_NAME) == name), None)
+        if child is None:
+            child = bpy.data.collections.new(name)
+            child[COLLECTION_NAME] = name
+            parent.children.link(child)
+        parent = child
+    return parent
+
+
+def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = ()) -> None:
+    """Remove a collection below "Rockfall" with those in it; their objects must be gone.
+
+    but : names of collections in it that stay, and it with them.
+    """
+    ours = next((c for c in scene.collection.children if c.get(COLLECTION_NAME) == "Rockfall"), None)
+    for child in list(ours.children) if ours is not None else ():
+        if child.get(COLLECTION_NAME) == name:
+            inner = [each for each in child.children_recursive if each.get(COLLECTION_NAME) not in but]
+            for each in (*inner, *(() if but else (child,))):
+                bpy.data.collections.remove(each)
+            return
+
+
+def remove_objects(objects: list[bpy.types.Object]) -> None:
+    """Remove objects with the data and actions that nothing else uses."""
+    for obj in objects:
+        data, action = obj.data, obj.animation_data.action if obj.animation_data else None
+        bpy.data.objects.remove(obj)
+        if isinstance(data, bpy.types.Mesh) and not data.users:
+            bpy.data.meshes.remove(data)
+        elif isinstance(data, bpy.types.Curves) and not data.users:
+            bpy.data.hair_curves.remove(data)
+        if action is not None and not action.users:
+            bpy.data.actions.remove(action)

@@ -63,7 +63,7 @@ void main() {
 @functools.cache
 def point_shader() -> gpu.types.GPUShader:
     """Points of a shape, cut off at bounds: made once, with the first window."""
-    between = gpu.types.GPUStageInterfaceInfo("rockfall_point")
+    between = gpu.types.GPUStageInterfaceInfo("point_between")
     between.flat("VEC4", "shade")
     between.flat("FLOAT", "diameter")
     info = gpu.types.GPUShaderCreateInfo()

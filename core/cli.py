@@ -32,6 +32,7 @@ COMMANDS = {
     "inspect": "what a video file really contains, with advice",
     "track": "follows the block through a video from one click → track.csv, proposed impacts",
     "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
+    "motion": "the motion of a project over time → speeds, heights, energies, residuals of tracks: motion.csv, figures",
     "refine": "fits picks and times to the pixels of the footage → picks, impacts with standard deviations",
     "simulate": "whole rockfalls on the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv, summary.json",
     "render": "the animation of a project, through Blender",

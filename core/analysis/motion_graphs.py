@@ -2,10 +2,11 @@
 """Motion over time as data: speed, heights, energy, and how far each track lies from the motion that was computed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..footage.clock import Clock
 from ..reconstruction.block import per_pick
 from ..reconstruction.flight import flight_states
 from ..reconstruction.refinement.views import PixelObservations, View
@@ -133,6 +134,43 @@ class MotionCourse:
         return np.nan
 
 
+@dataclass(frozen=True, eq=False)
+class FrameScale:
+    """Numbers of a video's pictures along the common time.
+
+    Attributes
+    ----------
+    video : name.
+    clock : of the video.
+    video_s, frame : (f,) video time [s], ascending, and number of some of its pictures.
+    """
+
+    video: str
+    clock: Clock
+    video_s: Array
+    frame: Array
+
+    def frames(self, time_s: Array) -> Array:
+        """Frame numbers, with their fractions, at common times [s]; beyond the pictures the usual rate goes on."""
+        at = np.asarray(self.clock.to_video(np.asarray(time_s, dtype=np.float64)))
+        found = np.interp(at, self.video_s, self.frame)
+        rate = self._rate_hz
+        found = np.where(at < self.video_s[0], self.frame[0] + rate * (at - self.video_s[0]), found)
+        return np.asarray(np.where(at > self.video_s[-1], self.frame[-1] + rate * (at - self.video_s[-1]), found))
+
+    def times(self, frame: Array) -> Array:
+        """The inverse of `frames`."""
+        wanted, rate = np.asarray(frame, dtype=np.float64), self._rate_hz
+        at = np.interp(wanted, self.frame, self.video_s)
+        at = np.where(wanted < self.frame[0], self.video_s[0] + (wanted - self.frame[0]) / rate, at)
+        at = np.where(wanted > self.frame[-1], self.video_s[-1] + (wanted - self.frame[-1]) / rate, at)
+        return np.asarray(self.clock.to_common(at))
+
+    @property
+    def _rate_hz(self) -> float:
+        return float((self.frame[-1] - self.frame[0]) / (self.video_s[-1] - self.video_s[0]))
+
+
 def motion_courses(
     reconstruction: Reconstruction,
     surface: Surface | None = None,
@@ -181,6 +219,22 @@ def motion_courses(
     seen = _seen(reconstruction, surface, views, observations) if RESIDUAL in quantities else {}
     return tuple(
         _course(reconstruction, name, which, time_s, values, seen.get(name, ())) for name in _names(picks.trajectory)
+    )
+
+
+def from_start(course: MotionCourse) -> MotionCourse:
+    """The same with times that count from its first moment."""
+    start = float(course.time_s[0]) if course.time_s.size else 0.0
+    return delayed(course, -start)
+
+
+def delayed(course: MotionCourse, by_s: float) -> MotionCourse:
+    """The same, so much later."""
+    return replace(
+        course,
+        time_s=course.time_s + by_s,
+        impact_time_s=course.impact_time_s + by_s,
+        residuals=tuple(replace(one, time_s=one.time_s + by_s) for one in course.residuals),
     )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..film.engines import ENGINES
-from ..film.job import Kind
+from ..film.job import GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
 from .options import add_parameter_options, model_parameters, whole
@@ -56,6 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole, metavar="S", help="of the simulation's random numbers (default 0)")
     add_parameter_options(parser)
+    parser.add_argument(
+        "--graphs",
+        choices=GRAPH_KINDS,
+        help="graphs beside the slope that follow the film's time: of the impacts, whose points appear as they happen, "
+        "or of the motion (speed, height above ground, energy)",
+    )
     parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
     picture = parser.add_mutually_exclusive_group()
     picture.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
@@ -79,6 +85,11 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(
             "--model and --simulate would show two kinds of blocks in the same colours",
             advice="Make a film of each: --model flies from impact to impact, --simulate falls to the end",
+        )
+    if arguments.graphs and arguments.slope:
+        raise InputError(
+            "--graphs follow the time of a film, and --slope is a picture of all moments",
+            advice="Leave out one of them; --still makes a picture of a moment, with graphs",
         )
     if not simulate and (arguments.number is not None or arguments.seed is not None):
         raise InputError("--number and --seed are of simulated blocks", advice="Add --simulate and a model")
@@ -110,6 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
             number=number,
             seed=arguments.seed or 0,
             parameters=parameters,
+            graphs=arguments.graphs,
         )
         done = maker.film(job, progress)
     for remark in done.remarks:

@@ -5,12 +5,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from ..impact_models.machinery.parameters import Value
 from .simulated import NUMBER
 
 Kind = Literal["film", "still", "slope", "terrain"]
+GraphKind = Literal["impacts", "motion"]
+GRAPH_KINDS: tuple[GraphKind, ...] = get_args(GraphKind)
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class FilmJob:
     simulate : impact models whose blocks fall beside the real ones, from their first flight to their end.
     number, seed : of simulated blocks for each real one and model, and of their random numbers.
     parameters : model → parameter → value, where it is not the default.
+    graphs : which stand in a film or still and follow its time; None for none.
     title : written into the picture of a terrain; empty for the name of its file.
     """
 
@@ -43,6 +46,7 @@ class FilmJob:
     up: str = "auto"
     unit_m: float = 1.0
     title: str = ""
+    graphs: GraphKind | None = None
     models: tuple[str, ...] = ()
     simulate: tuple[str, ...] = ()
     number: int = NUMBER

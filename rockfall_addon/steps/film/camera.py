@@ -9,6 +9,7 @@ from mathutils import Matrix, Vector
 
 from ....core.errors import RockfallError
 from ....core.exchange.project import CameraPlacement
+from ....core.film import graphs
 from ....core.film.framing import Margins, Seen, View, downhill_direction, look_at, place_camera
 from ....core.terrain.raycast import cast_rays
 from ....core.terrain.surface import Surface
@@ -23,11 +24,18 @@ CONTEXT = 0.12  # of the trajectories' extent: how much slope around them belong
 
 
 def automatic_view(
-    scene: bpy.types.Scene, motions: list[Motion], aspect: float, whole: bool = False, others: Array | None = None
+    scene: bpy.types.Scene,
+    motions: list[Motion],
+    aspect: float,
+    whole: bool = False,
+    others: Array | None = None,
+    *,
+    beside_graphs: bool = False,
 ) -> View:
     """A view of all trajectories, or of the whole slope around them.
 
     others : (n, 3) more points that are to be in the picture.
+    beside_graphs : graphs stand at the right.
 
     Raises
     ------
@@ -51,7 +59,9 @@ def automatic_view(
         downhill = _steepest_way(around)
     watched = _thinned(points if len(points) else around, WATCHED_POINTS)
     seen = None if surface is None else _visibility(surface, watched)
-    margins = BESIDE_LEGEND if len(further) else Margins(0.04, 0.04, 0.04, 0.04) if whole else None
+    margins = BESIDE_LEGEND if len(further) else Margins(0.04, 0.04, 0.04, 0.04) if whole else Margins()
+    if beside_graphs:
+        margins = graphs.beside_graphs(margins)
     return place_camera(framed, downhill, aspect, seen, margins)
 
 

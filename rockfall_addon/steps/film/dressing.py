@@ -8,12 +8,14 @@ from ....core.colours import OBSERVED_COLOUR
 from ....core.exchange.project import RenderPreset
 from ....core.film.engines import IDENTIFIERS
 from ....core.film.framing import View, rounded_scale
+from ....core.film.job import GraphKind
 from ....core.film.presets import FilmTiming
 from ....core.film.simulated import Group, LegendEntry, last_moment, legend
 from ....core.film.wording import compared_lines, fastest_speed, notes, simulated_lines
 from ....core.impact_models.registry import find_model
 from ...scene import models, simulation, store, timing
 from . import camera, layout, marks, presence, remembered, simulated
+from . import graphs as film_graphs
 from .engine import use_engine
 from .motions import Motion, motions_of
 
@@ -23,8 +25,10 @@ BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 2.2, 2.4
 SMALL_WIDTH = 640
 
 
-def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
+def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str, graphs: GraphKind | None = None) -> None:
     """Camera, captions and growing trails for a film of what is in the scene, which is then played frame by frame.
+
+    graphs : which stand beside the slope and follow the time; None for none.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
         settings.stagger_s = preset.stagger_s
 
     motions = motions_of(scene)
-    view = _view(scene, motions, preset, whole=False)
+    view = _view(scene, motions, preset, whole=False, beside=graphs is not None)
     _size_things(scene, motions, view)
     settings.trail_until_now = True
     motions = motions_of(scene)
@@ -66,7 +70,9 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> No
         rate=1.0 / film.frame_s,
     )
     _show_simulated(scene, until_now=True)
-    _furnish(scene, view, motions, words, preset)
+    front = _furnish(scene, view, motions, words, preset)
+    if graphs is not None:
+        _add_graphs(scene, front, graphs, preset, words.speed_top_mps, bool(groups))
     presence.show_while_moving(scene, motions)
     use_engine(scene, engine)
     scene.frame_set(0)
@@ -127,11 +133,13 @@ def _begin(scene: bpy.types.Scene, preset: RenderPreset, engine: str) -> None:
     render.resolution_x, render.resolution_y, render.resolution_percentage = preset.width, preset.height, 100
 
 
-def _view(scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, whole: bool) -> View:
+def _view(
+    scene: bpy.types.Scene, motions: list[Motion], preset: RenderPreset, whole: bool, beside: bool = False
+) -> View:
     aspect = preset.width / preset.height
     if preset.camera is not None:
         return camera.given_view(scene, preset.camera, aspect)
-    return camera.automatic_view(scene, motions, aspect, whole, simulated.points_of(scene))
+    return camera.automatic_view(scene, motions, aspect, whole, simulated.points_of(scene), beside_graphs=beside)
 
 
 def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> None:
@@ -152,8 +160,11 @@ def _size_things(scene: bpy.types.Scene, motions: list[Motion], view: View) -> N
 
 def _furnish(
     scene: bpy.types.Scene, view: View, motions: list[Motion], words: layout.Words, preset: RenderPreset
-) -> None:
-    """Camera, backdrop and captions, all moving with the camera; rings in place of the marks of the picks."""
+) -> bpy.types.Object:
+    """Camera, backdrop and captions, all moving with the camera; rings in place of the marks of the picks.
+
+    Returns the sheet of the captions.
+    """
     for obj in store.with_role(scene, store.PICK_ROLE):
         obj.hide_render = True
     if motions:
@@ -177,6 +188,23 @@ def _furnish(
     curtain.hide_viewport = True
     if scene.render.engine == "CYCLES":
         _keep_search_tree(scene, eye)
+    return front
+
+
+def _add_graphs(
+    scene: bpy.types.Scene,
+    front: bpy.types.Object,
+    kind: GraphKind,
+    preset: RenderPreset,
+    speed_top_mps: float | None,
+    beside_simulated: bool,
+) -> None:
+    """Graphs that follow the time, on the sheet of the captions."""
+    size = preset.width, preset.height
+    made = film_graphs.graphs_of(scene, kind, size, speed_top_mps, beside_simulated)
+    for obj in film_graphs.lay_out(made, size, timing.frame_rate(scene)):
+        _add(scene, obj)
+        obj.parent = front
 
 
 def _keep_search_tree(scene: bpy.types.Scene, eye: bpy.types.Object) -> None:

@@ -60,7 +60,9 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
             stagger_s=settings.stagger_s if settings.playback == "TOGETHER" else None,
             time_scale=float(f"{self.time_scale:.6g}"),
         )
-        dressing.set_up_film(scene, preset, quickest_engine() if self.engine == "auto" else self.engine)
+        graphs = None if settings.film_graphs == "NONE" else settings.film_graphs.lower()
+        engine = quickest_engine() if self.engine == "auto" else self.engine
+        dressing.set_up_film(scene, preset, engine, graphs)
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"

@@ -21,6 +21,8 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         ready = remembered.is_set_up(scene)
+        row = layout.row(heading="Graphs")
+        row.prop(scene.rockfall, "film_graphs", expand=True)
         layout.operator("rockfall.set_up_film", text="Update Set-up" if ready else "Set Up Film", icon="VIEW_CAMERA")
         if ready:
             rate = scene.render.fps / scene.render.fps_base

@@ -41,7 +41,7 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:
-            dressing.set_up_film(scene, preset, job.engine)
+            dressing.set_up_film(scene, preset, job.engine, job.graphs)
     if job.kind == "film":
         render_film(scene, job.out, job.frames, progress)
     else:

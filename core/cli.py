@@ -21,6 +21,7 @@ CLOSED_PIPE = 141
 COMMANDS = {
     "demo": "the whole job on the bundled site: reconstruct, figures, animation",
     "reconstruct": "timed picks → impacts.csv and trajectories.csv",
+    "statistics": "measured impacts alone, and groups of them → statistics.csv, groups.csv, figures",
     "compare": "impact models on measured impacts → predictions.csv, scores.csv, figures and a page",
     "compare-runs": "whole observed falls beside simulated ones → whole_runs.csv, whole_values.csv, runs.csv, figures",
     "explore": "a live page on this machine: a slider for every parameter of every model",

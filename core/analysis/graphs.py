@@ -162,6 +162,7 @@ def make_graph(
     predictions: Predictions | None = None,
     model: str = "",
     run: int = 0,
+    row: Indices | None = None,
 ) -> Graph:
     """The graph of measured impacts, and of one model's run on them.
 
@@ -169,12 +170,16 @@ def make_graph(
     ----------
     predictions, model : None and "" for the measured impacts alone.
     run : 0 for the model's mean, else the replicate.
+    row : (m,) the impacts that are shown, without predictions; None for all.
 
     Raises
     ------
     InputError : the model was not compared, or has no such run.
     """
-    row: Indices = np.arange(len(impacts)) if predictions is None else predictions.row
+    if predictions is not None:
+        row = predictions.row
+    elif row is None:
+        row = np.arange(len(impacts))
     measured = np.stack([measured_values(impacts, row, name) for name in (spec.x, spec.y)], axis=1)
     modelled = np.full_like(measured, np.nan)
     if predictions is not None and model:

@@ -34,6 +34,22 @@ MOST_NAMED = 6
 """So many pairs are named, the others counted."""
 
 
+@dataclass(frozen=True, eq=False)
+class Grouping:
+    """Which group each of n impacts belongs to.
+
+    Attributes
+    ----------
+    column : what they are grouped by, for people.
+    names : of the groups, in their order.
+    number : (n,) number of each impact's group, from 0; −1 for none.
+    """
+
+    column: str
+    names: tuple[str, ...]
+    number: Indices
+
+
 @dataclass(frozen=True)
 class GroupStatistics:
     """The statistics of groups.
@@ -41,7 +57,7 @@ class GroupStatistics:
     Attributes
     ----------
     column : what they are grouped by.
-    groups : name → statistics, in the order of first appearance.
+    groups : name → statistics, in their order.
     undefined : impacts without a group.
     tests : whether they differ.
     """
@@ -95,45 +111,76 @@ class GroupStatistics:
 
     def _about_pairs(self) -> list[Remark]:
         different = [pair for pair in self.tests.pairs if pair.differs]
-        lines = [
-            f"{QUANTITIES[pair.quantity]} of {pair.first} and {pair.second} (medians {pair.median_first:.2f}, "
-            f"{pair.median_second:.2f}; Cliff's δ {pair.effect:+.2f}; p {_chance(pair.p_holm)})"
-            for pair in sorted(different, key=lambda pair: -abs(pair.effect))[:MOST_NAMED]
-        ]
-        if not lines:
-            return []
-        more = f", and {len(different) - MOST_NAMED} more" if len(different) > MOST_NAMED else ""
-        return [Remark(f"Pairs that differ: {'; '.join(lines)}{more}.".replace("-0", "−0"), "note", "pairs")]
+        made = []
+        for pair in sorted(different, key=lambda pair: -abs(pair.effect))[:MOST_NAMED]:
+            text = (
+                f"{pair.first} and {pair.second} differ in {QUANTITIES[pair.quantity]}: "
+                f"medians {pair.median_first:.2f} and {pair.median_second:.2f}, "
+                f"Cliff's δ {pair.effect:+.2f}, p {_chance(pair.p_holm)}."
+            )
+            made.append(Remark(text.replace("-0", "−0"), "note", "pairs"))
+        if len(different) > MOST_NAMED:
+            made.append(Remark(f"And {len(different) - MOST_NAMED} more pairs differ.", "note", "pairs"))
+        return made
+
+
+def _named(numbers: Array) -> tuple[str, ...]:
+    """Different numbers as texts, with as few digits as tell them apart."""
+    for digits in range(4, 18):
+        names = tuple(f"{number:.{digits}g}" for number in numbers.tolist())
+        if len(set(names)) == len(names):
+            break
+    return names
 
 
 def group_statistics(
-    impacts: Impacts, labels: Names, column: str, *, seed: int = 0, progress: Progress = silent
+    impacts: Impacts, grouping: Grouping, *, seed: int = 0, progress: Progress = silent
 ) -> GroupStatistics:
     """The statistics of each group of impacts.
 
     Parameters
     ----------
-    labels : (n,) the name of each impact's group; "" for none.
-    column : what they are grouped by, for people.
     seed : of the exchanges.
     """
-    names, number = numbered(labels)
+    names, number = grouping.names, grouping.number
     found = statistics_by_number(impacts, number, len(names), progress)
     row = np.flatnonzero(usable(impacts) & (number >= 0))
     tests = group_tests(
         _tested(impacts, row), number[row], names, fall_numbers(impacts)[row], seed=seed, progress=progress
     )
-    return GroupStatistics(column, dict(zip(names, found, strict=True)), int((number < 0).sum()), tests)
+    return GroupStatistics(grouping.column, dict(zip(names, found, strict=True)), int((number < 0).sum()), tests)
 
 
-def numbered(labels: Names) -> tuple[list[str], Indices]:
-    """The different names, in the order of first appearance, and (n,) the number of each; −1 for the empty name."""
-    values, first, place = np.unique(labels, return_index=True, return_inverse=True)
+def group_by_text(column: str, texts: Names) -> Grouping:
+    """A group of each text, in the order of first appearance; "" is none."""
+    values, first, place = np.unique(texts, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
     order = order[values[order] != ""]
     rank = np.full(values.size, -1, dtype=np.intp)
     rank[order] = np.arange(order.size)
-    return values[order].tolist(), rank[place]
+    return Grouping(column, tuple(values[order].tolist()), rank[place])
+
+
+def group_by_number(column: str, values: Array, classes: int = 0) -> Grouping:
+    """A group of each number, or of each class of about equally many, in ascending order; NaN is none.
+
+    Parameters
+    ----------
+    classes : how many, between quantiles; fewer where many values are equal. 0 for a group of each number.
+    """
+    known = np.isfinite(values)
+    number = np.full(values.size, -1, dtype=np.intp)
+    if not known.any():
+        return Grouping(column, (), number)
+    if not classes:
+        each, place = np.unique(values[known], return_inverse=True)
+        number[known] = place
+        return Grouping(column, _named(each), number)
+    edges = np.unique(np.quantile(values[known], np.linspace(0, 1, classes + 1)))
+    last = max(edges.size - 2, 0)
+    number[known] = np.clip(np.searchsorted(edges, values[known], side="right") - 1, 0, last)
+    ends = [*edges.tolist(), edges[-1]]
+    return Grouping(column, tuple(f"{ends[i]:.4g}–{ends[i + 1]:.4g}" for i in range(last + 1)), number)
 
 
 def _tested(impacts: Impacts, row: Indices) -> dict[str, Array]:

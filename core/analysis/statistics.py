@@ -193,7 +193,7 @@ class ImpactStatistics:
                 "rt",
                 rt.slope,
                 f"R_T = {rt.slope:.3f} ({rt.low:.3f}–{rt.high:.3f}{_together(self.rt_by_trajectory)}), "
-                f"R² {rt.r2:.3f}: slope of |v_T2| on |v_T1| through the origin. "
+                f"R² {_signed(rt.r2, 3)}: slope of |v_T2| on |v_T1| through the origin. "
                 f"Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
             ),
             ("rn", self.rn_angle.slope, hyperbolic if self.rn_angle.high < 0 else unclear),
@@ -201,7 +201,7 @@ class ImpactStatistics:
                 "r",
                 trend.slope,
                 f"R {'falls' if falls else 'rises'} by {slope.removeprefix('-')} per 10° of deviation "
-                f"({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {trend.r2:.2f}). "
+                f"({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {_signed(trend.r2, 2)}). "
                 "Published: falls about linearly from 1.",
             ),
         ]
@@ -313,6 +313,10 @@ def _spreads(values: Array, of: Indices, groups: int) -> list[Spread]:
         low, high = ordered[first + below], ordered[first + np.ceil(place).astype(np.intp)]
         quantiles[some] = low + (high - low) * (place - below)
     return [Spread(n, *parts) for n, parts in zip(counts.tolist(), quantiles.tolist(), strict=True)]
+
+
+def _signed(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}".replace("-", "−")
 
 
 def _span(fit: LineFit, times: float = 1.0) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import add_out
+from .options import add_out, add_site_option, add_where_option, for_each, tables_as_asked
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -20,9 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "tables", nargs="+", metavar="TABLE", help="impacts.csv, or the folder of a package that was merged before"
     )
     add_out(parser)
-    parser.add_argument(
-        "--site", action="extend", nargs="+", default=[], metavar="NAME", help="of each table whose rows name none"
-    )
+    add_site_option(parser)
     parser.add_argument(
         "--licence",
         action="extend",
@@ -37,14 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="drop",
         help="impacts that are there twice: keep the first (default), keep all, or refuse",
     )
-    parser.add_argument(
-        "--where",
-        action="extend",
-        nargs="+",
-        default=[],
-        metavar="CONDITION",
-        help="only rows such as 'theta1_deg<20', 'site=Gully', 'flags!=doubtful'; all must hold",
-    )
+    add_where_option(parser)
     parser.add_argument(
         "--group", nargs="+", default=[], metavar="COLUMN", help="medians for each value of these columns → groups.csv"
     )
@@ -57,13 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..exchange.selection import column_of, group_medians, matching
 
-    sites = _for_each(arguments.site, arguments.tables, "--site")
-    licences = _for_each(arguments.licence, arguments.tables, "--licence")
+    licences = for_each(arguments.licence, arguments.tables, "--licence")
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        parts = []
-        for path, site, licence in zip(arguments.tables, sites, licences, strict=True):
-            progress(f"Reading {path}")
-            parts.append(_read(path, site, licence))
+        parts = tables_as_asked(arguments, arguments.tables, progress, licences)
         progress("Looking for duplicates")
         merged = merge(parts, arguments.duplicates)
         database = merged.database
@@ -86,23 +73,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(line)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
-
-
-def _read(path: str, site: str, licence: str) -> "Database":
-    from ..exchange.database import read_source
-    from ..exchange.datapackage import read_package
-
-    if Path(path).is_dir() or Path(path).suffix == ".json":
-        return read_package(path)
-    return read_source(path, site, licence)
-
-
-def _for_each(values: list[str], tables: list[str], option: str) -> list[str]:
-    if len(values) not in (0, 1, len(tables)):
-        raise InputError(
-            f"{option} is given {len(values)} times for {len(tables)} tables", advice="Give one, or one each"
-        )
-    return (values or [""]) * len(tables) if len(values) < 2 else values
 
 
 def _write_duplicates(merged: "Merged", path: Path) -> None:

@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 
 if TYPE_CHECKING:
+    from ..exchange.database import Database
     from ..impact_models.machinery.measured import MeasuredRebounds
     from ..progress import Progress
     from ..terrain.surface import Surface
@@ -162,6 +164,60 @@ def add_incident_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
     )
+
+
+def add_site_option(parser: argparse.ArgumentParser) -> None:
+    """``--site NAME …``."""
+    parser.add_argument(
+        "--site", action="extend", nargs="+", default=[], metavar="NAME", help="of each table whose rows name none"
+    )
+
+
+def add_where_option(parser: argparse.ArgumentParser) -> None:
+    """``--where CONDITION …``."""
+    parser.add_argument(
+        "--where",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="CONDITION",
+        help="only rows such as 'theta1_deg<20', 'site=Gully', 'flags!=doubtful'; all must hold",
+    )
+
+
+def for_each(values: list[str], tables: Sequence[str], option: str) -> list[str]:
+    """The value of an option for each of some tables.
+
+    Raises
+    ------
+    InputError : it is given neither once nor once for each.
+    """
+    if len(values) not in (0, 1, len(tables)):
+        raise InputError(
+            f"{option} is given {len(values)} times for {len(tables)} tables", advice="Give one, or one each"
+        )
+    return (values or [""]) * len(tables) if len(values) < 2 else values
+
+
+def tables_as_asked(
+    arguments: argparse.Namespace, tables: Sequence[str], progress: "Progress", licences: Sequence[str] | None = None
+) -> "list[Database]":
+    """Read tables of impacts, or packages that were merged before, with the option of `add_site_option`.
+
+    Raises
+    ------
+    InputError : see `read_source` and `read_package`.
+    """
+    from ..exchange.database import read_source
+    from ..exchange.datapackage import read_package
+
+    sites = for_each(arguments.site, tables, "--site")
+    parts = []
+    for path, site, licence in zip(tables, sites, licences or [""] * len(tables), strict=True):
+        progress(f"Reading {path}", 0, 0)
+        package = Path(path).is_dir() or Path(path).suffix == ".json"
+        parts.append(read_package(path) if package else read_source(path, site, licence))
+    return parts
 
 
 def add_observed_option(parser: argparse.ArgumentParser, default: str) -> None:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.group_statistics import Grouping, group_by_number, group_by_text
+from ..analysis.variables import VARIABLES, known_variables, measured_values
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..impact_models.machinery.parameters import suggestion
@@ -111,6 +113,38 @@ def grouped(impacts: Impacts, *columns: str) -> dict[tuple[Hashable, ...], Indic
     order = np.argsort(code, kind="stable")
     ends = np.cumsum(np.bincount(code, minlength=len(keys)))
     return dict(zip(keys, np.split(order, ends[:-1]), strict=True))
+
+
+def grouping_of(impacts: Impacts, name: str, classes: int = 0) -> Grouping:
+    """The groups of impacts that a column makes; empty cells and undefined numbers are in none.
+
+    Parameters
+    ----------
+    name : a column as in impacts.csv, a flag (the groups are "yes" and "no"), or a variable of the graphs.
+    classes : cut numbers into so many classes of about equally many impacts; 0 makes a group of each number.
+
+    Raises
+    ------
+    InputError : there is no such column; the nearest is suggested. Classes of a column of texts.
+    """
+    if name in FLAGS:
+        return group_by_text(name, np.where(impacts.flags[name], "yes", "no"))
+    column = impact_column(impacts, name)
+    if column is None and name in VARIABLES:
+        column = measured_values(impacts, np.arange(len(impacts)), name)
+    if column is None:
+        known = dict.fromkeys((*impact_columns(impacts), *known_variables(impacts), *FLAGS))
+        raise InputError(f"There is no column {name!r} to group by", advice=suggestion(name, known))
+    if column.dtype.kind != "U":
+        return group_by_number(name, np.asarray(column, dtype=np.float64), classes)
+    texts = [cell.strip() for cell in column.astype(np.str_).tolist()]
+    if not classes:
+        return group_by_text(name, np.array(texts, dtype=np.str_))
+    try:
+        numbers = [float(text) if text else np.nan for text in texts]
+    except ValueError:
+        raise InputError(f"The column {name!r} holds texts, which have no classes", advice="Drop the classes") from None
+    return group_by_number(name, np.array(numbers), classes)
 
 
 def codes(*columns: Array | Names | Indices) -> tuple[list[tuple[Hashable, ...]], Indices]:

@@ -7,7 +7,11 @@ from itertools import permutations
 import numpy as np
 import pytest
 import scipy.stats
-from rockfall.core.analysis.group_statistics import group_statistics, numbered
+from rockfall.core.analysis.group_statistics import (
+    group_by_number,
+    group_by_text,
+    group_statistics,
+)
 from rockfall.core.analysis.group_tests import group_tests, what_to_exchange
 from rockfall.core.analysis.statistics import impact_statistics
 from rockfall.core.reconstruction.impact import Impacts
@@ -132,7 +136,7 @@ def test_groups_of_a_table() -> None:
     impacts = bounces(6, 5)
     soil = np.where(np.arange(len(impacts)) % 2 == 0, "scree", "rock")
     soil[:7] = ""
-    found = group_statistics(impacts, soil, "soil")
+    found = group_statistics(impacts, group_by_text("soil", soil))
     assert list(found.groups) == [soil[7], soil[8]]
     assert found.undefined == 7
     assert found.groups["rock"] == impact_statistics(impacts, soil == "rock")
@@ -143,14 +147,14 @@ def test_groups_of_a_table() -> None:
 
 def test_what_cannot_be_told_is_said_first() -> None:
     impacts = bounces(4, 5)
-    one = group_statistics(impacts, np.full(len(impacts), "all"), "soil").remarks()
+    one = group_statistics(impacts, group_by_text("soil", np.full(len(impacts), "all"))).remarks()
     assert (one[0].severity, one[0].text[:36]) == ("problem", "Fewer than two groups have 3 impacts")
     names = np.where(impacts.trajectory < "T002", "a", "b")
-    few = group_statistics(impacts, names, "block").remarks()
+    few = group_statistics(impacts, group_by_text("block", names)).remarks()
     assert few[0].severity == "problem"
     assert "too few trajectories" in few[0].text
     names = np.where(np.arange(len(impacts)) == 3, "alone", names)
-    left = group_statistics(impacts, names, "block")
+    left = group_statistics(impacts, group_by_text("block", names))
     assert left.tests.left_out == ("alone",)
     assert next(remark.text for remark in left.remarks() if "fewer than 3" in remark.text).endswith("alone.")
 
@@ -167,22 +171,32 @@ def test_a_difference_that_is_the_angles_is_called_so() -> None:
         theta1=np.where(np.isfinite(impacts.theta1), np.radians(theta1_deg), np.nan),
         rn=np.where(np.isfinite(impacts.rn), rn, np.nan),
     )
-    found = group_statistics(shaped, np.where(steep, "cliff", "chute"), "place")
+    found = group_statistics(shaped, group_by_text("place", np.where(steep, "cliff", "chute")))
     differs = {test.quantity: test.differs for test in found.tests.tests}
     assert (differs["rn"], differs["theta1_deg"], differs["rn_over_law"]) == (True, True, False)
     assert "at the same angle no difference" in "".join(map(str, found.remarks()))
 
 
-def test_numbers_of_names_in_order_of_appearance() -> None:
-    names, number = numbered(np.array(["b", "", "a", "b", "a"]))
-    assert names == ["b", "a"]
-    assert number.tolist() == [0, -1, 1, 0, 1]
+def test_groups_of_texts_and_of_numbers() -> None:
+    texts = group_by_text("soil", np.array(["b", "", "a", "b", "a"]))
+    assert texts.names == ("b", "a")
+    assert texts.number.tolist() == [0, -1, 1, 0, 1]
+    each = group_by_number("diameter_m", np.array([0.4, np.nan, 0.35, 0.4]))
+    assert each.names == ("0.35", "0.4")
+    assert each.number.tolist() == [1, -1, 0, 1]
+    values = np.r_[np.arange(1.0, 100.0), np.nan]
+    cut = group_by_number("theta1_deg", values, 3)
+    assert np.bincount(cut.number[:-1]).tolist() == [33, 33, 33]
+    assert cut.number[-1] == -1
+    assert cut.names == ("1–33.67", "33.67–66.33", "66.33–99")
+    assert group_by_number("x", np.full(9, 2.0), 4).names == ("2–2",)
+    assert group_by_number("x", np.full(9, np.nan), 4).names == ()
 
 
 def test_very_many_groups() -> None:
     impacts = bounces(3, 1000)
     labels = np.array([f"g{i % 1600}" for i in range(len(impacts))])
-    found = group_statistics(impacts, labels, "cell")
+    found = group_statistics(impacts, group_by_text("cell", labels))
     assert len(found.groups) == 1600
     assert found.tests.pairs == ()
     assert len(found.tests.left_out) == 1600

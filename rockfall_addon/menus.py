@@ -38,7 +38,13 @@ STEPS = (
         "rockfall.refine", "rockfall.apply_refinement", "rockfall.discard_refinement",
     )),
     ("models", "6  Models", (
-        "rockfall.open_graphs", None, "rockfall.show_models", "rockfall.load_parameters", "rockfall.remove_models",
+        "rockfall.open_graphs", None, "rockfall.show_models", "rockfall.remove_models", None,
+        "rockfall.load_parameters", "rockfall.save_parameters",
+        ("rockfall.copy_parameters", "Copy Parameters A to B", {"way": "A_TO_B"}),
+        ("rockfall.copy_parameters", "Copy Parameters B to A", {"way": "B_TO_A"}),
+        ("rockfall.copy_parameters", "Swap Parameters A and B", {"way": "SWAP"}), None,
+        "rockfall.calibrate", "rockfall.find_equivalent", "rockfall.apply_fit", "rockfall.discard_fit", None,
+        "rockfall.add_database", "rockfall.remove_database",
     )),
     ("simulation", "7  Simulation", (
         ("rockfall.draw_release", "Draw Release Line", {"kind": "line"}),

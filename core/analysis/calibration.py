@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
@@ -19,6 +20,8 @@ from .fitting import COARSE, descend_from_best, watched
 from .verdicts import about_holdout, about_use
 
 FOLDS = 5
+USUAL = ("rn", "rt", "rn_exponent")
+"""Parameters that are usually fitted, where a model has them."""
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,12 @@ def calibrate(
         held_out_score=float(held.sum()) / total if held is not None else np.nan,
         folds=parts,
     )
+
+
+def usual_names(model: ImpactModel) -> tuple[str, ...]:
+    """The parameters of a model that are usually fitted, or else its first one."""
+    names = [spec.name for spec in model.parameters]
+    return tuple(name for name in names if name in USUAL) or tuple(names[:1])
 
 
 def _hold_out(

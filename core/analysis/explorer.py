@@ -230,10 +230,11 @@ class _Page:
     def _offer(self) -> None:
         """What suits the chosen model: draws if it has chance in it, and parameters that can be fitted."""
         self._offer_draws()
-        specs = find_model(self.model).parameters
-        self.fit.options = [spec.name for spec in specs]
-        usual = [spec.name for spec in specs if spec.name in ("rn", "rt", "rn_exponent")]
-        self.fit.value = usual or [specs[0].name]
+        from .calibration import usual_names
+
+        model = find_model(self.model)
+        self.fit.options = [spec.name for spec in model.parameters]
+        self.fit.value = list(usual_names(model))
 
     def _offer_draws(self) -> None:
         self.runs.visible = find_model(self.model).is_random

@@ -4,21 +4,15 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from html import escape
-from math import floor, log10
 from typing import Any
 
 from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.parameters import ParameterSpec, Value
+from ..impact_models.machinery.sliders import slider_range
 from .linked_graphs import MUTED, SHEET
 
 Changed = Callable[[str, Value], None]
 """Called with the parameter's name and its new value."""
-MANY_TIMES = 20.0
-"""Where the range goes beyond this many times the default, the slider does not; the field beside it does."""
-ALL_OF = 2.0
-"""A range that is not longer than this is on the slider as a whole."""
-LITTLE = 0.01
-"""Part of a range that the slider spans where the default is at its lower end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,16 +54,6 @@ def parameter_inputs(model: ImpactModel, values: Mapping[str, Value], changed: C
 
     layout = column(*(part for part, _ in parts.values()), sizing_mode="stretch_width", spacing=4)
     return ParameterInputs(layout, show)
-
-
-def slider_range(spec: ParameterSpec) -> tuple[float, float, float]:
-    """Start, end and step of a slider: the whole range, or the part of a very wide one in which the default lies."""
-    reach = float(spec.default) - spec.minimum
-    end = spec.maximum
-    if end - spec.minimum > max(MANY_TIMES * reach, ALL_OF):
-        end = spec.minimum + (4 * reach if reach > 0 else max(LITTLE * (end - spec.minimum), min(1.0, end)))
-    step = 10.0 ** floor(log10((end - spec.minimum) / 100))
-    return spec.minimum, end, step
 
 
 def _input(

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How near a model comes to the measured impacts: on average, in its scatter, and cloud against cloud."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,13 +54,15 @@ class Score:
     energy_distance: float
 
 
-def scores(impacts: Impacts, predictions: Predictions) -> tuple[Score, ...]:
-    """All models and all quantities of `ABSCISSA`."""
-    row = predictions.row
+def scores(
+    impacts: Impacts, predictions: Predictions, quantities: Iterable[str] = tuple(ABSCISSA)
+) -> tuple[Score, ...]:
+    """All models and some quantities, by default all of `ABSCISSA`."""
+    row, quantities = predictions.row, tuple(quantities)
     return tuple(
         _score(model, i, quantity, impacts, predictions)
         for i, model in enumerate(predictions.models)
-        for quantity in ABSCISSA
+        for quantity in quantities
         if row.size
     )
 

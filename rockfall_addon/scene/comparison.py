@@ -124,7 +124,7 @@ def comparison_of(scene: bpy.types.Scene) -> SceneComparison:
 
 def measured_of(scene: bpy.types.Scene) -> Measured:
     """The scene's own impacts as they are now."""
-    kept, key = _of(scene), _measured_key(scene)
+    kept, key = _of(scene), measured_key(scene)
     if kept.measured_key != key:
         kept.measured, kept.measured_key = _measure(scene), key
         kept.draws.clear()
@@ -242,7 +242,7 @@ def _pick_ids(scene: bpy.types.Scene, impacts: Impacts) -> tuple[str, ...]:
     return tuple(known.get(place, "") for place in places)
 
 
-def _measured_key(scene: bpy.types.Scene) -> object:
+def measured_key(scene: bpy.types.Scene) -> object:
     """All that the scene's impacts depend on: what is shown of the picks, and the settings."""
     settings = scene.rockfall
     kept = (

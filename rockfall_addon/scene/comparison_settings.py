@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is compared with the scene's impacts: models, draws, sets of parameters, impacts of other sites."""
 
+from collections.abc import Collection
+
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, StringProperty
 
 from ...core.analysis.courses import SPINS
+from ...core.analysis.scores import ABSCISSA
+from ...core.analysis.variables import find_variable
+from ...core.impact_models.registry import FORMULAS, MODELS
 from . import models
 
 SPIN_WORDS = {
@@ -13,6 +18,11 @@ SPIN_WORDS = {
     "table": ("Measured", "Impacts whose spin was measured, and no others"),
 }
 MOST_REPLICATES = 200
+
+
+def model_items(names: Collection[str]) -> list[tuple[str, str, str]]:
+    """Items of a property that is one of these models."""
+    return [(name, MODELS[name].title, MODELS[name].reference) for name in models.ORDER if name in names]
 
 
 def _redraw(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -76,6 +86,34 @@ class ComparisonSettings(bpy.types.PropertyGroup):
         ],
         default="A", update=_redraw,
     )  # fmt: skip
+    edited: EnumProperty(
+        name="Edit", description="Which set of parameters the sliders change",
+        items=[("A", "A", "The scene's parameters"), ("B", "B", "The second set")], default="A",
+    )  # fmt: skip
+    quantity: EnumProperty(
+        name="Quantity", description="What the scores are of",
+        items=[(name, find_variable(name).label, "") for name in ABSCISSA], default="rn", update=_redraw,
+    )  # fmt: skip
+    measure: EnumProperty(
+        name="Rank by", description="Which score ranks the models; 0 is best",
+        items=[
+            ("rmse", "RMSE", "Root mean square of model − measured, impact by impact"),
+            ("bias", "Bias", "Mean of model − measured, without its sign"),
+            ("median_error", "Median error", "Median size of model − measured, which a few outliers do not move"),
+            ("energy_distance", "Cloud", "Energy distance between the clouds of the graph, the scatter included"),
+        ],
+        default="rmse", update=_redraw,
+    )  # fmt: skip
+    fitted: EnumProperty(name="Model", description="Model whose parameters are fitted", items=model_items(FORMULAS))
+    imitated: EnumProperty(
+        name="Like", description="Model that is imitated, with the parameters of set A", items=model_items(FORMULAS),
+    )  # fmt: skip
+    fitted_names: StringProperty(
+        name="Fit", description="Parameters that are fitted, as MODEL.PARAMETER; the usual ones of a model without any"
+    )
+    fit_with_others: BoolProperty(
+        name="Impacts of Other Sites, Too", description="Fit to the shown tables of other sites as well", default=False
+    )
     databases: CollectionProperty(type=ComparedDatabase)
     database: IntProperty(name="Database", description="Row of the list", options={"SKIP_SAVE"})
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The models' parameters as properties that a person edits, made from their specifications.
 
-They hold nothing themselves: they read and write the scene's one set of parameters (`models.parameters_of`).
+They hold nothing themselves: they read and write the sets of parameters (`models.parameters_of`).
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 import bpy
 from bpy.props import EnumProperty, FloatProperty, PointerProperty
@@ -12,38 +12,70 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 from ...core.errors import RockfallError
 from ...core.impact_models.machinery.base import ImpactModel
 from ...core.impact_models.machinery.parameters import ParameterSpec, Value
+from ...core.impact_models.machinery.sliders import slider_range
+from ...core.impact_models.presets import Preset
 from ...core.impact_models.registry import MODELS
 from . import comparison, models, store, sync
 
 LARGEST = 1e30  # of a single-precision property
 
 
-def value_of(scene: bpy.types.Scene, model: str, spec: ParameterSpec) -> Value:
-    """The scene's value of a parameter."""
-    own = models.parameters_of(scene).get(model, {})
+def value_of(scene: bpy.types.Scene, model: str, spec: ParameterSpec, which: str = "A") -> Value:
+    """The value of a parameter in a set of parameters."""
+    own = models.parameters_of(scene, which).get(model, {})
     if spec.name in own:
         return own[spec.name]
     if spec.follows is not None:
         choice = MODELS[model].parameter(spec.follows[0])
-        return spec.follows[1][choice.choices.index(str(value_of(scene, model, choice)))]
+        return spec.follows[1][choice.choices.index(str(value_of(scene, model, choice, which)))]
     return spec.default
 
 
-def is_own(scene: bpy.types.Scene, model: str, name: str) -> bool:
-    """Whether the scene has another value than the default."""
-    return name in models.parameters_of(scene).get(model, {})
+def is_own(scene: bpy.types.Scene, model: str, name: str, which: str = "A") -> bool:
+    """Whether a set of parameters has another value than the default."""
+    return name in models.parameters_of(scene, which).get(model, {})
 
 
-def keep(scene: bpy.types.Scene, model: str, name: str, value: Value | None) -> None:
-    """Give a parameter a value; None gives it its default again."""
-    parameters = models.parameters_of(scene)
+def keep(scene: bpy.types.Scene, model: str, values: Mapping[str, Value | None], which: str = "A") -> None:
+    """Give parameters of a model values; None gives the default again."""
+    parameters = models.parameters_of(scene, which)
     own = parameters.setdefault(model, {})
-    own.pop(name, None)
-    spec = MODELS[model].parameter(name)
-    if value is not None and (value != spec.default or spec.follows is not None):
-        own[name] = value
-    models.keep_parameters(scene, {name: values for name, values in parameters.items() if values})
-    follow(scene, [model])
+    for name, value in values.items():
+        own.pop(name, None)
+        spec = MODELS[model].parameter(name)
+        if value is not None and (value != spec.default or spec.follows is not None):
+            own[name] = value
+    keep_all(scene, parameters, which, [model])
+
+
+def keep_all(
+    scene: bpy.types.Scene,
+    parameters: Mapping[str, Mapping[str, Value]],
+    which: str = "A",
+    changed: Iterable[str] | None = None,
+) -> None:
+    """Store a set of parameters, and let the blocks of the models follow.
+
+    changed : models that have changed; None for all.
+    """
+    models.keep_parameters(scene, {name: values for name, values in parameters.items() if values}, which)
+    if which == "A":
+        follow(scene, models.shown_models(scene) if changed is None else changed)
+
+
+def use_preset(scene: bpy.types.Scene, preset: Preset, which: str = "A") -> None:
+    """Give a model the published values for a kind of ground; what follows them has its default again."""
+    followers = [spec.name for spec in MODELS[preset.model].parameters if spec.follows]
+    led = {name: None for name in followers if MODELS[preset.model].parameter(name).follows[0] in preset.values}
+    keep(scene, preset.model, {**led, **preset.values}, which)
+
+
+def has_preset(scene: bpy.types.Scene, preset: Preset, which: str = "A") -> bool:
+    """Whether a model has the values of a preset."""
+    now = MODELS[preset.model].settings(models.parameters_of(scene, which).get(preset.model))
+    wanted = MODELS[preset.model].settings(preset.values)
+    led = [spec.name for spec in MODELS[preset.model].parameters if spec.follows and spec.follows[0] in preset.values]
+    return all(now[name] == wanted[name] for name in (*preset.values, *led))
 
 
 def follow(scene: bpy.types.Scene, changed: Iterable[str]) -> None:
@@ -73,14 +105,19 @@ def label(spec: ParameterSpec) -> str:
     return f"{spec.symbol or spec.name.replace('_', ' ')}{unit}"
 
 
-def _group(model: ImpactModel) -> type[bpy.types.PropertyGroup]:
-    fields = {spec.name: _property(model.name, spec) for spec in model.parameters}
-    name = f"Parameters_{model.name}"
+def group_of(scene: bpy.types.Scene, model: str, which: str = "A") -> bpy.types.PropertyGroup:
+    """The parameters of a model in a set, as properties by their names."""
+    return getattr(getattr(scene, PROPERTIES[which]), model)
+
+
+def _group(model: ImpactModel, which: str) -> type[bpy.types.PropertyGroup]:
+    fields = {spec.name: _property(model.name, spec, which) for spec in model.parameters}
+    name = f"Parameters{which}_{model.name}"
     return type(name, (bpy.types.PropertyGroup,), {"__annotations__": fields, "__module__": __name__})
 
 
-def _property(model: str, spec: ParameterSpec) -> object:
-    get, keep_value = _reader(model, spec), _writer(model, spec)
+def _property(model: str, spec: ParameterSpec, which: str) -> object:
+    get, keep_value = _reader(model, spec, which), _writer(model, spec, which)
     words = {"name": label(spec), "description": tooltip(spec)}
     if spec.choices:
         items = [(choice, choice, "") for choice in spec.choices]
@@ -90,11 +127,14 @@ def _property(model: str, spec: ParameterSpec) -> object:
             get=lambda self: spec.choices.index(str(get(self))),
             set=lambda self, place: keep_value(self, spec.choices[place]),
         )
+    start, end, step = slider_range(spec)
     return FloatProperty(
         **words,
         min=max(spec.minimum, -LARGEST),
         max=min(spec.maximum, LARGEST),
-        step=max(1.0, min(spec.maximum - spec.minimum, 100.0)),
+        soft_min=start,
+        soft_max=end,
+        step=max(100 * step, 0.001),
         precision=3,
         get=lambda self: float(get(self)),
         set=lambda self, value: keep_value(self, _within(spec, store.double(value))),
@@ -105,28 +145,35 @@ def _within(spec: ParameterSpec, value: float) -> float:
     return min(max(value, spec.minimum), spec.maximum)
 
 
-def _reader(model: str, spec: ParameterSpec) -> Callable[[bpy.types.PropertyGroup], Value]:
-    return lambda group: value_of(group.id_data, model, spec)
+def _reader(model: str, spec: ParameterSpec, which: str) -> Callable[[bpy.types.PropertyGroup], Value]:
+    return lambda group: value_of(group.id_data, model, spec, which)
 
 
-def _writer(model: str, spec: ParameterSpec) -> Callable[[bpy.types.PropertyGroup, Value], None]:
-    return lambda group, value: keep(group.id_data, model, spec.name, value)
+def _writer(model: str, spec: ParameterSpec, which: str) -> Callable[[bpy.types.PropertyGroup, Value], None]:
+    return lambda group, value: keep(group.id_data, model, {spec.name: value}, which)
 
 
-GROUPS = {name: _group(model) for name, model in MODELS.items()}
+def _classes(which: str) -> list[type[bpy.types.PropertyGroup]]:
+    """A group for each model, and one of all groups."""
+    groups = {name: _group(model, which) for name, model in MODELS.items()}
+    fields = {name: PointerProperty(type=group) for name, group in groups.items()}
+    name = f"Parameters{which}"
+    whole = type(name, (bpy.types.PropertyGroup,), {"__annotations__": fields, "__module__": __name__})
+    return [*groups.values(), whole]
 
-AllParameters = type(
-    "AllParameters",
-    (bpy.types.PropertyGroup,),
-    {"__annotations__": {name: PointerProperty(type=group) for name, group in GROUPS.items()}, "__module__": __name__},
-)
 
-CLASSES = (*GROUPS.values(), AllParameters)
+PROPERTIES = {"A": "rockfall_parameters", "B": "rockfall_other_parameters"}
+"""The scene's properties that show a set of parameters."""
+
+_of_set = {which: _classes(which) for which in PROPERTIES}
+CLASSES = tuple(cls for classes in _of_set.values() for cls in classes)
 
 
 def register() -> None:
-    bpy.types.Scene.rockfall_parameters = PointerProperty(type=AllParameters)
+    for which, name in PROPERTIES.items():
+        setattr(bpy.types.Scene, name, PointerProperty(type=_of_set[which][-1]))
 
 
 def unregister() -> None:
-    del bpy.types.Scene.rockfall_parameters
+    for name in PROPERTIES.values():
+        delattr(bpy.types.Scene, name)

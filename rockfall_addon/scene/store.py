@@ -43,10 +43,11 @@ SHOWN = "rockfall_shown"  # fingerprint of each trajectory
 GROUND, GROUND_CONTENTS = "rockfall_ground", "rockfall_ground_contents"  # fingerprints; 0.1.0 had the first only
 PROBLEM, TRAJECTORY_PROBLEMS = "rockfall_problem", "rockfall_trajectory_problems"
 SHOWN_MODELS, MODEL_PARAMETERS = "rockfall_twin_models", "rockfall_model_parameters"
-OTHER_PARAMETERS = "rockfall_other_parameters"  # of the models: the second set, for the graphs
+OTHER_PARAMETERS = "rockfall_model_parameters_b"  # of the models: the second set, for the graphs
 MODEL = "rockfall_model"  # of what a model predicts
 LANE = "rockfall_lane"  # of a model's block: number among those of a trajectory
 GRAPH_CHOSEN = "rockfall_graph_chosen"  # impacts of other sites that are selected: file → rows, as text
+FIT = "rockfall_fit"  # what a calibration has found and proposes, as text
 SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
 

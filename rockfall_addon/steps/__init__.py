@@ -19,6 +19,7 @@ STEPS = (
     "impacts",
     "refinement",
     "models",
+    "comparison",
     "graphs",
     "simulation",
     "playback",

@@ -10,6 +10,9 @@ import pytest
 POINTED = {"rockfall.mark_pair", "rockfall.drag_pick"}
 """What only the tools call: they need a mouse on the terrain or the footage."""
 WITH_PANEL = {
+    "rockfall.compare_model",
+    "rockfall.choose_fitted",
+    "rockfall.use_ground",
     "rockfall.sort_impacts", "rockfall.remove_video", "rockfall.choose_simulated_model", "rockfall.next_run",
     "rockfall.add_zone", "rockfall.remove_zone", "rockfall.remove_structure", "rockfall.reset_parameter",
 }  # fmt: skip

@@ -251,7 +251,7 @@ def test_a_wrong_parameter_file_is_refused(tmp_path, content, words) -> None:
 
 def test_sliders_hold_the_default_and_stay_in_range() -> None:
     pytest.importorskip("bokeh", reason="bokeh is not installed")
-    from rockfall.core.analysis.parameter_inputs import slider_range
+    from rockfall.core.impact_models.machinery.sliders import slider_range
 
     for name in MODELS:
         for spec in find_model(name).parameters:

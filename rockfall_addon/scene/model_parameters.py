@@ -107,7 +107,8 @@ def label(spec: ParameterSpec) -> str:
 
 def group_of(scene: bpy.types.Scene, model: str, which: str = "A") -> bpy.types.PropertyGroup:
     """The parameters of a model in a set, as properties by their names."""
-    return getattr(getattr(scene, PROPERTIES[which]), model)
+    whole = scene.rockfall_parameters if which == "A" else scene.rockfall_other_parameters
+    return getattr(whole, model)
 
 
 def _group(model: ImpactModel, which: str) -> type[bpy.types.PropertyGroup]:
@@ -162,18 +163,15 @@ def _classes(which: str) -> list[type[bpy.types.PropertyGroup]]:
     return [*groups.values(), whole]
 
 
-PROPERTIES = {"A": "rockfall_parameters", "B": "rockfall_other_parameters"}
-"""The scene's properties that show a set of parameters."""
-
-_of_set = {which: _classes(which) for which in PROPERTIES}
+_of_set = {which: _classes(which) for which in models.PARAMETER_SETS}
 CLASSES = tuple(cls for classes in _of_set.values() for cls in classes)
 
 
 def register() -> None:
-    for which, name in PROPERTIES.items():
-        setattr(bpy.types.Scene, name, PointerProperty(type=_of_set[which][-1]))
+    bpy.types.Scene.rockfall_parameters = PointerProperty(type=_of_set["A"][-1])
+    bpy.types.Scene.rockfall_other_parameters = PointerProperty(type=_of_set["B"][-1])
 
 
 def unregister() -> None:
-    for name in PROPERTIES.values():
-        delattr(bpy.types.Scene, name)
+    del bpy.types.Scene.rockfall_other_parameters
+    del bpy.types.Scene.rockfall_parameters

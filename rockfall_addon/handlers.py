@@ -9,6 +9,7 @@ from .scene import (
     graph_settings,
     impact_rows,
     migration,
+    motion,
     problems,
     store,
     sync,
@@ -17,7 +18,7 @@ from .scene import (
     video_files,
 )
 from .view import job
-from .view.graphs import impact_sheet, selection
+from .view.graphs import editor, impact_sheet, motion_sheet, selection
 
 _owner = object()
 
@@ -27,6 +28,13 @@ _owner = object()
 def _follow_rate(scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None = None) -> None:
     _keep_rate(scene)
     footage.follow(scene)
+
+
+@persistent
+@problems.guarded
+def _frame_shown(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """While the scene plays, Blender draws other editors than ours by itself."""
+    graph_settings.redraw_of(editor.MOTION)
 
 
 @persistent
@@ -46,6 +54,8 @@ def _loaded(_path: str, _unused: object = None) -> None:
     problems.forget()
     job.forget()
     impact_sheet.forget()
+    motion_sheet.forget()
+    motion.forget()
     selection.forget()
     _listen()  # subscriptions do not survive loading
     _catch_up()
@@ -117,6 +127,7 @@ def _listen() -> None:
 
 HANDLERS = (
     ("frame_change_pre", _follow_rate),
+    ("frame_change_post", _frame_shown),
     ("depsgraph_update_post", _updated),
     ("render_init", _follow_rate),
     ("load_post", _loaded),

@@ -52,7 +52,9 @@ STEPS = (
         ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}), "rockfall.use_as_structure", None,
         "rockfall.simulate", "rockfall.select_run", "rockfall.remove_simulation",
     )),
-    ("playback", "8  Playback", (("screen.animation_play", "Play or Pause", {}), "rockfall.show_relief")),
+    ("playback", "8  Playback", (
+        ("screen.animation_play", "Play or Pause", {}), "rockfall.open_motion_graphs", "rockfall.show_relief",
+    )),
     ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
     ("share", "10  Share", ("rockfall.export_tables", "rockfall.export_simulation", "rockfall.export_project")),
 )  # fmt: skip

@@ -242,12 +242,10 @@ def _pick_ids(scene: bpy.types.Scene, impacts: Impacts) -> tuple[str, ...]:
     return tuple(known.get(place, "") for place in places)
 
 
-def measured_key(scene: bpy.types.Scene) -> object:
-    """All that the scene's impacts depend on: what is shown of the picks, and the settings."""
+def settings_key(scene: bpy.types.Scene) -> tuple[object, ...]:
+    """All that a reconstruction depends on beside the picks: settings and terrain."""
     settings = scene.rockfall
-    kept = (
-        store.SHOWN, store.GROUND, store.GROUND_CONTENTS, store.SITE, store.GRAVITY, store.BLOCKS, store.NORMAL_RADIUS,
-    )  # fmt: skip
+    kept = (store.GROUND, store.GROUND_CONTENTS, store.SITE, store.GRAVITY, store.BLOCKS, store.NORMAL_RADIUS)
     arrays = (store.DRAG, store.DEFAULT_BLOCK)
     return (
         *(scene.get(key) for key in kept),
@@ -257,8 +255,12 @@ def measured_key(scene: bpy.types.Scene) -> object:
         settings.normal_radius_m,
         settings.use_drag,
         settings.flights_join,
-        scene.rockfall_comparison.spin,
     )
+
+
+def measured_key(scene: bpy.types.Scene) -> object:
+    """All that the scene's impacts depend on: what is shown of the picks, and the settings."""
+    return scene.get(store.SHOWN), settings_key(scene), scene.rockfall_comparison.spin
 
 
 def _of(scene: bpy.types.Scene) -> _Kept:

@@ -18,10 +18,15 @@ MOST_GRAPHS = len(PAPER_GRAPHS)
 
 def redraw() -> None:
     """Draw all graphs again."""
+    redraw_of()
+
+
+def redraw_of(tree: str = "") -> None:
+    """Draw the graphs of a type of editor again, empty for all."""
     manager = bpy.context.window_manager
     for window in manager.windows if manager is not None else ():
         for area in window.screen.areas:
-            if area.type == "NODE_EDITOR":
+            if area.type == "NODE_EDITOR" and tree in ("", area.ui_type):
                 area.tag_redraw()
 
 

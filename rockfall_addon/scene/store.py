@@ -48,6 +48,7 @@ MODEL = "rockfall_model"  # of what a model predicts
 LANE = "rockfall_lane"  # of a model's block: number among those of a trajectory
 GRAPH_CHOSEN = "rockfall_graph_chosen"  # impacts of other sites that are selected: file → rows, as text
 FIT = "rockfall_fit"  # what a calibration has found and proposes, as text
+MOTION_LIMITS = "rockfall_motion_limits"  # of the axes of motion graphs, as text
 SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
 

@@ -7,7 +7,7 @@ from types import ModuleType
 import bpy
 
 from .. import view
-from ..scene import comparison_settings, graph_settings, model_parameters, settings
+from ..scene import comparison_settings, graph_settings, model_parameters, motion_settings, settings
 from ..view.reporting import leave_newer_alone
 
 STEPS = (
@@ -21,6 +21,7 @@ STEPS = (
     "models",
     "comparison",
     "graphs",
+    "motion",
     "simulation",
     "playback",
     "film",
@@ -34,7 +35,7 @@ _registered_tools: list[type] = []
 
 def parts() -> list[ModuleType]:
     """All modules that register something: first the properties, which the rest reads; then step by step."""
-    first = [settings, model_parameters, comparison_settings, graph_settings]
+    first = [settings, model_parameters, comparison_settings, graph_settings, motion_settings]
     found = [*first, *view.PARTS]
     for name in STEPS:
         found += import_module(f".{name}", __name__).PARTS

@@ -233,3 +233,26 @@ def test_paths_bend_with_the_lens(part) -> None:
     stretch = 1 - 0.2 * (x**2 + y**2)
     expected = np.column_stack([640 + 1000 * x * stretch, 360 + 1000 * y * stretch])
     np.testing.assert_allclose(drawing.lines[0].segments[:, 0], expected[:-1], atol=1e-9)
+
+
+def test_motion_graphs_show_how_far_the_track_lies_from_the_motion(tracked, part, truth) -> None:
+    """Far before the refinement, hardly more than the noise of the pixels after it."""
+    graphs = part("core.analysis.motion_graphs")
+    motion = part("rockfall_addon.scene.motion")
+
+    def residual() -> np.ndarray:
+        (course,) = motion.motion_of(tracked).courses
+        assert course.has(graphs.RESIDUAL)
+        assert course.impact_time_s[0] == pytest.approx(picks_of(tracked)[0]["rockfall_time_s"] - OFFSET_S)
+        return course.residuals[0].distance_px
+
+    before = residual()
+    assert np.nanmedian(before) > 5.0
+    assert bpy.ops.rockfall.refine() == {"FINISHED"}
+    assert residual() is not None
+    np.testing.assert_array_equal(residual(), before)  # a proposal changes nothing yet
+    assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
+    assert np.nanmedian(residual()) < 2.0
+    (camera,) = part("rockfall_addon.scene.videos").cameras(tracked)
+    part("rockfall_addon.scene.sightings").clear(camera, "B10")
+    assert motion.motion_of(tracked).courses[0].residuals == ()

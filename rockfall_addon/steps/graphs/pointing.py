@@ -35,9 +35,9 @@ class ROCKFALL_OT_point_in_graph(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         canvas = editor.canvas_of(context)
         if canvas is not None:
-            on_button = _button_at(canvas, canvas.pointer)
+            on_button = editor.button_at(canvas)
             changed = editor.point(context, canvas, event.mouse_region_x, event.mouse_region_y)
-            if changed or _button_at(canvas, canvas.pointer) is not on_button:
+            if changed or editor.button_at(canvas) is not on_button:
                 context.region.tag_redraw()
         return {"PASS_THROUGH"}
 
@@ -82,7 +82,7 @@ class ROCKFALL_OT_press_in_graph(bpy.types.Operator):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         canvas = editor.canvas_of(context)
         editor.point(context, canvas, event.mouse_region_x, event.mouse_region_y)
-        button = _button_at(canvas, canvas.pointer)
+        button = editor.button_at(canvas)
         if button is not None:
             module, name = button.operator.split(".")
             getattr(getattr(bpy.ops, module), name)("INVOKE_DEFAULT")
@@ -205,12 +205,6 @@ def _choose_variable(context: bpy.types.Context, number: int, axis: str) -> None
         layout.props_enum(graph, axis)
 
     context.window_manager.popup_menu(draw, title=f"{axis} Axis")
-
-
-def _button_at(canvas: editor.Canvas, place: tuple[float, float] | None) -> editor.Button | None:
-    if place is None:
-        return None
-    return next((one for one in canvas.buttons if one.area.holds(*place)), None)
 
 
 def _band(context: bpy.types.Context, path: list[tuple[float, float]]) -> np.ndarray:

@@ -79,6 +79,8 @@ class Content:
 
 IMPACTS = "RockfallImpactGraphs"
 """Type of the editor that shows graphs of impacts."""
+MOTION = "RockfallMotionGraphs"
+"""Type of the editor that shows motion over time."""
 
 _contents: dict[str, Content] = {}
 _canvases: dict[int, Canvas] = {}  # of the regions that were drawn, by their address
@@ -169,6 +171,13 @@ def button(canvas: Canvas, left: float, bottom: float, words: str, operator: str
     drawing.text(area.left + area.width / 2, area.bottom + area.height / 2, words, seen.text, seen.ink, (0.5, 0.5))
     canvas.buttons.append(Button(area, operator))
     return area
+
+
+def button_at(canvas: Canvas) -> Button | None:
+    """The drawn button under the mouse."""
+    if canvas.pointer is None:
+        return None
+    return next((one for one in canvas.buttons if one.area.holds(*canvas.pointer)), None)
 
 
 @problems.guarded

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The type of editor that shows motion over time, and its header."""
+
+import bpy
+
+from ...scene import motion
+from ...view.graphs import editor, motion_sheet
+
+
+class RockfallMotionGraphs(bpy.types.NodeTree):
+    """Speed, height, energy and residuals of tracks over the time that the scene plays"""
+
+    bl_idname = editor.MOTION
+    bl_label = "Rockfall Motion Graphs"
+    bl_icon = "FCURVE"
+
+
+def draw_header(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """What is shown, and how the time is numbered."""
+    settings = context.scene.rockfall_motion
+    layout.row(align=True).prop(settings, "quantities")
+    layout.separator_spacer()
+    row = layout.row(align=True)
+    row.prop(settings, "only_selected", text="", icon="RESTRICT_SELECT_OFF", toggle=True)
+    row.prop(settings, "in_frames", toggle=True)
+    layout.operator("rockfall.reset_graphs", text="", icon="HOME").graph = 0
+
+
+CLASSES = (RockfallMotionGraphs,)
+
+
+def register() -> None:
+    editor.add(
+        editor.Content(
+            editor.MOTION,
+            motion_sheet.draw,
+            draw_header,
+            motion_sheet.point,
+            motion_sheet.set_limits,
+            motion_sheet.reset,
+        )
+    )
+
+
+def unregister() -> None:
+    editor.remove(editor.MOTION)
+    motion_sheet.forget()
+    motion.forget()

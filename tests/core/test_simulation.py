@@ -281,10 +281,12 @@ def test_the_same_bits_for_any_threads_and_batches(monkeypatch: pytest.MonkeyPat
     settings = Settings("stevens_1998", seed=4)
     one = simulate(ground, releases, settings, threads=1)
     monkeypatch.setattr(engine, "BATCH", 7)
-    for threads in (2, 7):
+    for threads, window in ((2, 4096), (7, 14)):
+        monkeypatch.setattr(engine, "WINDOW", window)
         other = simulate(ground, releases, settings, threads=threads)
         for name in ("end", "time_s", "length_m", "v_max_mps", "impacts", "position"):
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
+        np.testing.assert_array_equal(other.records.run, np.sort(other.records.run))
         np.testing.assert_array_equal(other.records.v2, one.records.v2)
     fewer = simulate(ground, releases.take(slice(0, 40)), settings)
     np.testing.assert_array_equal(fewer.position, one.position[:40])

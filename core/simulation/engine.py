@@ -219,7 +219,8 @@ def simulate(
     from .motion_kernels import COLUMNS
 
     progress("Compiling where needed, then simulating", 0, n)
-    run_blocks = _compiled_runs(tree)
+    facets = ground.facets
+    run_blocks = _compiled_runs(tree, facets)
     columns = (
         releases.position, releases.velocity, releases.angular_velocity, releases.radius_m, releases.mass_kg,
         releases.inertia, releases.principal_kgm2, releases.drag_per_m(settings.drag),
@@ -231,7 +232,7 @@ def simulate(
         part = order[start : start + BATCH]
         ended = np.empty((part.size, 5))
         moments = run_blocks(
-            tree, zone, model.compiled, numbers, friction, model.draws, first_run + part, settings.seed,
+            tree, facets, zone, model.compiled, numbers, friction, model.draws, first_run + part, settings.seed,
             *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts, settings.most_s,
             level, ended,
         )  # fmt: skip
@@ -321,7 +322,7 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
 
 
 @cache
-def _compiled_for(tree_type: Any) -> Any:
+def _compiled_for(tree_type: Any, facets_type: Any) -> Any:
     """`run_blocks` for one kind of ground and any model, which it takes as a pointer to a function: compiled once."""
     from numba import types
 
@@ -334,7 +335,7 @@ def _compiled_for(tree_type: Any) -> Any:
     run_blocks.disable_compile(False)
     run_blocks.compile(
         numba_types.Array(types.float64, 2, "C")(
-            tree_type, types.int32[::1], rebound_type(), lines, line, whole, types.int64[::1], whole, *block, number,
+            tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, whole, types.int64[::1], whole, *block, number,
             whole, whole, number, whole, lines,
         )
     )  # fmt: skip
@@ -342,11 +343,11 @@ def _compiled_for(tree_type: Any) -> Any:
     return run_blocks
 
 
-def _compiled_runs(tree: Any) -> Any:
+def _compiled_runs(tree: Any, facets: Any) -> Any:
     import numba
 
     typeof: Any = numba.typeof
-    return _compiled_for(typeof(tree))
+    return _compiled_for(typeof(tree), typeof(facets))
 
 
 def _near_one_another(places: Array) -> NDArray[np.int64]:

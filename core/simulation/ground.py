@@ -103,6 +103,21 @@ class Ground:
         return (self.index.tree, self.point_index.tree) if len(self.faces) else self.point_index.tree
 
     @cached_property
+    def facets(self) -> Any:
+        """What lies about each triangle, for blocks that roll: see `facet_kernels`; empty where there are points too."""
+        m = 0 if len(self.points) else len(self.faces)
+        across, bend, clear = np.empty((m, 3), np.int32), np.empty((m, 3), np.float32), np.zeros((m, 4), np.float32)
+        if m:
+            from ..terrain.kernels import edge_neighbours
+            from .facet_kernels import link
+
+            face = self.index.face
+            place = np.empty(m, np.int32)
+            place[face] = np.arange(m, dtype=np.int32)
+            link(self.index.corners, face, edge_neighbours(self.faces, len(self.vertices)), place, across, bend)
+        return across, bend, clear
+
+    @cached_property
     def element(self) -> NDArray[np.int32]:
         """(m + k,) the element behind each place in the tree."""
         triangles = self.index.face if len(self.faces) else np.empty(0, np.int32)

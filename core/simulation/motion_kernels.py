@@ -27,6 +27,7 @@ from ..compiled import kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, last_root
+from .edge_kernels import onto, over
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
@@ -254,7 +255,7 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
 
 @kernel
 def run_block(  # type: ignore[no-untyped-def]
-    tree, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count,
+    tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count,
     run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record,
 ):  # fmt: skip
     """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
@@ -276,7 +277,7 @@ def run_block(  # type: ignore[no-untyped-def]
     v_max = sqrt(_dot(v, v))
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
-    known, t, e, hit, at_edge, marked = False, 0.0, zero, -1, False, False
+    known, t, e, hit, edge, marked = False, 0.0, zero, -1, ON_TRIANGLE, False
     anchor, lingers = p, 0
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:
@@ -346,7 +347,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 v_max = max(v_max, sqrt(_dot(v, v)))
             rises = _dot(v, n)
             if n[2] > 0.0 and rises * rises < 2.0 * gravity * n[2] * HOP * radius:
-                grounded, v, at_edge, marked = True, _along(v, n), False, False
+                grounded, v, edge, marked = True, _along(v, n), ON_TRIANGLE, False
                 if law == NO_ROLLING:
                     end = STOPPED
             elif at_once >= MOST_AT_ONCE:
@@ -365,12 +366,20 @@ def run_block(  # type: ignore[no-untyped-def]
             end = STOPPED
             break
         moves = False
-        if len(tree) == 4 and not at_edge:
-            e, hit = n, place
-            t, q, turned, stop = leg(tree, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time)
-            moves, at_edge = t > 0.0, stop != ON_TRIANGLE
-            if stop == AT_ANOTHER:
-                q = _touching(tree, stack, q, turned, radius, nearby, n)[0]
+        if len(tree) == 4:
+            if edge == ON_TRIANGLE:
+                e, hit = n, place
+                t, q, turned, edge = leg(
+                    tree, facets, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time
+                )
+                moves = t > 0.0
+                if moves and edge == AT_ANOTHER:
+                    q = _touching(tree, stack, q, turned, radius, nearby, n)[0]
+            elif edge != AT_ANOTHER:
+                t, q, turned, e, hit = over(
+                    tree, facets, stack, p, v, n, place, edge, radius, gravity, HOP * radius, dt
+                )
+                moves, edge = hit >= 0, ON_TRIANGLE
         if not moves:
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
             pull = -gravity * factor * dt
@@ -389,11 +398,13 @@ def run_block(  # type: ignore[no-untyped-def]
                     if drag > 0.0:  # from off the ground: where it touches, its flight would end at once
                         p, v, time, length = free, falling, time + dt, length + speed * dt
                     continue
-                turned, at_edge = _along(turned, e), False
+                turned, edge = _along(turned, e), ON_TRIANGLE
         if moves:
             part, p, v, ds = _moved(p, q, v, turned, factor * gravity, mu * max(cosine, 0.0))
             time, length = time + part * t, length + part * ds
-            n, place = e, hit
+            n, place, came = e, hit, v
+            if len(tree) == 4 and part == 1.0 and 0 <= edge < AT_ANOTHER and facets[1][place, edge] > 0.0:
+                v, n, place, edge = onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, dt)
             held = held + 1 if ds < HELD * radius else 0
             if held > MOST_HELD:
                 end = STOPPED
@@ -438,7 +449,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 square = min(square, size * size)
             loss = 2.0 * factor * gravity * (way[2] + mu * max(cosine, 0.0) * ds)
             left = square - loss
-            n, place, at_edge = e, hit, blocked
+            n, place, edge = e, hit, AT_ANOTHER if blocked else ON_TRIANGLE
             if speed < 1e-6:
                 # From rest: what friction leaves of gravity along the ground, and along a wall that the block leans on.
                 pulls = size - mu * (factor * gravity * cosine * dt + (-back if blocked else 0.0))
@@ -462,7 +473,7 @@ def run_block(  # type: ignore[no-untyped-def]
         w = _rolling(n, v, radius)
         v_max = max(v_max, sqrt(_dot(v, v)))
         if record == ALL or (record == IMPACTS and not marked):
-            _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
+            _write(rows, count, run, ON_GROUND, time, p, v, w, came if moves else v, w, n, place)
             count, marked = count + 1, True
     if tumbles and not grounded:
         axes, w = turn(moments, axes, w, time - spun)
@@ -474,7 +485,7 @@ def run_block(  # type: ignore[no-untyped-def]
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
-    tree, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass, inertia,
+    tree, facets, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass, inertia,
     moments, drag, gravity, law, most_impacts, most_s, record, results,
 ):  # fmt: skip
     """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
@@ -484,7 +495,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
     rows, count = np.empty((64 * len(runs), COLUMNS)), 0
     for i in range(len(runs)):
         rows, count, end, time, impacts, length, v_max = run_block(
-            tree, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count, runs[i], seed,
+            tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count, runs[i], seed,
             (place[i, 0], place[i, 1], place[i, 2]), (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
             (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],
             (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record,

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A block on the ground that comes to an edge between two triangles: compiled kernels.
+
+Where the ground rises beyond, it touches the next triangle already, and goes on along that. Where it falls, it turns
+about the edge when it is slow, v² < g r for the part of v across; else it leaves the ground, and its flight is followed
+over the triangles that it passes to the one that it lands on. Bends of more than 30° and whatever else is near are left
+to the steps of `motion_kernels`.
+"""
+
+from math import inf, sqrt
+
+from ..compiled import kernel
+from .contact_kernels import first_root
+from .facet_kernels import GENTLE, corner, dot, is_clear, minus, upward
+from .leg_kernels import AT_ANOTHER, ON_TRIANGLE
+
+MOST_PASSED = 8
+"""A hop passes no more triangles than this."""
+
+
+@kernel
+def _along(v, n):  # type: ignore[no-untyped-def]
+    s = dot(v, n)
+    return v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2]
+
+
+@kernel
+def _inward(corners, i, edge, n):  # type: ignore[no-untyped-def]
+    """A corner at an edge, and the direction from the edge into the triangle, of length 1."""
+    start, end, third = corner(corners, i, edge), corner(corners, i, (edge + 1) % 3), corner(corners, i, (edge + 2) % 3)
+    u, w = minus(end, start), minus(third, start)
+    part = dot(u, w) / dot(u, u)
+    k = (w[0] - part * u[0], w[1] - part * u[1], w[2] - part * u[2])
+    size = 1.0 / sqrt(dot(k, k))
+    return start, (k[0] * size, k[1] * size, k[2] * size)
+
+
+@kernel
+def _within(tree, facets, i, p, n, radius, but):  # type: ignore[no-untyped-def]
+    """Whether a sphere at p that touches triangle i does so within it, and meets none that rises beyond its edges.
+
+    but : a triangle across an edge that it may touch.
+    """
+    corners, (across, bend, _) = tree[3], facets
+    for edge in range(3):
+        start, k = _inward(corners, i, edge, n)
+        h = dot(minus(p, start), k)
+        if across[i, edge] != but and bend[i, edge] > 0.0:
+            h -= radius * bend[i, edge]
+        if h < -1e-9 * radius:
+            return False
+    return True
+
+
+@kernel
+def _foot(corners, i, p, n):  # type: ignore[no-untyped-def]
+    """The place on the plane of triangle i that is next to p."""
+    h = dot(minus(p, corner(corners, i, 0)), n)
+    return p[0] - h * n[0], p[1] - h * n[1], p[2] - h * n[2]
+
+
+@kernel
+def _in_flight(p, v, gravity, t):  # type: ignore[no-untyped-def]
+    """Place and velocity."""
+    return (
+        (p[0] + v[0] * t, p[1] + v[1] * t, p[2] + (v[2] - 0.5 * gravity * t) * t),
+        (v[0], v[1], v[2] - gravity * t),
+    )
+
+
+@kernel
+def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, shortest):  # type: ignore[no-untyped-def]
+    """From one triangle at once onto the one that rises beyond an edge and is touched.
+
+    Parameters
+    ----------
+    shortest : [s] a block that comes back sooner moves along the corner between both.
+
+    Returns
+    -------
+    v, n, place : after it; the speed is kept.
+    edge : `ON_TRIANGLE`; or `AT_ANOTHER` where nothing is changed.
+    """
+    j = facets[0][place, edge]
+    if j < 0 or facets[1][place, edge] > GENTLE:
+        return v, n, place, AT_ANOTHER
+    m = upward(tree[3], j)
+    turned = _along(v, m)
+    size, speed = sqrt(dot(turned, turned)), sqrt(dot(v, v))
+    if size == 0.0 or not _within(tree, facets, j, p, m, radius, place):
+        return v, n, place, AT_ANOTHER
+    scale = speed / size
+    turned = (turned[0] * scale, turned[1] * scale, turned[2] * scale)
+    down = factor * gravity * m[2]
+    brake = mu * down / speed
+    a = (
+        down * m[0] - brake * turned[0],
+        down * m[1] - brake * turned[1],
+        down * m[2] - factor * gravity - brake * turned[2],
+    )
+    away, back = dot(turned, n), -dot(a, n)
+    if away <= 0.0 or 2.0 * away < back * shortest:
+        return v, n, place, AT_ANOTHER
+    return turned, m, j, ON_TRIANGLE
+
+
+@kernel
+def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, hop, shortest):  # type: ignore[no-untyped-def]
+    """Over an edge beyond which the ground falls: about it, or in a hop.
+
+    Parameters
+    ----------
+    hop : [m] how high above the ground it may rise.
+    shortest : [s] a hop that takes no longer is none.
+
+    Returns
+    -------
+    t, p, way : [s]; the centre after it, on the ground; the direction of the velocity.
+    n, place : of the ground there; −1 where steps have to follow.
+    """
+    corners, (across, bend, _) = tree[3], facets
+    j = across[place, edge]
+    if j < 0 or bend[place, edge] < -GENTLE or dot(v, v) == 0.0:
+        return 0.0, p, v, n, -1
+    m = upward(corners, j)
+    cosine, rises, fall = dot(m, n), dot(v, m), gravity * m[2]
+    height = radius * (cosine - 1.0)
+    square = rises * rises + 2.0 * fall * height
+    if square <= 0.0 or rises + sqrt(square) <= fall * shortest:
+        contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
+        wide = radius + hop
+        if not (
+            is_clear(tree, stack, facets, place, contact, contact, 0.0, wide)
+            and is_clear(tree, stack, facets, j, contact, contact, 0.0, wide)
+        ):
+            return 0.0, p, v, n, -1
+        q = (contact[0] + radius * m[0], contact[1] + radius * m[1], contact[2] + radius * m[2])
+        way, turned = minus(q, p), _along(v, m)
+        return sqrt(dot(way, way) / dot(v, v)), q, turned, m, j
+    total, came = 0.0, place
+    for _ in range(MOST_PASSED):
+        # The foot of the block is on the edge from `came` to j; height and rises are those over the plane of j.
+        square = rises * rises + 2.0 * fall * height
+        if square <= 0.0 or square > 2.0 * fall * hop:
+            break
+        land = (rises + sqrt(square)) / fall
+        leave, at = inf, 0
+        for e in range(3):
+            if across[j, e] == came:
+                continue
+            start, k = _inward(corners, j, e, m)
+            h = dot(minus(p, start), k)
+            if h < radius * max(bend[j, e], 0.0):
+                return 0.0, p, v, n, -1
+            t = first_root(h, dot(v, k), -gravity * k[2])
+            if t < leave:
+                leave, at = t, e
+        t = min(land, leave)
+        q, way = _in_flight(p, v, gravity, t)
+        if not is_clear(
+            tree, stack, facets, j, _foot(corners, j, p, m), _foot(corners, j, q, m), 0.125 * gravity * t * t,
+            radius + hop,
+        ):  # fmt: skip
+            break
+        if land <= leave:
+            return (total + t, q, _along(way, m), m, j if _within(tree, facets, j, q, m, radius, -1) else -1)
+        rises_beyond, came, j = bend[j, at] > 0.0, j, across[j, at]
+        if j < 0 or abs(bend[came, at]) > GENTLE:
+            break
+        m = upward(corners, j)
+        height, rises, fall = dot(minus(q, corner(corners, j, 0)), m) - radius, dot(way, m), gravity * m[2]
+        if height < 0.0:  # it has landed on that before
+            square = rises * rises + 2.0 * fall * height
+            if not (rises_beyond and rises < 0.0 and square <= 2.0 * fall * hop):
+                break
+            t += (rises + sqrt(square)) / fall
+            q, way = _in_flight(p, v, gravity, t)
+            contact = _foot(corners, j, q, m)
+            good = t > 0.0 and _within(tree, facets, j, q, m, radius, came)
+            good = good and is_clear(tree, stack, facets, j, contact, contact, 0.0, radius + hop)
+            return total + t, q, _along(way, m), m, j if good else -1
+        total, p, v = total + t, q, way
+    return 0.0, p, v, n, -1

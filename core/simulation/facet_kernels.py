@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What lies about each triangle, for a block that rolls or slides on it: compiled kernels.
+
+It is kept in a tuple `facets` of three, in the order of the leaves: the triangle across each edge (m, 3), from corner e
+to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground rises
+beyond, negative where it falls; and what a sphere is clear of (m, 4), which is looked up when a block is first on the
+triangle. That is
+
+- the radius of the largest sphere that, wherever it touches the triangle, meets no triangle without a common corner;
+  negative where it is exact, else it is at least that; 0 where it was not looked up;
+- for each corner, how many radii the contact must be from it for a sphere not to meet the triangles around the corner,
+  those across the edges left out.
+
+Whether a sphere is clear depends on the triangles alone, whichever sphere was looked up before, in whichever thread:
+each number is known or 0, and a thread that finds a 0 looks up all four.
+"""
+
+from math import inf, sqrt
+
+import numpy as np
+
+from ..compiled import kernel
+
+GENTLE = 0.2679
+"""tan(θ/2) of the bends that a block is taken over at once, 30°: beyond, an edge is a corner or a crest."""
+LEVEL = 0.05
+"""Vertical part of a normal below which a triangle is a wall."""
+NONE = 1e-30
+"""A radius of nothing that is known."""
+BEYOND = 1.5
+"""Look for somewhat larger spheres than the one that asks."""
+
+
+@kernel
+def dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def corner(corners, i, k):  # type: ignore[no-untyped-def]
+    return corners[i, k, 0], corners[i, k, 1], corners[i, k, 2]
+
+
+@kernel
+def minus(a, b):  # type: ignore[no-untyped-def]
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def upward(corners, i):  # type: ignore[no-untyped-def]
+    """The normal of triangle i that does not point down."""
+    a = corner(corners, i, 0)
+    m = cross(minus(corner(corners, i, 1), a), minus(corner(corners, i, 2), a))
+    size = sqrt(dot(m, m))
+    if m[2] < 0.0:
+        size = -size
+    return m[0] / size, m[1] / size, m[2] / size
+
+
+@kernel
+def link(corners, face, neighbours, place, across, bend):  # type: ignore[no-untyped-def]
+    """Fill `across` and `bend`.
+
+    Parameters
+    ----------
+    face : (m,) behind each triangle in the order of the leaves; place : (m,) of each face in that order.
+    neighbours : (m, 3) of the faces, negative where there is none, or more than one.
+    """
+    for i in range(len(corners)):
+        n = upward(corners, i)
+        for e in range(3):
+            across[i, e], bend[i, e] = -1, 0.0
+            other = neighbours[face[i], e]
+            if other < 0:
+                continue
+            j = place[other]
+            start, end = corner(corners, i, e), corner(corners, i, (e + 1) % 3)
+            apex = 0
+            while apex < 3 and (corner(corners, j, apex) == start or corner(corners, j, apex) == end):
+                apex += 1
+            if apex == 3:
+                continue
+            along, way = minus(end, start), minus(corner(corners, j, apex), start)
+            out = cross(n, along)
+            size = sqrt(dot(along, along))
+            out = (out[0] / size, out[1] / size, out[2] / size)
+            if dot(minus(corner(corners, i, (e + 2) % 3), start), out) > 0.0:
+                out = (-out[0], -out[1], -out[2])
+            rise, run = dot(way, n), dot(way, out)
+            whole = sqrt(rise * rise + run * run)
+            bend[i, e] = rise / (whole + run) if whole + run > 1e-6 * whole else 1e6
+            if n[2] > LEVEL and (n[2] * run - out[2] * rise) > LEVEL * whole:
+                across[i, e] = j
+
+
+@kernel
+def _greatest_cosine(w, a, b):  # type: ignore[no-untyped-def]
+    """Between a direction and those from one to another."""
+    m = cross(a, b)
+    if dot(cross(a, w), m) > 0.0 and dot(cross(w, b), m) > 0.0:
+        return sqrt(max(1.0 - dot(w, m) ** 2 / dot(m, m), 0.0))
+    return max(dot(w, a), dot(w, b))
+
+
+@kernel
+def _directions(corners, i, k):  # type: ignore[no-untyped-def]
+    """From a corner of a triangle to the others, of length 1."""
+    here = corner(corners, i, k)
+    a, b = minus(corner(corners, i, (k + 1) % 3), here), minus(corner(corners, i, (k + 2) % 3), here)
+    p, q = 1.0 / sqrt(dot(a, a)), 1.0 / sqrt(dot(b, b))
+    return (a[0] * p, a[1] * p, a[2] * p), (b[0] * q, b[1] * q, b[2] * q)
+
+
+@kernel
+def _around_corner(corners, i, at, j, there, n):  # type: ignore[no-untyped-def]
+    """How many radii a sphere on triangle i must touch it from a corner so that it does not meet triangle j there.
+
+    A sphere that touches at f, so far from the corner, meets a point q of the other, at the height h over the triangle,
+    where |q − f|² < 2 r h. With unit vectors u to f and w to q that is least at f = r w·n/(1 − w·u).
+    """
+    a, b = _directions(corners, i, at)
+    c, d = _directions(corners, j, there)
+    if dot(c, n) <= 1e-9 and dot(d, n) <= 1e-9:
+        return 0.0
+    cosine = max(
+        max(_greatest_cosine(a, c, d), _greatest_cosine(b, c, d)),
+        max(_greatest_cosine(c, a, b), _greatest_cosine(d, a, b)),
+    )
+    m = cross(c, d)
+    steep = sqrt(max(1.0 - dot(m, n) ** 2 / dot(m, m), 0.0))
+    return steep / max(1.0 - cosine, 1e-9)
+
+
+@kernel
+def _apart(corners, i, j, n):  # type: ignore[no-untyped-def]
+    """How far triangle j is from triangle i at least, seen along the edges of i."""
+    most = 0.0
+    for e in range(3):
+        start = corner(corners, i, e)
+        out = cross(minus(corner(corners, i, (e + 1) % 3), start), n)
+        inner = dot(minus(corner(corners, i, (e + 2) % 3), start), out)
+        least = inf
+        for k in range(3):
+            least = min(least, dot(minus(corner(corners, j, k), start), out) * (-1.0 if inner > 0.0 else 1.0))
+        most = max(most, least / sqrt(dot(out, out)))
+    return most
+
+
+@kernel
+def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
+    """Look up what a sphere on triangle i is clear of; returns the first of the four numbers."""
+    bounds, first, count, corners = tree
+    across, _, clear = facets
+    asked = np.float32(BEYOND * radius)
+    reach = 2.0 * (1.0 + 1e-5) * asked
+    n = upward(corners, i)
+    base = corner(corners, i, 0)
+    low_x = min(min(corners[i, 0, 0], corners[i, 1, 0]), corners[i, 2, 0]) - reach
+    low_y = min(min(corners[i, 0, 1], corners[i, 1, 1]), corners[i, 2, 1]) - reach
+    low_z = min(min(corners[i, 0, 2], corners[i, 1, 2]), corners[i, 2, 2]) - reach
+    high_x = max(max(corners[i, 0, 0], corners[i, 1, 0]), corners[i, 2, 0]) + reach
+    high_y = max(max(corners[i, 0, 1], corners[i, 1, 1]), corners[i, 2, 1]) + reach
+    high_z = max(max(corners[i, 0, 2], corners[i, 1, 2]), corners[i, 2, 2]) + reach
+    limit = inf
+    around = (0.0, 0.0, 0.0)
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if (
+            bounds[node, 0] > high_x or bounds[node, 3] < low_x or bounds[node, 1] > high_y
+            or bounds[node, 4] < low_y or bounds[node, 2] > high_z or bounds[node, 5] < low_z
+        ):  # fmt: skip
+            continue
+        if not count[node]:
+            stack[top], stack[top + 1] = first[node], first[node] + 1
+            top += 2
+            continue
+        for j in range(first[node], first[node] + count[node]):
+            rise, shared, at, there = 0.0, 0, -1, -1
+            for k in range(3):
+                q = corner(corners, j, k)
+                for own in range(3):
+                    if corner(corners, i, own) == q:
+                        shared, at, there = shared + 1, own, k
+                        break
+                else:
+                    rise = max(rise, dot(minus(q, base), n))
+            if j == i or shared == 3 or rise <= 1e-9 * radius:
+                continue
+            if shared == 0:
+                gap = _apart(corners, i, j, n)
+                limit = min(limit, max(gap * gap / (2.0 * rise), 0.5 * gap))
+            elif shared == 1:
+                c = _around_corner(corners, i, at, j, there, n)
+                around = (
+                    max(around[0], c) if at == 0 else around[0],
+                    max(around[1], c) if at == 1 else around[1],
+                    max(around[2], c) if at == 2 else around[2],
+                )
+            elif j != across[i, 0] and j != across[i, 1] and j != across[i, 2]:
+                limit = 0.0
+    found = np.float32(max(limit * (1.0 - 1e-6), NONE))
+    for k in range(3):
+        clear[i, k + 1] = max(around[k] * (1.0 + 1e-6), NONE)
+    limit = asked if found >= asked else -found
+    clear[i, 0] = limit
+    return limit
+
+
+@kernel
+def is_clear(tree, stack, facets, i, p, q, sag, radius):  # type: ignore[no-untyped-def]
+    """Whether a sphere on triangle i meets no others than those across its edges.
+
+    Parameters
+    ----------
+    p, q : the contact first and last. sag : how far the way between may be from a line.
+    """
+    corners, clear = tree[3], facets[2]
+    limit = clear[i, 0]
+    if 0.0 <= limit < radius or clear[i, 1] == 0.0 or clear[i, 2] == 0.0 or clear[i, 3] == 0.0:
+        limit = _look_about(tree, stack, facets, i, radius)
+    if abs(limit) < radius:
+        return False
+    way = minus(q, p)
+    square = dot(way, way)
+    for k in range(3):
+        if clear[i, k + 1] > NONE:
+            near = clear[i, k + 1] * radius + sag
+            x = minus(corner(corners, i, k), p)
+            along = dot(x, way)
+            part = along / square if 0.0 < along < square else 1.0 if along >= square > 0.0 else 0.0
+            x = (x[0] - part * way[0], x[1] - part * way[1], x[2] - part * way[2])
+            if dot(x, x) < near * near:
+                return False
+    return True

@@ -105,11 +105,12 @@ def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, shorte
 
 
 @kernel
-def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, hop, shortest):  # type: ignore[no-untyped-def]
+def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, hop, shortest):  # type: ignore[no-untyped-def]
     """Over an edge beyond which the ground falls: about it, or in a hop.
 
     Parameters
     ----------
+    factor, mu : part of gravity that accelerates; coefficient of friction.
     hop : [m] how high above the ground it may rise.
     shortest : [s] a hop that takes no longer is none.
 
@@ -135,8 +136,11 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, hop, shorte
         ):
             return 0.0, p, v, n, -1
         q = (contact[0] + radius * m[0], contact[1] + radius * m[1], contact[2] + radius * m[2])
-        way, turned = minus(q, p), _along(v, m)
-        return sqrt(dot(way, way) / dot(v, v)), q, turned, m, j
+        way = minus(q, p)
+        ds, square = sqrt(dot(way, way)), dot(v, v)
+        if square <= 2.0 * factor * gravity * (way[2] + mu * n[2] * ds):
+            return 0.0, p, v, n, -1  # it comes to rest on the edge
+        return ds / sqrt(square), q, _along(v, m), m, j
     total, came = 0.0, place
     for _ in range(MOST_PASSED):
         # The foot of the block is on the edge from `came` to j; height and rises are those over the plane of j.

@@ -335,8 +335,8 @@ def _compiled_for(tree_type: Any, facets_type: Any) -> Any:
     run_blocks.disable_compile(False)
     run_blocks.compile(
         numba_types.Array(types.float64, 2, "C")(
-            tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, whole, types.int64[::1], whole, *block, number,
-            whole, whole, number, whole, lines,
+            tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, whole, types.int64[::1], whole,
+            *block, number, whole, whole, number, whole, lines,
         )
     )  # fmt: skip
     run_blocks.disable_compile()

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What lies about each triangle, for a block that rolls or slides on it: compiled kernels.
 
-It is kept in a tuple `facets` of three, in the order of the leaves: the triangle across each edge (m, 3), from corner e
-to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground rises
-beyond, negative where it falls; and what a sphere is clear of (m, 4), which is looked up when a block is first on the
-triangle. That is
+It is kept in a tuple `facets` of three, in the order of the leaves: the triangle across each edge (m, 3), from corner
+e to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground
+rises beyond, negative where it falls; and what a sphere is clear of (m, 4), which is looked up when a block is first on
+the triangle. That is
 
 - the radius of the largest sphere that, wherever it touches the triangle, meets no triangle without a common corner;
   negative where it is exact, else it is at least that; 0 where it was not looked up;
@@ -137,17 +137,19 @@ def _around_corner(corners, i, at, j, there, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _apart(corners, i, j, n):  # type: ignore[no-untyped-def]
-    """How far triangle j is from triangle i at least, seen along the edges of i."""
+def _beyond(corners, i, j, n):  # type: ignore[no-untyped-def]
+    """How far triangle j lies beyond one of the edges of triangle i at least, seen along n."""
     most = 0.0
     for e in range(3):
         start = corner(corners, i, e)
         out = cross(minus(corner(corners, i, (e + 1) % 3), start), n)
-        inner = dot(minus(corner(corners, i, (e + 2) % 3), start), out)
-        least = inf
-        for k in range(3):
-            least = min(least, dot(minus(corner(corners, j, k), start), out) * (-1.0 if inner > 0.0 else 1.0))
-        most = max(most, least / sqrt(dot(out, out)))
+        size = sqrt(dot(out, out))
+        if size > 0.0:
+            side = -size if dot(minus(corner(corners, i, (e + 2) % 3), start), out) > 0.0 else size
+            least = inf
+            for k in range(3):
+                least = min(least, dot(minus(corner(corners, j, k), start), out) / side)
+            most = max(most, least)
     return most
 
 
@@ -195,7 +197,7 @@ def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
             if j == i or shared == 3 or rise <= 1e-9 * radius:
                 continue
             if shared == 0:
-                gap = _apart(corners, i, j, n)
+                gap = max(_beyond(corners, i, j, n), _beyond(corners, j, i, n))
                 limit = min(limit, max(gap * gap / (2.0 * rise), 0.5 * gap))
             elif shared == 1:
                 c = _around_corner(corners, i, at, j, there, n)
@@ -209,9 +211,8 @@ def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
     found = np.float32(max(limit * (1.0 - 1e-6), NONE))
     for k in range(3):
         clear[i, k + 1] = max(around[k] * (1.0 + 1e-6), NONE)
-    limit = asked if found >= asked else -found
-    clear[i, 0] = limit
-    return limit
+    clear[i, 0] = asked if found >= asked else -found
+    return clear[i, 0]
 
 
 @kernel

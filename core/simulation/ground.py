@@ -104,7 +104,7 @@ class Ground:
 
     @cached_property
     def facets(self) -> Any:
-        """What lies about each triangle, for blocks that roll: see `facet_kernels`; empty where there are points too."""
+        """What lies about each triangle, for blocks that roll: see `facet_kernels`; empty with points."""
         m = 0 if len(self.points) else len(self.faces)
         across, bend, clear = np.empty((m, 3), np.int32), np.empty((m, 3), np.float32), np.zeros((m, 4), np.float32)
         if m:

@@ -3,10 +3,10 @@
 
 Flight is the parabola (`contact_kernels`), or with drag a chain of parabolas. At a contact the impact model decides. A
 block whose rebound would hop less than `HOP` of its radius stays on the ground. There a leg takes it over a triangle in
-closed form (`leg_kernels`); round edges and in corners it moves on in steps shorter than half its radius, each a free
-fall that the terrain corrects to one radius above its closest point. A free fall that ends above that is followed to
-where it lands: when that is a hop as well the block has stayed on the ground, else it has left it. So blocks fly off
-crests by themselves.
+closed form (`leg_kernels`), and over gentle edges on to the next (`edge_kernels`). At other edges, in corners, and
+where more triangles are near, it moves on in steps shorter than half its radius, each a free fall that the terrain
+corrects to one radius above its closest point. A free fall that ends above that is followed to where it lands: when
+that is a hop as well the block has stayed on the ground, else it has left it. So blocks fly off crests by themselves.
 
 On the ground the direction follows gravity along the terrain, the speed follows the energy,
 
@@ -377,7 +377,7 @@ def run_block(  # type: ignore[no-untyped-def]
                     q = _touching(tree, stack, q, turned, radius, nearby, n)[0]
             elif edge != AT_ANOTHER:
                 t, q, turned, e, hit = over(
-                    tree, facets, stack, p, v, n, place, edge, radius, gravity, HOP * radius, dt
+                    tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius, dt
                 )
                 moves, edge = hit >= 0, ON_TRIANGLE
         if not moves:
@@ -485,8 +485,8 @@ def run_block(  # type: ignore[no-untyped-def]
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass, inertia,
-    moments, drag, gravity, law, most_impacts, most_s, record, results,
+    tree, facets, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass,
+    inertia, moments, drag, gravity, law, most_impacts, most_s, record, results,
 ):  # fmt: skip
     """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)

@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..compiled import as_rows, in_chunks
 from ..progress import Progress, silent
 from ..reconstruction.free_flight import fly
 from ..reconstruction.impact import Impacts, apparent, make_impacts
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
+from ..terrain.cloud import Cloud
 from ..vectors import Array, Indices, Mask, Names, dot
 from .engine import ENDS, FLIES_OFF, IMPACT, LEFT_TERRAIN, ON_GROUND, RELEASED, Simulation
 from .holes import within_rims
@@ -177,21 +179,49 @@ def _greatest_heights(simulation: Simulation) -> Array:
     order = np.lexsort((-duration, run))
     rank = np.arange(order.size) - np.searchsorted(run[order], run[order])
     looked, highest = order[rank < FIRST_FLIGHTS], np.full(n, -np.inf)
-    moments = np.full(rows.size, MOMENTS)
-    np.maximum.at(highest, run[looked], _flight_heights(simulation, rows[looked], duration[looked], moments[looked]))
+
+    def look(moments: Indices, more_than: Array) -> Array:
+        """The heights of the flights that are `looked` at."""
+        heights = _flight_heights(simulation, rows[looked], duration[looked], moments, more_than)
+        np.maximum.at(highest, run[looked], heights)
+        return heights
+
+    look(np.full(looked.size, MOMENTS), np.full(looked.size, -np.inf))
     rise = simulation.settings.gravity_mps2 * duration**2 / 8
     looked = np.flatnonzero(rise >= RISING * highest[run])
-    heights = _flight_heights(simulation, rows[looked], duration[looked], moments[looked])
-    np.maximum.at(highest, run[looked], heights)
+    heights = look(np.full(looked.size, MOMENTS), HIGH * highest[run[looked]])
     looked = looked[heights >= HIGH * highest[run[looked]]]
     length = np.hypot(*(simulation.records.position[rows + 1] - simulation.records.position[rows])[looked, :2].T)
     moments = np.clip(np.ceil(length / SPACING_M).astype(np.intp) + 1, MOMENTS, MOST_MOMENTS)
-    np.maximum.at(highest, run[looked], _flight_heights(simulation, rows[looked], duration[looked], moments))
+    look(moments, highest[run[looked]])
     return np.where(np.isfinite(highest), highest, np.nan)
 
 
-def _flight_heights(simulation: Simulation, start: Indices, duration: Array, moments: Indices) -> Array:
-    """(q,) greatest height above the terrain of flights from the records `start`, at so many moments (q,) of each."""
+def _flight_heights(
+    simulation: Simulation, start: Indices, duration: Array, moments: Indices, more_than: Array
+) -> Array:
+    """(q,) greatest height above the terrain of flights from the records `start`, at so many moments (q,) of each.
+
+    Those that are not above `more_than` (q,) may be −inf.
+    """
+    ground, settings, records = simulation.ground, simulation.settings, simulation.records
+    if isinstance(ground.terrain, Cloud) or settings.drag is not None:
+        return _sampled_heights(simulation, start, duration, moments)
+    from .height_kernels import greatest_heights
+
+    tree, heights = ground.terrain.index.tree, np.empty(start.size)
+    position, velocity = as_rows(records.position[start]), as_rows(records.v2[start])
+    in_chunks(
+        lambda i, j: greatest_heights(
+            tree, position, velocity, settings.gravity_mps2, duration, moments, more_than, heights, i, j
+        ),
+        start.size,
+    )
+    return heights
+
+
+def _sampled_heights(simulation: Simulation, start: Indices, duration: Array, moments: Indices) -> Array:
+    """`_flight_heights` on any ground and through air."""
     if not start.size:
         return np.empty(0)
     first = np.cumsum(moments) - moments

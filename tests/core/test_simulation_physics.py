@@ -7,7 +7,7 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.machinery.measured import MeasuredRebounds
 from rockfall.core.impact_models.registry import MODELS, find_model
-from rockfall.core.simulation import engine, motion_kernels
+from rockfall.core.simulation import engine, motion_kernels, results
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
@@ -248,6 +248,16 @@ def test_what_is_recorded_changes_no_run_and_flights_are_known_without_the_steps
     heights = [run_figures(runs[level]).height_max_m for level in ("impacts", "all")]
     np.testing.assert_array_equal(*heights)
     assert np.isnan(run_figures(runs["ends"]).height_max_m).all()
+
+
+def test_greatest_heights_of_flights_are_those_at_each_of_their_moments(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a look all the way down from each moment, as on a cloud."""
+    run = simulate(*rough_case(60), Settings("stevens_1998"), record="impacts")
+    found = run_figures(run).height_max_m
+    sampled = results._sampled_heights
+    monkeypatch.setattr(results, "_flight_heights", lambda *given: sampled(*given[:4]))
+    np.testing.assert_allclose(found, run_figures(run).height_max_m, rtol=0, atol=1e-12)
+    assert (found > 0.3).all()
 
 
 def test_small_blocks_roll_far_on_large_triangles() -> None:

@@ -2,6 +2,7 @@
 """The statistics of groups of measured impacts, and whether the groups differ."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -124,15 +125,6 @@ class GroupStatistics:
         return made
 
 
-def _named(numbers: Array) -> tuple[str, ...]:
-    """Different numbers as texts, with as few digits as tell them apart."""
-    for digits in range(4, 18):
-        names = tuple(f"{number:.{digits}g}" for number in numbers.tolist())
-        if len(set(names)) == len(names):
-            break
-    return names
-
-
 def group_statistics(
     impacts: Impacts, grouping: Grouping, *, seed: int = 0, progress: Progress = silent
 ) -> GroupStatistics:
@@ -177,10 +169,19 @@ def group_by_number(column: str, values: Array, classes: int = 0) -> Grouping:
         number[known] = place
         return Grouping(column, _named(each), number)
     edges = np.unique(np.quantile(values[known], np.linspace(0, 1, classes + 1)))
-    last = max(edges.size - 2, 0)
-    number[known] = np.clip(np.searchsorted(edges, values[known], side="right") - 1, 0, last)
-    ends = [*edges.tolist(), edges[-1]]
-    return Grouping(column, tuple(f"{ends[i]:.4g}–{ends[i + 1]:.4g}" for i in range(last + 1)), number)
+    edges = np.repeat(edges, 2) if edges.size == 1 else edges
+    number[known] = np.clip(np.searchsorted(edges, values[known], side="right") - 1, 0, edges.size - 2)
+    return Grouping(column, tuple(f"{low}–{high}" for low, high in pairwise(_named(edges))), number)
+
+
+def _named(numbers: Array) -> tuple[str, ...]:
+    """Numbers as texts, with as few digits as tell them apart."""
+    different = np.unique(numbers).size
+    for digits in range(3, 18):
+        names = tuple(f"{number:.{digits}g}" for number in numbers.tolist())
+        if len(set(names)) == different:
+            break
+    return names
 
 
 def _tested(impacts: Impacts, row: Indices) -> dict[str, Array]:

@@ -75,7 +75,8 @@ class PairTest:
     quantity, first, second : names.
     median_first, median_second : of their values.
     effect : Cliff's δ, the probability that a value of the second is the greater one, less that it is the smaller one.
-    p, p_holm : as in `GroupTest`; corrected for the number of pairs of this quantity.
+    p, p_holm : as in `GroupTest`; corrected for the number of pairs of this quantity, and never below that of the test
+        of all groups, so that no pair differs where the groups do not.
     """
 
     quantity: str
@@ -160,6 +161,7 @@ def group_tests(
     made = []
     for i, name in enumerate(values):
         corrected_all = holm(np.array([result[i][3] for result in results]))
+        corrected_all = np.maximum(corrected_all, tests[i].p_holm)
         for (a, b), result, corrected in zip(pairs, results, corrected_all.tolist(), strict=True):
             made.append(PairTest(name, tested[a], tested[b], *result[i], corrected))
     return GroupTests(exchanged, exchanges, tested, left_out, tuple(tests), tuple(made))

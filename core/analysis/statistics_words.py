@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The statistics as tables of text, for the command line and for a panel alike."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from .curves import number
 from .group_statistics import GroupStatistics
@@ -17,20 +17,27 @@ MOST_GROUPS = 12
 
 
 def summary_rows(statistics: ImpactStatistics) -> list[TextRow]:
-    """What a panel shows of a table of impacts: label and value."""
-    rows: list[TextRow] = [("Impacts", f"{statistics.used} of {statistics.impacts}")]
-    rows.append(("Trajectories", str(statistics.trajectories)))
+    """What a panel shows of a table of impacts: label and value, short enough for a sidebar."""
+    rows: list[TextRow] = [
+        ("Impacts used", f"{statistics.used} of {statistics.impacts}"),
+        ("Trajectories", str(statistics.trajectories)),
+    ]
+    if statistics.doubts:
+        rows.append(("Flagged among them", str(sum(statistics.doubts.values()))))
     if statistics.used < FEWEST:
         return [*rows, ("Fits", "too few impacts")]
     rt, angle, trend = statistics.rt, statistics.rn_angle, statistics.r_deviation
-    rows += [
-        ("R_T", f"{_slope(rt)}, R² {_two(rt.r2)}"),
-        ("R_N", f"{law(statistics)}, R² {_two(angle.r2)}"),
-        ("R per 10° of deviation", f"{_two(10 * trend.slope)}, R² {_two(trend.r2)}"),
-        ("R_N > 1", f"{statistics.rn_above_one} of {statistics.used}"),
+    return [
+        *rows,
+        ("Rᴛ", number(rt.slope)),
+        ("    95 %", f"{number(rt.low)}–{number(rt.high)}"),
+        ("    R² of vᴛ₂", _two(rt.r2)),
+        ("Rɴ", law(statistics).replace("θ1", "θ₁")),
+        ("    R² of ln Rɴ", _two(angle.r2)),
+        ("R per 10° of deviation", number(10 * trend.slope)),
+        ("    R²", _two(trend.r2)),
+        ("Rɴ > 1", f"{statistics.rn_above_one} of {statistics.used}"),
     ]
-    rows += [(f"  at {row[0]}", f"{row[2]} of {row[1]}") for row in class_rows(statistics)[1:]]
-    return rows
 
 
 def class_rows(statistics: ImpactStatistics) -> list[TextRow]:
@@ -45,14 +52,12 @@ def class_rows(statistics: ImpactStatistics) -> list[TextRow]:
 
 
 def group_rows(groups: GroupStatistics, most: int = MOST_GROUPS) -> list[TextRow]:
-    """A heading, and a row for each of the largest groups, in their order."""
+    """A heading of two rows, and a row for each of the largest groups, in their order."""
     rows: list[TextRow] = [
         (groups.column, "impacts", "falls", "R_T (95 %)", "R_N", "R_N > 1", "R_N", "R", "θ1 [°]", "|v1| [m/s]"),
         ("", "used", "", "", "", "", "median", "median", "median", "median"),
     ]
-    largest = sorted(groups.groups, key=lambda name: -groups.groups[name].used)[:most]
-    for name in (name for name in groups.groups if name in set(largest)):
-        one = groups.groups[name]
+    for name, one in _largest(groups.groups, most):
         middle = [
             format(one.spreads[variable].median, digits) if one.used else "–"
             for variable, digits in (("rn", ".2f"), ("r", ".2f"), ("theta1_deg", ".0f"), ("v1_mps", ".1f"))
@@ -60,6 +65,19 @@ def group_rows(groups: GroupStatistics, most: int = MOST_GROUPS) -> list[TextRow
         fits = (_slope(one.rt), law(one) if one.used >= FEWEST_FOR_LAW else "–")
         rows.append((name, str(one.used), str(one.trajectories), *fits, str(one.rn_above_one), *middle))
     return rows
+
+
+def group_cells(groups: Mapping[str, ImpactStatistics], most: int = MOST_GROUPS) -> list[TextRow]:
+    """The same in few columns, for a panel: a heading, and a row for each of the largest groups."""
+    rows: list[TextRow] = [("", "used", "Rᴛ", "Rɴ > 1")]
+    rows += [(name, str(one.used), _two(one.rt.slope), str(one.rn_above_one)) for name, one in _largest(groups, most)]
+    return rows
+
+
+def _largest(groups: Mapping[str, ImpactStatistics], most: int) -> list[tuple[str, ImpactStatistics]]:
+    """In their order."""
+    names = set(sorted(groups, key=lambda name: -groups[name].used)[:most])
+    return [(name, one) for name, one in groups.items() if name in names]
 
 
 def law(statistics: ImpactStatistics) -> str:

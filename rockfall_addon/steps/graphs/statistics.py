@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sidebar of the graphs: what the measured impacts say by themselves."""
+
+from collections.abc import Sequence
+
+import bpy
+
+from ....core.analysis.statistics_words import class_rows, group_cells, summary_rows
+from ...scene import statistics
+from .panel import GraphPanel
+
+MOST_GROUPS = 12
+
+
+class ROCKFALL_PT_graph_statistics(GraphPanel, bpy.types.Panel):
+    """Fits and counts of the measured impacts that are shown, of all and of the groups that colour them."""
+
+    bl_label = "Statistics"
+    bl_idname = "ROCKFALL_PT_graph_statistics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, found = self.layout, statistics.statistics_of(context.scene)
+        if found.whole is None:
+            layout.label(text="No measured impact is shown", icon="INFO")
+            return
+        _table(layout, summary_rows(found.whole))
+        layout.label(text="Rɴ > 1 by incident angle")
+        _table(layout, [(angle, f"{above} of {n}") for angle, n, above, _ in class_rows(found.whole)[1:]])
+        if not found.groups:
+            layout.label(text="Colour the points by a column to see its groups", icon="INFO")
+            return
+        header, body = layout.panel("ROCKFALL_graph_statistics_groups")
+        header.label(text=f"By {found.column}")
+        if body is not None:
+            rows = group_cells(found.groups, MOST_GROUPS)
+            _table(body, rows)
+            if len(found.groups) > MOST_GROUPS:
+                body.label(text=f"and {len(found.groups) - MOST_GROUPS} more")
+            body.label(text="Tests: rockfall statistics --group", icon="INFO")
+
+
+def _table(layout: bpy.types.UILayout, rows: Sequence[Sequence[str]]) -> None:
+    """Columns of text, the first to the left, the others to the right."""
+    first, *others = zip(*rows, strict=True)
+    split = layout.box().split(factor=0.55 if len(others) == 1 else 0.4)
+    _column(split, first, "LEFT")
+    row = split.row()
+    for cells in others:
+        _column(row, cells, "RIGHT")
+
+
+def _column(layout: bpy.types.UILayout, cells: Sequence[str], side: str) -> None:
+    column = layout.column(align=True)
+    column.alignment = side
+    for cell in cells:
+        column.label(text=cell)
+
+
+CLASSES = (ROCKFALL_PT_graph_statistics,)

@@ -42,6 +42,8 @@ def write_simulated_trajectories(
 ) -> None:
     """Write trajectories.csv, sampled every `step_s` in flight, to the micrometre and microsecond.
 
+    The last column is the seed, which measured trajectories have not: one of the models is called `observed`, too.
+
     Raises
     ------
     OSError : the file cannot be written.
@@ -76,6 +78,7 @@ def _impact_columns(simulation: Simulation, site: str) -> DecimalColumns:
         "run": simulation.number[run],
         "structure": Words(owner, ("", *ground.structures)),
         "source": Words(none, (simulation.settings.model,)),
+        "seed": Words(none, (str(simulation.settings.seed),)),
     }
 
 
@@ -91,9 +94,9 @@ def _flags(impacts: Impacts) -> Words:
 
 def _sample_columns(simulation: Simulation, step_s: float) -> DecimalColumns:
     samples = sample_runs(simulation, step_s)
-    run = samples.run - simulation.first_run - 1
+    run, none = samples.run - simulation.first_run - 1, np.zeros(len(samples), np.intp)
     return {
-        "source": Words(np.zeros(len(samples), np.intp), (simulation.settings.model,)),
+        "source": Words(none, (simulation.settings.model,)),
         "trajectory": Words(run, tuple(release_names(simulation).tolist())),
         "run": samples.run,
         "time_s": samples.time_s,
@@ -101,4 +104,5 @@ def _sample_columns(simulation: Simulation, step_s: float) -> DecimalColumns:
         **vector_columns(VELOCITY, samples.velocity),
         "height_m": samples.height_m,
         "kinetic_J": samples.kinetic_j,
+        "seed": Words(none, (str(simulation.settings.seed),)),
     }

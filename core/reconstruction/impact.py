@@ -28,8 +28,8 @@ REFUSED = ("departing", "discarded")
 """Flags of impacts that neither comparisons nor statistics take: no impact at all, or none that counts."""
 
 DeviationForm = Literal["signed", "as_printed"]
-RUN = ("run", "source", "simulated_with")
-"""Further columns of a table with simulated blocks: the run, and its model, in a database simulated_with."""
+RUN = ("run", "source", "simulated_with", "seed")
+"""Further columns of a table with simulated blocks: the run, its model, in a database simulated_with, and its seed."""
 
 CACHED_ROWS = 4096
 """Rows whose intermediate results stay in the processor's cache."""

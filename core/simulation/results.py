@@ -83,8 +83,8 @@ def flights_of(simulation: Simulation) -> tuple[Indices, Array]:
 def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
     """The impacts of all runs, as those that were measured.
 
-    ``run``, ``structure`` and ``source`` (the model) are further columns. The position is that of the contact, the
-    normal that from the contact to the centre.
+    ``run``, ``structure``, ``source`` (the model) and ``seed`` are further columns. The position is that of the
+    contact, the normal that from the contact to the centre.
     """
     records, releases, ground = simulation.records, simulation.releases, simulation.ground
     rows = np.flatnonzero(records.what == IMPACT)
@@ -114,6 +114,7 @@ def impacts_of(simulation: Simulation, site: str = "") -> Impacts:
             "run": simulation.number.astype(np.str_)[run],
             "structure": structure,
             "source": np.full(rows.size, simulation.settings.model),
+            "seed": np.full(rows.size, str(simulation.settings.seed)),
         },
         shift=ground.shift,
     )

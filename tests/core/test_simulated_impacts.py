@@ -31,12 +31,16 @@ PLANE = Surface(
 @pytest.fixture
 def table(tmp_path):
     """Two models, four like blocks of one release: their first impacts are one, with the first model all of them."""
+    return written(tmp_path / "impacts.csv", seed=3)
+
+
+def written(path, seed):
     start = np.tile([4.0, 40.0, 3.0], (RUNS, 1))
     releases = make_releases(start, name=np.full(RUNS, "face"), velocity=np.tile([3.0, 1.0, 0.0], (RUNS, 1)))
     ground = make_ground(PLANE)
-    runs = [simulate(ground, releases, Settings(name, seed=3, most_impacts=5)) for name in MODELS]
-    write_simulated_impacts(runs, tmp_path / "impacts.csv", "slope")
-    return tmp_path / "impacts.csv"
+    runs = [simulate(ground, releases, Settings(name, seed=seed, most_impacts=5)) for name in MODELS]
+    write_simulated_impacts(runs, path, "slope")
+    return path
 
 
 def test_each_run_is_compared_as_if_it_were_alone(table) -> None:
@@ -67,7 +71,7 @@ def test_predictions_say_which_run_they_are_of_and_are_read_back(table, tmp_path
     again = read_predictions(tmp_path / "predictions.csv", backwards)
     np.testing.assert_array_equal(len(impacts) - 1 - again.row, made.row)
     np.testing.assert_array_equal(again.v2, made.v2)
-    for name in ("run", "source"):
+    for name in ("run", "source", "seed"):
         np.testing.assert_array_equal(again.runs[name], made.runs[name])
 
 
@@ -87,7 +91,7 @@ def test_the_flights_of_predictions_end_at_the_next_impact_of_their_own_run(tabl
     }
     seen = 0
     for row in flights:
-        following = place.get((row["run"], row["source"], int(row["impact"]) + 1))
+        following = place.get((row["run"], row["source"], row["seed"], int(row["impact"]) + 1))
         if following is not None:
             assert float(row["measured_x_m"]) == pytest.approx(following[0], abs=1e-6)
             seen += 1
@@ -106,7 +110,16 @@ def test_no_run_is_taken_for_another_when_tables_are_merged(table, tmp_path) -> 
     out.mkdir()
     write_package(merged.database, out)
     schema = json.loads((out / "datapackage.json").read_text(encoding="utf-8"))["resources"][0]["schema"]
-    assert schema["primaryKey"] == ["site", "trajectory", "run", "simulated_with", "impact"]
+    assert schema["primaryKey"] == ["site", "trajectory", "run", "simulated_with", "seed", "impact"]
     again = read_package(out).impacts
     assert set(again.runs["simulated_with"]) == set(MODELS)
     np.testing.assert_array_equal(compare(again, MODELS[:1]).v2, compare(one.impacts, MODELS[:1]).v2)
+
+
+def test_runs_of_another_seed_are_runs_of_their_own(table, tmp_path) -> None:
+    """Their first impacts are at one place and time, with the model without chance all of them."""
+    one, other = read_source(table), read_source(written(tmp_path / "other.csv", seed=4))
+    merged = merge([one, other])
+    assert len(merged.database) == len(one) + len(other)
+    falls = set(zip(*(column.tolist() for column in merged.database.impacts.falls), strict=True))
+    assert len(falls) == 2 * RUNS * len(MODELS)

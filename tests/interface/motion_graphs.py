@@ -45,6 +45,17 @@ def case_motion_graphs_first_look(window):
     window.screenshot("light")
 
 
+def alone(courses, speed):
+    """A trajectory, and a time [s] at which no other one is as quick, far from its impacts."""
+    for course in courses:
+        for time_s in (course.impact_time_s[:-1] + course.impact_time_s[1:]) / 2:
+            others = [one.at(speed, time_s) for one in courses if one is not course]
+            apart = min((abs(value - course.at(speed, time_s)) for value in others if value == value), default=9.0)
+            if apart > 2.5 and abs(course.impact_time_s - time_s).min() > 0.3:
+                return course, float(time_s)
+    raise AssertionError("no trajectory is ever alone")
+
+
 def case_motion_graphs_move_the_time(window):
     """Click, drag, Esc, Shift, a click on a line and one on an impact; zoom and reset; undo brings the time back."""
     yield from open_graphs(window)
@@ -66,19 +77,18 @@ def case_motion_graphs_move_the_time(window):
 
     motion = window.part("rockfall_addon.scene.motion").motion_of(scene)
     speed = window.part("core.analysis.motion_graphs").SPEED
-    course = next(one for one in motion.courses if one.trajectory == "B10")
-    time_s = float((course.impact_time_s[2] + course.impact_time_s[3]) / 2)
+    course, time_s = alone(motion.courses, speed)
     yield from window.move(*place(window, 0, time_s, course.at(speed, time_s)))
-    assert canvas(window).hit == ("B10", 0)
+    assert canvas(window).hit == (course.trajectory, 0), canvas(window).hit
     window.screenshot("hover")
     yield from window.click(*place(window, 0, time_s, course.at(speed, time_s)))
-    assert [obj.name for obj in bpy.context.selected_objects] == ["B10 block"]
+    assert [obj.name for obj in bpy.context.selected_objects] == [f"{course.trajectory} block"]
     assert scene.frame_current == round(time_s * rate)
     yield 0.5
     window.screenshot("selected")
-    impact = float(course.impact_time_s[3])
+    impact = float(course.impact_time_s[course.impact_time_s > time_s][0])
     yield from window.click(*place(window, 0, impact, course.at(speed, impact) + 1.0))
-    assert bpy.context.object["rockfall_trajectory"] == "B10"
+    assert bpy.context.object["rockfall_trajectory"] == course.trajectory
     assert bpy.context.object["rockfall_role"] == "pick"
     assert abs(scene.frame_current + scene.frame_subframe - impact * rate) < 1e-3
 
@@ -126,8 +136,8 @@ def case_motion_graphs_follow(window):
     with window.override():
         bpy.ops.screen.animation_play()
     start = scene.frame_current
-    yield 3.0
-    assert scene.frame_current > start + 5
+    yield from window.wait_for(lambda: scene.frame_current > start + 3, 60.0, "the scene plays")
+    window.screenshot("playing")
     with window.override():
         bpy.ops.screen.animation_play()
     yield 0.5

@@ -15,10 +15,31 @@ class RockfallMotionGraphs(bpy.types.NodeTree):
     bl_icon = "FCURVE"
 
 
+class ROCKFALL_MT_motion_quantities(bpy.types.Menu):
+    """What is shown over the time."""
+
+    bl_idname = "ROCKFALL_MT_motion_quantities"
+    bl_label = "Quantities"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.rockfall_motion, "quantities", expand=True)
+
+
+class ROCKFALL_MT_motion_export(bpy.types.Menu):
+    """Files of the graphs."""
+
+    bl_idname = "ROCKFALL_MT_motion_export"
+    bl_label = "Export"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.layout.operator("rockfall.export_motion_graphs", icon="EXPORT")
+
+
 def draw_header(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     """What is shown, and how the time is numbered."""
     settings = context.scene.rockfall_motion
-    layout.row(align=True).prop(settings, "quantities")
+    layout.menu("ROCKFALL_MT_motion_quantities")
+    layout.menu("ROCKFALL_MT_motion_export")
     layout.separator_spacer()
     row = layout.row(align=True)
     row.prop(settings, "only_selected", text="", icon="RESTRICT_SELECT_OFF", toggle=True)
@@ -26,7 +47,7 @@ def draw_header(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
     layout.operator("rockfall.reset_graphs", text="", icon="HOME").graph = 0
 
 
-CLASSES = (RockfallMotionGraphs,)
+CLASSES = (RockfallMotionGraphs, ROCKFALL_MT_motion_quantities, ROCKFALL_MT_motion_export)
 
 
 def register() -> None:

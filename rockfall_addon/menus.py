@@ -56,7 +56,9 @@ STEPS = (
         ("screen.animation_play", "Play or Pause", {}), "rockfall.open_motion_graphs", "rockfall.show_relief",
     )),
     ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
-    ("share", "10  Share", ("rockfall.export_tables", "rockfall.export_simulation", "rockfall.export_project")),
+    ("share", "10  Share", (
+        "rockfall.export_tables", "rockfall.export_graphs", "rockfall.export_simulation", "rockfall.export_project",
+    )),
 )  # fmt: skip
 """Name, title and entries of each menu: an operator, or an operator with its text and properties; None is a line."""
 

@@ -65,6 +65,7 @@ class ROCKFALL_MT_graphs_export(bpy.types.Menu):
     bl_label = "Export"
 
     def draw(self, context: bpy.types.Context) -> None:
+        self.layout.operator("rockfall.export_graphs", icon="EXPORT")
         self.layout.operator("rockfall.export_tables", icon="EXPORT")
 
 

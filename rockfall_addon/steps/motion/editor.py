@@ -32,7 +32,7 @@ class ROCKFALL_MT_motion_export(bpy.types.Menu):
     bl_label = "Export"
 
     def draw(self, context: bpy.types.Context) -> None:
-        self.layout.operator("rockfall.export_motion_graphs", icon="EXPORT")
+        self.layout.operator("rockfall.export_graphs", icon="EXPORT")
 
 
 def draw_header(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:

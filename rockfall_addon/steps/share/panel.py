@@ -23,6 +23,7 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         advise(context, self.layout, True, "Tables in survey coordinates, with units.")
         self.layout.operator("rockfall.export_tables", icon="EXPORT")
+        self.layout.operator("rockfall.export_graphs", icon="EXPORT")
         self.layout.operator("rockfall.export_simulation", icon="EXPORT")
         self.layout.operator("rockfall.export_project", icon="FILE_FOLDER")
         job.draw(context, self.layout, "share")

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Areas, lines, points of several shapes, and text, in pixels of a region or in batches that are kept."""
+"""Areas, lines, points of several shapes, and text, in pixels of a region or in batches that are kept.
+
+Within `onto`, the same calls write a picture file instead, without the graphics card.
+"""
 
 import functools
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import blf
 import gpu
@@ -13,6 +17,7 @@ from mathutils import Matrix
 
 from ....core.analysis.axes import Axis
 from ....core.analysis.graph_layout import Frame, Rectangle
+from ....core.analysis.svg import Svg
 from .look import FONT, Look, Rgb, Rgba, alpha
 
 SHAPES = ("circle", "diamond", "square", "triangle", "down", "cross", "plus", "hexagon", "star", "ring")
@@ -88,6 +93,32 @@ def forget() -> None:
     point_shader.cache_clear()
 
 
+@dataclass
+class _Paper:
+    """A picture file that is drawn: where batches of the axes in use lie in it, and what is cut off."""
+
+    svg: Svg
+    low: np.ndarray
+    size: np.ndarray
+    clip: Rectangle | None = None
+
+    def pixels(self, places: np.ndarray) -> np.ndarray:
+        return self.low + places * self.size
+
+
+_paper: list[_Paper] = []
+
+
+@contextmanager
+def onto(svg: Svg) -> Iterator[None]:
+    """What is drawn goes into a picture file."""
+    _paper.append(_Paper(svg, np.zeros(2), np.ones(2)))
+    try:
+        yield
+    finally:
+        _paper.pop()
+
+
 class Points:
     """A kept batch of points.
 
@@ -112,12 +143,16 @@ class Points:
         colours = np.ones((len(places), 4), dtype=np.float32)
         colour = np.asarray(colour, dtype=np.float32)
         colours[:, : colour.shape[-1]] = colour
-        values = {
+        self.values = {
             "pos": np.ascontiguousarray(places[kept], dtype=np.float32),
             "color": np.ascontiguousarray(colours[kept]),
             "size": np.ascontiguousarray(np.broadcast_to(np.float32(size), len(places))[kept], dtype=np.float32),
         }
-        self.batch = batch_for_shader(point_shader(), "POINTS", values) if self.count else None
+
+    @functools.cached_property
+    def batch(self) -> gpu.types.GPUBatch:
+        """Made when it is first drawn."""
+        return batch_for_shader(point_shader(), "POINTS", self.values)
 
     def draw(
         self,
@@ -132,7 +167,10 @@ class Points:
         edge, rim : colour and width of their outline [px].
         hollow : width of the line along their shape [px]; 0 for full ones.
         """
-        if self.batch is None:
+        if not self.count:
+            return
+        if _paper:
+            self._write(_paper[-1], diameter, bounds, edge, rim, hollow)
             return
         shader = point_shader()
         shader.bind()
@@ -147,6 +185,26 @@ class Points:
         self.batch.draw(shader)
         gpu.state.program_point_size_set(False)
 
+    def _write(
+        self,
+        paper: _Paper,
+        diameter: float,
+        bounds: tuple[float, float, float, float],
+        edge: Rgb,
+        rim: float,
+        hollow: float,
+    ) -> None:
+        places, shape = self.values["pos"], SHAPES[self.shape]
+        seen = ((places >= bounds[:2]) & (places <= bounds[2:])).all(axis=1)
+        rows = zip(
+            paper.pixels(places[seen]).tolist(),
+            self.values["color"][seen].tolist(),
+            (0.5 * diameter * self.values["size"][seen]).tolist(),
+            strict=True,
+        )
+        for (x, y), colour, radius in rows:
+            paper.svg.point(x, y, shape, radius, colour, edge, 0.6 * rim, hollow)
+
 
 class Lines:
     """A kept batch of segments (k, 2, 2), or of a line (k, 2) through points."""
@@ -156,12 +214,21 @@ class Lines:
         if places.ndim == 2:
             places = np.stack([places[:-1], places[1:]], axis=1)
         places = places[np.isfinite(places).all(axis=(1, 2))]
-        flat = np.zeros((2 * len(places), 3), dtype=np.float32)
-        flat[:, :2] = places.reshape(-1, 2)
-        self.batch = batch_for_shader(_line_shader(), "LINES", {"pos": flat}) if len(flat) else None
+        self.places = places.astype(np.float32)
+
+    @functools.cached_property
+    def batch(self) -> gpu.types.GPUBatch:
+        """Made when it is first drawn."""
+        flat = np.zeros((2 * len(self.places), 3), dtype=np.float32)
+        flat[:, :2] = self.places.reshape(-1, 2)
+        return batch_for_shader(_line_shader(), "LINES", {"pos": flat})
 
     def draw(self, colour: Rgba, width: float) -> None:
-        if self.batch is None:
+        if not len(self.places):
+            return
+        if _paper:
+            paper = _paper[-1]
+            paper.svg.lines(paper.pixels(self.places), colour, width, paper.clip)
             return
         shader = _line_shader()
         shader.bind()
@@ -174,6 +241,9 @@ class Lines:
 
 def fill(area: Rectangle, colour: Rgb | Rgba) -> None:
     """A rectangle in one colour."""
+    if _paper:
+        _paper[-1].svg.area(area, colour)
+        return
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     shader.bind()
     shader.uniform_float("color", colour if len(colour) == 4 else alpha(colour))
@@ -209,6 +279,9 @@ def text(
     """
     blf.size(FONT, size)
     width, height = float(blf.dimensions(FONT, words)[0]), 0.72 * size
+    if _paper:
+        _paper[-1].svg.text(x, y, words, size, colour, anchor, upright)
+        return width
     along, across = anchor[0] * width, anchor[1] * height
     if upright:
         blf.enable(FONT, blf.ROTATION)
@@ -244,6 +317,14 @@ def card(place: tuple[float, float], rows: Sequence[str], look: Look, within: Re
 @contextmanager
 def clipped(area: Rectangle) -> Iterator[None]:
     """Draw within a rectangle only."""
+    if _paper:
+        paper, whole = _paper[-1], _paper[-1].clip
+        paper.clip = area
+        try:
+            yield
+        finally:
+            paper.clip = whole
+        return
     before = gpu.state.scissor_get()
     left, bottom, _, _ = gpu.state.viewport_get()
     gpu.state.scissor_set(round(left + area.left), round(bottom + area.bottom), round(area.width), round(area.height))
@@ -264,11 +345,22 @@ def in_axes(frame: Frame, x: Axis, y: Axis) -> Iterator[tuple[float, float, floa
     low, high = frame.x.places(np.array(x.limits)), frame.y.places(np.array(y.limits))
     wide, tall = low[1] - low[0], high[1] - high[0]
     plot = frame.plot
+    bounds = -low[0] / wide, -high[0] / tall, (1 - low[0]) / wide, (1 - high[0]) / tall
+    if _paper:
+        paper = _paper[-1]
+        before = paper.low, paper.size
+        paper.low = np.array([plot.left + low[0] * plot.width, plot.bottom + high[0] * plot.height])
+        paper.size = np.array([wide * plot.width, tall * plot.height])
+        try:
+            yield bounds
+        finally:
+            paper.low, paper.size = before
+        return
     matrix = Matrix.Translation((plot.left + low[0] * plot.width, plot.bottom + high[0] * plot.height, 0.0))
     matrix @= Matrix.Diagonal((wide * plot.width, tall * plot.height, 1.0, 1.0))
     with gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(matrix)
-        yield -low[0] / wide, -high[0] / tall, (1 - low[0]) / wide, (1 - high[0]) / tall
+        yield bounds
 
 
 @functools.cache

@@ -42,6 +42,7 @@ class Canvas:
     graph, part : what is under the mouse: number of a graph, −1 for none, and `Frame.part_at`.
     hit : what the content found under the mouse.
     band : outline of what is being selected [px], (k, 2).
+    printed : it becomes a picture file: nothing of the moment is shown.
     """
 
     room: Rectangle
@@ -53,6 +54,7 @@ class Canvas:
     part: str = ""
     hit: Any = None
     band: np.ndarray | None = None
+    printed: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,11 @@ def remove(tree: str) -> None:
     _contents.pop(tree, None)
     if not _contents:
         _end()
+
+
+def find_content(tree: str) -> Content:
+    """What a type of editor shows."""
+    return _contents[tree]
 
 
 def content_of(context: bpy.types.Context) -> Content | None:

@@ -92,7 +92,8 @@ def draw(context: bpy.types.Context, canvas: Canvas) -> None:
         graph = _graph(kept, number, chosen, look)
         _draw_graph(canvas, number, graph, quantities[number], last=number == len(quantities) - 1, some=bool(chosen))
     _draw_impacts(canvas, scene, courses, chosen)
-    _draw_cursor(canvas, scene)
+    if not canvas.printed:
+        _draw_cursor(canvas, scene)
     if canvas.hit is not None and canvas.pointer is not None:
         _draw_card(canvas, scene, courses)
 
@@ -114,6 +115,12 @@ def point(context: bpy.types.Context, canvas: Canvas) -> Hit | None:
         return None
     course = next(one for one in (*graph.chosen.courses, *graph.others.courses) if one.trajectory == best[1])
     return Hit(best[1], _impact_at(context.scene, course, frame, canvas.pointer[0], canvas.look.scale))
+
+
+def shown_courses(context: bpy.types.Context) -> tuple[MotionCourse, ...]:
+    """The trajectories that are shown."""
+    scene = context.scene
+    return _shown(scene, _kept(scene), motion.motion_of(scene), chosen_trajectories(context)).courses
 
 
 def time_at(scene: bpy.types.Scene, canvas: Canvas, x: float) -> float:

@@ -5,6 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .scene import (
+    comparison,
     footage,
     graph_settings,
     impact_rows,
@@ -69,6 +70,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     _keep_rate(scene)
     footage.follow(scene)
     sync.sync(scene, undone=True)
+    comparison.catch_up(scene)
     _selected_otherwise()
 
 
@@ -77,6 +79,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
 def _saving(_path: str, _unused: object = None) -> None:
     for scene in bpy.data.scenes:
         sync.sync(scene, dragging=sync.is_dragging())
+        comparison.catch_up(scene)
 
 
 @problems.guarded
@@ -149,7 +152,7 @@ def register() -> None:
 
 def unregister() -> None:
     bpy.msgbus.clear_by_owner(_owner)
-    for function in (sync.work, _catch_up):
+    for function in (sync.work, comparison.follow_later, _catch_up):
         if bpy.app.timers.is_registered(function):
             bpy.app.timers.unregister(function)
     for name, function in HANDLERS:

@@ -5,6 +5,7 @@ Computed when asked for, from what the scene stores, so it is right after an und
 changes, and only what depends on the change is computed again: for a slider, one model with the same draws.
 """
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,7 +21,7 @@ from ...core.impact_models.registry import MODELS
 from ...core.reconstruction.impact import Impacts
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.vectors import Array
-from . import databases, fingerprints, model_blocks, models, picks, reconstruction, store, timing
+from . import databases, fingerprints, model_blocks, models, picks, problems, reconstruction, store, timing
 from .databases import OtherSites
 
 
@@ -91,6 +92,11 @@ class _Kept:
     draws: dict[tuple[str, int, int], Array] = field(default_factory=dict)
     predictions: dict[tuple[str, int, int, str], Predictions] = field(default_factory=dict)
 
+
+MOST_AT_ONCE = 1000
+"""The blocks of more impacts do not follow a slider move by move."""
+REST_S = 0.3
+"""How long a parameter must rest for them to follow."""
 
 _kept: dict[int, _Kept] = {}  # session_uid of a scene
 _versions = count(1)
@@ -164,18 +170,53 @@ def predictions_of(scene: bpy.types.Scene, model: str, which: str = "A") -> Pred
 def follow_parameters(scene: bpy.types.Scene, model: str) -> None:
     """Bring the blocks of a model, if it has any in the 3-D view, in line with its parameters.
 
+    Those of many impacts follow as soon as the parameter rests: to move them takes longer than a picture should.
+
     Raises
     ------
     RockfallError : as `predictions_of`, and without a terrain.
     """
     measured = measured_of(scene)
-    if model not in models.shown_models(scene) or measured.reconstruction is None:
+    if model not in models.shown_models(scene) or measured.reconstruction is None or measured.impacts is None:
         return
+    if len(measured.impacts) > MOST_AT_ONCE and not bpy.app.background:
+        if bpy.app.timers.is_registered(follow_later):
+            bpy.app.timers.unregister(follow_later)
+        model_blocks.mark(scene, model, "")
+        bpy.app.timers.register(follow_later, first_interval=REST_S)
+        return
+    _move_blocks(scene, model, measured.reconstruction)
+
+
+def catch_up(scene: bpy.types.Scene) -> None:
+    """Bring the blocks in line that were moved for other parameters than the scene has now, as after an undo."""
+    measured = measured_of(scene)
+    if measured.reconstruction is None:
+        return
+    for model, text in model_blocks.marks(scene).items():
+        if text != _print(scene, model):
+            _move_blocks(scene, model, measured.reconstruction)
+
+
+@problems.guarded
+def follow_later() -> None:
+    """Move the blocks that waited for a parameter to rest; a timer calls it."""
+    for scene in bpy.data.scenes:
+        catch_up(scene)
+
+
+def _move_blocks(scene: bpy.types.Scene, model: str, result: Reconstruction) -> None:
     predictions = predictions_of(scene, model)
     if predictions is not None:
-        flights = models.fly(scene, measured.reconstruction, predictions, beside=False)
-        offsets = timing.shown_offsets(scene, measured.reconstruction.picks)
-        model_blocks.show(scene, flights, offsets, keep_blocks=True)
+        flights = models.fly(scene, result, predictions, beside=False)
+        model_blocks.show(scene, flights, timing.shown_offsets(scene, result.picks), keep_blocks=True)
+        model_blocks.mark(scene, model, _print(scene, model))
+
+
+def _print(scene: bpy.types.Scene, model: str) -> str:
+    """Of what a model's blocks are computed from."""
+    text = repr((measured_key(scene), sorted(models.parameters_of(scene).get(model, {}).items())))
+    return hashlib.sha1(text.encode(), usedforsecurity=False).hexdigest()
 
 
 def _is_used(scene: bpy.types.Scene, key: tuple[str, int, int, str]) -> bool:

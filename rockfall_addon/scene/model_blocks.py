@@ -60,22 +60,34 @@ def remove(scene: bpy.types.Scene, but: Collection[str] = ()) -> None:
     store.remove_collection(scene, COLLECTION, [find_model(name).title for name in but])
 
 
+def mark(scene: bpy.types.Scene, model: str, text: str) -> None:
+    """Remember with a model's flights what they were computed from."""
+    for obj in store.with_role(scene, store.MODEL_FLIGHTS_ROLE):
+        if obj[store.MODEL] == model:
+            obj[store.PRINT] = text
+
+
+def marks(scene: bpy.types.Scene) -> dict[str, str]:
+    """Model → what its flights were computed from, where that is remembered."""
+    curves = store.with_role(scene, store.MODEL_FLIGHTS_ROLE)
+    return {obj[store.MODEL]: obj[store.PRINT] for obj in curves if store.PRINT in obj}
+
+
 def _name_of(obj: bpy.types.Object) -> tuple[str, str, int]:
     return obj[store.MODEL], obj[store.TRAJECTORY], int(obj.get(store.LANE, 0))
 
 
 def _begins(predicted: PredictedFlights, offsets: Mapping[str, float]) -> Array:
     """(n,) when the flights begin in the scene [s]."""
-    names, place = np.unique(predicted.trajectory, return_inverse=True)
-    return predicted.time_s - np.array([offsets[name] for name in names.tolist()], dtype=np.float64)[place]
+    return predicted.time_s - np.array([offsets[name] for name in predicted.trajectory.tolist()], dtype=np.float64)
 
 
 def _by_trajectory(predicted: PredictedFlights, which: Indices) -> dict[str, Indices]:
     """Trajectory → its flights among `which`."""
-    names, place = np.unique(predicted.trajectory[which], return_inverse=True)
-    order = np.argsort(place, kind="stable")
-    edges = np.cumsum(np.bincount(place, minlength=len(names)))[:-1]
-    return dict(zip(names.tolist(), np.split(which[order], edges), strict=True)) if which.size else {}
+    found: dict[str, list[int]] = {}
+    for place, name in zip(which.tolist(), predicted.trajectory[which].tolist(), strict=True):
+        found.setdefault(name, []).append(place)
+    return {name: np.array(places, dtype=np.intp) for name, places in found.items()}
 
 
 def _show_flights(
@@ -96,6 +108,7 @@ def _show_flights(
     new = obj is None
     obj = trails.trail(f"{model} flights", store.MODEL_FLIGHTS_ROLE, lines, obj=obj)
     trails.paint(obj.data, np.array(find_model(model).colour))
+    obj.pop(store.PRINT, None)
     if new:
         obj[store.MODEL] = model
         _link(scene, obj, model)

@@ -101,8 +101,9 @@ def tooltip(spec: ParameterSpec) -> str:
 
 def label(spec: ParameterSpec) -> str:
     """The parameter's name for people, with its symbol and unit."""
-    unit = f" [{spec.unit}]" if spec.unit else ""
-    return f"{spec.symbol or spec.name.replace('_', ' ')}{unit}"
+    name, unit = spec.name.replace("_", " "), f" [{spec.unit}]" if spec.unit else ""
+    said = spec.symbol.replace("_", "").lower() == spec.name.replace("_", "")
+    return f"{spec.symbol if said else f'{name} {spec.symbol}'.strip()}{unit}"
 
 
 def group_of(scene: bpy.types.Scene, model: str, which: str = "A") -> bpy.types.PropertyGroup:

@@ -109,7 +109,7 @@ class ROCKFALL_PT_compared_scores(_GraphPanel, bpy.types.Panel):
         measure = "rmse" if settings.measure == "bias" else settings.measure
         _score_row(box, "", "bias", MEASURES[measure])
         for row in ranked:
-            title = f"{row.title} · {row.which}" if several else row.title
+            title = f"{row.which}  {row.title}" if several else row.title
             _score_row(box, title, _signed(row.score.bias), _number(getattr(row.score, measure)))
         unit = find_variable(settings.quantity).unit
         n = max(row.score.n for row in ranked)
@@ -119,7 +119,7 @@ class ROCKFALL_PT_compared_scores(_GraphPanel, bpy.types.Panel):
 
 
 def _score_row(layout: bpy.types.UILayout, *cells: str) -> None:
-    row = layout.split(factor=0.52)
+    row = layout.split(factor=0.58)
     row.label(text=cells[0])
     part = row.split(factor=0.5)
     for cell in cells[1:]:

@@ -26,7 +26,8 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
         return "READY" if models.shown_models(context.scene) else "TO_DO"
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, shown = self.layout, models.shown_models(context.scene)
+        layout, scene = self.layout, context.scene
+        shown = models.shown_models(scene)
         paragraph(context, layout, QUESTION, "QUESTION")
         column = layout.column(align=True)
         for name in models.ORDER:
@@ -38,17 +39,15 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
                 depress=on,
             )
             button.models = set(shown) ^ {name}
-        own = models.parameters_of(context.scene)
-        if own:
-            paragraph(context, layout, f"Own parameters: {', '.join(MODELS[name].title for name in own)}", "INFO")
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("rockfall.open_graphs", text="Open Graphs", icon="GRAPH")
         for name in shown:
             header, body = layout.panel(f"ROCKFALL_shown_parameters_{name}", default_closed=True)
-            header.label(text=f"Parameters: {MODELS[name].title}")
+            own = " (own values)" if models.parameters_of(scene).get(name) else ""
+            header.label(text=f"{MODELS[name].title}{own}")
             if body is not None:
-                parameters.draw(body, context.scene, name)
-        layout.operator("rockfall.load_parameters", icon="IMPORT")
-        if shown:
-            layout.operator("rockfall.remove_models", icon="X")
+                parameters.draw(body, scene, name)
 
 
 CLASSES = (ROCKFALL_PT_models,)

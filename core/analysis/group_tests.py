@@ -27,8 +27,8 @@ Exchanged = Literal["trajectories", "within", "impacts"]
 """Whole trajectories, impacts within their trajectory, or impacts freely."""
 
 EXCHANGES, FEWER_EXCHANGES = 9999, 999
-WORK = 20_000_000
-"""From so many values in all exchanges on, there are fewer of them."""
+WORK = 300_000_000
+"""From so many values in all exchanges on, which take a second or two, there are fewer of them."""
 FEWEST_ARRANGEMENTS = 20
 """With fewer different arrangements no probability can be below 5 %."""
 MOST_PAIRED = 12
@@ -143,7 +143,8 @@ def group_tests(
     exchanged = what_to_exchange(number, trajectory)
     if len(tested) < 2 or not values:
         return GroupTests(exchanged, 0, tested, left_out, (), ())
-    exchanges = EXCHANGES if columns.size * EXCHANGES <= WORK else FEWER_EXCHANGES
+    items = np.unique(trajectory).size if exchanged == "trajectories" else number.size
+    exchanges = EXCHANGES if items * len(values) * EXCHANGES <= WORK else FEWER_EXCHANGES
     progress("Testing whether groups differ", 0, 1)
     ranked = np.stack([_ranks(column) for column in columns])
     found, p = _exchange_test(ranked, number, len(tested), trajectory, exchanged, exchanges, seed)

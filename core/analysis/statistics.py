@@ -21,6 +21,9 @@ PUBLISHED_RT_R2 = 0.31
 PUBLISHED_RN_ANGLE_DEG = 20.0
 """Noël et al. 2018: R_N exceeds 1 where the incident angle is below about 20°."""
 
+HYPERBOLIC = (0.7, 1.3)
+"""Exponents of 1/θ1 that are called hyperbolic; Noël et al. 2017 have 1.08, Wyllie 1.03."""
+
 CLASS_DEG = 10.0
 CLASSES = 9
 """Classes of the incident angle, from 0 to 90°; the last holds 90°, too."""
@@ -172,14 +175,17 @@ class ImpactStatistics:
         before, angle = spreads["v1_mps"], spreads["theta1_deg"]
         slope, exponent = f"{trend.slope * 10:.3f}", f"{self.rn_angle.slope:.2f}".replace("-", "−")
         falls = slope.startswith("-")
-        hyperbolic = (
-            f"R_N = {self.rn_factor:.1f}·θ1^{exponent} (θ1 in degrees; exponent {_span(self.rn_angle)}): "
-            f"hyperbolic, as published. R_N > 1 at {self.rn_above_one} impacts, {self.rn_above_one_grazing} of them "
-            f"below {PUBLISHED_RN_ANGLE_DEG:.0f}° (published: below about {PUBLISHED_RN_ANGLE_DEG:.0f}°)."
-        )
-        unclear = (
-            f"R_N shows no clear fall with the incident angle (exponent {exponent}, {_span(self.rn_angle)}). "
-            f"R_N > 1 at {self.rn_above_one} impacts."
+        if not self.rn_angle.high < 0:
+            shape = "no clear fall with the incident angle"
+        elif -HYPERBOLIC[1] <= self.rn_angle.slope <= -HYPERBOLIC[0]:
+            shape = "hyperbolic, as published"
+        else:
+            slower = self.rn_angle.slope > -HYPERBOLIC[0]
+            shape = f"it falls {'more slowly' if slower else 'more steeply'} than the published hyperbola"
+        turn = (
+            f"R {'falls' if falls else 'rises'} by {slope.removeprefix('-')} per 10° of deviation"
+            if trend.low > 0 or trend.high < 0
+            else f"R shows no clear trend with the deviation: {slope.replace('-', '−')} per 10°"
         )
         texts = [
             (
@@ -196,12 +202,17 @@ class ImpactStatistics:
                 f"R² {_signed(rt.r2, 3)}: slope of |v_T2| on |v_T1| through the origin. "
                 f"Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
             ),
-            ("rn", self.rn_angle.slope, hyperbolic if self.rn_angle.high < 0 else unclear),
+            (
+                "rn",
+                self.rn_angle.slope,
+                f"R_N = {self.rn_factor:.1f}·θ1^{exponent} (θ1 in degrees; exponent {_span(self.rn_angle)}): {shape}. "
+                f"R_N > 1 at {self.rn_above_one} impacts, {self.rn_above_one_grazing} of them "
+                f"below {PUBLISHED_RN_ANGLE_DEG:.0f}° (published: below about {PUBLISHED_RN_ANGLE_DEG:.0f}°).",
+            ),
             (
                 "r",
                 trend.slope,
-                f"R {'falls' if falls else 'rises'} by {slope.removeprefix('-')} per 10° of deviation "
-                f"({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {_signed(trend.r2, 2)}). "
+                f"{turn} ({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {_signed(trend.r2, 2)}). "
                 "Published: falls about linearly from 1.",
             ),
         ]

@@ -95,7 +95,7 @@ def _nothing(impacts: "Impacts") -> InputError:
     return InputError(
         f"None of the {len(impacts)} impacts can be used: {refused} are departing or discarded, "
         f"{len(impacts) - refused} have no R_N, R_T and R",
-        advice="They need v1, v2 and the normal; the first and the last impact of a trajectory have none",
+        advice="They need v1, v2 and the terrain normal: reconstruct with a terrain, and more than two impacts each",
     )
 
 

@@ -175,6 +175,28 @@ def test_discarded_and_departing_impacts_do_not_enter_as_in_a_comparison() -> No
     )
 
 
+@pytest.mark.parametrize(
+    ("exponent", "said"),
+    [(-1.05, "hyperbolic, as published"), (-0.3, "more slowly than"), (-2.0, "more steeply"), (0.4, "no clear fall")],
+)
+def test_the_fall_of_rn_is_called_what_it_is(exponent: float, said: str) -> None:
+    theta1_deg = np.linspace(5.0, 60.0, 30)
+    rn = theta1_deg**exponent
+    found = impact_statistics(impacts_with(theta1_deg, rn, np.full(30, 0.6), np.full(30, 9.0)))
+    texts = {remark.about: remark.text for remark in found.remarks()}
+    assert said in texts["rn"]
+
+
+def test_no_trend_with_the_deviation_is_said() -> None:
+    rng = np.random.default_rng(12)
+    theta1_deg = rng.uniform(10, 50, 40)
+    r = rng.uniform(0.3, 0.9, 40)
+    noise = impact_statistics(impacts_with(theta1_deg, r, r, np.full(40, 9.0)))
+    (text,) = (remark.text for remark in noise.remarks() if remark.about == "r")
+    assert noise.r_deviation.low < 0 < noise.r_deviation.high
+    assert text.startswith("R shows no clear trend with the deviation")
+
+
 def test_rows_and_sentences(exact: ImpactStatistics) -> None:
     rows = exact.as_rows()
     names = [row[0] for row in rows]

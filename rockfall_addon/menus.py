@@ -38,7 +38,8 @@ STEPS = (
         "rockfall.refine", "rockfall.apply_refinement", "rockfall.discard_refinement",
     )),
     ("models", "6  Models", (
-        "rockfall.open_graphs", None, "rockfall.show_models", "rockfall.remove_models", None,
+        "rockfall.open_graphs", "rockfall.open_graphs_workspace", None,
+        "rockfall.show_models", "rockfall.remove_models", None,
         "rockfall.load_parameters", "rockfall.save_parameters",
         ("rockfall.copy_parameters", "Copy Parameters A to B", {"way": "A_TO_B"}),
         ("rockfall.copy_parameters", "Copy Parameters B to A", {"way": "B_TO_A"}),
@@ -139,6 +140,7 @@ def _draw_main(self: bpy.types.Menu, context: bpy.types.Context) -> None:
 def _draw_window(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     self.layout.separator()
     self.layout.operator("rockfall.open_workspace", icon="WORKSPACE")
+    self.layout.operator("rockfall.open_graphs_workspace", icon="GRAPH")
 
 
 def _draw_imports(self: bpy.types.Menu, context: bpy.types.Context) -> None:

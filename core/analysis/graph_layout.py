@@ -11,6 +11,8 @@ from .axes import Axis, Ticks, ticks
 
 SHAPE = 1.35
 """Width of a graph divided by its height, which the tiles come near to."""
+BESIDE, BELOW = 5.0, 6.0
+"""What numbers and labels take of a tile's width and height, in heights of the text."""
 GAP = 0.6
 """Between numbers, ticks and labels, in heights of the text."""
 FULL_LABEL = 0.95
@@ -84,12 +86,15 @@ class Frame:
         return "y" if x < self.plot.left else "title" if y > self.plot.top else ""
 
 
-def tiles(room: Rectangle, count: int, gap: float = 0.0) -> list[Rectangle]:
-    """`count` equal tiles that fill a room row by row, in as many columns as make their graphs largest."""
+def tiles(room: Rectangle, count: int, gap: float = 0.0, text: float = 0.0) -> list[Rectangle]:
+    """`count` equal tiles that fill a room row by row, in as many columns as make their plots largest.
+
+    text : height of the text [px], for the room that numbers and labels take of each tile.
+    """
 
     def size(columns: int) -> float:
         rows = -(-count // columns)
-        return min(room.width / columns / SHAPE, room.height / rows)
+        return min((room.width / columns - BESIDE * text) / SHAPE, room.height / rows - BELOW * text)
 
     columns = max(range(1, count + 1), key=lambda n: (round(size(n), 6), -n))
     rows = -(-count // columns)

@@ -135,8 +135,10 @@ class _Shared:
         ],
         default="POINTED", update=_changed,
     )  # fmt: skip
-    links: BoolProperty(name="Links", description="Lines from each measured impact to what the models make of it",
-                        default=True, update=_changed)  # fmt: skip
+    links: BoolProperty(
+        name="Links", description="Lines from each measured impact to what the models make of it; of very many, those "
+        "of the selected impacts and of the one under the mouse", default=True, update=_changed,
+    )  # fmt: skip
     fits: BoolProperty(name="Fits", description="Fitted curves, with equation and R²", default=True,
                        update=_changed)  # fmt: skip
     legend: BoolProperty(name="Legend", description="What the colours and shapes mean", default=True,

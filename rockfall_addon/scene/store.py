@@ -28,7 +28,7 @@ SITE, SITE_DESCRIPTION = "rockfall_site", "rockfall_site_description"
 PICKS_SOURCE = "rockfall_picks_source"
 RENDER_PRESETS = "rockfall_render_presets"
 BEFORE_FILM = "rockfall_film_before"
-WORKSPACE = "rockfall_workspace"  # of the workspace
+WORKSPACE, GRAPHS_WORKSPACE = "rockfall_workspace", "rockfall_graphs_workspace"  # of the workspaces
 
 # of the scene: how trajectories are computed
 GRAVITY, NORMAL_RADIUS = "rockfall_gravity_mps2", "rockfall_normal_radius_m"

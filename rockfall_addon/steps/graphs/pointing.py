@@ -202,7 +202,8 @@ def _choose_variable(context: bpy.types.Context, number: int, axis: str) -> None
         layout = menu.layout
         layout.prop(graph, f"{axis}_log")
         layout.separator()
-        layout.props_enum(graph, axis)
+        for name in impact_sheet.variables_of(context.scene):
+            layout.prop_enum(graph, axis, name)
 
     context.window_manager.popup_menu(draw, title=f"{axis} Axis")
 

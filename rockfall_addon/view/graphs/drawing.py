@@ -22,6 +22,8 @@ from .look import FONT, Look, Rgb, Rgba, alpha
 
 SHAPES = ("circle", "diamond", "square", "triangle", "down", "cross", "plus", "hexagon", "star", "ring")
 """By number, as the shader knows them."""
+THIN = ("cross", "plus", "ring")
+"""Shapes that have no outline: nothing would be left of them."""
 
 VERTEX = """
 void main() {
@@ -54,13 +56,18 @@ float away(vec2 p) {  /* from the shape's edge, in parts of the half width; nega
   return length(p) - 0.82;
 }
 
+vec3 linear(vec3 c) {
+  return mix(c / 12.92, pow((max(c, 0.0) + 0.055) / 1.055, vec3(2.4)), step(0.04045, c));
+}
+
 void main() {
   float reach = away(gl_PointCoord * 2.0 - 1.0) * diameter * 0.5;  /* [px] */
   float cover = clamp(0.5 - reach, 0.0, 1.0);
   if (cover <= 0.0) { discard; }
   float inner = clamp(0.5 - (reach + rim), 0.0, 1.0);
   if (hollow > 0.0) { cover *= 1.0 - clamp(0.5 - (reach + hollow), 0.0, 1.0); }
-  fragColor = vec4(mix(edge.rgb, shade.rgb, rim > 0.0 ? inner : 1.0), shade.a * cover);
+  vec4 seen = vec4(mix(edge.rgb, shade.rgb, rim > 0.0 ? inner : 1.0), shade.a * cover);
+  fragColor = srgbTarget ? vec4(linear(seen.rgb), seen.a) : seen;
 }
 """
 
@@ -79,6 +86,7 @@ def point_shader() -> gpu.types.GPUShader:
     info.push_constant("FLOAT", "rim")
     info.push_constant("FLOAT", "hollow")
     info.push_constant("INT", "shape")
+    info.push_constant("BOOL", "srgbTarget")  # Blender sets it: whether the frame buffer takes linear colours
     for place, (kind, name) in enumerate((("VEC2", "pos"), ("VEC4", "color"), ("FLOAT", "size"))):
         info.vertex_in(place, kind, name)
     info.vertex_out(between)
@@ -177,8 +185,9 @@ class Points:
         shader.uniform_float("bounds", bounds)
         shader.uniform_float("edge", alpha(edge))
         shader.uniform_float("scale", diameter)
-        shader.uniform_float("rim", rim)
-        shader.uniform_float("hollow", hollow)
+        thin = SHAPES[self.shape] in THIN
+        shader.uniform_float("rim", 0.0 if thin else rim)
+        shader.uniform_float("hollow", 0.0 if thin else hollow)
         shader.uniform_int("shape", self.shape)
         gpu.state.blend_set("ALPHA")
         gpu.state.program_point_size_set(True)

@@ -30,7 +30,7 @@ from ....core.vectors import Array, Mask
 from ...scene import graph_settings
 from ...scene.comparison import SceneComparison
 from .drawing import Lines, Points
-from .look import Look, Rgb, mixed
+from .look import Look, Rgb, mixed, readable
 from .point_colours import PointColours
 from .selection import Chosen
 
@@ -39,6 +39,8 @@ MANY = 2000
 POWER = "\ue000{}\ue001"
 """How an exponent is marked until it is raised."""
 RAISED = str.maketrans("0123456789.−", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻")
+MOST_LINKS = 6000
+"""Of more links in a graph, which no eye can follow, only those of selected impacts are drawn."""
 REACH = 9.0
 """How far from the mouse a point is still hit, at interface scale 1 [px]."""
 
@@ -55,6 +57,7 @@ class Drawn:
     links : from the measured points, for a model.
     curve : fitted; its batch `line`.
     start : place of its first point among all of the graph.
+    key : all that it depends on.
     """
 
     series: Series
@@ -66,6 +69,7 @@ class Drawn:
     curve: Curve | None
     line: Lines | None
     start: int
+    key: object
 
 
 @dataclass(eq=False)
@@ -79,7 +83,7 @@ class ImpactGraph:
     drawn : by source; models first, the scene's own measured impacts last and on top.
     places : (n, 2) of all points, those of each source together, single precision.
     bars : error bars of all measured points; None until they are wanted.
-    ring : what is selected, and for which selection.
+    ring : for a selection, rings about its points, and its links.
     """
 
     spec: GraphSpec
@@ -88,7 +92,7 @@ class ImpactGraph:
     drawn: list[Drawn]
     places: np.ndarray
     bars: Lines | None = None
-    ring: tuple[Chosen, Points] | None = None
+    ring: tuple[Chosen, Points, Lines] | None = None
     outside: dict[tuple[Limits, Limits], list[tuple[float, int, int]]] = field(default_factory=dict)
 
     @property
@@ -147,8 +151,8 @@ class ImpactGraph:
             self.outside = {key: sorted(found, reverse=True)}
         return self.outside[key]
 
-    def chosen_ring(self, chosen: Chosen, colour: Rgb) -> Points:
-        """Rings about the points of the selected impacts, the models' too."""
+    def chosen(self, chosen: Chosen, colour: Rgb) -> tuple[Points, Lines]:
+        """Rings about the points of the selected impacts, the models' too, and the links between them."""
         if self.ring is None or self.ring[0] != chosen:
             rows: dict[int, list[int]] = {}
             for source, row in chosen:
@@ -156,10 +160,28 @@ class ImpactGraph:
             spots, sizes = [np.empty((0, 2), dtype=np.float32)], [np.empty(0)]
             for one in self.drawn:
                 of_it = np.isin(one.series.row, rows.get(one.series.source, []))
-                spots.append(self.places[one.start : one.start + of_it.size][of_it])
+                spots.append(self.places_of(one)[of_it])
                 sizes.append(np.full(int(of_it.sum()), 1.5 if one.series.model else 2.1))
-            self.ring = chosen, Points(np.concatenate(spots), colour, np.concatenate(sizes), "ring")
-        return self.ring[1]
+            rings = Points(np.concatenate(spots), colour, np.concatenate(sizes), "ring")
+            self.ring = chosen, rings, Lines(self.links_of(np.array(rows.get(0, []), dtype=np.intp)))
+        return self.ring[1:]
+
+    def places_of(self, one: Drawn) -> np.ndarray:
+        """(n, 2) of the points of one source."""
+        return self.places[one.start : one.start + len(one.series.points)]
+
+    def links_of(self, rows: np.ndarray) -> np.ndarray:
+        """(k, 2, 2) along the axes: links of some of the scene's own impacts."""
+        own = next((one for one in self.measured if one.series.source == 0), None)
+        found = [np.empty((0, 2, 2), dtype=np.float32)]
+        if own is not None:
+            start = dict(zip(own.series.row.tolist(), self.places_of(own), strict=True)) if rows.size else {}
+            for one in self.drawn:
+                if one.series.model and rows.size:
+                    of_it = np.flatnonzero(np.isin(one.series.row, rows))
+                    pairs = [(start[int(one.series.row[i])], self.places_of(one)[i]) for i in of_it]
+                    found.append(np.array(pairs, dtype=np.float32).reshape(-1, 2, 2))
+        return np.concatenate(found)
 
     def error_bars(self, compared: SceneComparison) -> Lines:
         """Error bars of all measured points."""
@@ -204,52 +226,100 @@ def curve_text(curve: Curve, spec: GraphSpec, full: bool = True) -> str:
     return f"{before}{exponent.translate(RAISED)}{after}"
 
 
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Points that are to be drawn, and how.
+
+    Attributes
+    ----------
+    series, colour, shape, hollow : as in `Drawn`.
+    shades : (n, 3) colours of the single points; None for the colour of the source.
+    made_of : what the points come from; compared by identity.
+    """
+
+    series: Series
+    colour: Rgb
+    shape: str
+    hollow: bool
+    shades: Array | None
+    made_of: tuple[object, ...]
+
+
 def build(
     scene: bpy.types.Scene,
     spec: GraphSpec,
     compared: SceneComparison,
     kept: list[Mask],
+    filters: object,
     colours: PointColours,
     look: Look,
+    before: ImpactGraph | None = None,
 ) -> ImpactGraph:
     """The graph of what is compared.
 
-    kept : of the scene's own impacts, and of each other table, those that pass the filters.
+    kept, filters : of the scene's own impacts, and of each other table, those that pass the filters.
+    before : the graph as it was; what has not changed of it stays, so that a slider moves the points of its model only.
     """
     settings = scene.rockfall_graphs
-    drawn = _series(spec, compared, kept, colours, look)
-    every = [series for series, *_ in drawn]
-    whole = whole_limits(every, (spec.x_log, spec.y_log))
+    sources = _sources(spec, compared, kept, colours, look)
+    whole = whole_limits([one.series for one in sources], (spec.x_log, spec.y_log))
     x, y = axis_of(spec.x, whole[0], spec.x_log), axis_of(spec.y, whole[1], spec.y_log)
-    own = next((series for series in every if not series.model and series.source == 0), None)
+    own = next((one.series for one in sources if not one.series.model and one.series.source == 0), None)
+    known = [] if before is None else before.drawn
+    few = sum(len(one.series.points) for one in sources if one.series.model) <= MOST_LINKS
     found, pieces, start = [], [np.empty((0, 2), dtype=np.float32)], 0
-    for series, colour, each, shape, hollow in drawn:
-        places = np.stack([x.places(series.points[:, 0]), y.places(series.points[:, 1])], axis=1)
-        opacity = min(1.0, max(0.45, (MANY / max(len(places), 1)) ** 0.25))
-        shades = np.ones((len(places), 4))
-        shades[:, :3], shades[:, 3] = (colour if each is None else each), opacity
-        links = None
-        if series.model and own is not None and settings.links:
-            pairs = pair_links(own, series)
-            links = Lines(np.stack([x.places(pairs[:, :, 0]), y.places(pairs[:, :, 1])], axis=2))
-        curve = None
-        if settings.fits and (series.model or series.source == 0):
-            curve = fit_curve(spec.fitted, series.points[series.defined], *whole, interval=False)
-        line = None
-        if curve is not None and curve.is_fitted:
-            line = Lines(np.stack([x.places(curve.x), y.places(curve.y)], axis=1))
-        points = Points(places, shades, opacity if opacity < 1 else 1.0, shape)
-        found.append(Drawn(series, colour, shape, hollow, points, links, curve, line, start))
-        pieces.append(places.astype(np.float32))
-        start += len(places)
+    for one in sources:
+        how = spec.fitted, settings.links and few, settings.fits, one.colour, one.shape, one.hollow
+        key = (*one.made_of, filters, compared.runs, x, y, *how)
+        same = next((each for each in known if each.key == key), None)
+        if same is not None and before is not None:
+            found.append(replace(same, start=start))
+            pieces.append(before.places[same.start : same.start + len(same.series.points)])
+        else:
+            places = np.stack([x.places(one.series.points[:, 0]), y.places(one.series.points[:, 1])], axis=1)
+            pieces.append(places.astype(np.float32))
+            found.append(_drawn(one, own, places, x, y, spec, settings, start, few, key))
+        start += len(one.series.points)
     return ImpactGraph(spec, x, y, found, np.concatenate(pieces))
 
 
-def _series(
+def _drawn(
+    one: Source,
+    own: Series | None,
+    places: Array,
+    x: Axis,
+    y: Axis,
+    spec: GraphSpec,
+    settings: bpy.types.PropertyGroup,
+    start: int,
+    few: bool,
+    key: object,
+) -> Drawn:
+    """Batches of one source.
+
+    few : whether there are so few links that all of them are drawn.
+    """
+    series = one.series
+    opacity = min(1.0, max(0.45, (MANY / max(len(places), 1)) ** 0.25))
+    shades = np.ones((len(places), 4))
+    shades[:, :3], shades[:, 3] = (one.colour if one.shades is None else one.shades), opacity
+    links, curve, line = None, None, None
+    if series.model and own is not None and settings.links and few:
+        pairs = pair_links(own, series)
+        links = Lines(np.stack([x.places(pairs[:, :, 0]), y.places(pairs[:, :, 1])], axis=2))
+    if settings.fits and series.source == 0:
+        curve = fit_curve(spec.fitted, series.points[series.defined], x.limits, y.limits, interval=False)
+    if curve is not None and curve.is_fitted:
+        line = Lines(np.stack([x.places(curve.x), y.places(curve.y)], axis=1))
+    points = Points(places, shades, opacity, one.shape)
+    return Drawn(series, one.colour, one.shape, one.hollow, points, links, curve, line, start, key)
+
+
+def _sources(
     spec: GraphSpec, compared: SceneComparison, kept: list[Mask], colours: PointColours, look: Look
-) -> list[tuple[Series, Rgb, Array | None, str, bool]]:
-    """Series, colour, colours of each point or None, shape, and whether it is hollow; what is on top comes last."""
-    found: list[tuple[Series, Rgb, Array | None, str, bool]] = []
+) -> list[Source]:
+    """What is to be drawn; what is on top comes last."""
+    found: list[Source] = []
     impacts, several = compared.impacts, len(compared.predictions) > 1
     hues = model_colours(compared.models)
     if impacts is not None:
@@ -257,24 +327,22 @@ def _series(
             for model, predicted in predictions.items():
                 title = f"{MODELS[model].title}{f', {which}' if several else ''}"
                 series = model_series(impacts, predicted, model, compared.runs, spec.x, spec.y, kept[0], title)
-                colour = shade(hues[model], look)
-                found.append((series, colour, None, model_shape(model), several and which == "B"))
+                hollow = several and which == "B"
+                colour = readable(hues[model], look)
+                found.append(Source(series, colour, model_shape(model), hollow, None, (impacts, predicted, title)))
     for i, other in enumerate(compared.others):
         if other.impacts is not None:
             rows = np.flatnonzero(kept[i + 1])
             title = ", ".join(other.sites[:3]) or other.path.name
             series = measured_series(other.impacts, spec.x, spec.y, rows, title, i + 1)
-            found.append((series, mixed(look.plot, look.measured, 0.6), colours.of(i + 1, rows), "circle", True))
+            grey = mixed(look.plot, look.measured, 0.6)
+            made_of = other.impacts, colours
+            found.append(Source(series, grey, "circle", True, colours.of(i + 1, rows), made_of))
     if impacts is not None:
         rows = np.flatnonzero(kept[0])
         series = measured_series(impacts, spec.x, spec.y, rows, "measured")
-        found.append((series, look.measured, colours.of(0, rows), "circle", False))
+        found.append(Source(series, look.measured, "circle", False, colours.of(0, rows), (impacts, colours)))
     return found
-
-
-def shade(colour: Rgb, look: Look) -> Rgb:
-    """A model's colour, so that it stands out from the background."""
-    return mixed(colour, look.measured, 0.18)
 
 
 def specs_key(scene: bpy.types.Scene, number: int) -> tuple[object, ...]:

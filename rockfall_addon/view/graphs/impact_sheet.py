@@ -13,7 +13,7 @@ import numpy as np
 from ....core.analysis.columns import passing
 from ....core.analysis.graph_layout import Frame, Rectangle, frame, tiles
 from ....core.analysis.variable_sigma import measured_sigma
-from ....core.analysis.variables import VARIABLES, measured_values
+from ....core.analysis.variables import VARIABLES, known_variables, measured_values
 from ....core.reconstruction.impact import Impacts
 from ....core.vectors import Mask
 from ...scene import comparison, graph_settings
@@ -72,7 +72,7 @@ def draw(context: bpy.types.Context, canvas: Canvas) -> None:
         taken = legend.draw(room, look, compared, next(iter(graphs.values())), _kept(scene).colours)
         room = Rectangle(room.left, room.bottom, room.width, max(room.height - taken, 1.0))
     chosen = selection.selected(context)
-    for tile, (number, graph) in zip(tiles(room, len(graphs), 0.6 * look.text), graphs.items(), strict=True):
+    for tile, (number, graph) in zip(tiles(room, len(graphs), 0.6 * look.text, look.text), graphs.items(), strict=True):
         _draw_graph(scene, canvas, number, graph, tile, compared, chosen)
     if canvas.hit is not None and canvas.graph in graphs and canvas.pointer is not None:
         _draw_card(canvas, graphs[canvas.graph], canvas.hit, compared)
@@ -99,28 +99,36 @@ def graph_of(scene: bpy.types.Scene, number: int, compared: comparison.SceneComp
     """A graph with its batches; made again when something that it shows has changed."""
     kept, settings = _kept(scene), scene.rockfall_graphs
     rows = rows_of(scene, compared)
-    colours_key = compared.version, settings.colour_by, look.dark
+    tables = _tables(compared)
+    colours_key = tables, settings.colour_by, look.dark
     if kept.colours_key != colours_key:
-        kept.colours = find_colours(_tables(compared), settings.colour_by, look.dark)
+        kept.colours = find_colours(tables, settings.colour_by, look.dark)
         kept.colours_key = colours_key
     key = compared.version, kept.rows_key, colours_key, look.measured, look.plot, specs_key(scene, number)
-    if kept.graphs.get(number, (None,))[0] != key:
+    known, before = kept.graphs.get(number, (None, None))
+    if known != key:
         spec = graph_settings.spec_of(graph_settings.graph(scene, number), number)
-        kept.graphs[number] = key, build(scene, spec, compared, rows, kept.colours, look)
+        kept.graphs[number] = key, build(scene, spec, compared, rows, kept.rows_key, kept.colours, look, before)
     return kept.graphs[number][1]
 
 
 def rows_of(scene: bpy.types.Scene, compared: comparison.SceneComparison) -> list[Mask]:
     """Of the scene's own impacts, and of each other table, those that pass the filters."""
     kept, filters = _kept(scene), graph_settings.filters_of(scene)
-    if kept.rows_key != (compared.version, filters):
-        tables = _tables(compared)
+    tables = _tables(compared)
+    if kept.rows_key != (tables, len(compared.others), filters):
         kept.rows = [
             passing(tables[source], filters) if source in tables else np.zeros(0, dtype=np.bool_)
             for source in range(1 + len(compared.others))
         ]
-        kept.rows_key = compared.version, filters
+        kept.rows_key = tables, len(compared.others), filters
     return kept.rows
+
+
+def variables_of(scene: bpy.types.Scene) -> list[str]:
+    """The variables that one of the tables has anything of, in the order of menus."""
+    known = {name for table in _tables(comparison.comparison_of(scene)).values() for name in known_variables(table)}
+    return [name for name in VARIABLES if name in known or not known]
 
 
 def _kept(scene: bpy.types.Scene) -> _Kept:
@@ -148,15 +156,13 @@ def _draw_graph(
 ) -> None:
     look, settings = canvas.look, scene.rockfall_graphs
     x, y = graph.axes(graph_settings.spec_of(graph_settings.graph(scene, number), number))
-    fits = [one for one in reversed(graph.drawn) if one.curve is not None]
-    most = 1 + (len(fits) - 1 if tile.height > FULL_HEIGHT * look.text else 0)
-    most = min(most, max(1, int(0.25 * tile.height / (LINE * look.text))))
-    lines = max(min(most, len(fits)), 1)
-    seen = frame(tile, x, y, look.text, look.measure, lines * LINE * look.text + 0.3 * look.text)
+    fits = [one for one in graph.drawn if one.curve is not None]
+    lines = 1 + (len(fits) > 1 and tile.height > FULL_HEIGHT * look.text)
+    seen = frame(tile, x, y, look.text, look.measure, (lines * LINE + 0.4) * look.text)
     canvas.frames[number] = seen
     pointed = canvas.part if canvas.graph == number else ""
     draw_axes(seen, look, pointed)
-    rim = 0.0 if len(graph.places) > 5000 else 0.9 * look.scale
+    rim = 0.0 if len(graph.places) > 5000 else 0.8 * look.scale
     with drawing.in_axes(seen, graph.x, graph.y) as bounds:
         with drawing.clipped(seen.plot):
             for one in graph.drawn:
@@ -171,10 +177,13 @@ def _draw_graph(
             hollow = 1.6 * look.scale if one.hollow else 0.0
             one.points.draw(look.point * (1.15 if one.series.model else 1.0), bounds, look.plot, rim, hollow)
         if chosen:
-            graph.chosen_ring(chosen, look.chosen).draw(look.point, bounds)
+            rings, links = graph.chosen(chosen, look.chosen)
+            with drawing.clipped(seen.plot):
+                links.draw(alpha(look.chosen, 0.7), look.line)
+            rings.draw(look.point, bounds)
         if pointed and canvas.hit is not None:
             _draw_pointed(canvas, graph, compared, seen.plot, bounds)
-    _draw_title(canvas, graph, fits[:lines], seen, tile)
+    _draw_title(canvas, graph, fits, seen, lines)
     said = empty.in_graph(graph, compared)
     if said:
         empty.draw_in_plot(seen.plot, look, said)
@@ -192,32 +201,50 @@ def _draw_pointed(
     if hit.series >= len(graph.drawn):
         return
     one = graph.drawn[hit.series]
-    if not one.series.model and bpy.context.scene.rockfall_graphs.error_bars != "NEVER":
-        with drawing.clipped(plot):
+    with drawing.clipped(plot):
+        if not one.series.model and bpy.context.scene.rockfall_graphs.error_bars != "NEVER":
             drawing.Lines(graph.bar(compared, one, np.array([hit.place]))).draw(alpha(look.ink), look.line)
+        if hit.source == 0:
+            drawing.Lines(graph.links_of(np.array([hit.row]))).draw(alpha(look.ink, 0.8), look.line)
     same = [
-        graph.places[each.start : each.start + each.series.row.size][each.series.row == hit.row]
-        for each in graph.drawn
-        if each.series.source == hit.source
+        graph.places_of(each)[each.series.row == hit.row] for each in graph.drawn if each.series.source == hit.source
     ]
     drawing.Points(np.concatenate(same), look.ink, 2.0, "ring").draw(look.point, bounds)
 
 
-def _draw_title(canvas: Canvas, graph: ImpactGraph, fits: list[Drawn], seen: Frame, tile: Rectangle) -> None:
-    """Above the plot: what lies beyond the axes to the right, the fits to the left."""
+def _draw_title(canvas: Canvas, graph: ImpactGraph, fits: list[Drawn], seen: Frame, lines: int) -> None:
+    """Above the plot: the fits to the left, that of the measured points first; what lies beyond to the right."""
     look, plot = canvas.look, seen.plot
     base = plot.top + 0.45 * look.text
-    room = plot.width
+    top, room = base + (lines - 1) * LINE * look.text, plot.width
     outside = graph.beyond(seen.x, seen.y)
     if outside:
-        words = _beyond_text(outside, look, 0.5 * plot.width if fits else plot.width)
-        room -= drawing.text(plot.right, base, words, look.text, look.faint, (1.0, 0.0)) + look.text
-    for i, one in enumerate(reversed(fits)):
-        texts = [curve_text(one.curve, graph.spec), curve_text(one.curve, graph.spec, full=False)]
-        texts.append(f"R² = {one.curve.fit.r2:.2f}".replace("-", "−") if one.curve.is_fitted else "")
-        space = room if i == 0 else plot.width
-        words = next((text for text in texts if look.measure(text) <= space), "")
-        drawing.text(plot.left, base + i * LINE * look.text, words, look.text, one.colour)
+        words = _beyond_text(outside, look, 0.5 * room if fits else room)
+        room -= drawing.text(plot.right, top, words, look.text, look.faint, (1.0, 0.0)) + look.text
+    models = [one for one in fits if one.series.model]
+    for one in fits:
+        if not one.series.model:
+            drawing.text(plot.left, top, _fitting(_fit_texts(one, graph), look, room), look.text, one.colour)
+    if lines < 2:
+        return
+    x = plot.left
+    for one in models:
+        texts = _fit_texts(one, graph)
+        words = _fitting(texts if len(models) == 1 else texts[2:], look, plot.right - x)
+        x += drawing.text(x, base, words, look.text, one.colour) + look.text
+
+
+def _fit_texts(one: Drawn, graph: ImpactGraph) -> list[str]:
+    """What can be said of a fit, the longest first."""
+    curve = one.curve
+    r2 = f"R² {curve.fit.r2:.2f}".replace("-", "−") if curve.is_fitted else ""
+    rank = f", ρ {curve.rank:.2f}".replace("-", "−") if np.isfinite(curve.rank) and r2 else ""
+    return [curve_text(curve, graph.spec), curve_text(curve, graph.spec, full=False), f"{r2}{rank}", r2, ""]
+
+
+def _fitting(texts: list[str], look: Look, room: float) -> str:
+    """The longest text that has room."""
+    return next((text for text in texts if look.measure(text) <= room), "")
 
 
 def _beyond_text(outside: list[tuple[float, int, int]], look: Look, room: float) -> str:

@@ -12,7 +12,9 @@ from .look import Look, Rgb
 from .point_colours import PointColours
 
 STEP = 1.7
-MOST_LINES = 2
+LINES, LINES_OF_TALL = 2, 4
+TALL = 45
+"""Height of a room that has place for more lines, in heights of the text."""
 UNIT = (-1e9, -1e9, 1e9, 1e9)
 
 Entry = tuple[str, Rgb, str, bool]
@@ -31,7 +33,8 @@ def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGr
     if colours.colouring is not None:
         entries.append((f"   {colours.colouring.title.split(' [')[0]}:", look.faint, "", False))
         entries += [(text or "empty", colour, "circle", False) for text, colour in colours.colouring.groups]
-    lines = _lines(entries, look, room.width)
+    most = LINES_OF_TALL if room.height > TALL * look.text else LINES
+    lines = _lines(entries, look, room.width - look.text, most)
     top = room.top - 0.5 * STEP * look.text
     for i, line in enumerate(lines):
         x = room.left + look.text
@@ -42,20 +45,21 @@ def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGr
     return len(lines) * STEP * look.text
 
 
-def _lines(entries: list[Entry], look: Look, width: float) -> list[list[Entry]]:
+def _lines(entries: list[Entry], look: Look, width: float, most: int) -> list[list[Entry]]:
     """Entries line by line; those without room are counted."""
     lines: list[list[Entry]] = [[]]
-    used, rest = look.text, look.measure("+ 100 more") + 2 * look.text
+    used, more = 0.0, look.measure("+ 100 more")
     for number, entry in enumerate(entries):
         wide = look.measure(entry[0]) + (2.4 if entry[2] else 1.2) * look.text
-        last = number == len(entries) - 1
-        full = used + wide + (0 if last else rest) > width
-        if full and len(lines) < MOST_LINES and lines[-1]:
+        ends = len(lines) == most and number < len(entries) - 1  # then what is left must be counted
+        if lines[-1] and used + wide + (more if ends else 0) > width:
+            if len(lines) == most:
+                left = len(entries) - number
+                words = (f"+ {left} more", f"+ {left}")[used + more > width]
+                lines[-1].append((words, look.faint, "", False))
+                break
             lines.append([])
-            used, full = look.text, False
-        if full and lines[-1]:
-            lines[-1].append((f"+ {len(entries) - number} more", look.faint, "", False))
-            break
+            used = 0.0
         lines[-1].append(entry)
         used += wide
     return lines

@@ -10,7 +10,7 @@ Rgb = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
 
 FONT = 0
-POINT = 7.0
+POINT = 8.0
 """Diameter of a point at interface scale 1 [px]."""
 
 
@@ -63,19 +63,20 @@ def look(context: bpy.types.Context) -> Look:
     preferences = context.preferences
     scale = preferences.system.ui_scale
     theme, text = preferences.themes[0], preferences.ui_styles[0].widget.points * scale
-    return dressed(scale, text, tuple(theme.node_editor.space.back[:3]), tuple(theme.view_3d.object_active[:3]))
+    panel = theme.user_interface.panel_back  # a light theme keeps the node editor dark
+    return dressed(scale, text, tuple(panel[:3]), tuple(theme.view_3d.object_active[:3]))
 
 
 def dressed(scale: float, text: float, back: Rgb, chosen: Rgb = (1.0, 0.63, 0.16)) -> Look:
     """For a background, dark or light; also for pictures that no theme has a say in."""
     dark = luminance(back) < 0.45
     far, near = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0)) if dark else ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-    plot = mixed(back, near, 0.25 if dark else 0.75)
+    plot = mixed(back, near, 0.55 if dark else 0.85)
     return Look(
         scale=scale,
         text=text,
         dark=dark,
-        back=back if dark else mixed(back, near, 0.45),
+        back=mixed(back, near, 0.35 if dark else 0.5),
         plot=plot,
         ink=mixed(plot, far, 0.88),
         faint=mixed(plot, far, 0.6),
@@ -89,6 +90,16 @@ def dressed(scale: float, text: float, back: Rgb, chosen: Rgb = (1.0, 0.63, 0.16
 def luminance(colour: Rgb) -> float:
     """From 0, black, to 1, white, as the eye weighs sRGB."""
     return 0.2126 * colour[0] + 0.7152 * colour[1] + 0.0722 * colour[2]
+
+
+def readable(colour: Rgb, look: Look) -> Rgb:
+    """A colour, mixed with that of the measured points until it stands out from the background."""
+    apart = 0.30 if look.dark else 0.42
+    for share in range(10):
+        found = mixed(colour, look.measured, share / 10)
+        if abs(luminance(found) - luminance(look.plot)) >= apart:
+            break
+    return found
 
 
 def mixed(one: Rgb, other: Rgb, share: float) -> Rgb:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""PlatRock on the case of `simulation.py`: run by its own Python; prints RESULT, seconds and contacts for each block.
+"""PlatRock on the case of `simulation.py`, run by its own Python: prints RESULT, seconds, contacts, metres of a block.
 
 PlatRock reads grids and polygons with GDAL, of which there are no wheels. Nothing is read here: the grid is handed over
 as numbers, so an empty module stands in for GDAL; and there are no trees. The contact code is PlatRock's own.
@@ -82,7 +82,9 @@ def main() -> None:
     if simulation.status != "finished":
         raise SystemExit(f"PlatRock ended with {simulation.status}")
     contacts = np.mean([len(one) for one in simulation.output.contacts])
-    print("RESULT", seconds / len(starts), contacts)
+    ways = [np.diff(simulation.output.get_contacts_pos(i), axis=0) for i in range(len(starts))]
+    metres = np.mean([np.linalg.norm(way, axis=1).sum() for way in ways])
+    print("RESULT", seconds / len(starts), contacts, metres)
 
 
 if __name__ == "__main__":

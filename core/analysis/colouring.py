@@ -66,9 +66,12 @@ def group_colour(number: int, dark: bool) -> Rgb:
     return colorsys.hls_to_rgb(hue, light, 0.75)
 
 
-def model_colours(models: Sequence[str]) -> dict[str, Rgb]:
-    """Model → colour in a graph: red for one alone, else a hue each, that of its blocks in the 3-D view."""
-    if len(models) == 1:
+def model_colours(models: Sequence[str], *, with_blocks: bool = False) -> dict[str, Rgb]:
+    """Model → colour in a graph: red for one alone, else a hue each, that of its blocks in the 3-D view.
+
+    with_blocks : such blocks are shown, so one alone has the hue of its own, too: there red are the real ones.
+    """
+    if len(models) == 1 and not with_blocks:
         return {models[0]: ONE_MODEL}
     return {name: (MODELS[name].colour[0], MODELS[name].colour[1], MODELS[name].colour[2]) for name in models}
 

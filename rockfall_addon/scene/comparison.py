@@ -59,6 +59,7 @@ class SceneComparison:
         same object as before.
     runs : which runs of a model's predictions are its points: 0 is the mean.
     others : tables of other sites.
+    in_view : models whose blocks are in the 3-D view.
     problems : sentences about what is not shown, and why.
     """
 
@@ -68,6 +69,7 @@ class SceneComparison:
     predictions: Mapping[str, Mapping[str, Predictions]]
     runs: tuple[int, ...]
     others: tuple[OtherSites, ...]
+    in_view: tuple[str, ...]
     problems: tuple[str, ...]
 
     @property
@@ -109,8 +111,8 @@ def comparison_of(scene: bpy.types.Scene) -> SceneComparison:
     chosen = tuple(name for name in models.ORDER if name in settings.models)
     sets = tuple(models.PARAMETER_SETS) if settings.sets == "BOTH" else (settings.sets,)
     texts = tuple(scene.get(key, "{}") for key in models.PARAMETER_SETS.values())
-    measured = measured_of(scene)
-    key = (measured, chosen, sets, settings.points, settings.replicates, settings.seed, texts, others)
+    measured, in_view = measured_of(scene), models.shown_models(scene)
+    key = (measured, chosen, sets, settings.points, settings.replicates, settings.seed, texts, others, in_view)
     if kept.found is None or kept.key != key:
         problems = [*measured.problems, *(one.problem for one in others if one.problem)]
         predictions = _predictions(scene, kept, measured, chosen, sets, problems)
@@ -122,6 +124,7 @@ def comparison_of(scene: bpy.types.Scene) -> SceneComparison:
             predictions=predictions,
             runs=runs if settings.replicates else (0,),
             others=others,
+            in_view=in_view,
             problems=tuple(dict.fromkeys(problems)),
         )
         kept.key = key

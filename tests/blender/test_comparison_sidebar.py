@@ -128,6 +128,16 @@ def test_the_models_blocks_follow_the_scenes_set_only(scene, models) -> None:
     assert speeds() == before
 
 
+def test_graphs_have_the_colours_of_the_blocks_that_are_shown(scene, part, comparison_of) -> None:
+    model_colours = part("core.analysis.colouring").model_colours
+    own = part("core.impact_models.registry").find_model(MODEL).colour
+    assert comparison_of(scene).in_view == ()
+    assert model_colours([MODEL])[MODEL] != own
+    bpy.ops.rockfall.show_models(models={MODEL})
+    assert comparison_of(scene).in_view == (MODEL,)
+    assert model_colours([MODEL], with_blocks=True)[MODEL] == own
+
+
 def test_blocks_after_a_slider_are_those_of_showing_them_anew(scene, part) -> None:
     bpy.ops.rockfall.show_models(models={MODEL, "noel_2017"})
 

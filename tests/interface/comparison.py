@@ -39,19 +39,35 @@ def theme(name):
 
 
 def case_sidebar_of_the_graphs(window):
+    """What is in the sidebar, with two sets of parameters and with what a calibration proposes, in both themes."""
     yield from wide(window)
-    window.screenshot("dark")
     scene = bpy.context.scene
-    scene.rockfall_comparison.models = {"azimi_desvarreux_1977", "pfeiffer_bowen_1989", MODEL}
+    with window.override("NODE_EDITOR"):
+        bpy.ops.screen.screen_full_area()
+    yield 2.0
+    scene.rockfall_comparison.models = {"pfeiffer_bowen_1989", MODEL}
     scene.rockfall_comparison.sets = "BOTH"
     scene.rockfall_other_parameters.noel_2017.rt = 0.4
-    yield 1.0
+    yield 1.5
     window.screenshot("both")
     theme("Light")
-    yield 1.0
+    yield 1.5
     window.screenshot("light")
     theme("Dark")
-    yield 0.5
+    scene.rockfall_comparison.models = {MODEL}
+    scene.rockfall_comparison.sets = "A"
+    scene.rockfall_comparison.fitted = MODEL
+    with window.override("NODE_EDITOR"):
+        assert bpy.ops.rockfall.calibrate("EXEC_DEFAULT") == {"FINISHED"}
+    sidebar = window.region("UI", "NODE_EDITOR")
+    top = sidebar.y + sidebar.height
+    yield from window.click(sidebar.x + 60, top - 14, ctrl=True)
+    yield 2.0
+    window.screenshot("closed")
+    yield from window.click(sidebar.x + 60, top - 377, ctrl=True)
+    yield 2.0
+    window.screenshot("calibrated")
+    assert set(window.part("rockfall_addon.scene.comparison").comparison_of(scene).predictions) == {"A", "B"}
 
 
 def spread_of(window):
@@ -114,7 +130,7 @@ def case_drag_a_slider_calibrate_and_undo(window):
     job = window.part("rockfall_addon.view.job")
     with window.override("NODE_EDITOR"):
         bpy.ops.rockfall.calibrate("INVOKE_DEFAULT")
-    yield 0.6
+    yield 1.5
     window.screenshot("calibrating")
     yield from window.press("ESC", *window.centre())
     yield from window.wait_for(lambda: not job.is_running(), 60, "stopped")

@@ -73,7 +73,10 @@ class ROCKFALL_PT_compared_parameters(_GraphPanel, bpy.types.Panel):
             row.label(text="Change")
             row.prop(settings, "edited", expand=True)
             which = settings.edited
-        if settings.sets != "A" and store.FIT not in scene:
+        if store.FIT in scene:
+            paragraph(context, layout, "Set B is what was fitted.", "INFO")
+            _draw_decision(layout)
+        elif settings.sets != "A":
             row = layout.row(align=True)
             for way, text in (("A_TO_B", "A → B"), ("B_TO_A", "B → A"), ("SWAP", "Swap")):
                 row.operator("rockfall.copy_parameters", text=text).way = way
@@ -179,6 +182,10 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, propo
     paragraph(context, layout, f"{proposal.scores}.", "INFO")
     show_remarks(context, layout, proposal.remarks)
     paragraph(context, layout, "Graphs and scores show it as set B beside set A.", "INFO")
+    _draw_decision(layout)
+
+
+def _draw_decision(layout: bpy.types.UILayout) -> None:
     row = layout.row(align=True)
     row.scale_y = 1.4
     row.operator("rockfall.apply_fit", text="Apply", icon="CHECKMARK")

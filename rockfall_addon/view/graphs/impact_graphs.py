@@ -321,7 +321,7 @@ def _sources(
     """What is to be drawn; what is on top comes last."""
     found: list[Source] = []
     impacts, several = compared.impacts, len(compared.predictions) > 1
-    hues = model_colours(compared.models)
+    hues = model_colours(compared.models, with_blocks=bool(compared.in_view))
     if impacts is not None:
         for which, predictions in compared.predictions.items():
             for model, predicted in predictions.items():

@@ -10,7 +10,7 @@ from ....core.impact_models.registry import MODELS
 from ...scene import comparison, comparison_scores, databases, fit, model_parameters, models, store
 from ...view import job, parameters
 from ...view.graphs import editor
-from ...view.panel import facts, paragraph, show_remarks
+from ...view.panel import paragraph, show_remarks
 
 MEASURES = {"rmse": "RMSE", "median_error": "median", "energy_distance": "cloud"}
 """Measure → head of its column."""
@@ -172,12 +172,14 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, propo
         paragraph(context, layout, proposal.stale, "ERROR")
     title = MODELS[proposal.model].title
     what = f"like {MODELS[proposal.imitated].title}, on" if proposal.imitated else "fitted to"
-    paragraph(context, layout, f"{title} {what} {proposal.impacts} impacts of {proposal.trajectories} trajectories:")
+    paragraph(
+        context, layout, f"{title} {what} {proposal.impacts} impacts of {proposal.trajectories} trajectories:", "GRAPH"
+    )
     for row in proposal.rows:
         box = layout.box().column(align=True)
-        facts(box, [(row.name, f"{_value(row.before)} → {_value(row.after)}")])
+        box.label(text=f"{row.name}: {_value(row.before)} → {_value(row.after)}")
         if row.interval:
-            facts(box, [("95 % interval", row.interval)])
+            box.label(text=f"95 %: {row.interval}")
         show_remarks(context, box, row.remarks)
     paragraph(context, layout, f"{proposal.scores}.", "INFO")
     show_remarks(context, layout, proposal.remarks)

@@ -39,9 +39,10 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
                 depress=on,
             )
             button.models = set(shown) ^ {name}
-        row = layout.row()
+        row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator("rockfall.open_graphs", text="Open Graphs", icon="GRAPH")
+        row.operator("rockfall.open_graphs_workspace", text="", icon="WORKSPACE")
         for name in shown:
             header, body = layout.panel(f"ROCKFALL_shown_parameters_{name}", default_closed=True)
             own = " (own values)" if models.parameters_of(scene).get(name) else ""

@@ -108,13 +108,14 @@ def test_the_line_under_the_mouse_is_the_nearest_one(rockfall, part) -> None:
     plot = layout.Rectangle(100.0, 50.0, 400.0, 200.0)
     zoomed = layout.Frame(plot, plot, axes.Axis((0.0, 5.0)), axes.Axis((0.0, 10.0)), None, None)
     ends = np.array([[[0.0, 0.1], [0.5, 0.1]], [[0.0, 0.3], [0.5, 0.3]], [[0.5, 0.1], [0.5, 0.9]]], dtype=np.float32)
-    found = lines.Bundle((), ends, np.array([0, 1, 2]), None, None)
+    found = lines.Bundle((), ends, lines.span_of(ends), np.array([0, 1, 2]), None, None)
     # a value of 2 of 20 is at 0.2 of the zoomed axis: 40 px above the bottom
     assert lines.nearest_line(found, zoomed, *whole, (200.0, 93.0), 8.0) == (pytest.approx(3.0, abs=1e-4), 0)
     assert lines.nearest_line(found, zoomed, *whole, (200.0, 165.0), 8.0) == (pytest.approx(5.0, abs=1e-4), 1)
     assert lines.nearest_line(found, zoomed, *whole, (200.0, 130.0), 8.0) == (np.inf, -1)
     assert lines.nearest_line(found, zoomed, *whole, (497.0, 200.0), 8.0)[1] == 2
-    nothing = lines.Bundle((), np.empty((0, 2, 2), np.float32), np.empty(0, np.intp), None, None)
+    none = np.empty((0, 2, 2), np.float32)
+    nothing = lines.Bundle((), none, lines.span_of(none), np.empty(0, np.intp), None, None)
     assert lines.nearest_line(nothing, zoomed, *whole, (200.0, 93.0), 8.0) == (np.inf, -1)
 
 

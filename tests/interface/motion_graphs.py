@@ -61,7 +61,7 @@ def case_motion_graphs_move_the_time(window):
     yield from open_graphs(window)
     scene, rate = bpy.context.scene, bpy.context.scene.render.fps
     yield from window.click(*place(window, 0, 6.0, 22.0))
-    assert scene.frame_current == round(6.0 * rate)
+    assert abs(scene.frame_current - 6.0 * rate) <= 1
     first = place(window, 1, 8.0, 7.7)
     yield from window.move(*first)
     window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(first[0]), y=round(first[1]))
@@ -71,7 +71,7 @@ def case_motion_graphs_move_the_time(window):
     window.screenshot("dragging")
     assert abs(scene.frame_current - 12.0 * rate) <= 1
     yield from window.press("ESC", *place(window, 1, 12.0, 7.0))
-    assert scene.frame_current == round(6.0 * rate)
+    assert abs(scene.frame_current - 6.0 * rate) <= 1
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(first[0]), y=round(first[1]))
     yield 0.3
 
@@ -80,10 +80,11 @@ def case_motion_graphs_move_the_time(window):
     course, time_s = alone(motion.courses, speed)
     yield from window.move(*place(window, 0, time_s, course.at(speed, time_s)))
     assert canvas(window).hit == (course.trajectory, 0), canvas(window).hit
+    yield 1.0
     window.screenshot("hover")
     yield from window.click(*place(window, 0, time_s, course.at(speed, time_s)))
     assert [obj.name for obj in bpy.context.selected_objects] == [f"{course.trajectory} block"]
-    assert scene.frame_current == round(time_s * rate)
+    assert abs(scene.frame_current - time_s * rate) <= 1.5
     yield 0.5
     window.screenshot("selected")
     impact = float(course.impact_time_s[course.impact_time_s > time_s][0])

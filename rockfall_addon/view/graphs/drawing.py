@@ -232,17 +232,19 @@ class Lines:
         flat[:, :2] = self.places.reshape(-1, 2)
         return batch_for_shader(_line_shader(), "LINES", {"pos": flat})
 
-    def draw(self, colour: Rgba, width: float) -> None:
+    def draw(self, colour: Rgba, width: float, *, thin: bool = False) -> None:
+        """thin : one pixel wide on the screen and not smoothed, which is many times quicker."""
         if not len(self.places):
             return
         if _paper:
             paper = _paper[-1]
             paper.svg.lines(paper.pixels(self.places), colour, width, paper.clip)
             return
-        shader = _line_shader()
+        shader = gpu.shader.from_builtin("UNIFORM_COLOR") if thin else _line_shader()
         shader.bind()
-        shader.uniform_float("lineWidth", width)
-        shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
+        if not thin:
+            shader.uniform_float("lineWidth", width)
+            shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
         shader.uniform_float("color", colour)
         gpu.state.blend_set("ALPHA")
         self.batch.draw(shader)

@@ -23,7 +23,7 @@ ON_LIGHT: Rgb = (0.78, 0.45, 0.0)
 MARK_PX = 7.0
 """How near to an impact's time the mouse points at it, at interface scale 1."""
 MOST_MARKED = 40
-"""Of more trajectories, only the selected ones have their impacts marked."""
+"""Of more trajectories, only the selected ones have their impacts marked and smooth lines."""
 
 
 class Hit(NamedTuple):
@@ -231,7 +231,8 @@ def _draw_graph(canvas: Canvas, number: int, graph: _Graph, quantity: Quantity, 
     with drawing.in_axes(frame, x, graph.y) as bounds, drawing.clipped(frame.plot):
         many = len(graph.others.courses)
         faint = 0.22 if some else max(0.35, min(0.9, (20 / max(many, 1)) ** 0.5))
-        graph.others.lines.draw(alpha(look.measured, faint), max(1.0, (0.9 if some else 1.2) * look.scale))
+        width = max(1.0, (0.9 if some else 1.2) * look.scale)
+        graph.others.lines.draw(alpha(look.measured, faint), width, thin=many > MOST_MARKED)
         graph.chosen.lines.draw(alpha(look.measured), 2.0 * look.scale)
         if graph.chosen.points is not None:
             graph.chosen.points.draw(look.point, bounds)

@@ -14,7 +14,7 @@ from .extras import FIGURES, demand
 from .figures import COLUMN_IN, FORMATS, INK, MEASURED, MUTED, PAGE_IN, STYLE, beyond_lines, curve_text, save_named
 from .graphs import PAPER_GRAPHS, Graph, GraphSpec, make_graph
 from .group_statistics import Grouping
-from .statistics import usable
+from .statistics import FEWEST_FOR_LAW, usable
 from .variables import find_variable
 
 if TYPE_CHECKING:
@@ -114,13 +114,14 @@ def _series(impacts: Impacts, spec: GraphSpec, grouping: Grouping | None) -> lis
     fixed = {"x_limits": whole.x_limits, "y_limits": whole.y_limits, "x_log": spec.x_log, "y_log": spec.y_log}
     same = GraphSpec(spec.name, spec.x, spec.y, trend=spec.trend, **fixed)  # type: ignore[arg-type]
     series = []
+    bare = GraphSpec(spec.name, spec.x, spec.y, trend="none", **fixed)  # type: ignore[arg-type]
     rest = used & ~np.isin(group, largest)
     if rest.any():
-        bare = GraphSpec(spec.name, spec.x, spec.y, trend="none", **fixed)  # type: ignore[arg-type]
         series.append(Series("others", make_graph(impacts, bare, row=np.flatnonzero(rest)), OTHERS, OTHERS_MARKER))
     for place, i in enumerate(largest):
         if counts[i]:
-            graph = make_graph(impacts, same, row=np.flatnonzero(used & (group == i)))
+            shown = same if counts[i] >= FEWEST_FOR_LAW else bare
+            graph = make_graph(impacts, shown, row=np.flatnonzero(used & (group == i)))
             series.append(Series(names[i], graph, COLOURS[place], MARKERS[place]))
     return series
 
@@ -134,13 +135,12 @@ def _draw(axes: "Axes", series: Sequence[Series]) -> None:
     axes.set_ylim(graph.y_limits)
     if spec.y == "rn" and graph.y_limits[0] < 1.0 < graph.y_limits[1]:
         axes.axhline(1.0, color=MUTED, linewidth=0.5, linestyle=(0, (4, 3)), zorder=1)
-    crowded = points > MOST_VECTORS
-    common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "rasterized": crowded}
-    for one in series:
-        size, alpha = (1.2, 0.25) if crowded else (3.3, 0.85)
-        axes.plot(
-            *one.graph.measured.T, marker=one.marker, markersize=size, alpha=alpha, color=one.colour, zorder=3, **common
-        )
+    if points > MOST_VECTORS:
+        _crowd(axes, series)
+    else:
+        common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "markersize": 3.3, "alpha": 0.85}
+        for one in series:
+            axes.plot(*one.graph.measured.T, marker=one.marker, color=one.colour, zorder=3, **common)
     notes = []
     for one in series:
         curve = one.graph.measured_curve
@@ -161,6 +161,17 @@ def _draw(axes: "Axes", series: Sequence[Series]) -> None:
     x, y = find_variable(spec.x), find_variable(spec.y)
     axes.set_xlabel(x.tex_label)
     axes.set_ylabel(y.tex_label)
+
+
+def _crowd(axes: "Axes", series: Sequence[Series]) -> None:
+    """Very many points as small dots, the groups mixed so that none hides the others."""
+    from matplotlib.colors import to_rgb
+
+    points = np.concatenate([one.graph.measured for one in series])
+    colours = np.repeat([to_rgb(one.colour) for one in series], [one.graph.row.size for one in series], axis=0)
+    order = np.random.default_rng(0).permutation(len(points))
+    x, y = points[order].T
+    axes.scatter(x, y, s=1.5, c=colours[order], alpha=0.3, linewidths=0, rasterized=True, zorder=3)
 
 
 def _write_above(axes: "Axes", notes: Sequence[tuple[str, str]]) -> None:
@@ -185,7 +196,7 @@ def _legend(figure: "Figure", series: Sequence[Series], title: str, columns: int
     common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "markersize": 4.0}
     handles = [
         Line2D([], [], marker=one.marker, color=one.colour, label=f"{one.name} ({one.graph.row.size})", **common)
-        for one in series
+        for one in sorted(series, key=lambda one: one.colour == OTHERS)
     ]
     figure.legend(
         handles=handles,

@@ -21,6 +21,8 @@ PUBLISHED_RT_R2 = 0.31
 PUBLISHED_RN_ANGLE_DEG = 20.0
 """Noël et al. 2018: R_N exceeds 1 where the incident angle is below about 20°."""
 
+FEWEST_FOR_LAW = 10
+"""With fewer impacts a group's trends are not shown: a power law through a few points is anything."""
 HYPERBOLIC = (0.7, 1.3)
 """Exponents of 1/θ1 that are called hyperbolic; Noël et al. 2017 have 1.08, Wyllie 1.03."""
 

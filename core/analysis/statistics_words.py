@@ -6,12 +6,10 @@ from collections.abc import Mapping, Sequence
 from .curves import number
 from .group_statistics import GroupStatistics
 from .line_fits import FEWEST, LineFit
-from .statistics import ImpactStatistics
+from .statistics import FEWEST_FOR_LAW, ImpactStatistics
 
 TextRow = tuple[str, ...]
 """The cells of a row."""
-FEWEST_FOR_LAW = 10
-"""With fewer impacts a group's power law is not shown: its two numbers would be anything."""
 MOST_GROUPS = 12
 """So many groups are shown, the largest ones; all are in groups.csv."""
 

@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     moving.add_argument(
         "--frames", type=whole, nargs=2, metavar=("FIRST", "LAST"), help="of the video to follow (default all)"
     )
-    moving.add_argument("--terrain", metavar="MESH", help="mesh, grid or cloud; the points are checked against it")
+    moving.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; the points are checked against it")
     errors = parser.add_argument_group("errors of the pairs")
     errors.add_argument(
         "--sigma-px",

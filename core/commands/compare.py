@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "predicted flights: the blocks that leave each impact as a model says, and where they land"
     )
-    group.add_argument("--terrain", metavar="MESH", help="the terrain on which they land → predicted_flights.csv")
+    group.add_argument("--terrain", metavar="FILE", help="the terrain on which they land → predicted_flights.csv")
     group.add_argument(
         "--gravity", type=not_negative, default=GRAVITY_MPS2, metavar="G", help="[m/s²] (default %(default)s)"
     )

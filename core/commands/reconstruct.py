@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("picks", metavar="PICKS", help="picks.csv")
     add_out(parser)
-    parser.add_argument("--terrain", metavar="MESH", help="mesh, grid or cloud; not needed with nx, ny, nz")
+    parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; not needed with nx, ny, nz")
     parser.add_argument(
         "--normal-radius",
         type=positive,

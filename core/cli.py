@@ -20,25 +20,25 @@ CLOSED_PIPE = 141
 
 COMMANDS = {
     "demo": "the whole job on the bundled site: reconstruct, figures, animation",
+    "terrain": "any terrain file → terrain.ply, and what there is to know about it",
+    "inspect": "what a video file really contains, with advice",
+    "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
+    "track": "follows the block through a video from one click → track.csv, proposed impacts",
+    "refine": "fits picks and times to the pixels of the footage → picks, impacts with standard deviations",
     "reconstruct": "timed picks → impacts.csv and trajectories.csv",
+    "motion": "the motion of a project over time → speeds, heights, energies, residuals of tracks: motion.csv, figures",
     "statistics": "measured impacts alone, and groups of them → statistics.csv, groups.csv, figures",
     "compare": "impact models on measured impacts → predictions.csv, scores.csv, figures and a page",
-    "compare-runs": "whole observed falls beside simulated ones → whole_runs.csv, whole_values.csv, runs.csv, figures",
     "explore": "a live page on this machine: a slider for every parameter of every model",
     "calibrate": "parameters of an impact model that fit measured impacts → calibration.csv, parameters.toml",
     "equivalent": "parameters with which one model behaves like another → equivalent.csv, parameters.toml",
     "merge": "impact tables of several sites → one table with its sources, impacts.csv and datapackage.json",
-    "models": "the impact models, their parameters, units, ranges, defaults and sources",
-    "terrain": "any terrain file → terrain.ply, and what there is to know about it",
-    "inspect": "what a video file really contains, with advice",
-    "track": "follows the block through a video from one click → track.csv, proposed impacts",
-    "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
-    "motion": "the motion of a project over time → speeds, heights, energies, residuals of tracks: motion.csv, figures",
-    "refine": "fits picks and times to the pixels of the footage → picks, impacts with standard deviations",
     "simulate": "whole rockfalls on the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv, summary.json",
+    "compare-runs": "whole observed falls beside simulated ones → whole_runs.csv, whole_values.csv, runs.csv, figures",
     "render": "the animation of a project, through Blender",
+    "models": "the impact models, their parameters, units, ranges, defaults and sources",
 }
-"""Name → help; the module of the same name in `commands`, with _ for -, does it."""
+"""Name → help, in the order of the work; the module of the same name in `commands`, with _ for -, does it."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .options import add_out
+from .options import add_figure_options, add_out, figure_formats
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -17,22 +17,13 @@ if TYPE_CHECKING:
     from ..reconstruction.picks import Picks
     from ..terrain.surface import Surface
 
-FORMATS = ("svg", "png", "pdf")
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("project", metavar="PROJECT", help="project.toml; with cameras and tracks also their residuals")
     add_out(parser)
     parser.add_argument("--trajectory", action="extend", nargs="+", metavar="NAME", help="only these (default: all)")
-    parser.add_argument(
-        "--format",
-        action="extend",
-        nargs="+",
-        choices=FORMATS,
-        help="of the figures, one or several (default: all)",
-    )
-    parser.add_argument("--tables-only", action="store_true", help="no figures")
+    add_figure_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -73,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
         notes = [] if footage is None else list(footage.notes)
         if not arguments.tables_only and is_there(FIGURES):
             progress("Drawing the figures")
-            save_motion_figures(courses, folder / "figures", scale, formats=tuple(arguments.format or FORMATS))
+            save_motion_figures(courses, folder / "figures", scale, formats=figure_formats(arguments))
             written.append("figures")
         elif not arguments.tables_only:
             notes.append(f"No figures without Matplotlib. Install it: {install_command(FIGURES)}")

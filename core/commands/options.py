@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..terrain.surface import Surface
 
+FIGURE_FORMATS = ("svg", "png", "pdf")
 UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
 
@@ -164,6 +165,23 @@ def add_incident_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--radius", type=positive, metavar="M", help="of the block [m] (default: half the table's diameter)"
     )
+
+
+def add_figure_options(parser: argparse.ArgumentParser) -> None:
+    """``--format`` and ``--tables-only``."""
+    parser.add_argument(
+        "--format",
+        action="extend",
+        nargs="+",
+        choices=FIGURE_FORMATS,
+        help="of the figures, one or several (default: all)",
+    )
+    parser.add_argument("--tables-only", action="store_true", help="no figures")
+
+
+def figure_formats(arguments: argparse.Namespace) -> tuple[str, ...]:
+    """What ``--format`` says."""
+    return tuple(dict.fromkeys(arguments.format or FIGURE_FORMATS))
 
 
 def add_site_option(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .options import add_out, add_site_option, add_where_option, naming, tables_as_asked, whole
+from .options import (
+    add_figure_options,
+    add_out,
+    add_site_option,
+    add_where_option,
+    figure_formats,
+    naming,
+    tables_as_asked,
+    whole,
+)
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -53,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a further figure, of any two variables; can be given again",
     )
     parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the tests by exchange (default 0)")
-    parser.add_argument("--tables-only", action="store_true", help="no figures")
+    add_figure_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -82,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         inputs |= {"where": arguments.where, "seed": arguments.seed}
         written = write_statistics(statistics, groups, folder, inputs=inputs, remarks=remarks)
         if not arguments.tables_only:
-            notes += _draw(impacts, specs, grouping, folder, progress)
+            notes += _draw(impacts, specs, grouping, folder, figure_formats(arguments), progress)
             written += ["figures"] if (folder / "figures").exists() else []
     for line in (*notes, *_digest(statistics, groups)):
         print(line)
@@ -137,7 +146,12 @@ def _read(arguments: argparse.Namespace, progress: "Progress") -> "tuple[Impacts
 
 
 def _draw(
-    impacts: "Impacts", specs: "Sequence[GraphSpec]", grouping: "Grouping | None", folder: Path, progress: "Progress"
+    impacts: "Impacts",
+    specs: "Sequence[GraphSpec]",
+    grouping: "Grouping | None",
+    folder: Path,
+    formats: "Sequence[str]",
+    progress: "Progress",
 ) -> list[str]:
     """The figures, if Matplotlib is there; returns what to install otherwise."""
     from ..analysis.extras import FIGURES, install_command, is_there
@@ -146,7 +160,7 @@ def _draw(
     if not is_there(FIGURES):
         return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]
     progress("Drawing the figures", 0, 0)
-    save_measured_figures(impacts, folder / "figures", specs, grouping)
+    save_measured_figures(impacts, folder / "figures", specs, grouping, formats)
     return []
 
 

@@ -19,7 +19,7 @@ CLOSED_PIPE = 141
 """What a shell says of a tool that a closed pipe has ended, as in ``rockfall models | head -1``."""
 
 COMMANDS = {
-    "demo": "the whole job on the bundled site: reconstruct, figures, animation",
+    "demo": "the whole job on the bundled site: tables, statistics, a picture, the film",
     "terrain": "any terrain file → terrain.ply, and what there is to know about it",
     "inspect": "what a video file really contains, with advice",
     "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
@@ -39,6 +39,14 @@ COMMANDS = {
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
 }
 """Name → help, in the order of the work; the module of the same name in `commands`, with _ for -, does it."""
+EPILOG = """rockfall COMMAND --help tells more about a command.
+
+examples:
+  rockfall demo --out demo
+  rockfall reconstruct picks.csv --terrain slope.ply --out result
+  rockfall statistics result/impacts.csv --out statistics
+  rockfall compare result/impacts.csv --replicates 20 --out comparison
+  rockfall simulate releases.csv --terrain slope.ply --model noel_2017 --out simulation"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -81,7 +89,8 @@ def _parser(argv: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rockfall",
         description="From filmed rockfalls and scanned slopes to trajectories, impacts and films.",
-        epilog="rockfall COMMAND --help tells more about a command.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"rockfall {_version()}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)

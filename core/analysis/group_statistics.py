@@ -144,7 +144,9 @@ def group_statistics(
 
 
 def group_by_text(column: str, texts: Names) -> Grouping:
-    """A group of each text, in the order of first appearance; "" is none."""
+    """A group of each text, in the order of first appearance; "" is none, but of flags a group, too."""
+    if column == "flags":
+        texts = np.where(texts == "", "no flag", texts)
     values, first, place = np.unique(texts, return_index=True, return_inverse=True)
     order = np.argsort(first, kind="stable")
     order = order[values[order] != ""]

@@ -93,10 +93,22 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.tables_only:
             notes += _draw(impacts, specs, grouping, folder, figure_formats(arguments), progress)
             written += ["figures"] if (folder / "figures").exists() else []
+    if groups is not None and not arguments.classes and _are_numbers_apart(groups):
+        notes.append(f"Most groups of {arguments.group} are too small: cut its numbers into classes, as --classes 4.")
     for line in (*notes, *_digest(statistics, groups)):
         print(line)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _are_numbers_apart(groups: "GroupStatistics") -> bool:
+    """Whether most groups are too small because each number has its own."""
+    if len(groups.tests.left_out) <= len(groups.tests.tested):
+        return False
+    try:
+        return all(float(name) == float(name) for name in groups.groups)
+    except ValueError:
+        return False
 
 
 def _nothing(impacts: "Impacts") -> InputError:

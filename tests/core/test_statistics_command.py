@@ -132,6 +132,20 @@ def test_several_sites_and_what_is_there_twice(demo, table, tmp_path, capsys) ->
     assert groups == {"Synthetic gully": "104", "quarry": "40"}
 
 
+def test_impacts_without_a_flag_are_a_group(table, tmp_path) -> None:
+    assert main(["statistics", str(table), "--group", "flags", "--out", str(tmp_path / "out"), "--tables-only"]) == 0
+    groups = {row["group"]: int(row["impacts"]) for row in read(tmp_path / "out" / "groups.csv")}
+    assert groups["no flag"] == sum(not row["flags"] for row in read(table))
+    assert sum(groups.values()) == 104
+
+
+def test_a_group_of_each_number_is_told_about_classes(table, tmp_path, capsys) -> None:
+    assert main(["statistics", str(table), "--group", "time_s", "--out", str(tmp_path / "out"), "--tables-only"]) == 0
+    printed = capsys.readouterr().out
+    assert "--classes 4" in printed.splitlines()[0]
+    assert "whether groups differ cannot be told" in printed
+
+
 def test_only_some_rows(table, tmp_path, capsys) -> None:
     argv = ["statistics", str(table), "--where", "theta1_deg<20", "--out", str(tmp_path / "out"), "--tables-only"]
     assert main(argv) == 0

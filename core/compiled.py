@@ -9,6 +9,7 @@ so that importing `rockfall` compiles nothing. Compiled code is kept on disk (`k
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,20 +17,27 @@ import numpy as np
 CHUNK_ROWS = 4096
 
 
-def kernel(function: Callable[..., Any], *, inline: bool = False) -> Any:
+def kernel(function: Callable[..., Any], *, inline: bool = False, allocates: bool = True) -> Any:
     """Compile a plain Python function with numba: no Python objects, the GIL released, kept on disk.
 
     Parameters
     ----------
     inline : whether it becomes a part of each compiled function that calls it.
+    allocates : whether it makes arrays. If not, references to arrays are not counted in it: that is an atomic operation
+        for each array of each call, on counters that all threads share.
     """
     from numba import njit
 
     from .kept_code import KeptCode
 
-    dispatcher: Any = njit(nogil=True, error_model="numpy", forceinline=inline)(function)
-    dispatcher._cache = KeptCode(function)
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": inline, "_nrt": allocates}
+    dispatcher: Any = njit(**options)(function)
+    dispatcher._cache = KeptCode(dispatcher)
     return dispatcher
+
+
+borrowing = partial(kernel, allocates=False)
+"""A kernel that makes no arrays."""
 
 
 def in_chunks(function: Callable[[int, int], None], rows: int, chunk: int = CHUNK_ROWS) -> None:

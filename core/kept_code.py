@@ -33,8 +33,9 @@ class KeptCode:
     half-written or outdated is used, and nothing piles up.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
+    def __init__(self, dispatcher: Any) -> None:
+        self._function: Callable[..., Any] = dispatcher.py_func
+        self._options = _options(dispatcher)
 
     @property
     def cache_path(self) -> str | None:
@@ -53,7 +54,9 @@ class KeptCode:
 
     @cached_property
     def _digest(self) -> bytes:
-        return digest(self._function).encode()  # when it is needed: all that the function calls is defined by then
+        return (
+            digest(self._function) + self._options
+        ).encode()  # when it is needed: all that the function calls is defined by then
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         """The compiled function for a signature, or None."""
@@ -123,10 +126,11 @@ def _parts(function: FunctionType, call: Callable[[FunctionType], None]) -> Iter
     """What a function is made of, as texts; the functions that it reaches are handed to `call`."""
 
     def described(value: Any) -> str:
+        options = _options(value)
         value = getattr(value, "py_func", value)
         if isinstance(value, FunctionType):
             call(value)
-            return value.__qualname__
+            return f"{value.__qualname__} {options}"
         if isinstance(value, PLAIN):
             return repr(value)
         if isinstance(value, np.ndarray):
@@ -149,6 +153,11 @@ def _parts(function: FunctionType, call: Callable[[FunctionType], None]) -> Iter
                 for attribute in sorted(set(code.co_names)):
                     if hasattr(value, attribute):
                         yield f"{name}.{attribute}={described(getattr(value, attribute))}"
+
+
+def _options(value: Any) -> str:
+    """How a function is compiled, where it is one that numba compiles."""
+    return repr(sorted(getattr(value, "targetoptions", {}).items())) if hasattr(value, "py_func") else ""
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:

@@ -15,7 +15,7 @@ face, and converges quadratically on edges and corners.
 from functools import partial
 from math import inf, sqrt
 
-from ..compiled import kernel
+from ..compiled import borrowing as kernel
 from ..terrain.kernels import closest_on_triangle, inverse
 
 inlined = partial(kernel, inline=True)

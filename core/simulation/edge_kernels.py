@@ -9,7 +9,7 @@ to the steps of `motion_kernels`.
 
 from math import inf, sqrt
 
-from ..compiled import kernel
+from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
 from .facet_kernels import GENTLE, corner, dot, is_clear, minus, upward
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE

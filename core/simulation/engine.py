@@ -212,7 +212,7 @@ def simulate(
     if not n:
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
     ground.refuse_small(releases.radius_m)
-    tree, zone = ground.tree, ground.zone[ground.element]
+    tree, zone = ground.tree, ground.zone_in_tree
     order = _near_one_another(releases.position[:, :2])
     results, over, rows = np.empty((n, 5)), np.zeros(n, np.bool_), list[Array]()
 

@@ -126,6 +126,11 @@ class Ground:
         return np.concatenate([triangles, self.point_index.number + np.int32(len(self.faces))])
 
     @cached_property
+    def zone_in_tree(self) -> NDArray[np.int32]:
+        """(m + k,) place in `zones` of each place in the tree."""
+        return self.zone[self.element] if len(self.zones) > 1 else np.zeros(len(self.zone), np.int32)
+
+    @cached_property
     def faults(self) -> GroundFaults | None:
         """What is wrong with the terrain's triangles, counted; None where it is a cloud."""
         return ground_faults(self.terrain) if isinstance(self.terrain, Surface) else None

@@ -5,11 +5,13 @@ A tree of triangles has four members, one of points five, and a pair of them two
 length rules out, so that each ground has code of its own. Places in the points of a pair follow those in its triangles.
 """
 
-from ..compiled import kernel
+import numpy as np
+
+from ..compiled import borrowing, kernel
 from . import contact_kernels, point_kernels
 
 
-@kernel
+@borrowing
 def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[no-untyped-def]
     """The first contact of a sphere with the ground before `limit`: see `contact_kernels.first_contact`."""
     if len(tree) == 5:
@@ -27,8 +29,8 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
 def box(tree):  # type: ignore[no-untyped-def]
     """(6,) low and high corners of the ground [m]."""
     if len(tree) > 2:
-        return tree[0][0].copy()
-    whole = tree[0][0][0].copy()
+        return tree[0][0, :6].astype(np.float64)
+    whole = tree[0][0][0].astype(np.float64)
     for a in range(3):
         whole[a] = min(whole[a], tree[1][0][0, a])
         whole[a + 3] = max(whole[a + 3], tree[1][0][0, a + 3])

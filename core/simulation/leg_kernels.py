@@ -8,7 +8,7 @@ to rest, or to where another triangle stops it; whatever the size of the triangl
 
 from math import inf, sqrt
 
-from ..compiled import kernel
+from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
 from .facet_kernels import is_clear
 from .near_kernels import first_near, inside, leaves, look_around

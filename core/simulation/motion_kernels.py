@@ -23,14 +23,15 @@ from math import inf, sqrt
 
 import numpy as np
 
-from ..compiled import kernel
+from ..compiled import borrowing, kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
-from .contact_kernels import TOUCHING_M, last_root
+from .contact_kernels import TOUCHING_M, inlined, last_root
 from .edge_kernels import onto, over
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
+from .near_point_kernels import KNOWN, MOST_CLOSE, forget
 from .point_kernels import closest
 from .rotation import drawn_axes, turn
 
@@ -53,7 +54,7 @@ DRAG_CHANGE = 0.005
 """With drag, the speed changes by less than this part on one parabola."""
 HELD, MOST_HELD = 1e-4, 100
 """A block that moves less than this part of its radius in so many steps is held where it is."""
-LINGERS = 0.1
+LINGERS = 0.3
 """So is one that rocks: that in so many short steps gets no further than this part of its radius."""
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
@@ -62,12 +63,12 @@ COLUMNS = 22
 """run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
 
 
-@kernel
+@borrowing
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@borrowing
 def _at(p, v, a, t):  # type: ignore[no-untyped-def]
     """Place and velocity on a parabola."""
     h = 0.5 * t
@@ -77,14 +78,14 @@ def _at(p, v, a, t):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@borrowing
 def _slowed(v, drag, gravity):  # type: ignore[no-untyped-def]
     """The acceleration by gravity and drag."""
     k = drag * sqrt(_dot(v, v))
     return -k * v[0], -k * v[1], -k * v[2] - gravity
 
 
-@kernel
+@borrowing
 def _with_drag(v, drag, gravity, h):  # type: ignore[no-untyped-def]
     """Displacement and velocity after a time h, by a step of Runge and Kutta's fourth order."""
     a = _slowed(v, drag, gravity)
@@ -109,14 +110,14 @@ def _with_drag(v, drag, gravity, h):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@borrowing
 def _along(v, n):  # type: ignore[no-untyped-def]
     """The part of a vector along the ground."""
     s = _dot(v, n)
     return v[0] - s * n[0], v[1] - s * n[1], v[2] - s * n[2]
 
 
-@kernel
+@borrowing
 def _in_corner(v, n, m):  # type: ignore[no-untyped-def]
     """The part of a vector along the corner of two planes of other normals."""
     x, y, z = n[1] * m[2] - n[2] * m[1], n[2] * m[0] - n[0] * m[2], n[0] * m[1] - n[1] * m[0]
@@ -124,7 +125,7 @@ def _in_corner(v, n, m):  # type: ignore[no-untyped-def]
     return s * x, s * y, s * z
 
 
-@kernel
+@borrowing
 def _rolling(n, v, radius):  # type: ignore[no-untyped-def]
     """The spin that rolls: (n × v)/r."""
     return (
@@ -141,7 +142,7 @@ def _grown(rows):  # type: ignore[no-untyped-def]
     return more
 
 
-@kernel
+@borrowing
 def _write(rows, k, run, what, time, p, v, w, v1, w1, n, place):  # type: ignore[no-untyped-def]
     rows[k, 0], rows[k, 1], rows[k, 2] = run, what, time
     for axis in range(3):
@@ -150,22 +151,22 @@ def _write(rows, k, run, what, time, p, v, w, v1, w1, n, place):  # type: ignore
     rows[k, 21] = place
 
 
-@kernel
-def _closest(tree, stack, p, radius, nearby, towards, again):  # type: ignore[no-untyped-def]
+@inlined
+def _closest(tree, stack, p, v, radius, nearby, close, towards, again):  # type: ignore[no-untyped-def]
     """The closest of the ground to a block: see `closest_near` and `point_kernels.closest`."""
     if len(tree) == 5:
-        return closest(tree, stack, p, radius, towards, again)
+        return closest(tree, stack, close, p, v, radius, towards, again)
     if len(tree) == 4:
         return closest_near(tree, stack, p, radius, nearby)
     x, y, z, square, place = closest_near(tree[0], stack, p, radius, nearby)
-    qx, qy, qz, other, found = closest(tree[1], stack, p, radius, towards, again)
+    qx, qy, qz, other, found = closest(tree[1], stack, close, p, v, radius, towards, again)
     if found >= 0 and other < square:
         return qx, qy, qz, other, tree[0][3].shape[0] + found
     return x, y, z, square, place
 
 
-@kernel
-def _touching(tree, stack, p, v, radius, nearby, towards):  # type: ignore[no-untyped-def]
+@inlined
+def _touching(tree, stack, p, v, radius, nearby, close, towards):  # type: ignore[no-untyped-def]
     """The centre moved out of the ground, and the contacts that moved it.
 
     Parameters
@@ -181,7 +182,7 @@ def _touching(tree, stack, p, v, radius, nearby, towards):  # type: ignore[no-un
     """
     distance, support, place, against, other, most = inf, (0.0, 0.0, -2.0), -1, (0.0, 0.0, 1.0), -1, -inf
     for k in range(MOST_AT_ONCE):
-        qx, qy, qz, square, found = _closest(tree, stack, p, radius, nearby, towards, k > 0)
+        qx, qy, qz, square, found = _closest(tree, stack, p, v, radius, nearby, close, towards, k > 0)
         if found < 0:
             break
         d = sqrt(square)
@@ -202,7 +203,7 @@ def _touching(tree, stack, p, v, radius, nearby, towards):  # type: ignore[no-un
     return p, support, place, against, other, distance
 
 
-@kernel
+@borrowing
 def _moved(p, q, v, towards, gravity, mu):  # type: ignore[no-untyped-def]
     """A way on the ground, or as much of it as the energy lasts for.
 
@@ -226,7 +227,7 @@ def _moved(p, q, v, towards, gravity, mu):  # type: ignore[no-untyped-def]
     return part, (p[0] + part * way[0], p[1] + part * way[1], p[2] + part * way[2]), (0.0, 0.0, 0.0), ds
 
 
-@kernel
+@borrowing
 def _lands(tree, stack, times, nearby, p, v, gravity, radius):  # type: ignore[no-untyped-def]
     """Where a block that hops on the ground lands: `first_contact`, looked for nearby first."""
     a = (0.0, 0.0, -gravity)
@@ -238,7 +239,7 @@ def _lands(tree, stack, times, nearby, p, v, gravity, radius):  # type: ignore[n
     return first_contact(tree, stack, times, p, v, a, radius, inf)
 
 
-@kernel
+@borrowing
 def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
     """When a flight that meets nothing is gone from the box of the terrain."""
     leave = 0.0
@@ -255,7 +256,7 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
 
 @kernel
 def run_block(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count,
+    tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, close, rows, count,
     run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record,
 ):  # fmt: skip
     """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
@@ -277,6 +278,7 @@ def run_block(  # type: ignore[no-untyped-def]
     v_max = sqrt(_dot(v, v))
     grounded, n, place = False, (0.0, 0.0, 1.0), -1
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
+    forget(close)
     known, t, e, hit, edge, marked = False, 0.0, zero, -1, ON_TRIANGLE, False
     anchor, lingers = p, 0
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
@@ -374,7 +376,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 )
                 moves = t > 0.0
                 if moves and edge == AT_ANOTHER:
-                    q = _touching(tree, stack, q, turned, radius, nearby, n)[0]
+                    q = _touching(tree, stack, q, turned, radius, nearby, close, n)[0]
             elif edge != AT_ANOTHER:
                 t, q, turned, e, hit = over(
                     tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius, dt
@@ -384,7 +386,7 @@ def run_block(  # type: ignore[no-untyped-def]
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
             pull = -gravity * factor * dt
             ahead = _along((v[0], v[1], v[2] + pull), n)
-            away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby, n)
+            away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby, close, n)
             if distance > radius + TOUCHING_M:
                 t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
                 q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
@@ -491,12 +493,14 @@ def run_blocks(  # type: ignore[no-untyped-def]
     """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
+    close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
     draws = np.empty(draw_count)
     rows, count = np.empty((64 * len(runs), COLUMNS)), 0
     for i in range(len(runs)):
         rows, count, end, time, impacts, length, v_max = run_block(
-            tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, rows, count, runs[i], seed,
-            (place[i, 0], place[i, 1], place[i, 2]), (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
+            tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, close, rows, count,
+            runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
+            (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
             (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],
             (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record,
         )  # fmt: skip

@@ -9,7 +9,7 @@ triangles: small blocks on large triangles look far.
 
 from math import inf, sqrt
 
-from ..compiled import kernel
+from ..compiled import borrowing as kernel
 from ..terrain.kernels import box_distance2, closest_on_triangle, nearest_point
 from .contact_kernels import TOUCHING_M, enter_node, first_root, prepared, touch, triangle_box
 

@@ -1,56 +1,149 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compiled kernels over points: their spatial index, the nearest point, how dense they are, heights above them.
 
-A tree is the plain tuple ``(bounds, first, count, points, 0)`` of `cloud.PointIndex.tree`: nodes as in `kernels`, and
-``points`` (k, 3) in the order of the leaves. It has one member more than a tree of triangles, so that compiled code can
-tell them apart by their type.
+A tree is the plain tuple ``(nodes, first, count, points, spacing)`` of `cloud.PointIndex.tree`: ``first`` and ``count``
+as in `kernels`, and ``points`` (k, 3) in the order of the leaves. It has one member more than a tree of triangles, so
+that compiled code can tell them apart by their type.
+
+A row of ``nodes`` (n, 16) has the low and high corner of a box; the two planes that its points are between, across the
+direction in which they spread least: their normal, no longer than one, and the lowest and highest product of it with a
+point; how far the points are from the middle of the box, along those planes and in all. These are in single precision,
+rounded outwards. ``first`` and ``count`` are the last columns, so that a node is one line of the processor's cache.
 """
+
+from functools import partial
+from math import acos, cos, pi, sqrt
 
 import numpy as np
 
-from ..compiled import kernel
+from ..compiled import borrowing, kernel
 from .kernels import STACK_SIZE, box_distance2
 
-LEAF_POINTS = 8
+inlined = partial(borrowing, inline=True)
+
+LEAF_POINTS = 16
+SPREAD_POINTS = 32
+"""So many points of a node, or up to twice as many, tell in which direction they spread least."""
+SHORTER = 1.0 - 1e-6
 FARTHER = 3.0
 STEEP = 4.0
 """A column of points belongs to one surface as far as this slope."""
 
 
 @kernel
-def build_point_tree(points, bounds, first, count, order):  # type: ignore[no-untyped-def]
+def build_point_tree(points, nodes, links, order):  # type: ignore[no-untyped-def]
     """Sort points into the nodes of a tree, halved by count along their longest side; returns the number of nodes."""
     for i in range(points.shape[0]):
         order[i] = i
     todo = np.zeros((STACK_SIZE, 3), np.int64)
     todo[0, 2] = points.shape[0]
-    pending, nodes = 1, 1
+    pending, used = 1, 1
     while pending:
         pending -= 1
         node, start, stop = todo[pending, 0], todo[pending, 1], todo[pending, 2]
+        axis, longest = 0, -1.0
         for a in range(3):
             low, high = np.inf, -np.inf
             for i in range(start, stop):
                 low, high = min(low, points[i, a]), max(high, points[i, a])
-            bounds[node, a], bounds[node, a + 3] = low, high
+            nodes[node, a], nodes[node, a + 3] = below(low), -below(-high)
+            if high - low > longest:
+                axis, longest = a, high - low
+        _enclose(points, start, stop, nodes, node)
         if stop - start <= LEAF_POINTS:
-            first[node], count[node] = start, stop - start
+            links[node, 0], links[node, 1] = start, stop - start
             continue
-        axis = 0
-        for a in range(1, 3):
-            if bounds[node, a + 3] - bounds[node, a] > bounds[node, axis + 3] - bounds[node, axis]:
-                axis = a
         middle = (start + stop) // 2
         _divide(points, order, start, stop - 1, middle, axis)
-        first[node], count[node] = nodes, 0
-        todo[pending, 0], todo[pending, 1], todo[pending, 2] = nodes, start, middle
-        todo[pending + 1, 0], todo[pending + 1, 1], todo[pending + 1, 2] = nodes + 1, middle, stop
+        links[node, 0], links[node, 1] = used, 0
+        todo[pending, 0], todo[pending, 1], todo[pending, 2] = used, start, middle
+        todo[pending + 1, 0], todo[pending + 1, 1], todo[pending + 1, 2] = used + 1, middle, stop
         pending += 2
-        nodes += 2
-    return nodes
+        used += 2
+    return used
 
 
-@kernel
+@borrowing
+def below(value):  # type: ignore[no-untyped-def]
+    """A number in single precision that is less."""
+    return np.nextafter(np.float32(value), np.float32(-np.inf))
+
+
+@borrowing
+def _enclose(points, start, stop, nodes, node):  # type: ignore[no-untyped-def]
+    """Fill the planes and the distances of a node. Any normal would do; that of some of its points is as good."""
+    step = max(1, (stop - start) // SPREAD_POINTS)
+    n, x, y, z = 0.0, 0.0, 0.0, 0.0
+    for i in range(start, stop, step):
+        n, x, y, z = n + 1.0, x + points[i, 0], y + points[i, 1], z + points[i, 2]
+    x, y, z = x / n, y / n, z / n
+    xx, yy, zz, xy, yz, zx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(start, stop, step):
+        u, v, w = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
+        xx, yy, zz = xx + u * u, yy + v * v, zz + w * w
+        xy, yz, zx = xy + u * v, yz + v * w, zx + w * u
+    u, v, w = least_direction(xx, yy, zz, xy, yz, zx)
+    nodes[node, 6], nodes[node, 7], nodes[node, 8] = SHORTER * u, SHORTER * v, SHORTER * w
+    u, v, w = nodes[node, 6], nodes[node, 7], nodes[node, 8]
+    low, high = np.inf, -np.inf
+    for i in range(start, stop):
+        height = u * points[i, 0] + v * points[i, 1] + w * points[i, 2]
+        low, high = min(low, height), max(high, height)
+    nodes[node, 9], nodes[node, 10] = below(low), -below(-high)
+    size = sqrt(u * u + v * v + w * w)
+    u, v, w = u / size, v / size, w / size
+    x, y, z = middle(nodes, node)
+    wide, far = 0.0, 0.0
+    for i in range(start, stop):
+        dx, dy, dz = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
+        far = max(far, dx * dx + dy * dy + dz * dz)
+        height = u * dx + v * dy + w * dz
+        dx, dy, dz = dx - height * u, dy - height * v, dz - height * w
+        wide = max(wide, dx * dx + dy * dy + dz * dz)
+    nodes[node, 11], nodes[node, 12] = -below(-sqrt(wide)), -below(-sqrt(far))
+
+
+@inlined
+def middle(nodes, node):  # type: ignore[no-untyped-def]
+    """Of a node's box."""
+    return (
+        0.5 * (nodes[node, 0] + nodes[node, 3]),
+        0.5 * (nodes[node, 1] + nodes[node, 4]),
+        0.5 * (nodes[node, 2] + nodes[node, 5]),
+    )
+
+
+@borrowing
+def least_direction(xx, yy, zz, xy, yz, zx):  # type: ignore[no-untyped-def]
+    """The unit direction in which points of these second moments spread least; upwards where it is not one.
+
+    The least root of the characteristic polynomial (Smith 1961, Eigenvalues of a symmetric 3 × 3 matrix) and the
+    longest cross product of two rows of the moments less that root.
+    """
+    mean = (xx + yy + zz) / 3.0
+    xx, yy, zz = xx - mean, yy - mean, zz - mean
+    size = sqrt((xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + yz * yz + zx * zx)) / 6.0)
+    if size == 0.0:
+        return 0.0, 0.0, 1.0
+    det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
+    half = min(max(0.5 * det / (size * size * size), -1.0), 1.0)
+    root = 2.0 * size * cos((acos(half) + 2.0 * pi) / 3.0)
+    xx, yy, zz = xx - root, yy - root, zz - root
+    ax, ay, az = xy * yz - zx * yy, zx * xy - xx * yz, xx * yy - xy * xy
+    bx, by, bz = xy * zz - zx * yz, zx * zx - xx * zz, xx * yz - xy * zx
+    cx, cy, cz = yy * zz - yz * yz, yz * zx - xy * zz, xy * yz - yy * zx
+    a, b, c = ax * ax + ay * ay + az * az, bx * bx + by * by + bz * bz, cx * cx + cy * cy + cz * cz
+    if b > a:
+        a, ax, ay, az = b, bx, by, bz
+    if c > a:
+        a, ax, ay, az = c, cx, cy, cz
+    if a == 0.0:
+        return 0.0, 0.0, 1.0
+    a = sqrt(a)
+    return ax / a, ay / a, az / a
+
+
+@borrowing
 def _divide(points, order, low, high, middle, axis):  # type: ignore[no-untyped-def]
     """Hoare's selection: what is before `middle` is not above it along the axis, what follows not below."""
     while low < high:
@@ -75,7 +168,7 @@ def _divide(points, order, low, high, middle, axis):  # type: ignore[no-untyped-
             return
 
 
-@kernel
+@borrowing
 def nearest(tree, stack, p, limit):  # type: ignore[no-untyped-def]
     """The nearest point nearer than ``limit``: (squared distance, place), place −1 when none."""
     bounds, first, count, points, _ = tree
@@ -107,7 +200,7 @@ def nearest(tree, stack, p, limit):  # type: ignore[no-untyped-def]
     return best, found
 
 
-@kernel
+@borrowing
 def within(tree, stack, p, reach):  # type: ignore[no-untyped-def]
     """How many points are within `reach` of a place."""
     bounds, first, count, points, _ = tree
@@ -147,14 +240,14 @@ def spacings(tree, places, enough, reach, result):  # type: ignore[no-untyped-de
         result[k] = radius * np.sqrt(np.pi / found)
 
 
-@kernel
+@borrowing
 def _plan_distance2(bounds, node, x, y):  # type: ignore[no-untyped-def]
     dx = max(bounds[node, 0] - x, 0.0, x - bounds[node, 3])
     dy = max(bounds[node, 1] - y, 0.0, y - bounds[node, 4])
     return dx * dx + dy * dy
 
 
-@kernel
+@borrowing
 def next_height(tree, stack, p, reach, side):  # type: ignore[no-untyped-def]
     """Height of the next point below (`side` −1) or above (1) a place, within `reach` in plan; NaN when none."""
     bounds, first, count, points, _ = tree
@@ -181,7 +274,7 @@ def next_height(tree, stack, p, reach, side):  # type: ignore[no-untyped-def]
     return p[2] + side * best if best < np.inf else np.nan
 
 
-@kernel
+@borrowing
 def plane_height(tree, stack, p, reach, low, high):  # type: ignore[no-untyped-def]
     """At a place, the height of the plane fitted to the points within `reach` in plan, between two heights.
 

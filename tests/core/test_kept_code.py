@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from numba import njit
 from rockfall.core.kept_code import digest
 
 INNER = """
@@ -127,3 +128,13 @@ def test_what_a_digest_looks_at():
         made("def h(a):\n    def f(x): return a\n    return f\nf = h(2)"),
     }
     assert len(others - {one}) == 8
+
+
+def test_a_digest_looks_at_how_a_function_that_is_called_is_compiled():
+    def made(**options):
+        scope = {"g": njit(**options)(lambda x: x + 1.0)}
+        exec("def f(x): return g(x)", scope)
+        return digest(scope["f"])
+
+    assert made() == made()
+    assert len({made(), made(forceinline=True), made(error_model="numpy")}) == 3

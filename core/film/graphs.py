@@ -2,13 +2,14 @@
 """Graphs in the picture of a film: what is drawn where, and from which moment on."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.axes import Axis
+from ..analysis.axes import Axis, Limits
 from ..analysis.comparison import Predictions
 from ..analysis.graph_layout import Frame, Rectangle, frame, tiles
+from ..analysis.graph_series import usual_limits
 from ..analysis.graphs import PAPER_GRAPHS, Graph, GraphSpec, make_graph
 from ..analysis.motion_graphs import HEIGHT, KINETIC, SPEED, MotionCourse, Quantity, shown_quantities
 from ..analysis.stacked_graphs import quantity_axis, stacked, worth_drawing
@@ -132,8 +133,13 @@ def impact_graphs(
     models = ("",) if predictions is None else predictions.models
     made = []
     for spec, tile in zip(specs, tiles(room.shrunk(text / 2), len(specs)), strict=True):
-        graphs = [make_graph(impacts, spec, predictions, model) for model in models]
-        x, y = _axis(graphs, spec.x, 0), _axis(graphs, spec.y, 1)
+        found = [make_graph(impacts, spec, predictions, model) for model in models]
+        x_limits, y_limits = usual_limits(
+            spec, (_whole([g.x_limits for g in found]), _whole([g.y_limits for g in found]))
+        )
+        shown = replace(spec, x_limits=x_limits, y_limits=y_limits)
+        graphs = [make_graph(impacts, shown, predictions, model) for model in models]
+        x, y = _axis(spec.x, x_limits, spec.x_log), _axis(spec.y, y_limits, spec.y_log)
         axes = frame(tile, x, y, text, lambda words: LETTER * text * len(words))
         made.append(_impact_graph(axes, graphs, since, text, measured))
     return FilmGraphs(room, text, tuple(made))
@@ -183,13 +189,14 @@ def _room(size: tuple[int, int]) -> Rectangle:
     )  # fmt: skip
 
 
-def _axis(graphs: Sequence[Graph], name: str, side: int) -> Axis:
-    """That holds the points of all graphs, unless the limits are given."""
-    limits = [(graph.x_limits, graph.y_limits)[side] for graph in graphs]
-    variable, spec = find_variable(name), graphs[0].spec
-    symbol = f"{variable.symbol or variable.title} [{variable.unit or '–'}]"
-    low, high = min(each[0] for each in limits), max(each[1] for each in limits)
-    return Axis((low, high), (spec.x_log, spec.y_log)[side], variable.label, symbol)
+def _whole(limits: Sequence[Limits]) -> Limits:
+    """That hold all of these."""
+    return min(low for low, _ in limits), max(high for _, high in limits)
+
+
+def _axis(name: str, limits: Limits, log: bool) -> Axis:
+    variable = find_variable(name)
+    return Axis(limits, log, variable.label, f"{variable.symbol or variable.title} [{variable.unit or '–'}]")
 
 
 def _impact_graph(axes: Frame, graphs: Sequence[Graph], since: Array, text: float, measured: Colour) -> FilmGraph:

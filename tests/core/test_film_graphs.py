@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Graphs in a film: each point and line is at the right place, and there from the right moment on."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,17 @@ def test_a_point_appears_at_its_impact(run: Reconstruction) -> None:
     slope = np.polyfit(*(fit.ends[:, 0] - [plot.left, plot.bottom]).T, 1)[0] * plot.width / plot.height
     ratio = run.impacts.vt1[known] @ run.impacts.vt2[known] / (run.impacts.vt1[known] @ run.impacts.vt1[known])
     assert slope == pytest.approx(ratio)
+
+
+def test_axes_without_limits_hold_all_points_but_for_those_beyond_the_usual(run: Reconstruction) -> None:
+    impacts = replace(run.impacts, rn=run.impacts.rn * np.where(np.arange(len(run.impacts)) == 1, 50.0, 1.0))
+    (graph,) = impact_graphs(impacts, OFFSETS, SIZE, specs=[GraphSpec("rn", "theta1_deg", "rn")]).graphs
+    assert graph.frame.y.limits == (0.0, 5.0)
+    (dots,) = graph.dots
+    assert len(dots.place) == np.count_nonzero(impacts.rn < 5.0)
+    assert (dots.place[:, 1] <= graph.frame.plot.top).all()
+    for stroke in graph.strokes:
+        assert (stroke.ends[:, :, 1] <= graph.frame.plot.top + 1e-6).all()
 
 
 def test_models_have_their_colours_and_links(run: Reconstruction) -> None:

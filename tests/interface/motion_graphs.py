@@ -155,12 +155,24 @@ def case_motion_graphs_without_motion(window):
 
 
 def case_motion_graphs_of_footage(window):
-    """Tracked footage: the residual over time, and the number of the picture at the cursor."""
+    """Tracked footage: the residual over time, the number of the picture at the cursor, a click goes to its moment."""
     with window.override():
         assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
     yield 3.0
-    assert bpy.ops.rockfall.open_motion_graphs.poll()
     with window.override():
         bpy.ops.rockfall.open_motion_graphs()
     yield 1.5
+    assert canvas(window).buttons, "it is said what to do next"
+    with window.override():
+        bpy.ops.rockfall.propose_impacts()
+    yield 3.0
+    scene = bpy.context.scene
+    assert len(canvas(window).frames) == 4
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    bpy.data.objects["B10 block"].select_set(True)
+    time_s = 3.0
+    yield from window.click(*place(window, 3, time_s, 1.0))
+    yield 2.0
+    assert abs(scene.frame_current - time_s * scene.render.fps / scene.render.fps_base) <= 1
     window.screenshot("footage")

@@ -21,7 +21,7 @@ from ....core.film.graphs import FilmGraphs
 from ....core.film.job import GraphKind
 from ....core.film.simulated import MEASURED_COLOUR
 from ....core.vectors import Array
-from ...scene import keyframes, materials, models, reconstruction, timing
+from ...scene import graph_settings, keyframes, materials, models, reconstruction, timing
 from . import captions
 from .marks import until_now_group
 
@@ -89,7 +89,8 @@ def graphs_of(
         raise InputError("There is no impact to show in graphs", advice="Make the film without graphs")
     own = {name: values for name, values in models.parameters_of(scene).items() if name in shown}
     predictions = compare(result.impacts, shown, own) if shown else None
-    return film_graphs.impact_graphs(result.impacts, offsets, size, predictions, measured)
+    specs = [graph_settings.spec_of(graph_settings.graph(scene, n), n) for n in graph_settings.shown(scene)]
+    return film_graphs.impact_graphs(result.impacts, offsets, size, predictions, measured, specs)
 
 
 def lay_out(graphs: FilmGraphs, size: tuple[int, int], rate: float) -> list[bpy.types.Object]:

@@ -24,6 +24,7 @@ BUTTONS = {
     "rockfall.open_project": "Open Project",
     "rockfall.add_video": "Add Video",
     "rockfall.import_picks": "Import Picks",
+    "rockfall.propose_impacts": "Propose Impacts",
     "rockfall.clear_graph_filters": "Clear Filters",
 }
 """Operators that can be offered, with their texts."""

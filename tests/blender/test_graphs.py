@@ -60,6 +60,8 @@ def test_numbers_of_choices_do_not_depend_on_their_order(rockfall, part) -> None
     choices = part("rockfall_addon.scene.graph_settings").VARIABLE_CHOICES
     numbers = {name: number for name, *_, number in choices}
     assert len(set(numbers.values())) == len(numbers)
+    assert all(np.float32(number) == number for number in numbers.values()), "a button of a menu holds such a number"
+    assert list(numbers.values()) != sorted(numbers.values()), "they are no counts"
 
 
 def test_a_variable_takes_its_own_axis(rockfall, part) -> None:

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person looks at the graphs of the impacts: chooses variables, points, selects, zooms, undoes, saves and reopens."""
 
+import csv
+import random
+
 import bpy
 
 TREE = "RockfallImpactGraphs"
@@ -170,6 +173,7 @@ def case_select_in_graphs(window):
     expected = {row for row, (x, y) in points.items() if x <= corners[1][0] and y <= corners[1][1]}
     assert selected_rows(window) == expected
     assert 5 < len(expected) < len(points)
+    yield 1.0
     window.screenshot("box")
     with window.override():
         bpy.ops.ed.undo()
@@ -179,15 +183,18 @@ def case_select_in_graphs(window):
     x, y = own_points(window, 2)[first]
     yield from drag(window, [(x + 9 * a, y + 9 * b) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
     assert selected_rows(window) == {first}
+    yield 1.0
     window.screenshot("lasso")
-    others = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "pick"][40:43]
+    pick = window.part("rockfall_addon.scene.comparison").comparison_of(bpy.context.scene).pick
+    some = sorted(points)[10:13]
+    others = [o for o in bpy.context.scene.objects if o.get("rockfall_id") in {pick[row] for row in some}]
     for obj in bpy.context.selected_objects:
         obj.select_set(False)
     for obj in others:
         obj.select_set(True)
     yield 1.0
     selection = window.part("rockfall_addon.view.graphs.selection")
-    assert {row for _, row in selection.selected(bpy.context)} == selected_rows(window) != {first}
+    assert {row for _, row in selection.selected(bpy.context)} == set(some) == selected_rows(window)
     window.screenshot("from-the-scene")
     yield from window.press("A", *spot(window, plot.left + 20, plot.bottom + 20), alt=True)
     yield 0.5
@@ -221,7 +228,11 @@ def case_zoom_and_variables_of_graphs(window):
     yield from window.click(*label)
     yield 1.0
     window.screenshot("list-of-an-axis")
-    yield from window.press("ESC", *label)
+    for key in ("DOWN_ARROW", "DOWN_ARROW", "RET"):
+        yield from window.press(key, *label)
+    yield 0.5
+    assert scene.rockfall_graphs.graph_3.x != "vt1_mps", "the list of the axis sets another variable"
+    assert drawn(window, 2)[1].x.label != before.x.label
     scene.rockfall_graphs.graph_3.x = "kinetic1_j"
     scene.rockfall_graphs.graph_3.x_log = True
     scene.rockfall_graphs.colour_by = "trajectory"
@@ -310,3 +321,52 @@ def case_graphs_workspace(window):
         assert bpy.ops.rockfall.open_graphs_workspace() == {"FINISHED"}
     yield 1.0
     assert [one.name for one in bpy.data.workspaces if one.name.startswith("Graphs")] == ["Graphs"]
+
+
+def case_a_hundred_thousand_impacts(window):
+    """A table of other sites beside the scene's own impacts: drawn, pointed at, selected, zoomed."""
+    yield from open_graphs(window)
+    scene, tables = bpy.context.scene, window.part("core.exchange.tables")
+    impacts = window.part("rockfall_addon.scene.comparison").comparison_of(scene).impacts
+    path = f"{bpy.app.tempdir}many.csv"
+    write_many(tables, impacts, path, 100_000)
+    with window.override():
+        assert bpy.ops.rockfall.add_database(filepath=path) == {"FINISHED"}
+        bpy.ops.ed.undo_push(message="table")
+    yield 3.0
+    window.screenshot("drawn")
+    graph, frame = drawn(window, 2)
+    assert sum(one.series.row.size for one in graph.measured) == 100_000 + len(impacts)
+    plot = frame.plot
+    yield from drag(window, [spot(window, plot.left + 5, plot.bottom + 5), spot(window, plot.right - 5, plot.top - 5)])
+    yield 2.0
+    selection = window.part("rockfall_addon.view.graphs.selection")
+    assert len(selection.selected(bpy.context)) > 50_000
+    window.screenshot("selected")
+    with window.override():
+        bpy.ops.ed.undo()
+    yield 2.0
+    assert not selection.selected(bpy.context)
+    middle = spot(window, plot.left + plot.width / 2, plot.bottom + plot.height / 2)
+    for _ in range(8):
+        yield from window.click(*middle, button="WHEELUPMOUSE")
+    yield 1.0
+    window.screenshot("zoomed")
+
+
+def write_many(tables, impacts, path, count):
+    """The same impacts again and again, of another site, a little apart."""
+    tables.write_impacts(impacts, path)
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    draw = random.Random(4)
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        for number in range(count):
+            row = dict(rows[number % len(rows)])
+            row["site"], row["trajectory"] = "Elsewhere", f"{row['trajectory']}-{number // len(rows)}"
+            for name in ("rn", "rt", "r", "vt1_mps", "vt2_mps", "vn1_mps", "theta1_deg", "theta_dev_deg"):
+                if row.get(name):
+                    row[name] = f"{float(row[name]) * draw.gauss(1.0, 0.15):.5g}"
+            table.writerow(row)

@@ -4,6 +4,7 @@
 import bpy
 
 from ...scene import problems, store
+from ...view import look
 from ...view.graphs import areas, editor
 from ...view.reporting import possible, reported
 
@@ -72,6 +73,9 @@ def _arrange() -> None:
             if area.ui_type == editor.IMPACTS:
                 area.ui_type = "VIEW_3D"
         areas.show_largest(window, editor.IMPACTS, OWN_SHARE)
+        if store.with_role(window.scene, store.TERRAIN_ROLE):
+            with bpy.context.temp_override(window=window):
+                look.show_relief(bpy.context, frame_all=True)
 
 
 def unregister() -> None:

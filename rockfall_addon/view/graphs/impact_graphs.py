@@ -39,6 +39,8 @@ MANY = 2000
 POWER = "\ue000{}\ue001"
 """How an exponent is marked until it is raised."""
 RAISED = str.maketrans("0123456789.−", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻")
+MANY_CHOSEN = 400
+"""Rings about more points would hide the graph."""
 MOST_LINKS = 6000
 """Of more links in a graph, which no eye can follow, only those of selected impacts are drawn."""
 REACH = 9.0
@@ -80,7 +82,7 @@ class ImpactGraph:
     ----------
     spec : what it shows; its limits are not used.
     x, y : axes that hold all points, along which `places` count.
-    drawn : by source; models first, the scene's own measured impacts last and on top.
+    drawn : by source; those of other sites first, then models, the scene's own measured impacts last and on top.
     places : (n, 2) of all points, those of each source together, single precision.
     bars : error bars of all measured points; None until they are wanted.
     ring : for a selection, rings about its points, and its links.
@@ -152,7 +154,8 @@ class ImpactGraph:
         return self.outside[key]
 
     def chosen(self, chosen: Chosen, colour: Rgb) -> tuple[Points, Lines]:
-        """Rings about the points of the selected impacts, the models' too, and the links between them."""
+        """Rings about the points of the selected impacts, the models' too, and the links between them; very many are
+        drawn as points of the colour."""
         if self.ring is None or self.ring[0] != chosen:
             rows: dict[int, list[int]] = {}
             for source, row in chosen:
@@ -162,8 +165,12 @@ class ImpactGraph:
                 of_it = np.isin(one.series.row, rows.get(one.series.source, []))
                 spots.append(self.places_of(one)[of_it])
                 sizes.append(np.full(int(of_it.sum()), 1.5 if one.series.model else 2.1))
-            rings = Points(np.concatenate(spots), colour, np.concatenate(sizes), "ring")
-            self.ring = chosen, rings, Lines(self.links_of(np.array(rows.get(0, []), dtype=np.intp)))
+            if len(chosen) > MANY_CHOSEN:
+                sizes = [np.full(len(each), 0.6) for each in spots]
+            shape = "ring" if len(chosen) <= MANY_CHOSEN else "circle"
+            rings = Points(np.concatenate(spots), colour, np.concatenate(sizes), shape)
+            linked = rows.get(0, []) if len(chosen) <= MANY_CHOSEN else []
+            self.ring = chosen, rings, Lines(self.links_of(np.array(linked, dtype=np.intp)))
         return self.ring[1:]
 
     def places_of(self, one: Drawn) -> np.ndarray:
@@ -322,14 +329,6 @@ def _sources(
     found: list[Source] = []
     impacts, several = compared.impacts, len(compared.predictions) > 1
     hues = model_colours(compared.models, with_blocks=bool(compared.in_view))
-    if impacts is not None:
-        for which, predictions in compared.predictions.items():
-            for model, predicted in predictions.items():
-                title = f"{MODELS[model].title}{f', {which}' if several else ''}"
-                series = model_series(impacts, predicted, model, compared.runs, spec.x, spec.y, kept[0], title)
-                hollow = several and which == "B"
-                colour = readable(hues[model], look)
-                found.append(Source(series, colour, model_shape(model), hollow, None, (impacts, predicted, title)))
     for i, other in enumerate(compared.others):
         if other.impacts is not None:
             rows = np.flatnonzero(kept[i + 1])
@@ -338,6 +337,14 @@ def _sources(
             grey = mixed(look.plot, look.measured, 0.6)
             made_of = other.impacts, colours
             found.append(Source(series, grey, "circle", True, colours.of(i + 1, rows), made_of))
+    if impacts is not None:
+        for which, predictions in compared.predictions.items():
+            for model, predicted in predictions.items():
+                title = f"{MODELS[model].title}{f', {which}' if several else ''}"
+                series = model_series(impacts, predicted, model, compared.runs, spec.x, spec.y, kept[0], title)
+                hollow = several and which == "B"
+                colour = readable(hues[model], look)
+                found.append(Source(series, colour, model_shape(model), hollow, None, (impacts, predicted, title)))
     if impacts is not None:
         rows = np.flatnonzero(kept[0])
         series = measured_series(impacts, spec.x, spec.y, rows, "measured")

@@ -20,7 +20,7 @@ from ...scene import comparison, graph_settings
 from . import drawing, empty, legend, selection
 from .axes import draw_axes
 from .editor import Canvas
-from .impact_graphs import Drawn, ImpactGraph, build, curve_text, specs_key
+from .impact_graphs import MANY, Drawn, ImpactGraph, build, curve_text, specs_key
 from .look import Look, alpha, mixed
 from .point_colours import PointColours, find_colours
 
@@ -162,8 +162,10 @@ def _draw_graph(
     canvas.frames[number] = seen
     pointed = canvas.part if canvas.graph == number else ""
     draw_axes(seen, look, pointed)
-    rim = 0.0 if len(graph.places) > 5000 else 0.8 * look.scale
     with drawing.in_axes(seen, graph.x, graph.y) as bounds:
+        for one in graph.drawn:
+            if one.series.source > 0:
+                _draw_points(one, look, bounds)
         with drawing.clipped(seen.plot):
             for one in graph.drawn:
                 if one.links is not None:
@@ -174,8 +176,8 @@ def _draw_graph(
                 if one.line is not None:
                     one.line.draw(alpha(mixed(one.colour, look.plot, 0.15)), 1.6 * look.scale)
         for one in graph.drawn:
-            hollow = 1.6 * look.scale if one.hollow else 0.0
-            one.points.draw(look.point * (1.15 if one.series.model else 1.0), bounds, look.plot, rim, hollow)
+            if one.series.source == 0:
+                _draw_points(one, look, bounds)
         if chosen:
             rings, links = graph.chosen(chosen, look.chosen)
             with drawing.clipped(seen.plot):
@@ -187,6 +189,13 @@ def _draw_graph(
     said = empty.in_graph(graph, compared)
     if said:
         empty.draw_in_plot(seen.plot, look, said)
+
+
+def _draw_points(one: Drawn, look: Look, bounds: tuple[float, float, float, float]) -> None:
+    """The points of one source, outlined unless they are very many."""
+    rim = 0.0 if len(one.series.points) > MANY else 0.8 * look.scale
+    hollow = 1.6 * look.scale if one.hollow and len(one.series.points) <= MANY else 0.0
+    one.points.draw(look.point * (1.15 if one.series.model else 1.0), bounds, look.plot, rim, hollow)
 
 
 def _draw_pointed(

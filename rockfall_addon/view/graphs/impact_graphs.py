@@ -345,7 +345,6 @@ def _sources(
                 hollow = several and which == "B"
                 colour = readable(hues[model], look)
                 found.append(Source(series, colour, model_shape(model), hollow, None, (impacts, predicted, title)))
-    if impacts is not None:
         rows = np.flatnonzero(kept[0])
         series = measured_series(impacts, spec.x, spec.y, rows, "measured")
         found.append(Source(series, look.measured, "circle", False, colours.of(0, rows), (impacts, colours)))

@@ -72,6 +72,8 @@ def draw(context: bpy.types.Context, canvas: Canvas) -> None:
         taken = legend.draw(room, look, compared, next(iter(graphs.values())), _kept(scene).colours)
         room = Rectangle(room.left, room.bottom, room.width, max(room.height - taken, 1.0))
     chosen = selection.selected(context)
+    if canvas.hit is not None and not _is_there(canvas.hit, graphs.get(canvas.graph)):
+        canvas.hit = None
     for tile, (number, graph) in zip(tiles(room, len(graphs), 0.6 * look.text, look.text), graphs.items(), strict=True):
         _draw_graph(scene, canvas, number, graph, tile, compared, chosen)
     if canvas.hit is not None and canvas.graph in graphs and canvas.pointer is not None:
@@ -145,6 +147,14 @@ def _tables(compared: comparison.SceneComparison) -> dict[int, Impacts]:
     return found if compared.impacts is None else {0: compared.impacts, **found}
 
 
+def _is_there(hit: Hit, graph: ImpactGraph | None) -> bool:
+    """Whether what was under the mouse is still in the graph, which may have been made again since."""
+    if graph is None or hit.series >= len(graph.drawn):
+        return False
+    series = graph.drawn[hit.series].series
+    return series.source == hit.source and hit.place < series.row.size and int(series.row[hit.place]) == hit.row
+
+
 def _draw_graph(
     scene: bpy.types.Scene,
     canvas: Canvas,
@@ -207,8 +217,6 @@ def _draw_pointed(
 ) -> None:
     """The point under the mouse, its error bars, and all other points of the same impact."""
     hit, look = canvas.hit, canvas.look
-    if hit.series >= len(graph.drawn):
-        return
     one = graph.drawn[hit.series]
     with drawing.clipped(plot):
         if not one.series.model and bpy.context.scene.rockfall_graphs.error_bars != "NEVER":
@@ -272,8 +280,6 @@ def _beyond_text(outside: list[tuple[float, int, int]], look: Look, room: float)
 def _draw_card(canvas: Canvas, graph: ImpactGraph, hit: Hit, compared: comparison.SceneComparison) -> None:
     """What is known of the impact under the mouse."""
     tables = _tables(compared)
-    if hit.source not in tables or hit.series >= len(graph.drawn):
-        return
     impacts, drawn, row = tables[hit.source], graph.drawn[hit.series], np.array([hit.row])
     name = f"{impacts.trajectory[hit.row]}, impact {impacts.impact[hit.row]}"
     rows = [name if hit.source == 0 else f"{impacts.site[hit.row]}: {name}"]

@@ -8,6 +8,8 @@ length rules out, so that each ground has code of its own. Places in the points 
 import numpy as np
 
 from ..compiled import borrowing, kernel
+from ..terrain.kernels import nearest_point
+from ..terrain.point_kernels import nearest
 from . import contact_kernels, point_kernels
 
 
@@ -23,6 +25,16 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
     if other >= 0 and u < t:
         return u, m, tree[0][3].shape[0] + other
     return t, n, place
+
+
+@borrowing
+def is_in(tree, stack, p, radius):  # type: ignore[no-untyped-def]
+    """Whether a sphere at p is in the ground."""
+    if len(tree) == 5:
+        return nearest(tree, stack, p, radius)[1] >= 0
+    if len(tree) == 4:
+        return nearest_point(tree, stack, p, radius)[4] >= 0
+    return nearest_point(tree[0], stack, p, radius)[4] >= 0 or nearest(tree[1], stack, p, radius)[1] >= 0
 
 
 @kernel

@@ -13,6 +13,7 @@ from ..reconstruction.impact import Impacts
 from ..reconstruction.placement import FAR_IN_THE_AIR_M, FAR_M
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
+from ..terrain.cloud import Cloud, local_planes, nearest_points
 from ..terrain.raycast import closest_points
 from ..vectors import Array, Mask, Names, cross
 from .block_shapes import volumes
@@ -232,16 +233,15 @@ def _released(
         axes, shape, density = sizes[0][which], sizes[1][which], sizes[2][which]
     diameter = axes.mean(axis=1)
     check_size(ground, diameter)
-    nearest = closest_points(ground.surface, start.position)
-    for i in np.flatnonzero(nearest.distance > start.reach)[:1].tolist():
+    distance, foot, normal = _feet(ground, start.position)
+    for i in np.flatnonzero(distance > start.reach)[:1].tolist():
         raise InputError(
-            f"The start {start.name[i]} is {nearest.distance[i]:.1f} m from the terrain",
+            f"The start {start.name[i]} is {distance[i]:.1f} m from the terrain",
             advice="Give the terrain on which it was measured",
         )
-    normal = ground.surface.face_normals[nearest.face]
     centre = start.position[which]
-    lies: Mask = nearest.distance[which] <= np.where(start.reach[which] > FAR_M, diameter, np.inf)
-    placed, fits = standing_on(ground, nearest.point[which][lies], normal[which][lies], diameter[lies])
+    lies: Mask = distance[which] <= np.where(start.reach[which] > FAR_M, diameter, np.inf)
+    placed, fits = standing_on(ground, foot[which][lies], normal[which][lies], diameter[lies])
     for i in np.flatnonzero(~fits)[:1].tolist():
         raise InputError(
             f"A block of {diameter[lies][i]:.3g} m is too large for the ground at {start.name[which[lies][i]]}",
@@ -260,3 +260,15 @@ def _released(
         axes_m=axes,
         density_kgpm3=density,
     )
+
+
+def _feet(ground: Ground, places: Array) -> tuple[Array, Array, Array]:
+    """(n,) distance of places (n, 3) from the terrain, (n, 3) where it is nearest, (n, 3) its normal there."""
+    terrain = ground.terrain
+    if isinstance(terrain, Cloud):
+        distance, point = nearest_points(terrain, places)
+        foot = terrain.points[point]
+        normal = local_planes(terrain, foot)[0]
+        return distance, foot, np.where(np.isfinite(normal), normal, (0.0, 0.0, 1.0))
+    nearest = closest_points(terrain, places)
+    return nearest.distance, nearest.point, terrain.face_normals[nearest.face]

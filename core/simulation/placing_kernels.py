@@ -7,7 +7,7 @@ import numpy as np
 
 from ..compiled import kernel
 from ..terrain.kernels import STACK_SIZE, nearest_hit, nearest_point
-from .ground_kernels import first_contact
+from .ground_kernels import first_contact, is_in
 
 ABOVE_M = 1e-6
 """A block that is placed on the terrain starts so much above it."""
@@ -91,3 +91,24 @@ def stand_many(tree, points, normals, radius, centres, fits, start, stop):  # ty
             p, good = _stood(tree, stack, point, normal, radius[i] + ABOVE_M, PARTS)
         fits[i] = good
         centres[i, 0], centres[i, 1], centres[i, 2] = p
+
+
+@kernel
+def lean_many(tree, points, normals, radius, centres, fits, start, stop):  # type: ignore[no-untyped-def]
+    """Fill centres (n, 3) of spheres that come to points (n, 3) of a cloud along their normals until they touch.
+
+    Where the ground leaves no room for the sphere to come from, one radius away, it does not fit.
+    """
+    stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
+    for i in range(start, stop):
+        n, r = (normals[i, 0], normals[i, 1], normals[i, 2]), radius[i]
+        far = 2.0 * r
+        p = (points[i, 0] + far * n[0], points[i, 1] + far * n[1], points[i, 2] + far * n[2])
+        fits[i] = False
+        if is_in(tree, stack, p, r):
+            continue
+        way, _, place = first_contact(tree, stack, times, p, (-n[0], -n[1], -n[2]), (0.0, 0.0, 0.0), r, far)
+        fits[i] = place >= 0
+        back = far - way + ABOVE_M
+        for k in range(3):
+            centres[i, k] = points[i, k] + back * n[k]

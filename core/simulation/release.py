@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.drag import Drag
 from ..remarks import Remark
+from ..terrain.cloud import Cloud
 from ..vectors import Array, Indices, Mask, Names
 from .block_shapes import ROUND, SHAPES, Shape, mean_inertia, principal_moments, volumes
 from .ground import Ground
@@ -176,13 +177,25 @@ def standing_on(ground: Ground, points: Array, normals: Array, diameter_m: Array
     -------
     centres : moved on, where the ground is too narrow for the sphere, until it touches and is nowhere in the ground.
     fits : (n,) false where there is no such place.
-    """
-    from .placing_kernels import stand_many
 
-    tree, radius = ground.index.tree, np.ascontiguousarray(diameter_m / 2)
+    Notes
+    -----
+    On a terrain of points, spheres come along the normals until they touch; they are not moved on.
+
+    Raises
+    ------
+    InputError : spheres that would fall between the points of the ground.
+    """
+    from .placing_kernels import lean_many, stand_many
+
+    radius = np.ascontiguousarray(diameter_m / 2)
+    on_points = isinstance(ground.terrain, Cloud)
+    if on_points:
+        ground.refuse_small(radius)
+    tree, put = (ground.tree, lean_many) if on_points else (ground.index.tree, stand_many)
     at, along = np.ascontiguousarray(points), np.ascontiguousarray(normals)
     centres, fits = np.empty((len(at), 3)), np.empty(len(at), np.bool_)
-    in_chunks(lambda i, j: stand_many(tree, at, along, radius, centres, fits, i, j), len(at))
+    in_chunks(lambda i, j: put(tree, at, along, radius, centres, fits, i, j), len(at))
     return centres, fits
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import InputError
 from ..reconstruction.placement import FAR_M
 from ..remarks import Remark
-from ..terrain.cloud import Cloud
+from ..terrain.cloud import Cloud, local_planes
 from ..terrain.raycast import cast_rays, closest_points
 from ..terrain.surface import face_cross_products
 from ..vectors import Array, Indices, Mask, Names, norm, unit
@@ -120,26 +120,18 @@ def in_polygon(
     InputError : no terrain within, or none so steep; a block that is too large for all places; an impossible angle.
     """
     check_number(number)
-    corners, normals = _terrain_faces(ground)
+    pieces, areas, normals, which = _pieces(ground, polygons)
     if steeper_than is not None:
         steep = _steeper(normals, steeper_than)
-        corners, normals = corners[steep], normals[steep]
-    parts, sources, owner = [], [], []
-    for i, polygon in enumerate(polygons):
-        part, source = polygon.clipped(corners)
-        parts.append(part)
-        sources.append(source)
-        owner.append(np.full(len(part), i))
-    pieces = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+        pieces, areas, normals, which = pieces[steep], areas[steep], normals[steep], which[steep]
     if not len(pieces):
         steep_too = "" if steeper_than is None else f" that is steeper than {np.degrees(steeper_than):g}°"
         raise InputError(
             f"There is no terrain within the polygon{steep_too}",
             advice="Check its coordinates" if steeper_than is None else "Give a smaller angle, or another polygon",
         )
-    which = np.concatenate(owner)
     name = np.array([polygon.name for polygon in polygons], dtype=np.str_)[which]
-    return _anywhere(ground, pieces, normals[np.concatenate(sources)], name, blocks, number, seed)
+    return _anywhere(ground, pieces, areas, normals, name, blocks, number, seed)
 
 
 def steeper_than(ground: Ground, angle: float, blocks: Blocks, number: int, seed: int = 0) -> Releases:
@@ -151,10 +143,10 @@ def steeper_than(ground: Ground, angle: float, blocks: Blocks, number: int, seed
 
     Notes
     -----
-    90° is a vertical wall, more is an overhang.
+    90° is a vertical wall, more is an overhang; a cloud of points has none, see `local_planes`.
     """
     check_number(number)
-    corners, normals = _terrain_faces(ground)
+    pieces, areas, normals, _ = _pieces(ground)
     steep = _steeper(normals, angle)
     if not steep.any():
         raise InputError(
@@ -162,7 +154,7 @@ def steeper_than(ground: Ground, angle: float, blocks: Blocks, number: int, seed
             advice=f"Give a smaller angle; the steepest is {np.degrees(np.arccos(normals[:, 2].min())):.1f}°",
         )
     name = np.full(int(steep.sum()), "")
-    return _anywhere(ground, corners[steep], normals[steep], name, blocks, number, seed)
+    return _anywhere(ground, pieces[steep], areas[steep], normals[steep], name, blocks, number, seed)
 
 
 def check_number(number: int, places: int = 1) -> None:
@@ -192,14 +184,38 @@ def _steeper(normals: Array, angle: float) -> Mask:
     return steep
 
 
-def _terrain_faces(ground: Ground) -> tuple[Array, Array]:
-    """Corners (m, 3, 3) and unit normals (m, 3) of the terrain's faces that have an area."""
-    terrain = ground.surface
+def _pieces(ground: Ground, polygons: Sequence[Polygon] | None = None) -> tuple[Array, Array, Array, Indices]:
+    """The terrain, or what is of it within polygons.
+
+    Returns
+    -------
+    pieces : (p, 3, 3) corners of triangles, or (p, 1, 3) points. areas : (p,) [m²]. normals : (p, 3).
+    which : (p,) polygon.
+    """
+    terrain = ground.terrain
+    if isinstance(terrain, Cloud):
+        places = [terrain.points] if polygons is None else []
+        for polygon in polygons or ():
+            places.append(terrain.points[polygon.contains(terrain.points[:, :2])])
+        points = np.concatenate(places) if places else np.empty((0, 3))
+        which = np.repeat(np.arange(len(places)), [len(part) for part in places])
+        normals, areas = local_planes(terrain, points)
+        good = np.isfinite(areas)
+        if len(points) and not good.any():
+            raise InputError("The points are too few to know how steep the terrain is", advice="Give a denser cloud")
+        return points[good, None], areas[good], normals[good], which[good]
     normals = terrain.face_normals
     good = np.isfinite(normals[:, 0])
-    if good.all():
-        return terrain.vertices[terrain.faces], normals
-    return terrain.vertices[terrain.faces[good]], normals[good]
+    corners, normals = terrain.vertices[terrain.faces[good]], normals[good]
+    which, sources = np.zeros(len(corners), np.intp), np.arange(len(corners))
+    if polygons is not None:
+        parts = [polygon.clipped(corners) for polygon in polygons]
+        which = np.repeat(np.arange(len(parts)), [len(part) for part, _ in parts])
+        sources = np.concatenate([sources[:0], *(source for _, source in parts)])
+        corners = np.concatenate([corners[:0], *(part for part, _ in parts)])
+    apart = np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
+    areas = 0.5 * norm(face_cross_products(corners.reshape(-1, 3), apart))
+    return corners, areas, normals[sources], which
 
 
 def _on_terrain(ground: Ground, points: Array) -> tuple[Array, Indices]:
@@ -256,13 +272,19 @@ def _chosen(cumulated: Array, part: Array) -> tuple[Indices, Array]:
 
 
 def _anywhere(
-    ground: Ground, pieces: Array, normals: Array, name: Names, blocks: Blocks, number: int, seed: int
+    ground: Ground,
+    pieces: Array,
+    areas: Array,
+    normals: Array,
+    name: Names,
+    blocks: Blocks,
+    number: int,
+    seed: int,
 ) -> Releases:
-    """Blocks on triangles (p, 3, 3), all areas alike; a place that is too narrow for its block is drawn again."""
+    """Blocks on pieces of the terrain, all areas alike; a place that is too narrow for its block is drawn again."""
     axes, density = draw_blocks(blocks, number, seed)
     diameter = axes.mean(axis=1)
     check_size(ground, diameter)
-    areas = norm(face_cross_products(pieces.reshape(-1, 3), np.arange(3 * len(pieces), dtype=np.int32).reshape(-1, 3)))
     cumulated = np.cumsum(areas)
     centre, chosen = np.empty((number, 3)), np.empty(number, np.intp)
     left = np.arange(number)
@@ -272,7 +294,7 @@ def _anywhere(
         at, _ = _chosen(cumulated, u[:, 0])
         root = np.sqrt(u[:, 1])
         weights = np.column_stack([1 - root, root * (1 - u[:, 2]), root * u[:, 2]])
-        points = np.einsum("ij,ijk->ik", weights, pieces[at])
+        points = np.einsum("ij,ijk->ik", weights, pieces[at]) if pieces.shape[1] == 3 else pieces[at, 0]
         centre[left], fits = standing_on(ground, points, normals[at], diameter[left])
         chosen[left] = at
         left = left[~fits]

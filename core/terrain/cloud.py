@@ -20,6 +20,9 @@ SAMPLES, ENOUGH = 2000, 12
 COLUMN = 2.0
 """The points below a place are those within so many spacings in plan."""
 
+PLANE = 2.5
+"""Points within so many spacings make a local plane: some twenty."""
+
 
 @dataclass(frozen=True, eq=False)
 class PointIndex:
@@ -140,6 +143,25 @@ def heights_above_points(cloud: Cloud, places: Any) -> Array:
     tree = cloud.index.tree
     in_chunks(lambda i, j: point_kernels.heights_many(tree, rows, reach, result, i, j), len(rows))
     return result
+
+
+def local_planes(cloud: Cloud, places: Any) -> tuple[Array, Array]:
+    """Normals (n, 3) of the cloud at places (n, 3) on it, and the area [m²] (n,) that a point has to itself there.
+
+    Both of the points within `PLANE` spacings, or further where they are few; NaN where they are too few for a plane.
+    A cloud does not tell which side is the open one: normals point upwards, so that nothing dips more than 90°.
+
+    Raises
+    ------
+    InputError : a coordinate that is not finite.
+    """
+    from . import point_kernels
+
+    rows = _finite(places)
+    normals, areas = np.empty((len(rows), 3)), np.empty(len(rows))
+    tree, reach = cloud.index.tree, PLANE * cloud.spacing_m
+    in_chunks(lambda i, j: point_kernels.planes_many(tree, rows, reach, normals, areas, i, j), len(rows))
+    return normals, areas
 
 
 def nearest_points(cloud: Cloud, places: Any) -> tuple[Array, NDArray[np.int64]]:

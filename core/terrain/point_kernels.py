@@ -26,6 +26,7 @@ SPREAD_POINTS = 32
 """So many points of a node, or up to twice as many, tell in which direction they spread least."""
 SHORTER = 1.0 - 1e-6
 FARTHER = 3.0
+LEAST_PLANE = 8
 STEEP = 4.0
 """A column of points belongs to one surface as far as this slope."""
 
@@ -338,3 +339,55 @@ def nearest_many(tree, places, distance, place, start, stop):  # type: ignore[no
     for k in range(start, stop):
         square, place[k] = nearest(tree, stack, (places[k, 0], places[k, 1], places[k, 2]), np.inf)
         distance[k] = np.sqrt(square)
+
+
+@borrowing
+def moments(tree, stack, p, reach):  # type: ignore[no-untyped-def]
+    """Of the points within `reach` of a place, as differences to it: how many; sums; sums of products."""
+    nodes, first, count, points, _ = tree
+    n, x, y, z, square = 0, 0.0, 0.0, 0.0, reach * reach
+    xx, yy, zz, xy, yz, zx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    stack[0] = 0
+    top = 1
+    while top:
+        top -= 1
+        node = stack[top]
+        if box_distance2(nodes, node, p[0], p[1], p[2]) > square:
+            continue
+        if count[node] == 0:
+            stack[top], stack[top + 1] = first[node], first[node] + 1
+            top += 2
+            continue
+        for i in range(first[node], first[node] + count[node]):
+            u, v, w = points[i, 0] - p[0], points[i, 1] - p[1], points[i, 2] - p[2]
+            if u * u + v * v + w * w <= square:
+                n, x, y, z = n + 1, x + u, y + v, z + w
+                xx, yy, zz = xx + u * u, yy + v * v, zz + w * w
+                xy, yz, zx = xy + u * v, yz + v * w, zx + w * u
+    return n, x, y, z, xx, yy, zz, xy, yz, zx
+
+
+@kernel
+def planes_many(tree, places, reach, normals, areas, start, stop):  # type: ignore[no-untyped-def]
+    """Fill the upward normals (n, 3) of the planes of the points about places, and the area (n,) of each such point.
+
+    They are those within `reach`, or up to `FARTHER` times that where they would be fewer than `LEAST_PLANE`; NaN where
+    they still are.
+    """
+    stack = np.empty(STACK_SIZE, np.int64)
+    for k in range(start, stop):
+        p, far = (places[k, 0], places[k, 1], places[k, 2]), reach
+        n, x, y, z, xx, yy, zz, xy, yz, zx = moments(tree, stack, p, far)
+        while n < LEAST_PLANE and far < FARTHER * reach:
+            far *= 1.5
+            n, x, y, z, xx, yy, zz, xy, yz, zx = moments(tree, stack, p, far)
+        normals[k, 0] = normals[k, 1] = normals[k, 2] = areas[k] = np.nan
+        if n < LEAST_PLANE:
+            continue
+        x, y, z = x / n, y / n, z / n
+        u, v, w = least_direction(
+            xx / n - x * x, yy / n - y * y, zz / n - z * z, xy / n - x * y, yz / n - y * z, zx / n - z * x
+        )
+        up = 1.0 if w >= 0.0 else -1.0
+        normals[k, 0], normals[k, 1], normals[k, 2] = up * u, up * v, up * w
+        areas[k] = pi * far * far / n

@@ -12,14 +12,22 @@ from rockfall.core.errors import InputError
 from rockfall.core.exchange.csv_text import read_table
 from rockfall.core.exchange.project import read_project, write_project
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.simulation import engine
+from rockfall.core.simulation.blocks import Blocks
+from rockfall.core.simulation.distributions import Distribution
 from rockfall.core.simulation.engine import ENDS, IMPACT, Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.measured_releases import from_reconstruction
 from rockfall.core.simulation.point_kernels import CORE
+from rockfall.core.simulation.polygons import Polygon
 from rockfall.core.simulation.release import make_releases, overlapping, placed_on
+from rockfall.core.simulation.release_sources import in_polygon, steeper_than
 from rockfall.core.simulation.results import fell_through
-from rockfall.core.terrain.cloud import Cloud, heights_above_points, nearest_points
+from rockfall.core.terrain.cloud import Cloud, heights_above_points, local_planes, nearest_points
 from rockfall.core.terrain.kernels import STACK_SIZE
 from rockfall.core.terrain.readers import read_points, read_terrain
 from rockfall.core.terrain.surface import Surface
@@ -155,6 +163,51 @@ def test_releases_are_placed_on_points_and_their_depth_is_known() -> None:
     np.testing.assert_allclose(overlapping(ground, releases), [0, 0.2 / np.hypot(1, 0.5)], atol=0.01)
     with pytest.raises(InputError, match="beside the terrain"):
         overlapping(ground, make_releases(np.array([[50.0, 10.0, 0.0]]), diameter_m=0.6))
+
+
+@pytest.fixture(scope="module")
+def cliff() -> Cloud:
+    """20 m wide: 20° over 30 m of slope, a face of 80° over 20 m with half the points, then level ground."""
+    rng = np.random.default_rng(6)
+    x, z, parts = 0.0, 0.0, []
+    for length, angle, spacing in ((30.0, 20.0, 0.1), (20.0, 80.0, 0.14), (30.0, 0.0, 0.1)):
+        along = rng.uniform(0, length, int(length * 20 / spacing**2))
+        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        parts.append(np.column_stack([x + c * along, rng.uniform(0, 20, along.size), z - s * along]))
+        x, z = x + c * length, z - s * length
+    return Cloud(np.concatenate(parts), GlobalShift(), "cliff")
+
+
+CLIFF_X = 30 * np.cos(np.radians(20)), 30 * np.cos(np.radians(20)) + 20 * np.cos(np.radians(80))
+
+
+def test_local_planes_of_a_cloud(cliff: Cloud) -> None:
+    places = np.array([[10.0, 10, -10 * np.tan(np.radians(20))], [35.0, 10.0, cliff.points[:, 2].min()]])
+    places = np.vstack([places, cliff.points[np.argmin(abs(cliff.points - [29.5, 10, -17]).sum(axis=1))]])
+    normals, areas = local_planes(cliff, places)
+    np.testing.assert_allclose(np.degrees(np.arccos(normals[:, 2])), [20, 0, 80], atol=0.01)
+    np.testing.assert_allclose(areas, [0.01, 0.01, 0.0196], rtol=0.5)
+    few = Cloud(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), GlobalShift(), "few")
+    assert np.isnan(local_planes(few, few.points)[1]).all()
+
+
+def test_releases_on_points_are_as_many_on_each_square_metre(cliff: Cloud) -> None:
+    """On the face, whose points are half as many, as on the slope; both in true area."""
+    ground, blocks, n = make_ground(cliff), Blocks(diameter=Distribution("fixed", 0.6)), 6000
+    whole = in_polygon(
+        ground, [Polygon("area", (np.array([[0.0, 0], [70, 0], [70, 20], [0, 20]]),))], blocks, n, seed=2
+    )
+    near = np.digitize(whole.position[:, 0] - 0.3 * (whole.position[:, 2] < -11), CLIFF_X)
+    counts = np.bincount(near, minlength=3)
+    np.testing.assert_allclose(counts / n, [30 / 80, 20 / 80, 30 / 80], atol=0.025)
+    steep = steeper_than(ground, np.radians(60), blocks, 500, seed=2)
+    away = (steep.position - [CLIFF_X[0], 0, -30 * np.sin(np.radians(20))]) @ [
+        np.sin(np.radians(80)), 0, np.cos(np.radians(80)),
+    ]  # fmt: skip
+    assert (abs(away - 0.3) < 0.02).mean() > 0.97  # they touch the face, less at its edges
+    assert overlapping(ground, steep).max() < 0.02
+    with pytest.raises(InputError, match="steeper than 85°"):
+        steeper_than(ground, np.radians(85), blocks, 10)
 
 
 def test_blocks_that_would_fall_between_the_points_are_refused() -> None:
@@ -382,6 +435,46 @@ def test_the_command_lets_blocks_meet_points_and_walls_of_points(survey: Path, t
     ends = [read_table(tmp_path / name / "runs.csv", ("x_m",), ()).numbers("x_m") for name in ("points", "mesh")]
     np.testing.assert_allclose(*ends, atol=6.0)  # the wall sends them back a little
     assert (np.concatenate(ends) < 2_600_039.41).all()
+
+
+def test_the_command_releases_blocks_where_points_are_steep(survey: Path, tmp_path: Path) -> None:
+    """The upper half of the slope has 35°, the rest is level; the faces of the mesh of the same points say the same."""
+    for contact in ("points", "mesh"):
+        out = tmp_path / contact
+        argv = ["simulate", "--steeper-than", "20", "--number", "300", "--diameter", "1", "--seed", "4"]
+        argv += [
+            "--terrain",
+            str(survey / "slope.xyz"),
+            "--contact",
+            contact,
+            "--model",
+            "noel_2017",
+            "--out",
+            str(out),
+        ]
+        assert main(argv) == 0
+        rows = read_table(out / "trajectories.csv", ("time_s", "x_m", "z_m"), ())
+        starts = rows.numbers("time_s") == 0
+        x, z = rows.numbers("x_m")[starts] - 2_600_000, rows.numbers("z_m")[starts]
+        assert (x < 31).all()
+        assert np.median(x) == pytest.approx(15, abs=1.5)
+        np.testing.assert_allclose((z - 500 + 0.7 * x) / np.hypot(1, 0.7), 0.5, atol=0.06)
+
+
+def test_measured_releases_start_on_points() -> None:
+    """One in the air where it was, one that is seen from its impact on touching the plain of points there."""
+    fall = np.sqrt(2 * 5 / 9.81)
+    picks = make_picks(
+        ["a", "a", "b", "b"],
+        [0.0, fall, 10.0, 10.6],
+        [[2.0, 10.0, 5.0], [2.0 + 3 * fall, 10.0, 0.0], [4.0, 15.0, 0.0], [6.0, 15.0, 0.0]],
+        kind=["release", "impact", "impact", "impact"],
+        normal=[[0.0, 0.0, 1.0]] * 4,
+    )
+    made = from_reconstruction(make_ground(lattice(0.1)), reconstruct(picks, block=Block(0.6, 0.5, 0.4, 2700, "box")))
+    np.testing.assert_allclose(made.position, [[2.0, 10.0, 5.0], [4.0, 15.0, 0.25]], atol=0.01)
+    np.testing.assert_allclose(made.velocity, [[3.0, 0.0, 0.0], [2 / 0.6, 0.0, 9.81 * 0.3]], atol=1e-6)
+    np.testing.assert_allclose(made.angular_velocity[1], [0.0, 2 / 0.6 / 0.25, 0.0], atol=1e-6)
 
 
 def test_the_command_refuses_what_points_cannot_do(survey: Path, tmp_path: Path, capsys) -> None:

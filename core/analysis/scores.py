@@ -79,19 +79,35 @@ def predicted(predictions: Predictions, model: int, name: str) -> Array:
     return np.degrees(values) if name.endswith("_deg") else values
 
 
-def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions) -> Score:
-    from scipy.stats import wasserstein_distance
+def rmse(impacts: Impacts, predictions: Predictions, model: int, quantity: str) -> float:
+    """That of a `Score` alone, at once; NaN where nothing is measured. `model` is its place in the predictions."""
+    y, runs, _, _ = _pairs(model, quantity, impacts, predictions)
+    return float(np.sqrt(np.mean((_drawn(runs).mean(axis=0) - y) ** 2))) if y.size else np.nan
 
+
+def _pairs(i: int, quantity: str, impacts: Impacts, predictions: Predictions) -> tuple[Array, Array, Array, Array]:
+    """Of the impacts where both are known: measured (n,), predicted (1 + R, n), and the same of the abscissa."""
     against = ABSCISSA[quantity]
     y, runs = measured(impacts, predictions.row, quantity), predicted(predictions, i, quantity)
     x = measured(impacts, predictions.row, against)
     x_runs = predicted(predictions, i, against) if against in ABSCISSA else np.broadcast_to(x, runs.shape)
     known = np.isfinite(y) & np.isfinite(x) & np.isfinite(runs).all(axis=0) & np.isfinite(x_runs).all(axis=0)
-    n = int(known.sum())
+    return y[known], runs[:, known], x[known], x_runs[:, known]
+
+
+def _drawn(runs: Array) -> Array:
+    """The replicates, or the model's mean when there are none."""
+    return runs[1:] if len(runs) > 1 else runs
+
+
+def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions) -> Score:
+    from scipy.stats import wasserstein_distance
+
+    y, runs, x, x_runs = _pairs(i, quantity, impacts, predictions)
+    n = y.size
     if not n:
         return Score(model, quantity, 0, *[np.nan] * 7)
-    y, runs, x, x_runs = y[known], runs[:, known], x[known], x_runs[:, known]
-    draws, x_draws = (runs[1:], x_runs[1:]) if predictions.replicates else (runs, x_runs)
+    draws, x_draws = _drawn(runs), _drawn(x_runs)
     error = draws.mean(axis=0) - y
     return Score(
         model,

@@ -2,18 +2,19 @@
 """How near the models come to the scene's impacts: the numbers of `rockfall compare`, kept with the predictions."""
 
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from weakref import WeakKeyDictionary
 
 import bpy
 
 from ...core.analysis.comparison import Predictions
-from ...core.analysis.scores import Score, scores
+from ...core.analysis.scores import ABSCISSA, Score, rmse, scores
 from ...core.impact_models.registry import MODELS
 from ...core.reconstruction.impact import Impacts
 from .comparison import SceneComparison
 
 _known: WeakKeyDictionary[Predictions, dict[str, Score]] = WeakKeyDictionary()
+_errors: WeakKeyDictionary[Predictions, dict[str, float]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,17 @@ def score_of(impacts: Impacts, predictions: Predictions, quantity: str) -> Score
     known = _known.setdefault(predictions, {})
     if quantity not in known:
         known[quantity] = scores(impacts, predictions, [quantity])[0]
+    return known[quantity]
+
+
+def rmse_of(comparison: SceneComparison, which: str, model: str, quantity: str) -> float:
+    """Root mean square of model − measured, at once; NaN where it is not known, or no score of that quantity."""
+    predictions = comparison.predictions.get(which, {}).get(model)
+    if comparison.impacts is None or predictions is None or quantity not in ABSCISSA:
+        return nan
+    known = _errors.setdefault(predictions, {})
+    if quantity not in known:
+        known[quantity] = rmse(comparison.impacts, predictions, 0, quantity)
     return known[quantity]
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How quickly graphs and blocks follow a slider of a model: what is computed, and what Blender is told.
 
-Blender as a module is needed: the bpy wheel. Drawing is not in it. In a window the blocks of more than 1 000 impacts wait
-until the slider rests: for what follows each move then, take --no-blocks.
+Blender as a module is needed: the bpy wheel. Drawing is not in it. In a window the blocks of more than 1 000 impacts
+wait until the slider rests: for what follows each move then, take --no-blocks.
 """
 
 import argparse

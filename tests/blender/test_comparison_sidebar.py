@@ -234,6 +234,8 @@ def test_scores_are_those_of_rockfall_compare(scene, part, comparison_of) -> Non
             for row in rows:
                 one = wanted[row.model, quantity]
                 assert (row.score.bias, row.score.rmse) == (pytest.approx(one.bias), pytest.approx(one.rmse))
+                rmse_of = part("rockfall_addon.scene.comparison_scores").rmse_of
+                assert rmse_of(comparison_of(scene), "A", row.model, quantity) == pytest.approx(one.rmse)
                 assert row.score.energy_distance == pytest.approx(one.energy_distance, abs=1e-9)
 
 

@@ -16,7 +16,7 @@ from ....core.analysis.variable_sigma import measured_sigma
 from ....core.analysis.variables import VARIABLES, known_variables, measured_values
 from ....core.reconstruction.impact import Impacts
 from ....core.vectors import Mask
-from ...scene import comparison, graph_settings
+from ...scene import comparison, comparison_scores, graph_settings
 from . import drawing, empty, legend, selection
 from .axes import draw_axes
 from .editor import Canvas
@@ -195,7 +195,7 @@ def _draw_graph(
             rings.draw(look.point, bounds)
         if pointed and canvas.hit is not None:
             _draw_pointed(canvas, graph, compared, seen.plot, bounds)
-    _draw_title(canvas, graph, fits, seen, lines)
+    _draw_title(canvas, graph, fits, seen, lines, compared)
     said = empty.in_graph(graph, compared)
     if said:
         empty.draw_in_plot(seen.plot, look, said)
@@ -229,7 +229,14 @@ def _draw_pointed(
     drawing.Points(np.concatenate(same), look.ink, 2.0, "ring").draw(look.point, bounds)
 
 
-def _draw_title(canvas: Canvas, graph: ImpactGraph, fits: list[Drawn], seen: Frame, lines: int) -> None:
+def _draw_title(
+    canvas: Canvas,
+    graph: ImpactGraph,
+    fits: list[Drawn],
+    seen: Frame,
+    lines: int,
+    compared: comparison.SceneComparison,
+) -> None:
     """Above the plot: the fits to the left, that of the measured points first; what lies beyond to the right."""
     look, plot = canvas.look, seen.plot
     base = plot.top + 0.45 * look.text
@@ -246,8 +253,11 @@ def _draw_title(canvas: Canvas, graph: ImpactGraph, fits: list[Drawn], seen: Fra
         return
     x = plot.left
     for one in models:
-        texts = _fit_texts(one, graph)
-        words = _fitting(texts if len(models) == 1 else texts[2:], look, plot.right - x)
+        texts, score = _fit_texts(one, graph), _score_text(one, graph, compared)
+        texts = texts if len(models) == 1 else texts[2:]
+        if score:
+            texts = [*(f"{text}, {score}" if text else score for text in texts), ""]
+        words = _fitting(texts, look, plot.right - x)
         x += drawing.text(x, base, words, look.text, one.colour) + look.text
 
 
@@ -257,6 +267,16 @@ def _fit_texts(one: Drawn, graph: ImpactGraph) -> list[str]:
     r2 = f"R² {curve.fit.r2:.2f}".replace("-", "−") if curve.is_fitted else ""
     rank = f", ρ {curve.rank:.2f}".replace("-", "−") if np.isfinite(curve.rank) and r2 else ""
     return [curve_text(curve, graph.spec), curve_text(curve, graph.spec, full=False), f"{r2}{rank}", r2, ""]
+
+
+def _score_text(one: Drawn, graph: ImpactGraph, compared: comparison.SceneComparison) -> str:
+    """How near a model comes to all impacts, as `rockfall compare` has it; empty where some are filtered out."""
+    which = "B" if one.hollow or "A" not in compared.predictions else "A"
+    predicted = compared.predictions[which].get(one.series.model)
+    if predicted is None or one.series.points.shape[0] != predicted.row.size * len(compared.runs):
+        return ""
+    error = comparison_scores.rmse_of(compared, which, one.series.model, graph.spec.y)
+    return f"RMSE {error:.2f}" if np.isfinite(error) else ""
 
 
 def _fitting(texts: list[str], look: Look, room: float) -> str:

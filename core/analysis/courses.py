@@ -10,7 +10,7 @@ import numpy as np
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..impact_models.machinery.base import Incident
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import Impacts, fall_numbers
 from ..vectors import Array, Indices, Mask, cross, dot, unit
 
 Spin = Literal["rolling", "zero", "table"]
@@ -118,9 +118,7 @@ def find_courses(impacts: Impacts, spin: Spin = "rolling", radius_m: float | Non
 
 def _in_time(impacts: Impacts) -> tuple[Indices, Mask]:
     """The rows grouped by fall and in time order; whether a row is of the fall of the one before."""
-    number: dict[tuple[str, ...], int] = {}
-    names = zip(*(column.tolist() for column in impacts.falls), strict=True)
-    code = np.array([number.setdefault(name, len(number)) for name in names], dtype=np.intp)
+    code = fall_numbers(impacts)
     order = np.lexsort((impacts.impact, impacts.time_s, code))
     return order, np.r_[False, np.diff(code[order]) == 0]
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices
 from .curves import number
 from .graphs import Graph
@@ -70,13 +69,6 @@ def graph_scores(graph: Graph, fall: Indices) -> tuple[GraphScore, ...]:
     if find_variable(graph.spec.x).restituted and graph.spec.x != graph.spec.y:
         axes.append((0, graph.spec.x))
     return tuple(_score(name, (graph.modelled - graph.measured)[linked, axis], of) for axis, name in axes)
-
-
-def fall_numbers(impacts: Impacts) -> Indices:
-    """(n,) number of the fall that each impact belongs to."""
-    keys: dict[tuple[str, ...], int] = {}
-    names = zip(*(column.tolist() for column in impacts.falls), strict=True)
-    return np.array([keys.setdefault(name, len(keys)) for name in names], dtype=np.intp)
 
 
 def _score(variable: str, error: Array, fall: Indices) -> GraphScore:

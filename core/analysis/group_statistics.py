@@ -7,10 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from ..progress import Progress, silent
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import Impacts, fall_numbers
 from ..remarks import Remark
 from ..vectors import Array, Indices, Names
-from .graph_scores import fall_numbers
 from .group_tests import LEVEL, Exchanged, GroupTest, GroupTests, group_tests
 from .line_fits import FEWEST, LineFit, power_law
 from .statistics import ImpactStatistics, statistics_by_number, usable

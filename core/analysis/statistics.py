@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import Progress, silent
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import Impacts, fall_numbers
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask
-from .graph_scores import fall_numbers
 from .line_fits import FEWEST, LineFit, interval_by_cluster, line, line_through_origin, power_law
 from .variables import APPARENT, VARIABLES, known_variables, measured_values
 

@@ -199,6 +199,13 @@ class Impacts:
         return texts
 
 
+def fall_numbers(impacts: Impacts) -> Indices:
+    """(n,) number of the fall that each impact belongs to."""
+    keys: dict[tuple[str, ...], int] = {}
+    names = zip(*(column.tolist() for column in impacts.falls), strict=True)
+    return np.array([keys.setdefault(name, len(keys)) for name in names], dtype=np.intp)
+
+
 JUDGED = ("rn", "rt", "r", "theta1", "theta_dev")
 """What a block that does not come nearer has none of."""
 

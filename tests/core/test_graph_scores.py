@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rockfall.core.analysis.comparison import compare
-from rockfall.core.analysis.graph_scores import fall_numbers, graph_scores
+from rockfall.core.analysis.graph_scores import graph_scores
 from rockfall.core.analysis.graphs import PAPER_GRAPHS, GraphSpec, make_graph
 from rockfall.core.analysis.scores import scores
+from rockfall.core.reconstruction.impact import fall_numbers
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
 

@@ -18,7 +18,7 @@ from ...core.analysis.motion_graphs import QUANTITIES, MotionCourse, delayed, mo
 from ...core.errors import RockfallError
 from ...core.workflow.refinement import pixels_of
 from ...core.workflow.sightings import SeenVideo
-from . import comparison, fingerprints, picks, reconstruction, sightings, store, timing, videos
+from . import comparison, fingerprints, picks, reconstruction, sightings, store, sync, timing, videos
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +114,13 @@ def _compute(scene: bpy.types.Scene, kept: _Kept, names: list[str]) -> None:
     seen, surface = _seen(scene, names), reconstruction.ground(scene)
     offsets = timing.kept_offsets(scene)
 
-    def add(members: Iterable[bpy.types.Object]) -> None:
-        result = reconstruction.reconstruct_scene(scene, picks.read(scene, list(members)), surface)
+    def add(members: Iterable[bpy.types.Object], name: str = "") -> None:
+        if name:  # as `sync` reads what a person may be dragging
+            held, block = sync.held_keys(scene, name), reconstruction.blocks_of(scene, {name})[name]
+            found = picks.read(scene, picks.ordered(scene, members, held), surface, sync.reach_of(block), held)
+        else:
+            found = picks.read(scene, list(members))
+        result = reconstruction.reconstruct_scene(scene, found, surface)
         pixels = pixels_of(seen)[0] if seen else None
         views = [video.view for video in seen]
         if pixels is not None:
@@ -124,14 +129,16 @@ def _compute(scene: bpy.types.Scene, kept: _Kept, names: list[str]) -> None:
             kept.courses[course.trajectory] = delayed(course, -offsets.get(course.trajectory, 0.0))
 
     try:
-        if groups:
+        if len(groups) > 1:
             add(obj for members in groups.values() for obj in members)
-    except RockfallError:
-        for name, members in groups.items():
-            try:
-                add(members)
-            except RockfallError as error:
-                kept.problems[name] = str(error)
+            return
+    except RockfallError:  # one of them has a problem
+        kept.courses = {name: one for name, one in kept.courses.items() if name not in groups}
+    for name, members in groups.items():
+        try:
+            add(members, name)
+        except RockfallError as error:
+            kept.problems[name] = str(error)
 
 
 def _seen(scene: bpy.types.Scene, names: list[str]) -> list[SeenVideo]:

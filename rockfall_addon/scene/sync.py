@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.reconstruction.block import Block
 from ...core.remarks import Remark
 from . import (
     block_keys,
@@ -181,6 +182,16 @@ def sync(
     return done
 
 
+def reach_of(block: Block) -> float:
+    """How near to the terrain a pick of a block lies on it [m]."""
+    return max(LEAST_REACH_M, REACH_RADII * block.radius_m)
+
+
+def held_keys(scene: bpy.types.Scene, name: str) -> picks.Held:
+    """What a person is just doing to the keys of a trajectory's block; nothing when nobody drags."""
+    return _held(name, trajectories.parts_of(scene, [name])) if is_dragging() else picks.NOTHING_HELD
+
+
 def recompute(scene: bpy.types.Scene) -> None:
     """Reconstruct everything anew, after a setting has changed; the panel shows what cannot be computed.
 
@@ -317,7 +328,7 @@ def _rebuild(
     """Compute one trajectory and show it; returns what there is to say about it."""
     surface = reconstruction.ground(scene)
     block = reconstruction.blocks_of(scene, {name})[name]
-    reach = max(LEAST_REACH_M, REACH_RADII * block.radius_m)
+    reach = reach_of(block)
     if not dragging:
         for obj in members:
             picks.absorb(scene, obj, surface, reach)

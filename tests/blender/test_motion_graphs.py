@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 HEADER = "trajectory,time_s,x_m,y_m,z_m\n"
 TIMES, DELAY_S = (0.0, 1.0, 2.0, 3.0), 0.5
@@ -123,3 +124,29 @@ def test_the_pick_of_an_impact_is_found_by_its_number(scene, part) -> None:
     sheet = part("rockfall_addon.view.graphs.motion_sheet")
     assert sheet.pick_of(scene, "B", 2) == picks_of(scene, "B")[1]
     assert sheet.pick_of(scene, "B", 9) is None
+
+
+def test_a_dragged_pick_lies_on_the_terrain_as_its_flights_do(part, tmp_path: Path) -> None:
+    """A pick on level ground that is held 10 cm above it, nearer than its block's radius, is on the ground."""
+    surface = part("core.terrain.surface").Surface(
+        np.array([[-50.0, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]]),
+        np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32),
+        part("core.georeference").GlobalShift(),
+        "level",
+    )
+    scene = bpy.context.scene
+    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    path = tmp_path / "picks.csv"
+    path.write_text(HEADER + "".join(f"A,{t!r},{5.0 * t!r},0.0,0.0\n" for t in TIMES), encoding="utf-8")
+    assert bpy.ops.rockfall.import_picks(filepath=str(path)) == {"FINISHED"}
+    motion, sync = part("rockfall_addon.scene.motion"), part("rockfall_addon.scene.sync")
+    height = part("core.analysis.motion_graphs").HEIGHT
+    (course,) = motion.motion_of(scene).courses
+    assert course.at(height, 1.5) == pytest.approx(9.81 / 8, abs=1e-3)
+    obj = picks_of(scene, "A")[1]
+    obj.location += Vector((0.4, 0.0, 0.1))
+    bpy.context.view_layer.update()
+    sync.sync(scene, ["A"], dragging=True)
+    (course,) = motion.motion_of(scene).courses
+    assert course.at(height, 1.0) == pytest.approx(0.0, abs=1e-6)
+    assert course.at(part("core.analysis.motion_graphs").SPEED, 1.0) == pytest.approx(np.hypot(4.6, 9.81 / 2), rel=1e-5)

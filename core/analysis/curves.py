@@ -13,6 +13,7 @@ Trend = Literal["auto", "none", "origin", "line", "power", "exponential", "logar
 """That of the pair of variables (`trend_of`), no curve, y = a·x, a + b·x, a·x^b, a·e^(b·x), a + b·ln x."""
 POINTS = 60
 DIGITS = 3
+ROUNDING = 1e-12
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 PAIRS: dict[tuple[str, str], Trend] = {
@@ -80,6 +81,8 @@ class Curve:
     def _equation(self, y: str, x: str, slope: str, power: str) -> str:
         fit = self.fit
         exponent = number(fit.slope)
+        if fit.slope == 0.0 and self.trend != "origin":
+            return f"{y} = {number(float(self.y[0]))}" if self.y.size else f"{y} is constant"
         if self.trend == "origin":
             return f"{slope} = {number(fit.slope)}" if slope else f"{y} = {number(fit.slope)} {x}"
         if self.trend == "power":
@@ -128,6 +131,8 @@ def fit_curve(
         return None
     x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
     placed = _placed(trend, x, y)
+    if np.ptp(y) <= ROUNDING * np.abs(y).max():  # a constant, but for rounding
+        y = np.full_like(y, y[0])
     fit, rank = _fit(trend, x[placed], y[placed], interval), rank_correlation(x, y)
     if not np.isfinite(fit.slope):
         return Curve(trend, fit, rank, x.size, np.empty(0), np.empty(0))

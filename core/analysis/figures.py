@@ -5,12 +5,12 @@ Text stays text in SVG and PDF. The two series differ in colour (the paper's red
 and in shape, so that they are told apart without colour too.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..impact_models.registry import find_model
-from .curves import Curve
+from .curves import Curve, number
 from .extras import FIGURES, demand
 from .graphs import Graph
 from .variables import Variable, find_variable
@@ -19,14 +19,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FORMATS = ("svg", "png", "pdf")
+FORMATS = ("png", "svg", "pdf")
 DPI = 300
+COMPRESSION = 4
+"""Of PNG files: much quicker than the usual 6 (of 9), and hardly larger."""
 COLUMN_IN, PAGE_IN = 3.54, 7.48
 """Widths of one column (90 mm) and of a page (190 mm)."""
 MEASURED, MODELLED, LINK = "#20262e", "#d7301f", "#b4b9c1"
 INK, MUTED = "#20262e", "#5b6470"
 LISTED = 3
-"""So many points beyond the axes are listed, the others are counted."""
+"""Up to so many points beyond the axes are listed, more are counted."""
+DENSE = 2000
+"""Graphs of more impacts are clouds: smaller, fainter points, as a picture within an SVG or PDF, and no links. The
+model's points are on top, for they are narrower."""
+LEAST_SIZE, LEAST_ALPHA = 0.4, 0.06
+"""Of the points of a cloud."""
 
 STYLE: Any = {
     "font.family": "sans-serif",
@@ -106,7 +113,7 @@ def sheet_figure(sheet: Sequence[Sequence[Graph]]) -> "Figure":
 
 
 def save_figures(
-    sheet: Sequence[Sequence[Graph]], folder: str | Path, formats: Sequence[str] = FORMATS
+    sheet: Sequence[Sequence[Graph]], folder: str | Path, formats: Sequence[str] = FORMATS[:1]
 ) -> tuple[Path, ...]:
     """Write the sheet (all_models) and one figure per model into a folder; returns the files.
 
@@ -115,12 +122,17 @@ def save_figures(
     DependencyError : Matplotlib is not installed.
     """
     demand(FIGURES)
-    figures = [("all_models", sheet_figure(sheet)), *((graphs[0].model, model_figure(graphs)) for graphs in sheet)]
-    return save_named(figures, folder, formats)
+
+    def figures() -> "Iterator[tuple[str, Figure]]":  # one at a time: clouds fill the memory
+        yield "all_models", sheet_figure(sheet)
+        for graphs in sheet:
+            yield graphs[0].model, model_figure(graphs)
+
+    return save_named(figures(), folder, formats)
 
 
 def save_named(
-    figures: "Iterable[tuple[str, Figure]]", folder: str | Path, formats: Sequence[str] = FORMATS
+    figures: "Iterable[tuple[str, Figure]]", folder: str | Path, formats: Sequence[str] = FORMATS[:1]
 ) -> tuple[Path, ...]:
     """Write (name, figure) pairs into a folder, each in all formats; returns the files."""
     folder = Path(folder)
@@ -139,12 +151,18 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
 
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
     with rc_context(STYLE):
-        figure.savefig(path, dpi=DPI, facecolor="white", metadata=undated)
+        png = {"pil_kwargs": {"compress_level": COMPRESSION}} if Path(path).suffix == ".png" else {}
+        figure.savefig(path, dpi=DPI, facecolor="white", metadata=undated, **png)
 
 
 def _laid_out(figure: "Figure") -> "Figure":
-    """The figure with its places fixed, which takes longer than to draw it."""
-    figure.draw_without_rendering()
+    """The figure with its places fixed, which takes as long as to draw it."""
+    for axes in figure.axes:
+        for artist in (*axes.lines, *axes.collections, *axes.texts):
+            artist.set_in_layout(False)  # it is within the axes
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
     figure.set_layout_engine("none")
     return figure
 
@@ -161,11 +179,20 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(7 if size == 1.0 else 5, steps=[1, 2, 5, 10]))
     axes.set_xlim(graph.x_limits)
     axes.set_ylim(graph.y_limits)
-    axes.add_collection(LineCollection(list(graph.links), colors=LINK, linewidths=0.6 * size, zorder=1), autolim=False)
-    common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "alpha": 0.85}
-    scale = size**0.5
-    axes.plot(*graph.modelled.T, marker="D", markersize=3.5 * scale, color=MODELLED, zorder=2, **common)
-    axes.plot(*graph.measured.T, marker="o", markersize=3.3 * scale, color=MEASURED, zorder=3, **common)
+    dense = _is_dense(graph)
+    if not dense:
+        links = LineCollection(list(graph.links), colors=LINK, linewidths=0.6 * size, zorder=1)
+        axes.add_collection(links, autolim=False)
+    part = DENSE / max(graph.row.size, DENSE)
+    scale = size**0.5 * max(part**0.25, LEAST_SIZE)
+    common: dict[str, Any] = {
+        "linestyle": "none",
+        "markeredgewidth": 0,
+        "alpha": max(0.85 * part**0.7, LEAST_ALPHA),
+        "rasterized": dense,
+    }
+    axes.plot(*graph.modelled.T, marker="D", markersize=3.5 * scale, color=MODELLED, zorder=3 if dense else 2, **common)
+    axes.plot(*graph.measured.T, marker="o", markersize=3.3 * scale, color=MEASURED, zorder=2 if dense else 3, **common)
     notes = []
     for curve, colour in ((graph.measured_curve, MEASURED), (graph.modelled_curve, MODELLED)):
         if curve is not None:
@@ -199,17 +226,16 @@ def curve_text(curve: Curve, graph: Graph, full: bool = True) -> str:
 
 
 def beyond_lines(graph: Graph) -> list[str]:
-    """What the axes cut off, for the corner of a graph: the farthest points, and how many there are besides."""
+    """What the axes cut off, for the corner of a graph: the points, or how many there are and how far the farthest is."""
     x, y = find_variable(graph.spec.x), find_variable(graph.spec.y)
     lines = []
     for series, word in (("measured", "measured"), ("model", "model")):
         points = [point for point in graph.beyond if point.series == series]
-        if points:
-            listed = "; ".join(
-                f"{point.y:.3g} at {point.x:.3g}{x.unit if x.unit == '°' else ''}" for point in points[:LISTED]
-            )
-            more = f" and {len(points) - LISTED} more" if len(points) > LISTED else ""
-            lines.append(f"Beyond, {word}: {y.tex} {listed}{more}")
+        if len(points) > LISTED:
+            lines.append(f"Beyond, {word}: {len(points)} points, {y.tex} up to {number(points[0].y)}")
+        elif points:
+            listed = "; ".join(f"{point.y:.3g} at {point.x:.3g}{x.unit if x.unit == '°' else ''}" for point in points)
+            lines.append(f"Beyond, {word}: {y.tex} {listed}")
     return lines
 
 
@@ -220,6 +246,10 @@ def _labels(axes: "Axes", graph: Graph, *, x: bool, short: bool) -> None:
     axes.set_ylabel(text(find_variable(graph.spec.y)))
     if x:
         axes.set_xlabel(find_variable(graph.spec.x).tex_label)
+
+
+def _is_dense(graph: Graph) -> bool:
+    return graph.row.size > DENSE
 
 
 def _title(graph: Graph) -> str:
@@ -234,7 +264,9 @@ def _legend(figure: "Figure", graph: Graph) -> None:
     handles = [
         Line2D([], [], marker="o", markersize=3.6, color=MEASURED, label="measured", **common),
         Line2D([], [], marker="D", markersize=3.4, color=MODELLED, label=kind, **common),
-        Line2D([], [], color=LINK, linewidth=0.9, label="same impact"),
+        Line2D([], [], linestyle="none", label=f"more than {DENSE} impacts: no links")
+        if _is_dense(graph)
+        else Line2D([], [], color=LINK, linewidth=0.9, label="same impact"),
     ]
     figure.legend(
         handles=handles,

@@ -176,25 +176,7 @@ def make_graph(
     ------
     InputError : the model was not compared, or has no such run.
     """
-    if predictions is not None:
-        row = predictions.row
-    elif row is None:
-        row = np.arange(len(impacts))
-    measured = np.stack([measured_values(impacts, row, name) for name in (spec.x, spec.y)], axis=1)
-    modelled = np.full_like(measured, np.nan)
-    if predictions is not None and model:
-        if not 0 <= run <= predictions.replicates:
-            raise InputError(f"There is no replicate {run}", advice=f"There are {predictions.replicates}")
-        which = predictions.index(model)
-        columns = [model_values(impacts, predictions, which, run, name) for name in (spec.x, spec.y)]
-        modelled = np.stack(columns, axis=1)
-    points = np.concatenate([measured, modelled])
-    points = points[_finite(points)]
-    limits = (
-        spec.x_limits or axis_limits(points[:, 0], spec.x_log),
-        spec.y_limits or axis_limits(points[:, 1], spec.y_log),
-    )
-    return _with_curves(Graph(spec, model, run, row, measured, modelled, *limits, None, None))
+    return _with_curves(_unfitted(impacts, spec, predictions, model, run, row))
 
 
 def make_sheet(
@@ -209,10 +191,17 @@ def make_sheet(
     run = min(1, predictions.replicates) if run is None else run
     columns = []
     for spec in specs:
-        graphs = [make_graph(impacts, spec, predictions, model, run) for model in predictions.models]
+        graphs = [_unfitted(impacts, spec, predictions, model, run) for model in predictions.models]
         x = min(graph.x_limits[0] for graph in graphs), max(graph.x_limits[1] for graph in graphs)
         y = min(graph.y_limits[0] for graph in graphs), max(graph.y_limits[1] for graph in graphs)
-        columns.append([_with_curves(replace(graph, x_limits=x, y_limits=y)) for graph in graphs])
+        graphs = [replace(graph, x_limits=x, y_limits=y) for graph in graphs]
+        measured = _curve(graphs[0], graphs[0].measured, interval=True) if graphs else None
+        columns.append(
+            [
+                replace(graph, measured_curve=measured, modelled_curve=_curve(graph, graph.modelled, interval=False))
+                for graph in graphs
+            ]
+        )
     return tuple(zip(*columns, strict=True))
 
 
@@ -275,14 +264,44 @@ def _placed(values: Array, limits: Limits, log: bool) -> Array:
     return (values - limits[0]) / (limits[1] - limits[0])
 
 
-def _with_curves(graph: Graph) -> Graph:
-    measured, modelled = (
-        fit_curve(
-            graph.spec.fitted, points[_finite(points)], graph.x_limits, graph.y_limits, interval=name == "measured"
-        )
-        for name, points in graph.series
+def _unfitted(
+    impacts: Impacts,
+    spec: GraphSpec,
+    predictions: Predictions | None,
+    model: str,
+    run: int,
+    row: Indices | None = None,
+) -> Graph:
+    """The graph without curves."""
+    if predictions is not None:
+        row = predictions.row
+    elif row is None:
+        row = np.arange(len(impacts))
+    measured = np.stack([measured_values(impacts, row, name) for name in (spec.x, spec.y)], axis=1)
+    modelled = np.full_like(measured, np.nan)
+    if predictions is not None and model:
+        if not 0 <= run <= predictions.replicates:
+            raise InputError(f"There is no replicate {run}", advice=f"There are {predictions.replicates}")
+        which = predictions.index(model)
+        columns = [model_values(impacts, predictions, which, run, name) for name in (spec.x, spec.y)]
+        modelled = np.stack(columns, axis=1)
+    points = np.concatenate([measured, modelled])
+    points = points[_finite(points)]
+    limits = (
+        spec.x_limits or axis_limits(points[:, 0], spec.x_log),
+        spec.y_limits or axis_limits(points[:, 1], spec.y_log),
     )
-    return replace(graph, measured_curve=measured, modelled_curve=modelled)
+    return Graph(spec, model, run, row, measured, modelled, *limits, None, None)
+
+
+def _with_curves(graph: Graph) -> Graph:
+    measured = _curve(graph, graph.measured, interval=True)
+    return replace(graph, measured_curve=measured, modelled_curve=_curve(graph, graph.modelled, interval=False))
+
+
+def _curve(graph: Graph, points: Array, interval: bool) -> Curve | None:
+    points = points[_finite(points)]
+    return fit_curve(graph.spec.fitted, points, graph.x_limits, graph.y_limits, interval=interval)
 
 
 def _finite(points: Array) -> Mask:

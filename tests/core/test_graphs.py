@@ -275,7 +275,9 @@ def test_why_there_is_no_fit_is_said(trend, points, words) -> None:
 
 def test_a_constant_ordinate_has_a_line_and_no_correlation() -> None:
     points = np.array([[1.0, 2.0], [2.0, 2.0], [4.0, 2.0]])
-    assert fit_curve("line", points, (0.0, 5.0), (0.0, 5.0)).text("y", "x") == "y = 2.00 + 0.00 x, n = 3"
+    assert fit_curve("line", points, (0.0, 5.0), (0.0, 5.0)).text("y", "x") == "y = 2.00, n = 3"
+    points = np.stack([np.arange(1.0, 800.0), 0.35 * (1 + 1e-15 * np.arange(799.0) % 3)], axis=1)
+    assert fit_curve("power", points, (0.0, 800.0), (0.0, 5.0)).text("y", "x") == "y = 0.350, n = 799"
     assert fit_curve("line", np.empty((0, 2)), (0.0, 5.0), (0.0, 5.0)) is None
 
 

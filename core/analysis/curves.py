@@ -75,7 +75,8 @@ class Curve:
         more += f", n = {self.fit.n if self.is_fitted else self.n}"
         if not self.is_fitted:
             return f"{self._why_not()}{more}" if full else self._why_not()
-        r2 = f", R² = {_signed(self.fit.r2)}" if np.isfinite(self.fit.r2) else ""
+        explained = np.isfinite(self.fit.r2) and self.fit.slope != 0.0
+        r2 = f", R² = {_signed(self.fit.r2)}" if explained else ""
         return f"{self._equation(y, x, slope, power)}{r2}{more if full else ''}"
 
     def _equation(self, y: str, x: str, slope: str, power: str) -> str:

@@ -44,6 +44,7 @@ class Exploration:
     given : parameters that are not to start at their default.
     seed : of the random numbers.
     origin : name of the table of impacts.
+    title : heading of the page; "" for the usual one.
     save : writes model → all parameters, and returns where.
     """
 
@@ -54,6 +55,7 @@ class Exploration:
     given: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     seed: int = 0
     origin: str = ""
+    title: str = ""
 
 
 def serve(exploration: Exploration, port: int = 0, ready: Callable[[str], None] | None = None) -> None:
@@ -104,10 +106,10 @@ def open_page(document: Any, exploration: Exploration) -> None:
     page = _Page(document, exploration)
     for root in page.roots():
         document.add_root(root)
-    document.title = "Rockfall: explore impact models"
+    document.title = exploration.title or "Rockfall: explore impact models"
     document.template = template()
     document.template_variables.update(
-        heading="Explore impact models",
+        heading=exploration.title or "Explore impact models",
         summary=summary(page.first, len(exploration.impacts), exploration.origin, chance=False),
         after="",
         live=True,

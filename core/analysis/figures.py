@@ -151,7 +151,7 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
 
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
     with rc_context(STYLE):
-        png = {"pil_kwargs": {"compress_level": COMPRESSION}} if Path(path).suffix == ".png" else {}
+        png: dict[str, Any] = {"pil_kwargs": {"compress_level": COMPRESSION}} if Path(path).suffix == ".png" else {}
         figure.savefig(path, dpi=DPI, facecolor="white", metadata=undated, **png)
 
 
@@ -226,7 +226,7 @@ def curve_text(curve: Curve, graph: Graph, full: bool = True) -> str:
 
 
 def beyond_lines(graph: Graph) -> list[str]:
-    """What the axes cut off, for the corner of a graph: the points, or how many there are and how far the farthest is."""
+    """What the axes cut off, for the corner of a graph: a few points, or their number and the farthest."""
     x, y = find_variable(graph.spec.x), find_variable(graph.spec.y)
     lines = []
     for series, word in (("measured", "measured"), ("model", "model")):

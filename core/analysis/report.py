@@ -30,13 +30,19 @@ source.data = {...source.data, ...shown.columns};
 
 
 def write_report(
-    impacts: Impacts, predictions: Predictions, scores: Sequence[Score], path: str | Path, origin: str = ""
+    impacts: Impacts,
+    predictions: Predictions,
+    scores: Sequence[Score],
+    path: str | Path,
+    origin: str = "",
+    title: str = "",
 ) -> None:
     """Write the page.
 
     Parameters
     ----------
-    origin : name of the table of impacts, for the heading and the provenance.
+    origin : name of the table of impacts, for the summary and the provenance.
+    title : the heading; "" for the usual one.
 
     Raises
     ------
@@ -51,11 +57,11 @@ def write_report(
     run = min(1, predictions.replicates)
     linked = link_graphs(impacts, predictions, first, run)
     document = Document()
-    document.title = f"Rockfall: {origin or 'impact models'}"
+    document.title = title or f"Rockfall: {origin or 'impact models'}"
     for root in (_controls(impacts, predictions, first, run, linked), linked.layout, linked.selection):
         document.add_root(root)
     document.template_variables.update(
-        heading="Impact models against measured impacts",
+        heading=title or "Impact models against measured impacts",
         summary=summary(predictions, len(impacts), origin),
         after=score_table(by_model(scores)) + provenance(predictions, origin),
         live=False,

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2
 from .options import (
+    add_figure_options,
     add_incident_options,
     add_observed_option,
     add_out,
     add_parameter_options,
     add_terrain_options,
+    figure_formats,
     measured_as_asked,
     model_parameters,
     naming,
@@ -49,7 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
     )
     add_incident_options(parser)
-    parser.add_argument("--tables-only", action="store_true", help="neither figures nor the page")
+    add_figure_options(parser, default="png", without="neither figures nor the page")
+    parser.add_argument("--title", default="", metavar="TEXT", help="heading of the page")
     group = parser.add_argument_group(
         "predicted flights: the blocks that leave each impact as a model says, and where they land"
     )
@@ -96,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_settings(predictions, folder / "comparison.toml")
         if flights is not None:
             write_predicted_flights(flights, folder / "predicted_flights.csv")
-        notes = [] if arguments.tables_only else _draw(impacts, predictions, marks, folder, arguments.impacts, progress)
+        notes = [] if arguments.tables_only else _draw(arguments, impacts, predictions, marks, folder, progress)
         written = [name for name in FILES if (folder / name).exists()]
     for line in (*_counts(predictions, len(impacts)), *_table(marks), *_landings(flights), *notes):
         print(line)
@@ -130,11 +133,11 @@ def _landings(flights: "PredictedFlights | None") -> list[str]:
 
 
 def _draw(
+    arguments: argparse.Namespace,
     impacts: "Impacts",
     predictions: "Predictions",
     marks: "tuple[Score, ...]",
     folder: Path,
-    origin: str,
     progress: PrintedProgress,
 ) -> list[str]:
     """The figures and the page, as far as their libraries are there; returns what to install for the others."""
@@ -146,12 +149,13 @@ def _draw(
     notes = []
     if is_there(FIGURES):
         progress("Drawing the figures")
-        save_figures(make_sheet(impacts, predictions), folder / "figures")
+        save_figures(make_sheet(impacts, predictions), folder / "figures", figure_formats(arguments))
     else:
         notes.append(f"No figures without Matplotlib. Install it: {install_command(FIGURES)}")
     if is_there(PAGES):
         progress("Writing the page")
-        write_report(impacts, predictions, marks, folder / "report.html", Path(origin).name)
+        origin = Path(arguments.impacts).name
+        write_report(impacts, predictions, marks, folder / "report.html", origin, arguments.title)
     else:
         notes.append(f"No report.html without Bokeh. Install it: {install_command(PAGES)}")
     return notes

@@ -34,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port", type=whole, default=0, metavar="N", help="on this machine (default: one that is free)"
     )
+    parser.add_argument("--title", default="", metavar="TEXT", help="heading of the page")
     parser.add_argument("--no-browser", action="store_true", help="only print the address")
 
 
@@ -70,7 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         serve(
-            Exploration(impacts, courses, models, save, given, arguments.seed, Path(arguments.impacts).name),
+            Exploration(
+                impacts, courses, models, save, given, arguments.seed, Path(arguments.impacts).name, arguments.title
+            ),
             arguments.port,
             ready,
         )

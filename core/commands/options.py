@@ -167,21 +167,22 @@ def add_incident_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_figure_options(parser: argparse.ArgumentParser) -> None:
-    """``--format`` and ``--tables-only``."""
+def add_figure_options(parser: argparse.ArgumentParser, default: str = "", without: str = "no figures") -> None:
+    """``--format``, of which `default` is taken when none is asked for ("" for all), and ``--tables-only``."""
+    parser.set_defaults(figure_formats=(default,) if default else FIGURE_FORMATS)
     parser.add_argument(
         "--format",
         action="extend",
         nargs="+",
         choices=FIGURE_FORMATS,
-        help="of the figures, one or several (default: all)",
+        help=f"of the figures, one or several (default: {default or 'all'})",
     )
-    parser.add_argument("--tables-only", action="store_true", help="no figures")
+    parser.add_argument("--tables-only", action="store_true", help=without)
 
 
 def figure_formats(arguments: argparse.Namespace) -> tuple[str, ...]:
     """What ``--format`` says."""
-    return tuple(dict.fromkeys(arguments.format or FIGURE_FORMATS))
+    return tuple(dict.fromkeys(arguments.format or arguments.figure_formats))
 
 
 def add_site_option(parser: argparse.ArgumentParser) -> None:

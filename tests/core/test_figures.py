@@ -52,7 +52,7 @@ def figures(impacts, predictions, tmp_path_factory):
     from rockfall.core.analysis.figures import save_figures
 
     folder = tmp_path_factory.mktemp("figures")
-    save_figures(make_sheet(impacts, predictions), folder)
+    save_figures(make_sheet(impacts, predictions), folder, ("png", "svg", "pdf"))
     return folder
 
 
@@ -106,6 +106,29 @@ def test_a_logarithmic_graph_of_measured_impacts(impacts, tmp_path) -> None:
     graph = make_graph(impacts, GraphSpec("energy", "kinetic1_j", "kinetic2_j", x_log=True, y_log=True))
     save_figure(model_figure([graph]), tmp_path / "energy.svg")
     assert "Incident kinetic energy" in (tmp_path / "energy.svg").read_text(encoding="utf-8")
+
+
+def test_a_cloud_of_impacts_is_a_picture_within_the_drawing(impacts, predictions, tmp_path) -> None:
+    """Its file does not grow with the points, and it says that the links are left out."""
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from rockfall.core.analysis.figures import model_figure, save_figure
+
+    graph = make_graph(impacts, GraphSpec("any", "vn1_mps", "vn2_mps"), predictions, "noel_2017")
+    times = 3000 // graph.row.size + 1
+    many = replace(
+        graph,
+        row=np.tile(graph.row, times),
+        measured=np.tile(graph.measured, (times, 1)),
+        modelled=np.tile(graph.modelled, (times, 1)),
+    )
+    sizes = []
+    for name, each in (("few", graph), ("many", many)):
+        save_figure(model_figure([each]), tmp_path / f"{name}.svg")
+        sizes.append((tmp_path / f"{name}.svg").read_text(encoding="utf-8"))
+    few, cloud = sizes
+    assert ("<image" in few, "<image" in cloud) == (False, True)
+    assert ("no links" in few, "more than 2000 impacts: no links" in cloud) == (False, True)
+    assert cloud.count("<use") <= few.count("<use")
 
 
 class Links(HTMLParser):
@@ -163,8 +186,11 @@ def test_compare_leaves_figures_and_the_page(impacts, tmp_path, capsys) -> None:
     write_impacts(impacts, tmp_path / "impacts.csv")
     write_parameters({"wyllie_2014": {"inertia": "sphere"}}, tmp_path / "parameters.toml")
     argv = ["compare", str(tmp_path / "impacts.csv"), "--model", "wyllie_2014", "--out", str(tmp_path / "out")]
+    argv += ["--title", "Quarry <north>"]
     assert main([*argv, "--parameters", str(tmp_path / "parameters.toml")]) == 0
-    assert len(list((tmp_path / "out" / "figures").iterdir())) == 6
+    assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} == {"all_models.png", "wyllie_2014.png"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "<h1>Quarry &lt;north&gt;</h1>" in page
     assert "inertia = sphere" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "figures, report.html" in capsys.readouterr().out
 

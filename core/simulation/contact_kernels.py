@@ -2,9 +2,10 @@
 """The first contact of a flying sphere with a terrain of triangles: compiled kernels, exact on the parabola.
 
 The path is p(t) = p + v t + ½ a t²; there are no chords. A node of the terrain's tree is entered when the parabola is
-in its box, grown by the radius, axis by axis. A triangle is first rejected by its plane, whose distance is a quadratic
-in t. What is left is found by conservative advancement: with the closest point q of the triangle, at the distance d in
-the direction e = (p − q)/d, the triangle lies behind the plane through q, because it is convex. So
+in its box, grown by the radius, axis by axis, and between the two planes that hold its triangles. A triangle is first
+rejected by its plane, whose distance is a quadratic in t. What is left is found by conservative advancement: with the
+closest point q of the triangle, at the distance d in the direction e = (p − q)/d, the triangle lies behind the plane
+through q, because it is convex. So
 
     d(t + h) ≥ d + (v·e) h + ½ (a·e) h²
 
@@ -15,8 +16,11 @@ face, and converges quadratically on edges and corners.
 from functools import partial
 from math import inf, sqrt
 
+import numpy as np
+
 from ..compiled import borrowing as kernel
 from ..terrain.kernels import closest_on_triangle, inverse
+from .pair_kernels import CODES, SECOND
 
 inlined = partial(kernel, inline=True)
 
@@ -26,6 +30,11 @@ RESTING_S = 1e-9
 """A sphere that touches, and comes back within this time, has not left."""
 STEPS = 100
 FOREVER_S = 1e12
+NOTHING = 1 << 40
+"""No row of the tree."""
+UNIT = 1.0 + 1e-6
+"""Length of a unit vector in single precision, at most."""
+SLOW_MPS = 0.5
 
 
 @kernel
@@ -181,32 +190,99 @@ def touch(corners, i, p, v, a, radius, t, limit):  # type: ignore[no-untyped-def
 
 
 @kernel
+def span(p, v, a, start, stop, grown):  # type: ignore[no-untyped-def]
+    """Between which values p + v t + ½ a t² stays from one time to another, and so much more."""
+    one, other = p + (v + 0.5 * a * start) * start, p + (v + 0.5 * a * stop) * stop
+    bow = 0.125 * a * (stop - start) * (stop - start)
+    return min(one, other) - max(bow, 0.0) - grown, max(one, other) + max(-bow, 0.0) + grown
+
+
+@inlined
+def overlaps(pairs, row, k, x, y, z):  # type: ignore[no-untyped-def]
+    """Whether a child's box overlaps three spans."""
+    low = (pairs[row, k] <= x[1]) & (pairs[row, k + 1] <= y[1]) & (pairs[row, k + 2] <= z[1])
+    return low & (pairs[row, k + 3] >= x[0]) & (pairs[row, k + 4] >= y[0]) & (pairs[row, k + 5] >= z[0])
+
+
+@inlined
+def enter_child(pairs, row, k, p, v, a, path, limit):  # type: ignore[no-untyped-def]
+    """`enter_box` of a child, its first time alone; inf when not between the planes that hold its triangles, either."""
+    near, far = enter_box(
+        np.float64(pairs[row, k]), np.float64(pairs[row, k + 1]), np.float64(pairs[row, k + 2]),
+        np.float64(pairs[row, k + 3]), np.float64(pairs[row, k + 4]), np.float64(pairs[row, k + 5]),
+        p, v, a, path, limit,
+    )  # fmt: skip
+    if near == inf:
+        return inf
+    x, y, z = np.float64(pairs[row, k + 6]), np.float64(pairs[row, k + 7]), np.float64(pairs[row, k + 8])
+    low, high = span(
+        x * p[0] + y * p[1] + z * p[2], x * v[0] + y * v[1] + z * v[2], x * a[0] + y * a[1] + z * a[2],
+        near, far, path[2] * UNIT,
+    )  # fmt: skip
+    return near if (low <= pairs[row, k + 10]) & (high >= pairs[row, k + 9]) else inf
+
+
+@kernel
+def soon(v, a):  # type: ignore[no-untyped-def]
+    """When a flight has most likely met the ground: on a slope of 45° and some more."""
+    return 2.0 * (sqrt(v[0] * v[0] + v[1] * v[1]) + max(v[2], 0.0) + SLOW_MPS) / -a[2] if a[2] < 0.0 else inf
+
+
+@kernel
 def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[no-untyped-def]
     """The first contact of a sphere with the terrain before `limit`.
 
     Parameters
     ----------
-    tree : of the terrain's index.
+    tree : of triangles, see `ground_kernels`.
     stack, times : work space of `STACK_SIZE`, int64 and float64.
     p, v, a : triples: place [m], velocity [m/s], acceleration [m/s²].
 
     Returns
     -------
     time, normal, place : [s], from the contact to the centre, in the order of the leaves; (inf, zeros, −1) for none.
+
+    Notes
+    -----
+    The path is looked at in parts, since most flights are short: where only one of two children overlaps the box of a
+    part, that is all that is asked.
     """
-    bounds, first, count, corners = tree
+    bounds, _, _, corners, pairs, children = tree
     found, normal = -1, (0.0, 0.0, 0.0)
-    best = min(limit, last_inside(bounds, p, v, a, radius + 2.0 * TOUCHING_M))
-    path = prepared(p, v, a, radius, best)
-    stack[0], times[0] = 0, 0.0
-    top = 1 if best >= 0.0 else 0
-    while top:
-        top -= 1
-        node = stack[top]
-        if times[top] > best:
-            continue
-        if count[node]:
-            for i in range(first[node], first[node] + count[node]):
+    grown = radius + 2.0 * TOUCHING_M
+    whole, begin, length = min(limit, last_inside(bounds, p, v, a, grown)), 0.0, soon(v, a)
+    while found < 0 and begin < whole:
+        best = min(whole, begin + length)
+        path = prepared(p, v, a, radius, best)
+        x, y = span(p[0], v[0], a[0], begin, best, grown), span(p[1], v[1], a[1], begin, best, grown)
+        z = span(p[2], v[2], a[2], begin, best, grown)
+        stack[0], times[0] = 0, begin
+        top = 1
+        while top:
+            top -= 1
+            node = stack[top]
+            if times[top] > best:
+                continue
+            while 0 <= node < NOTHING:
+                one, other = overlaps(pairs, node, 0, x, y, z), overlaps(pairs, node, SECOND, x, y, z)
+                left, right = np.int64(children[node, CODES]), np.int64(children[node, CODES + 1])
+                if one and other:
+                    near_left = enter_child(pairs, node, 0, p, v, a, path, best)
+                    near_right = enter_child(pairs, node, SECOND, p, v, a, path, best)
+                    if near_left > near_right:
+                        left, right, near_left, near_right = right, left, near_right, near_left
+                    if near_right < inf:
+                        stack[top], times[top] = right, near_right
+                        top += 1
+                    node = left if near_left < inf else NOTHING
+                elif one or other:
+                    node = left if one else right
+                else:
+                    node = NOTHING
+            if node == NOTHING:
+                continue
+            leaf = -1 - node
+            for i in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
                 low_x, low_y, low_z, high_x, high_y, high_z = triangle_box(corners, i)
                 near, far = enter_box(low_x, low_y, low_z, high_x, high_y, high_z, p, v, a, path, best)
                 if near == inf:
@@ -214,19 +290,7 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
                 t, e = touch(corners, i, p, v, a, radius, near, far)
                 if t < best or (t == best and found < 0):
                     best, found, normal = t, i, e
-            continue
-        left = first[node]
-        near_left, _ = enter_node(bounds, left, p, v, a, path, best)
-        near_right, _ = enter_node(bounds, left + 1, p, v, a, path, best)
-        right = left + 1
-        if near_left > near_right:
-            left, right, near_left, near_right = right, left, near_right, near_left
-        if near_right < inf:
-            stack[top], times[top] = right, near_right
-            top += 1
-        if near_left < inf:
-            stack[top], times[top] = left, near_left
-            top += 1
+        begin, length = best, 2.0 * length
     return (best, normal, found) if found >= 0 else (inf, normal, -1)
 
 

@@ -156,7 +156,7 @@ def _beyond(corners, i, j, n):  # type: ignore[no-untyped-def]
 @kernel
 def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
     """Look up what a sphere on triangle i is clear of; returns the first of the four numbers."""
-    bounds, first, count, corners = tree
+    bounds, first, count, corners = tree[:4]
     across, _, clear = facets
     asked = np.float32(BEYOND * radius)
     reach = 2.0 * (1.0 + 1e-5) * asked

@@ -20,6 +20,7 @@ from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
 from .ground_faults import GroundFaults, ground_faults
 from .holes import rims_of_holes
+from .pairs import make_pairs
 
 Contact = Literal["mesh", "points"]
 CONTACTS: tuple[Contact, ...] = ("mesh", "points")
@@ -98,9 +99,15 @@ class Ground:
     @property
     def tree(self) -> Any:
         """What the kernels take: see `ground_kernels`."""
-        if not len(self.points):
-            return self.index.tree
-        return (self.index.tree, self.point_index.tree) if len(self.faces) else self.point_index.tree
+        if not len(self.faces):
+            return self.point_index.tree
+        triangles = (*self.index.tree, *self.pairs)
+        return (triangles, self.point_index.tree) if len(self.points) else triangles
+
+    @cached_property
+    def pairs(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """The nodes of the index as flights look at them: see `pair_kernels`."""
+        return make_pairs(self.index)
 
     @cached_property
     def facets(self) -> Any:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One door for the motion to what blocks fall on: triangles, points, or both. Compiled kernels.
 
-A tree of triangles has four members, one of points five, and a pair of them two: numba leaves out the branches that the
-length rules out, so that each ground has code of its own. Places in the points of a pair follow those in its triangles.
+A tree of triangles has six members: `bounds, first, count, corners` of the terrain's index, `pairs, children` of
+`pair_kernels`. One of points has five, and a pair of both two: numba leaves out the branches that the length rules out,
+so that each ground has code of its own. Places in the points of a pair follow those in its triangles.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ def first_contact(tree, stack, times, p, v, a, radius, limit):  # type: ignore[n
     """The first contact of a sphere with the ground before `limit`: see `contact_kernels.first_contact`."""
     if len(tree) == 5:
         return point_kernels.first_contact(tree, stack, times, p, v, a, radius, limit)
-    if len(tree) == 4:
+    if len(tree) == 6:
         return contact_kernels.first_contact(tree, stack, times, p, v, a, radius, limit)
     t, n, place = contact_kernels.first_contact(tree[0], stack, times, p, v, a, radius, limit)
     u, m, other = point_kernels.first_contact(tree[1], stack, times, p, v, a, radius, min(t, limit))

@@ -156,7 +156,7 @@ def _closest(tree, stack, p, v, radius, nearby, close, towards, again):  # type:
     """The closest of the ground to a block: see `closest_near` and `point_kernels.closest`."""
     if len(tree) == 5:
         return closest(tree, stack, close, p, v, radius, towards, again)
-    if len(tree) == 4:
+    if len(tree) == 6:
         return closest_near(tree, stack, p, radius, nearby)
     x, y, z, square, place = closest_near(tree[0], stack, p, radius, nearby)
     qx, qy, qz, other, found = closest(tree[1], stack, close, p, v, radius, towards, again)
@@ -231,7 +231,7 @@ def _moved(p, q, v, towards, gravity, mu):  # type: ignore[no-untyped-def]
 def _lands(tree, stack, times, nearby, p, v, gravity, radius):  # type: ignore[no-untyped-def]
     """Where a block that hops on the ground lands: `first_contact`, looked for nearby first."""
     a = (0.0, 0.0, -gravity)
-    if len(tree) == 4 and nearby[2][0] >= 0.0:
+    if len(tree) == 6 and nearby[2][0] >= 0.0:
         limit = inside(nearby, p, sqrt(_dot(v, v)), gravity, radius)
         t, e, hit = first_near(tree[3], nearby, p, v, a, radius, -1, limit)
         if hit >= 0:
@@ -368,7 +368,7 @@ def run_block(  # type: ignore[no-untyped-def]
             end = STOPPED
             break
         moves = False
-        if len(tree) == 4:
+        if len(tree) == 6:
             if edge == ON_TRIANGLE:
                 e, hit = n, place
                 t, q, turned, edge = leg(
@@ -405,7 +405,7 @@ def run_block(  # type: ignore[no-untyped-def]
             part, p, v, ds = _moved(p, q, v, turned, factor * gravity, mu * max(cosine, 0.0))
             time, length = time + part * t, length + part * ds
             n, place, came = e, hit, v
-            if len(tree) == 4 and part == 1.0 and 0 <= edge < AT_ANOTHER and facets[1][place, edge] > 0.0:
+            if len(tree) == 6 and part == 1.0 and 0 <= edge < AT_ANOTHER and facets[1][place, edge] > 0.0:
                 v, n, place, edge = onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, dt)
             held = held + 1 if ds < HELD * radius else 0
             if held > MOST_HELD:

@@ -21,7 +21,7 @@ FEW_NEAR, MOST_NEAR = 20, 64
 @kernel
 def collect(tree, stack, p, reach, near, boxes):  # type: ignore[no-untyped-def]
     """Fill both with the triangles whose boxes are within `reach` of a point; how many, −1 when there is no room."""
-    bounds, first, count, corners = tree
+    bounds, first, count, corners = tree[:4]
     square, found = reach * reach, 0
     stack[0] = 0
     top = 1
@@ -91,7 +91,7 @@ def closest_near(tree, stack, p, radius, nearby):  # type: ignore[no-untyped-def
     if around[0] < 0.0 or away(around, p) + 2.0 * radius > around[4]:
         look_around(tree, stack, p, radius, nearby)
         if around[0] < 0.0:
-            return nearest_point(tree, stack, p, radius + 2.0 * TOUCHING_M)
+            return nearest_point(tree[:4], stack, p, radius + 2.0 * TOUCHING_M)
     corners = tree[3]
     best, place = (radius + 2.0 * TOUCHING_M) ** 2, -1
     qx, qy, qz = 0.0, 0.0, 0.0

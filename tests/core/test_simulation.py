@@ -12,6 +12,7 @@ from rockfall.core.simulation import engine
 from rockfall.core.simulation.chance_kernels import fill_uniform, philox
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
+from rockfall.core.simulation.pairs import make_pairs
 from rockfall.core.simulation.release import make_releases, placed_on
 from rockfall.core.terrain.kernels import STACK_SIZE
 from rockfall.core.terrain.raycast import closest_points
@@ -93,7 +94,14 @@ def test_first_contact_on_a_plane_is_the_closed_form(degrees: float) -> None:
         start = np.array([x, rng.uniform(40, 80), -np.tan(np.radians(degrees)) * x])
         start += (radius + rng.uniform(0, 10)) * normal
         t, e, place = first_contact(
-            index.tree, stack, times, tuple(start), tuple(velocity), (0.0, 0.0, -G), radius, np.inf
+            (*index.tree, *make_pairs(index)),
+            stack,
+            times,
+            tuple(start),
+            tuple(velocity),
+            (0.0, 0.0, -G),
+            radius,
+            np.inf,
         )
         away, speed, bend = start @ normal - radius, velocity @ normal, -G * normal[2]
         expected = (-speed - np.sqrt(speed**2 - 2 * bend * away)) / bend

@@ -29,6 +29,13 @@ def _redraw(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     redraw()
 
 
+def _spin_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from . import model_parameters
+
+    model_parameters.follow(self.id_data, models.shown_models(self.id_data))
+    redraw()
+
+
 def redraw() -> None:
     """Draw graphs and panels again."""
     manager = bpy.context.window_manager
@@ -75,7 +82,7 @@ class ComparisonSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     spin: EnumProperty(
         name="First spin", description="The spin before an impact when none is known from the impact before",
-        items=[(name, *SPIN_WORDS[name]) for name in SPINS], default="rolling", update=_redraw,
+        items=[(name, *SPIN_WORDS[name]) for name in SPINS], default="rolling", update=_spin_changed,
     )  # fmt: skip
     sets: EnumProperty(
         name="Parameters", description="Which set of parameters the graphs show",

@@ -138,6 +138,22 @@ def test_graphs_have_the_colours_of_the_blocks_that_are_shown(scene, part, compa
     assert model_colours([MODEL], with_blocks=True)[MODEL] == own
 
 
+def test_models_with_blocks_are_in_the_graphs_and_have_the_same_first_spin(scene, part, comparison_of) -> None:
+    bpy.ops.rockfall.show_models(models={"wyllie_2014"})
+    assert comparison_of(scene).models == (MODEL, "wyllie_2014")
+
+    def starts() -> np.ndarray:
+        curve = next(obj for obj in scene.objects if obj.get("rockfall_role") == "twin_flights")
+        return np.array([vertex.co for vertex in curve.data.vertices])
+
+    rolling = starts()
+    scene.rockfall_comparison.spin = "zero"
+    without = starts()
+    assert rolling.shape != without.shape or not np.allclose(rolling, without)
+    bpy.ops.rockfall.show_models(models={"wyllie_2014"})
+    assert np.allclose(starts(), without)
+
+
 def test_blocks_after_a_slider_are_those_of_showing_them_anew(scene, part) -> None:
     bpy.ops.rockfall.show_models(models={MODEL, "noel_2017"})
 

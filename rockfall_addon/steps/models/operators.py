@@ -46,6 +46,7 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
             return {"FINISHED"}
         chosen = [name for name in models.ORDER if name in self.models]
         marks = score_landings(models.show_models(scene, reconstruction.reconstruct_scene(scene), chosen))
+        scene.rockfall_comparison.models |= set(chosen)
         said = [
             f"{MODELS[mark.model].title}: {mark.median_offset_m:.1f} m"
             for mark in marks

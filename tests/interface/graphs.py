@@ -370,3 +370,27 @@ def write_many(tables, impacts, path, count):
                 if row.get(name):
                     row[name] = f"{float(row[name]) * draw.gauss(1.0, 0.15):.5g}"
             table.writerow(row)
+
+
+def case_graphs_of_flagged_impacts(window):
+    """All picks are doubtful: flags in the card. All are discarded: said, with what to do. Interface scale 2.5."""
+    yield from open_graphs(window)
+    picks = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "pick"]
+    for obj in picks:
+        obj.rockfall_pick.status = "doubtful"
+    yield 3.0
+    points = own_points(window, 2)
+    yield from window.move(*points[lonely(points)[0]])
+    yield 1.0
+    window.screenshot("doubtful")
+    assert canvas(window).hit is not None
+    bpy.context.preferences.view.ui_scale = 2.5
+    yield 2.0
+    window.screenshot("scale-2.5")
+    assert len(canvas(window).frames) == 4
+    bpy.context.preferences.view.ui_scale = 1.0
+    for obj in picks:
+        obj.rockfall_pick.status = "discarded"
+    yield 4.0
+    window.screenshot("discarded")
+    assert not own_points(window, 2)

@@ -74,7 +74,7 @@ def in_graph(graph: ImpactGraph, compared: SceneComparison) -> str:
     no = "no " if lacking else "both "
     if not lacking:
         return f"{many} {no}values: choose another variable by a click on the axis."
-    return f"{many} {no}{words}. {_reason(lacking[0])}"
+    return f"{many} {no}{words}. {_unused(graph, compared) or _reason(lacking[0])}"
 
 
 def draw(canvas: Canvas, said: Said) -> None:
@@ -121,6 +121,18 @@ def wrapped(sentence: str, look: Look, width: float) -> list[str]:
 def _any(graph: ImpactGraph, name: str) -> bool:
     column = 0 if name == graph.spec.x else 1
     return any(bool(np.isfinite(one.series.points[:, column]).any()) for one in graph.measured)
+
+
+def _unused(graph: ImpactGraph, compared: SceneComparison) -> str:
+    """That all of the scene's impacts that are shown were put aside; empty when that is not so."""
+    rows = next((one.series.row for one in graph.measured if one.series.source == 0), np.empty(0, dtype=np.intp))
+    if compared.impacts is None or not rows.size:
+        return ""
+    flags = compared.impacts.flags
+    aside = (flags["discarded"] | flags["shattered"])[rows]
+    if not aside.all():
+        return ""
+    return "All are discarded or shattered: nothing is computed across them. Change the status of some picks."
 
 
 def _reason(name: str) -> str:

@@ -20,7 +20,7 @@ from ...scene import comparison, comparison_scores, graph_settings
 from . import drawing, empty, legend, selection
 from .axes import draw_axes
 from .editor import Canvas
-from .impact_graphs import MANY, Drawn, ImpactGraph, build, curve_text, specs_key
+from .impact_graphs import MANY, Drawn, ImpactGraph, build, curve_text, specs_key, symbol
 from .look import Look, alpha, mixed
 from .point_colours import PointColours, find_colours
 
@@ -299,21 +299,33 @@ def _beyond_text(outside: list[tuple[float, int, int]], look: Look, room: float)
 
 def _draw_card(canvas: Canvas, graph: ImpactGraph, hit: Hit, compared: comparison.SceneComparison) -> None:
     """What is known of the impact under the mouse."""
-    tables = _tables(compared)
-    impacts, drawn, row = tables[hit.source], graph.drawn[hit.series], np.array([hit.row])
+    impacts, drawn = _tables(compared)[hit.source], graph.drawn[hit.series]
     name = f"{impacts.trajectory[hit.row]}, impact {impacts.impact[hit.row]}"
-    rows = [name if hit.source == 0 else f"{impacts.site[hit.row]}: {name}"]
-    for axis, variable in ((0, graph.spec.y), (1, graph.spec.x)):
-        value = float(measured_values(impacts, row, variable)[0])
-        sigma = float(measured_sigma(impacts, row, variable)[0])
-        rows.append(f"{VARIABLES[variable].title}: {_quantity(value, sigma, VARIABLES[variable].unit)}")
-        if drawn.series.model and VARIABLES[variable].restituted:
-            model = float(drawn.series.points[hit.place, 1 - axis])
-            rows.append(f"    {drawn.series.title}: {_quantity(model, np.nan, VARIABLES[variable].unit)}")
+    first = name if hit.source == 0 else f"{impacts.site[hit.row]}: {name}"
     flags = impacts.flag_text()[hit.row] if len(impacts) < 20_000 else ""
-    if flags:
-        rows.append(f"Flags: {flags.replace(';', ', ').replace('_', ' ')}")
+    last = [f"Flags: {flags.replace(';', ', ').replace('_', ' ')}"] if flags else []
+    for short in (False, True):
+        rows = [first, *_card_values(impacts, drawn, graph, hit, short), *last]
+        if max(canvas.look.measure(row) for row in rows) < canvas.room.width - 2 * canvas.look.text:
+            break
     drawing.card(canvas.pointer, rows, canvas.look, canvas.room)
+
+
+def _card_values(impacts: Impacts, drawn: Drawn, graph: ImpactGraph, hit: Hit, short: bool) -> list[str]:
+    """The values of an impact with their errors, and what a model makes of it.
+
+    short : symbols in place of words.
+    """
+    found, row = [], np.array([hit.row])
+    for axis, name in ((1, graph.spec.y), (0, graph.spec.x)):
+        variable = VARIABLES[name]
+        words = symbol(name) if short else variable.title
+        value = float(measured_values(impacts, row, name)[0])
+        found.append(f"{words}: {_quantity(value, float(measured_sigma(impacts, row, name)[0]), variable.unit)}")
+        if drawn.series.model and variable.restituted:
+            model = float(drawn.series.points[hit.place, axis])
+            found.append(f"    {drawn.series.title}: {_quantity(model, np.nan, variable.unit)}")
+    return found
 
 
 def _quantity(value: float, sigma: float, unit: str) -> str:

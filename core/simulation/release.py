@@ -158,7 +158,7 @@ def placed_on(ground: Ground, releases_xy: Array, diameter_m: Array) -> Array:
 
     Raises
     ------
-    InputError : spheres that would fall between the points of the ground.
+    InputError : spheres too small for the points of the ground.
     """
     from .placing_kernels import drop_many
 
@@ -184,7 +184,7 @@ def standing_on(ground: Ground, points: Array, normals: Array, diameter_m: Array
 
     Raises
     ------
-    InputError : spheres that would fall between the points of the ground.
+    InputError : spheres too small for the points of the ground.
     """
     from .placing_kernels import lean_many, stand_many
 

@@ -278,7 +278,7 @@ def _remarks_of_points(simulation: Simulation) -> list[Remark]:
         if least < DENSE * spacing:
             text += (
                 f": that is coarse for the smallest radius of {least:.3g} m, for which they are to be "
-                f"{least / DENSE:.2g} m apart at the most. Such blocks feel single points and stop early."
+                f"{least / DENSE:.2g} m apart at the most. Such blocks feel single points as roughness."
             )
             remarks.append(Remark(text, "warning", "terrain"))
         else:

@@ -59,7 +59,7 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=4_000_000)
     parser.add_argument("--triangles", type=int, default=2_000_000)
     parser.add_argument("--blocks", type=int, default=2000)
-    parser.add_argument("--diameter", type=float, nargs="+", default=[0.3, 0.6, 1.5])
+    parser.add_argument("--diameter", type=float, nargs="+", default=[0.6, 1.5])
     parser.add_argument("--model", default="noel_2017")
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()

@@ -33,9 +33,9 @@ def is_in(tree, stack, p, radius):  # type: ignore[no-untyped-def]
     """Whether a sphere at p is in the ground."""
     if len(tree) == 5:
         return nearest(tree, stack, p, radius)[1] >= 0
-    if len(tree) == 4:
-        return nearest_point(tree, stack, p, radius)[4] >= 0
-    return nearest_point(tree[0], stack, p, radius)[4] >= 0 or nearest(tree[1], stack, p, radius)[1] >= 0
+    if len(tree) == 6:
+        return nearest_point(tree[:4], stack, p, radius)[4] >= 0
+    return nearest_point(tree[0][:4], stack, p, radius)[4] >= 0 or nearest(tree[1], stack, p, radius)[1] >= 0
 
 
 @kernel

@@ -105,6 +105,22 @@ def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, shorte
 
 
 @kernel
+def _take_off(tree, facets, stack, p, v, n, m, place, j, t, radius, gravity, wide):  # type: ignore[no-untyped-def]
+    """Whether a block that flies off over an edge is above the triangle j beyond it after a time, and meets no other.
+
+    m : the normal of j. wide : the radius and how far it is above the ground.
+    """
+    q = _foot(tree[3], j, _in_flight(p, v, gravity, t)[0], m)
+    contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
+    return (
+        is_clear(tree, stack, facets, place, contact, contact, 0.0, wide)
+        and is_clear(tree, stack, facets, j, contact, q, 0.125 * gravity * t * t, wide)
+        and _within(tree, facets, j, contact, m, wide, place)
+        and _within(tree, facets, j, q, m, wide, place)
+    )
+
+
+@kernel
 def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, hop, shortest):  # type: ignore[no-untyped-def]
     """Over an edge beyond which the ground falls: about it, or in a hop.
 
@@ -117,7 +133,8 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
     Returns
     -------
     t, p, way : [s]; the centre after it, on the ground; the direction of the velocity.
-    n, place : of the ground there; −1 where steps have to follow.
+    n, place : of the ground there; −1 where it flies off, with the time from which on it has left the ground; and, with
+        a time of 0, where steps have to follow.
     """
     corners, (across, bend, _) = tree[3], facets
     j = across[place, edge]
@@ -141,6 +158,10 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
         if square <= 2.0 * factor * gravity * (way[2] + mu * n[2] * ds):
             return 0.0, p, v, n, -1  # it comes to rest on the edge
         return ds / sqrt(square), q, _along(v, m), m, j
+    if square > 2.0 * fall * hop:
+        t = (rises - sqrt(square - fall * hop)) / fall  # when it is half a hop high
+        good = _take_off(tree, facets, stack, p, v, n, m, place, j, t, radius, gravity, radius + hop)
+        return t if good else 0.0, p, v, n, -1
     total, came = 0.0, place
     for _ in range(MOST_PASSED):
         # The foot of the block is on the edge from `came` to j; height and rises are those over the plane of j.
@@ -167,7 +188,9 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
         ):  # fmt: skip
             break
         if land <= leave:
-            return (total + t, q, _along(way, m), m, j if _within(tree, facets, j, q, m, radius, -1) else -1)
+            if not _within(tree, facets, j, q, m, radius, -1):
+                break
+            return total + t, q, _along(way, m), m, j
         rises_beyond, came, j = bend[j, at] > 0.0, j, across[j, at]
         if j < 0 or abs(bend[came, at]) > GENTLE:
             break
@@ -180,8 +203,12 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
             t += (rises + sqrt(square)) / fall
             q, way = _in_flight(p, v, gravity, t)
             contact = _foot(corners, j, q, m)
-            good = t > 0.0 and _within(tree, facets, j, q, m, radius, came)
-            good = good and is_clear(tree, stack, facets, j, contact, contact, 0.0, radius + hop)
-            return total + t, q, _along(way, m), m, j if good else -1
+            if not (
+                t > 0.0
+                and _within(tree, facets, j, q, m, radius, came)
+                and is_clear(tree, stack, facets, j, contact, contact, 0.0, radius + hop)
+            ):
+                break
+            return total + t, q, _along(way, m), m, j
         total, p, v = total + t, q, way
     return 0.0, p, v, n, -1

@@ -367,7 +367,7 @@ def run_block(  # type: ignore[no-untyped-def]
         if speed < 1e-6 and steep <= mu * cosine:
             end = STOPPED
             break
-        moves = False
+        moves, leaves = False, False
         if len(tree) == 6:
             if edge == ON_TRIANGLE:
                 e, hit = n, place
@@ -381,12 +381,17 @@ def run_block(  # type: ignore[no-untyped-def]
                 t, q, turned, e, hit = over(
                     tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius, dt
                 )
-                moves, edge = hit >= 0, ON_TRIANGLE
+                moves, leaves, edge = hit >= 0, hit < 0 and t > 0.0, ON_TRIANGLE
         if not moves:
+            dt = t if leaves else dt
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
             pull = -gravity * factor * dt
-            ahead = _along((v[0], v[1], v[2] + pull), n)
-            away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby, close, n)
+            away, e, hit, against, other, distance = p, n, place, n, place, inf
+            if not leaves:
+                ahead = _along((v[0], v[1], v[2] + pull), n)
+                away, e, hit, against, other, distance = _touching(
+                    tree, stack, free, ahead, radius, nearby, close, n
+                )
             if distance > radius + TOUCHING_M:
                 t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
                 q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)

@@ -4,7 +4,7 @@
 They are kept in a tuple `nearby` of three: their places in the tree; their boxes (`MOST_NEAR`, 6); and what is known of
 them: how many they are, −1 for none looked up or too many; about which place (three coordinates); how far away all
 triangles are among them [m]; and how many radii that is to be the next time. It is adapted to the size of the
-triangles: small blocks on large triangles look far.
+triangles: small blocks on large triangles look far, where they look around again and again.
 """
 
 from math import inf, sqrt
@@ -13,7 +13,7 @@ from ..compiled import borrowing as kernel
 from ..terrain.kernels import box_distance2, closest_on_triangle, nearest_point
 from .contact_kernels import TOUCHING_M, enter_node, first_root, prepared, touch, triangle_box
 
-NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD, MOST_NEIGHBOURHOOD = 6.0, 2.5, 100.0
+NEIGHBOURHOOD, LEAST_NEIGHBOURHOOD, MOST_NEIGHBOURHOOD = 4.0, 2.5, 100.0
 """How many radii around a block are looked up: the first time, at least, at most."""
 FEW_NEAR, MOST_NEAR = 20, 64
 
@@ -49,6 +49,8 @@ def collect(tree, stack, p, reach, near, boxes):  # type: ignore[no-untyped-def]
 def look_around(tree, stack, p, radius, nearby):  # type: ignore[no-untyped-def]
     """Look up the triangles about a place: fills `nearby`."""
     near, boxes, around = nearby
+    if around[0] < 0.0 or away(around, p) > 2.0 * around[4]:
+        around[5] = min(around[5], NEIGHBOURHOOD)  # elsewhere: it may be for one step only
     found, reach = -1, 0.0
     while found < 0:
         reach = around[5] * radius

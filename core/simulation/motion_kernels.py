@@ -389,9 +389,7 @@ def run_block(  # type: ignore[no-untyped-def]
             away, e, hit, against, other, distance = p, n, place, n, place, inf
             if not leaves:
                 ahead = _along((v[0], v[1], v[2] + pull), n)
-                away, e, hit, against, other, distance = _touching(
-                    tree, stack, free, ahead, radius, nearby, close, n
-                )
+                away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby, close, n)
             if distance > radius + TOUCHING_M:
                 t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
                 q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)

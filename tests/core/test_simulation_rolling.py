@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blocks on the ground that are taken over edges in closed form: what is near them, and the ways that they go."""
+
+import numpy as np
+import pytest
+from rockfall.core.constants import GRAVITY_MPS2
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.simulation import engine
+from rockfall.core.simulation.engine import ENDS, Settings, simulate
+from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.release import make_releases
+from rockfall.core.terrain.raycast import closest_points
+from rockfall.core.terrain.surface import Surface
+
+ROLLS = {"rn": 0.0, "rt": 1.0}
+
+
+def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
+    x, y = np.meshgrid(x, y)
+    i = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Surface(
+        np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3), faces.astype(np.int32), GlobalShift(), "sheet"
+    )
+
+
+def needles(count: int, seed: int) -> Surface:
+    """A slope of triangles of any shape: rows of very different widths, their nodes moved at random."""
+    rng = np.random.default_rng(seed)
+    x = np.concatenate([[0.0], np.cumsum(rng.choice([0.03, 0.2, 0.9, 2.5], count))])
+    x, y = x * (30 / x[-1]), np.linspace(0, 20, 24)
+    rough = rng.normal(0, 1, (24, count + 1))
+    return sheet(x, y, lambda x, y: -0.5 * x + 0.03 * rough * np.minimum(np.gradient(x, axis=1), 1.0))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_no_block_rolls_deeper_than_a_thousandth_on_needles(seed: int) -> None:
+    ground = make_ground(needles(60, seed))
+    rng = np.random.default_rng(seed)
+    places = np.column_stack([rng.uniform(2, 6, 60), rng.uniform(3, 17, 60), np.full(60, 1.0)])
+    diameter = rng.choice([0.2, 0.6, 1.4], 60)
+    releases = make_releases(places, velocity=np.tile([3.0, 0.5, 0.0], (60, 1)), diameter_m=diameter)
+    records = simulate(ground, releases, Settings("azimi_desvarreux_1977", {"rn": 0.1, "rt": 0.95})).records
+    rolls = np.flatnonzero(records.what == engine.ON_GROUND)
+    assert rolls.size > 2000
+    radius = diameter[records.run[rolls]] / 2
+    distance = closest_points(ground.terrain, records.position[rolls]).distance
+    assert ((radius - distance) / radius).max() < 1e-3 + 1e-7
+
+
+@pytest.mark.parametrize("diameter", [0.3, 1.2])
+def test_no_rolling_block_passes_a_wall_that_shares_no_corner_with_the_terrain(diameter: float) -> None:
+    """A thin wall of one large triangle pair stands through the triangles of a slope, at an angle to their edges."""
+    slope = sheet(np.arange(0.0, 31.0), np.arange(0.0, 21.0), lambda x, y: -0.5 * x + 0.02 * np.sin(3 * x + 2 * y))
+    corners = np.array([[19.3, -1.0, -14.0], [20.9, 21.0, -14.0], [20.9, 21.0, -5.0], [19.3, -1.0, -5.0]])
+    wall = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), GlobalShift(), "wall")
+    rng = np.random.default_rng(4)
+    places = np.column_stack([rng.uniform(8, 12, 200), rng.uniform(5, 15, 200), np.zeros(200)])
+    places[:, 2] = -0.5 * places[:, 0] + 0.6 * diameter + 0.03
+    releases = make_releases(places, velocity=np.tile([4.0, 0.0, -2.0], (200, 1)), diameter_m=diameter)
+    run = simulate(make_ground(slope, {"wall": wall}), releases, Settings("azimi_desvarreux_1977", ROLLS, friction=0.3))
+    records = run.records
+    assert (records.what == engine.ON_GROUND).sum() > 2000
+    normal = np.array([22.0, -1.6, 0.0]) / np.hypot(22.0, 1.6)
+    before = (records.position - corners[0]) @ normal
+    assert -0.5 * diameter - 0.01 < before.max() < -0.5 * diameter * (1 - 1e-3) + 1e-7
+    assert (run.end != ENDS.index("left_terrain")).all()
+
+
+@pytest.mark.parametrize("spacing", [0.11, 1.0, 7.0])
+def test_the_energy_line_holds_over_gentle_edges_of_any_size(spacing: float) -> None:
+    """v² = 2 g (drop − μ way in plan) where a block slides straight down a valley of facets, whatever their size."""
+    line = np.arange(0.0, 60.0 + spacing, spacing)
+    profile = lambda x: 0.004 * (x - 60.0) ** 2  # noqa: E731
+    ground = make_ground(sheet(line, np.linspace(0, 20, 3), lambda x, y: profile(x)))
+    at = np.searchsorted(line, 5.0)
+    middle = 0.5 * (line[at - 1] + line[at])
+    slope = (profile(line[at]) - profile(line[at - 1])) / spacing
+    normal = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
+    height = 0.5 * (profile(line[at - 1]) + profile(line[at]))
+    start = np.array([[middle, 9.7, height]]) + 0.2 * normal
+    releases = make_releases(start, velocity=-1e-4 * normal[None], diameter_m=0.4)
+    settings = Settings("azimi_desvarreux_1977", ROLLS, rolling="coulomb", friction=0.1)
+    records = simulate(ground, releases, settings).records
+    rolls = records.what == engine.ON_GROUND
+    drop, way = start[0, 2] - records.position[rolls, 2], records.position[rolls, 0] - start[0, 0]
+    expected = 2 * GRAVITY_MPS2 * (drop - 0.1 * way)
+    speed2 = (records.v2[rolls] ** 2).sum(axis=1)
+    assert rolls.sum() > 5
+    assert speed2.max() > 50
+    np.testing.assert_allclose(speed2, expected, atol=0.005 * expected.max())
+
+
+def test_what_a_sphere_is_clear_of_does_not_depend_on_who_asked_before() -> None:
+    """Small and large blocks alone, together, and in the other order: the same bits."""
+    surface = needles(40, 5)
+    rng = np.random.default_rng(6)
+    places = np.column_stack([rng.uniform(2, 6, 40), rng.uniform(3, 17, 40), np.full(40, 1.0)])
+    diameter = np.where(np.arange(40) % 2, 0.2, 1.6)
+    releases = make_releases(places, velocity=np.tile([3.0, 0.5, 0.0], (40, 1)), diameter_m=diameter)
+    settings = Settings("azimi_desvarreux_1977", {"rn": 0.1, "rt": 0.95})
+
+    def ends(ground: Ground, numbers: list[int]) -> dict[int, tuple[float, ...]]:
+        runs = [simulate(ground, releases.take(slice(i, i + 1)), settings, first_run=i) for i in numbers]
+        return {i: (*run.position[0], run.time_s[0]) for i, run in zip(numbers, runs, strict=True)}
+
+    forth, back = ends(make_ground(surface), [*range(40)]), ends(make_ground(surface), [*range(39, -1, -1)])
+    assert forth == back

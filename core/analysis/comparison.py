@@ -3,7 +3,7 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -197,6 +197,23 @@ def predict(
         measured=measured,
         beyond=beyond,
         runs={name: column[courses.row] for name, column in impacts.runs.items()},
+    )
+
+
+def thinned(predictions: Predictions, most: int) -> Predictions:
+    """At most so many of the impacts, evenly spaced."""
+    m = predictions.row.size
+    if m <= most:
+        return predictions
+    kept = np.linspace(0, m - 1, most).round().astype(np.intp)
+    rows = ("row", "site", "trajectory", "impact")
+    runs = ("v2", "omega2", "omega1", "vn2", "vt2", "rn", "rt", "r", "theta_dev", "into_ground")
+    return replace(
+        predictions,
+        **{name: getattr(predictions, name)[kept] for name in rows},
+        **{name: getattr(predictions, name)[:, :, kept] for name in runs},
+        beyond=None if predictions.beyond is None else predictions.beyond[kept],
+        runs={name: column[kept] for name, column in predictions.runs.items()},
     )
 
 

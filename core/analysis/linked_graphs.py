@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..reconstruction.impact import Impacts
-from ..vectors import Array
 from .comparison import Predictions
+from .curves import PAIRS
 from .figures import LINK, MEASURED, MODELLED
 from .graphs import PAPER_GRAPHS, Graph, GraphSpec, axis_limits, make_graph
 from .variables import VARIABLES, Variable, find_variable, known_variables, measured_values, model_values
@@ -81,6 +81,8 @@ def link_graphs(
             "source": source,
             "graphs": [{key: value for key, value in block.items() if key != "top"} for block in blocks],
             "variables": variables,
+            "pairs": {" ".join(pair): trend for pair, trend in PAIRS.items()},
+            "colours": [MEASURED, MODELLED],
             "selection": selection,
         },
         code=(WEB / "graphs.js").read_text(encoding="utf-8"),
@@ -113,14 +115,18 @@ def measured_columns(impacts: Impacts, predictions: Predictions) -> dict[str, An
         "impact": predictions.impact.tolist(),
     }
     for name in known_variables(impacts):
-        columns[f"m_{name}"] = measured_values(impacts, predictions.row, name)
+        columns[f"m_{name}"] = measured_values(impacts, predictions.row, name).astype(np.float32)
     return columns
 
 
-def model_columns(impacts: Impacts, predictions: Predictions, model: str, run: int) -> dict[str, Array]:
-    """Values of one model and run."""
+def model_columns(impacts: Impacts, predictions: Predictions, model: str, run: int) -> dict[str, Any]:
+    """Values of one model and run, of the variables that models change."""
     which = predictions.index(model)
-    return {f"p_{name}": model_values(impacts, predictions, which, run, name) for name in known_variables(impacts)}
+    return {
+        f"p_{name}": model_values(impacts, predictions, which, run, name).astype(np.float32)
+        for name in known_variables(impacts)
+        if VARIABLES[name].restituted
+    }
 
 
 def curve_tables(
@@ -164,6 +170,7 @@ def _facts(variable: Variable, impacts: Impacts, predictions: Predictions) -> di
         "label": variable.label,
         "symbol": symbol_html(variable) if variable.symbol else variable.title,
         "unit": variable.unit,
+        "restituted": variable.restituted,
         "linear": list(fixed or axis_limits(together)),
         "log": list(axis_limits(together, log=True)),
     }
@@ -174,6 +181,7 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
     from bokeh.models import (
         BasicTicker,
         CheckboxButtonGroup,
+        ColumnDataSource,
         Div,
         HoverTool,
         LinearScale,
@@ -213,19 +221,20 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
         axis.axis_label_text_font_size, axis.major_label_text_font_size = "13px", "12px"
         axis.axis_label_text_color, axis.major_label_text_color = INK, MUTED
     faded = {"nonselection_alpha": 0.1, "selection_alpha": 1.0}
+    model_x, model_y = (f"{'p' if VARIABLES[name].restituted else 'm'}_{name}" for name in (spec.x, spec.y))
     links = plot.segment(
         x0=f"m_{spec.x}",
         y0=f"m_{spec.y}",
-        x1=f"p_{spec.x}",
-        y1=f"p_{spec.y}",
+        x1=model_x,
+        y1=model_y,
         source=source,
         line_color=LINK,
         line_width=1.0,
         **faded,
     )
     modelled = plot.scatter(
-        f"p_{spec.x}",
-        f"p_{spec.y}",
+        model_x,
+        model_y,
         source=source,
         marker="diamond",
         size=9,
@@ -238,6 +247,8 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
         f"m_{spec.x}", f"m_{spec.y}", source=source, size=6.5, color=MEASURED, line_color=None, alpha=0.8, **faded
     )
     fitted = plot.multi_line("xs", "ys", source=curves, line_color="colour", line_width=1.8)
+    own = ColumnDataSource({"xs": [], "ys": [], "colour": []}, syncable=False)
+    own_fitted = plot.multi_line("xs", "ys", source=own, line_color="colour", line_width=1.8, visible=False)
     plot.add_tools(HoverTool(tooltips=_tooltip(), renderers=[measured, modelled], point_policy="snap_to_data"))
 
     names = [(name, VARIABLES[name].label) for name in variables]
@@ -254,6 +265,8 @@ def _block(spec: GraphSpec, variables: Mapping[str, Any], source: Any, curves: A
         "measured": _looks(measured),
         "modelled": _looks(modelled),
         "fitted": fitted,
+        "own": own,
+        "ownFitted": own_fitted,
         "curves": curves,
         "default": [spec.x, spec.y],
         "x": x,

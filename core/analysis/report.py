@@ -12,7 +12,7 @@ from typing import Any
 
 from ..impact_models.registry import find_model
 from ..reconstruction.impact import Impacts
-from .comparison import Predictions
+from .comparison import Predictions, thinned
 from .extras import PAGES, demand
 from .figures import LINK, MEASURED, MODELLED
 from .linked_graphs import SHEET, WEB, curve_tables, link_graphs, model_columns, symbol_html
@@ -20,6 +20,8 @@ from .scores import Score
 from .variables import VARIABLES
 
 SHOWN = ("rn", "rt", "r", "theta_dev_deg")
+MOST_SHOWN = 3000
+"""Impacts that a page's graphs show: more make it slow, and too large to be sent."""
 PARTS = {"bias": "bias", "rmse": "RMSE", "energy_distance": "distance"}
 DECIMALS = {"theta_dev_deg": 1}
 SHOW_MODEL = """
@@ -55,6 +57,10 @@ def write_report(
 
     first = _nearest_model(scores) or predictions.models[0]
     run = min(1, predictions.replicates)
+    total = predictions
+    predictions = thinned(predictions, MOST_SHOWN)
+    shown = predictions.row.size
+    less = f" The graphs and their fits show {shown} of them, evenly spaced." if shown < total.row.size else ""
     linked = link_graphs(impacts, predictions, first, run)
     document = Document()
     document.title = title or f"Rockfall: {origin or 'impact models'}"
@@ -62,7 +68,7 @@ def write_report(
         document.add_root(root)
     document.template_variables.update(
         heading=title or "Impact models against measured impacts",
-        summary=summary(predictions, len(impacts), origin),
+        summary=summary(total, len(impacts), origin) + less,
         after=score_table(by_model(scores)) + provenance(predictions, origin),
         live=False,
         **looks(),

@@ -1,81 +1,41 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How quickly graphs and blocks follow a slider of a model: what is computed, and what Blender is told.
-
-Blender as a module is needed: the bpy wheel. Drawing is not in it. In a window the blocks of more than 1 000 impacts
-wait until the slider rests: for what follows each move then, take --no-blocks.
-"""
+"""How long `rockfall compare` takes with figures and page, and how much memory and room: small and large tables."""
 
 import argparse
-import cProfile
-import importlib
-import itertools
-import pstats
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
 
-import bpy
-from live import make_picks, make_terrain, said, timed
+from analysis import made_impacts
+from rockfall.core.exchange.tables import write_impacts
 
-MODEL = "noel_2017"
+SIZES = (100, 20_000, 90_000)
+
+
+def measured(impacts: int) -> str:
+    """One line: impacts, processor time of the whole command, its greatest memory, size of page and figures."""
+    with tempfile.TemporaryDirectory() as folder:
+        table, out = Path(folder) / "impacts.csv", Path(folder) / "out"
+        write_impacts(made_impacts(impacts // 10, 10), table)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        command = [sys.executable, "-m", "rockfall.core.cli", "compare", str(table), "--out", str(out)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        page = (out / "report.html").stat().st_size
+        figures = sum(path.stat().st_size for path in (out / "figures").iterdir())
+        return f"{impacts:>8}{seconds:>9.1f}{after.ru_maxrss / 1e6:>9.2f}{page / 1e6:>9.1f}{figures / 1e6:>12.1f}"
 
 
 def main() -> None:
+    """Print a line for each size, the smallest first, because the greatest memory is that of all children so far."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trajectories", type=int, default=15)
-    parser.add_argument("--impacts", type=int, default=7)
-    parser.add_argument("--triangles", type=int, default=300_000)
-    parser.add_argument("--moves", type=int, default=30)
-    parser.add_argument("--no-blocks", action="store_true", help="graphs alone: no blocks in the 3-D view")
-    parser.add_argument("--profile", action="store_true")
-    options = parser.parse_args()
-
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    importlib.import_module("rockfall").register()
-    part = {
-        name: importlib.import_module(f"rockfall.{name}")
-        for name in (
-            "core.impact_models.registry", "core.terrain.shading", "rockfall_addon.scene.comparison",
-            "rockfall_addon.scene.comparison_scores", "rockfall_addon.scene.models",
-            "rockfall_addon.scene.reconstruction", "rockfall_addon.scene.terrain",
-        )
-    }  # fmt: skip
-    scene, scenes = bpy.context.scene, part["rockfall_addon.scene.reconstruction"]
-    surface = make_terrain(options.triangles)
-    part["rockfall_addon.scene.terrain"].add_terrain(scene, surface, part["core.terrain.shading"].shade(surface))
-    result = scenes.reconstruct_scene(scene, make_picks(options.trajectories, options.impacts))
-    scenes.show(scene, result)
-    six = part["core.impact_models.registry"].COMPARED
-    scene.rockfall_comparison.models = set(six)
-    if not options.no_blocks:
-        part["rockfall_addon.scene.models"].show_models(scene, result, six)
-    comparison = part["rockfall_addon.scene.comparison"]
-    scores = part["rockfall_addon.scene.comparison_scores"]
-    slider, values = scene.rockfall_parameters.noel_2017, itertools.cycle([0.3 + 0.01 * i for i in range(60)])
-
-    def move() -> None:
-        slider.rt = next(values)
-
-    def follow() -> None:
-        move()
-        comparison.comparison_of(scene)
-
-    def scored() -> None:
-        follow()
-        scores.ranking(scene, comparison.comparison_of(scene))
-
-    def evaluated() -> None:
-        follow()
-        bpy.context.view_layer.update()
-
-    blocks = sum(obj.get("rockfall_role") == "twin" for obj in scene.objects)
-    print(f"{len(result.impacts)} impacts, six models, {blocks} blocks; one model's slider moves:")
-    follow()
-    print(f"parameter, and blocks if any  {said(timed(move, options.moves))}")
-    print(f"and what the graphs show      {said(timed(follow, options.moves))}")
-    print(f"and the scores                {said(timed(scored, options.moves))}")
-    print(f"and Blender's evaluation      {said(timed(evaluated, options.moves))}")
-    if options.profile:
-        profile = cProfile.Profile()
-        profile.runcall(timed, follow, options.moves)
-        pstats.Stats(profile).sort_stats("tottime").print_stats(20)
+    parser.add_argument("--impacts", type=int, nargs="+", default=SIZES)
+    print(f"{'impacts':>8}{'CPU [s]':>9}{'GB':>9}{'page MB':>9}{'figures MB':>12}")
+    for impacts in sorted(parser.parse_args().impacts):
+        print(measured(impacts), flush=True)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from rockfall.core.analysis import extras
-from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.comparison import compare, thinned
 from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.graphs import GraphSpec, make_graph, make_sheet
 from rockfall.core.analysis.scores import scores
@@ -159,6 +159,23 @@ def test_the_page_says_what_and_how(page, predictions) -> None:
     body = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert "<1>" not in body
     assert "<b>&" not in body
+
+
+def test_a_page_shows_some_of_many_impacts_and_says_so(impacts, predictions, monkeypatch, tmp_path) -> None:
+    pytest.importorskip("bokeh", reason="bokeh is not installed")
+    from rockfall.core.analysis import report
+
+    monkeypatch.setattr(report, "MOST_SHOWN", 5)
+    report.write_report(impacts, predictions, scores(impacts, predictions), tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f"{predictions.row.size} of {len(impacts)} impacts" in page
+    assert "The graphs and their fits show 5 of them, evenly spaced." in page
+    few = thinned(predictions, 5)
+    every = [list(predictions.row).index(row) for row in few.row]
+    assert (every[0], every[-1], len(every)) == (0, predictions.row.size - 1, 5)
+    np.testing.assert_array_equal(few.v2, predictions.v2[:, :, every])
+    np.testing.assert_array_equal(few.rn, predictions.rn[:, :, every])
+    assert thinned(predictions, predictions.row.size) is predictions
 
 
 def test_what_is_missing_is_named_with_its_command(monkeypatch, impacts, predictions, tmp_path, capsys) -> None:

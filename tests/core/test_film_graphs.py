@@ -90,6 +90,7 @@ def test_a_line_grows_with_the_time_in_the_colours_of_the_speed(run: Reconstruct
     assert [graph.title for graph in made.graphs] == ["Speed [m/s]", "Kinetic energy [kJ]"]
     assert [graph.shows_x for graph in made.graphs] == [False, True]
     (line,) = speed.strokes
+    assert (line.since_s.min(), line.since_s.max()) == pytest.approx((0.0, 4.1), abs=0.05)
     plot = speed.frame.plot
     np.testing.assert_allclose(line.ends[:, 1, 0], plot.left + line.since_s / 4.1 * plot.width, atol=1e-6)
     fast = (line.ends[:, 1, 1] - plot.bottom) / plot.height * speed.frame.y.limits[1] > 10.0

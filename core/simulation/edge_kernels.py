@@ -9,6 +9,8 @@ to the steps of `motion_kernels`.
 
 from math import inf, sqrt
 
+import numpy as np
+
 from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
 from .facet_kernels import GENTLE, corner, dot, is_clear, minus, upward
@@ -81,7 +83,7 @@ def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, shorte
     v, n, place : after it; the speed is kept.
     edge : `ON_TRIANGLE`; or `AT_ANOTHER` where nothing is changed.
     """
-    j = facets[0][place, edge]
+    j = np.int64(facets[0][place, edge])
     if j < 0 or facets[1][place, edge] > GENTLE:
         return v, n, place, AT_ANOTHER
     m = upward(tree[3], j)
@@ -137,7 +139,7 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
         a time of 0, where steps have to follow.
     """
     corners, (across, bend, _) = tree[3], facets
-    j = across[place, edge]
+    j = np.int64(across[place, edge])
     if j < 0 or bend[place, edge] < -GENTLE or dot(v, v) == 0.0:
         return 0.0, p, v, n, -1
     m = upward(corners, j)
@@ -188,10 +190,10 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
         ):  # fmt: skip
             break
         if land <= leave:
-            if not _within(tree, facets, j, q, m, radius, -1):
+            if not _within(tree, facets, j, q, m, radius, np.int64(-1)):
                 break
             return total + t, q, _along(way, m), m, j
-        rises_beyond, came, j = bend[j, at] > 0.0, j, across[j, at]
+        rises_beyond, came, j = bend[j, at] > 0.0, j, np.int64(across[j, at])
         if j < 0 or abs(bend[came, at]) > GENTLE:
             break
         m = upward(corners, j)

@@ -78,7 +78,7 @@ def link(corners, face, neighbours, place, across, bend):  # type: ignore[no-unt
             other = neighbours[face[i], e]
             if other < 0:
                 continue
-            j = place[other]
+            j = np.int64(place[other])
             start, end = corner(corners, i, e), corner(corners, i, (e + 1) % 3)
             apex = 0
             while apex < 3 and (corner(corners, j, apex) == start or corner(corners, j, apex) == end):
@@ -185,7 +185,7 @@ def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
             top += 2
             continue
         for j in range(first[node], first[node] + count[node]):
-            rise, shared, at, there = 0.0, 0, -1, -1
+            rise, shared, at, there = 0.0, 0, np.int64(-1), np.int64(-1)
             for k in range(3):
                 q = corner(corners, j, k)
                 for own in range(3):

@@ -59,6 +59,8 @@ LINGERS = 0.3
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NOWHERE = np.int64(-1)
+"""No place in the tree. Where kernels get the number itself, numba compiles them for it, and then for others."""
 COLUMNS = 22
 """run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
 
@@ -233,7 +235,7 @@ def _lands(tree, stack, times, nearby, p, v, gravity, radius):  # type: ignore[n
     a = (0.0, 0.0, -gravity)
     if len(tree) == 6 and nearby[2][0] >= 0.0:
         limit = inside(nearby, p, sqrt(_dot(v, v)), gravity, radius)
-        t, e, hit = first_near(tree[3], nearby, p, v, a, radius, -1, limit)
+        t, e, hit = first_near(tree[3], nearby, p, v, a, radius, NOWHERE, limit)
         if hit >= 0:
             return t, e, hit
     return first_contact(tree, stack, times, p, v, a, radius, inf)
@@ -276,10 +278,10 @@ def run_block(  # type: ignore[no-untyped-def]
     shortest = sqrt(2.0 * FALL * radius / gravity)
     time, length, impacts, at_once, held, end = 0.0, 0.0, 0, 0, 0, -1
     v_max = sqrt(_dot(v, v))
-    grounded, n, place = False, (0.0, 0.0, 1.0), -1
+    grounded, n, place = False, (0.0, 0.0, 1.0), NOWHERE
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
     forget(close)
-    known, t, e, hit, edge, marked = False, 0.0, zero, -1, ON_TRIANGLE, False
+    known, t, e, hit, edge, marked = False, 0.0, zero, NOWHERE, np.int64(ON_TRIANGLE), False
     anchor, lingers = p, 0
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:
@@ -498,7 +500,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
     draws = np.empty(draw_count)
-    rows, count = np.empty((64 * len(runs), COLUMNS)), 0
+    rows, count = np.empty((64 * len(runs), COLUMNS)), np.int64(0)
     for i in range(len(runs)):
         rows, count, end, time, impacts, length, v_max = run_block(
             tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, close, rows, count,

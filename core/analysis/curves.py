@@ -7,13 +7,12 @@ from typing import Literal
 import numpy as np
 
 from ..vectors import Array, Mask
-from .line_fits import LineFit, line, line_through_origin, power_law
+from .line_fits import LineFit, is_constant, line, line_through_origin, power_law
 
 Trend = Literal["auto", "none", "origin", "line", "power", "exponential", "logarithm"]
 """That of the pair of variables (`trend_of`), no curve, y = a·x, a + b·x, a·x^b, a·e^(b·x), a + b·ln x."""
 POINTS = 60
 DIGITS = 3
-ROUNDING = 1e-12
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 PAIRS: dict[tuple[str, str], Trend] = {
@@ -132,7 +131,7 @@ def fit_curve(
         return None
     x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
     placed = _placed(trend, x, y)
-    if np.ptp(y) <= ROUNDING * np.abs(y).max():  # a constant, but for rounding
+    if is_constant(y):
         y = np.full_like(y, y[0])
     fit, rank = _fit(trend, x[placed], y[placed], interval), rank_correlation(x, y)
     if not np.isfinite(fit.slope):
@@ -151,7 +150,7 @@ def rank_correlation(x: Array, y: Array) -> float:
     """Spearman's ρ of (n,) values each, ties sharing their ranks; NaN with fewer than three, or of a constant."""
     from scipy.stats import rankdata
 
-    if x.size < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+    if x.size < 3 or is_constant(x) or is_constant(y):
         return float("nan")
     one, other = (rankdata(values) - (x.size + 1) / 2 for values in (x, y))
     return float(one @ other / np.sqrt((one @ one) * (other @ other)))

@@ -11,6 +11,8 @@ from .robust_slope import theil_sen
 CONFIDENCE = 0.95
 FEWEST = 3
 """With fewer points no line is fitted."""
+ROUNDING = 1e-12
+"""Values that differ by less than this part of themselves are one value."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,11 @@ class LineFit:
     n: int
 
 
+def is_constant(values: Array) -> bool:
+    """Whether (n,) values, n ≥ 1, are all the same but for rounding."""
+    return bool(np.ptp(values) <= ROUNDING * np.abs(values).max())
+
+
 def line_through_origin(x: Array, y: Array) -> LineFit:
     """Least squares y = slope · x, (n,) each; the interval is Student's with n − 1 degrees of freedom."""
     if x.size < FEWEST or not np.any(x):
@@ -45,7 +52,7 @@ def line_through_origin(x: Array, y: Array) -> LineFit:
 
 def line(x: Array, y: Array) -> LineFit:
     """Least squares y = intercept + slope · x, (n,) each; the interval is Student's with n − 2 degrees of freedom."""
-    if x.size < FEWEST or np.ptp(x) == 0.0:
+    if x.size < FEWEST or is_constant(x):
         return _no_line(x.size)
     centred = x - x.mean()
     slope = float(centred @ (y - y.mean()) / (centred @ centred))
@@ -65,7 +72,7 @@ def power_law(x: Array, y: Array, interval: bool = True) -> LineFit:
     """
     positive = (x > 0.0) & (y > 0.0)
     log_x, log_y = np.log(x[positive]), np.log(y[positive])
-    if log_x.size < FEWEST or np.ptp(log_x) == 0.0:
+    if log_x.size < FEWEST or is_constant(x[positive]):
         return _no_line(log_x.size)
     slope, intercept, low, high = theil_sen(log_x, log_y, CONFIDENCE, interval)
     return LineFit(slope, low, high, intercept, _r2(log_y, intercept + slope * log_x), log_x.size)

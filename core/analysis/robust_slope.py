@@ -64,7 +64,10 @@ def _reach(x: Array, y: Array, pairs: int, confidence: float) -> float:
 
     n = float(x.size)
     variance = (n * (n - 1) * (2 * n + 5) - ties(x) - ties(np.sort(y))) / 18
-    return min(float(ndtri(0.5 + confidence / 2)) * variance**0.5 / 2, pairs / 2 - 1)
+    widest = pairs / 2 - 1
+    if variance <= 0.0:  # ties in x and in y, which the formula takes off twice
+        return widest
+    return min(float(ndtri(0.5 + confidence / 2)) * variance**0.5 / 2, widest)
 
 
 def _repeats(ordered: Array) -> list[int]:

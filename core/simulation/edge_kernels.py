@@ -13,7 +13,7 @@ import numpy as np
 
 from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
-from .facet_kernels import GENTLE, corner, dot, is_clear, minus, upward
+from .facet_kernels import GENTLE, NOWHERE, corner, dot, is_clear, minus, upward
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE
 
 MOST_PASSED = 8
@@ -190,7 +190,7 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
         ):  # fmt: skip
             break
         if land <= leave:
-            if not _within(tree, facets, j, q, m, radius, np.int64(-1)):
+            if not _within(tree, facets, j, q, m, radius, NOWHERE):
                 break
             return total + t, q, _along(way, m), m, j
         rises_beyond, came, j = bend[j, at] > 0.0, j, np.int64(across[j, at])

@@ -16,6 +16,7 @@ each number is known or 0, and a thread that finds a 0 looks up all four.
 """
 
 from math import inf, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,8 @@ LEVEL = 0.05
 """Vertical part of a normal below which a triangle is a wall."""
 NONE = 1e-30
 """A radius of nothing that is known."""
+NOWHERE: Any = np.int64(-1)
+"""No triangle. Kernels that are given a plain −1 are compiled for that number, and once more for all others."""
 BEYOND = 1.5
 """Look for somewhat larger spheres than the one that asks."""
 
@@ -185,7 +188,7 @@ def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
             top += 2
             continue
         for j in range(first[node], first[node] + count[node]):
-            rise, shared, at, there = 0.0, 0, np.int64(-1), np.int64(-1)
+            rise, shared, at, there = 0.0, 0, NOWHERE, NOWHERE
             for k in range(3):
                 q = corner(corners, j, k)
                 for own in range(3):

@@ -7,6 +7,9 @@ to rest, or to where another triangle stops it; whatever the size of the triangl
 """
 
 from math import inf, sqrt
+from typing import Any
+
+import numpy as np
 
 from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
@@ -21,7 +24,8 @@ BEND = 0.01
 """The path bends by this part of the radius at least, however slow the block."""
 FLAT = 1.0 - 1e-9
 """Cosine between a triangle's normal and that of the contact from which on the contact is within the triangle."""
-ON_TRIANGLE, AT_ANOTHER = -1, 3
+ON_TRIANGLE: Any = np.int64(-1)
+AT_ANOTHER = 3
 """Where a leg ends: on the triangle; at another one, or at an edge where steps have to follow; else at the edge 0 to 2
 that it may be taken over."""
 

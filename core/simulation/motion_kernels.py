@@ -28,6 +28,7 @@ from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
 from .edge_kernels import onto, over
+from .facet_kernels import NOWHERE
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
@@ -59,8 +60,6 @@ LINGERS = 0.3
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-NOWHERE = np.int64(-1)
-"""No place in the tree. Where kernels get the number itself, numba compiles them for it, and then for others."""
 COLUMNS = 22
 """run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
 
@@ -281,7 +280,7 @@ def run_block(  # type: ignore[no-untyped-def]
     grounded, n, place = False, (0.0, 0.0, 1.0), NOWHERE
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
     forget(close)
-    known, t, e, hit, edge, marked = False, 0.0, zero, NOWHERE, np.int64(ON_TRIANGLE), False
+    known, t, e, hit, edge, marked = False, 0.0, zero, NOWHERE, ON_TRIANGLE, False
     anchor, lingers = p, 0
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:

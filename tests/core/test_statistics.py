@@ -224,6 +224,18 @@ def test_too_few_impacts_give_no_numbers_and_no_warnings() -> None:
     same = line(np.ones(5), np.arange(5.0))
     assert np.isnan(same.slope)
     assert np.isnan(power_law(np.full(4, 10.0), np.ones(4)).slope)
+    nearly = 10.0 + 1e-15 * np.array([0.0, 2.0, 0.0, 2.0])
+    assert np.ptp(nearly) > 0.0
+    assert np.isnan(power_law(nearly, nearly).slope)
+
+
+def test_the_robust_slope_of_mostly_equal_points_is_not_known() -> None:
+    x, y = np.array([1.0, 1.0, 1.0, 1.0, 2.0]), np.array([5.0, 5.0, 5.0, 5.0, 8.0])
+    slope, _, low, high = theil_sen(x, y, 0.95)
+    assert slope == low == high == 3.0  # all pairs that have a slope have this one
+    slope, _, low, high = theil_sen(x, np.array([5.0, 5.0, 5.0, 6.0, 8.0]), 0.95)
+    assert (low, high) == (2.0, 3.0)
+    assert slope == 3.0
 
 
 @pytest.mark.parametrize("case", ["scattered", "few abscissae", "few abscissae and ordinates", "a law", "two clusters"])

@@ -71,7 +71,8 @@ def case_statistics_beside_the_graphs(window):
     theme("Light")
     yield 1.0
     window.screenshot("light")
-    # Blender 5.2.2 crashes, in its Shader Editor as well, when a new file comes with the mouse on a panel just opened.
+    # Blender 5.2.2 crashes, also without extensions and in its Shader Editor, when a new file comes with the mouse on a
+    # panel of a sidebar that was just opened or folded.
     yield from window.move(*window.centre())
     yield 1.0
 

@@ -9,26 +9,14 @@ from ....core.analysis.variables import find_variable
 from ....core.impact_models.registry import MODELS
 from ...scene import comparison, comparison_scores, databases, fit, model_parameters, models, store
 from ...view import job, parameters
-from ...view.graphs import editor
+from ...view.graphs.panel import GraphPanel
 from ...view.panel import paragraph, show_remarks
 
 MEASURES = {"rmse": "RMSE", "median_error": "median", "energy_distance": "cloud"}
 """Measure → head of its column."""
 
 
-class _GraphPanel:
-    """Mix-in: where the panels live."""
-
-    bl_space_type = "NODE_EDITOR"
-    bl_region_type = "UI"
-    bl_category = "Rockfall"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return editor.shows(context)
-
-
-class ROCKFALL_PT_compared_models(_GraphPanel, bpy.types.Panel):
+class ROCKFALL_PT_compared_models(GraphPanel, bpy.types.Panel):
     bl_label = "Models"
     bl_idname = "ROCKFALL_PT_compared_models"
 
@@ -58,7 +46,7 @@ class ROCKFALL_PT_compared_models(_GraphPanel, bpy.types.Panel):
         layout.prop(settings, "spin")
 
 
-class ROCKFALL_PT_compared_parameters(_GraphPanel, bpy.types.Panel):
+class ROCKFALL_PT_compared_parameters(GraphPanel, bpy.types.Panel):
     bl_label = "Parameters"
     bl_idname = "ROCKFALL_PT_compared_parameters"
 
@@ -93,7 +81,7 @@ class ROCKFALL_PT_compared_parameters(_GraphPanel, bpy.types.Panel):
         row.operator("rockfall.save_parameters", text="Save", icon="EXPORT").which = which
 
 
-class ROCKFALL_PT_compared_scores(_GraphPanel, bpy.types.Panel):
+class ROCKFALL_PT_compared_scores(GraphPanel, bpy.types.Panel):
     bl_label = "Scores"
     bl_idname = "ROCKFALL_PT_compared_scores"
 
@@ -131,7 +119,7 @@ def _score_row(layout: bpy.types.UILayout, *cells: str) -> None:
         place.label(text=cell)
 
 
-class ROCKFALL_PT_calibration(_GraphPanel, bpy.types.Panel):
+class ROCKFALL_PT_calibration(GraphPanel, bpy.types.Panel):
     bl_label = "Calibrate"
     bl_idname = "ROCKFALL_PT_calibration"
     bl_options = {"DEFAULT_CLOSED"}
@@ -194,7 +182,7 @@ def _draw_decision(layout: bpy.types.UILayout) -> None:
     row.operator("rockfall.discard_fit", text="Discard", icon="X")
 
 
-class ROCKFALL_PT_other_sites(_GraphPanel, bpy.types.Panel):
+class ROCKFALL_PT_other_sites(GraphPanel, bpy.types.Panel):
     bl_label = "Other sites"
     bl_idname = "ROCKFALL_PT_other_sites"
     bl_options = {"DEFAULT_CLOSED"}

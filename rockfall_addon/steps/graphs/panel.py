@@ -4,20 +4,8 @@
 import bpy
 
 from ...scene import graph_settings
-from ...view.graphs import editor
+from ...view.graphs.panel import GraphPanel
 from . import showing
-
-
-class GraphPanel:
-    """Mix-in: a panel beside the graphs of impacts."""
-
-    bl_space_type = "NODE_EDITOR"
-    bl_region_type = "UI"
-    bl_category = "Rockfall"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return editor.shows(context)
 
 
 class ROCKFALL_PT_graph_axes(GraphPanel, bpy.types.Panel):

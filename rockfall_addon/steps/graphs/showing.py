@@ -59,9 +59,8 @@ class ROCKFALL_OT_filter_graph_text(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         row = context.scene.rockfall_graphs.filters[self.number]
         chosen = texts_of(row)
-        row.texts = ", ".join([one for one in chosen if one != self.text] or [])
-        if self.text not in chosen:
-            row.texts = ", ".join([*chosen, self.text])
+        others = [one for one in chosen if one != self.text]
+        row.texts = ", ".join(others if self.text in chosen else [*chosen, self.text])
         return {"FINISHED"}
 
 

@@ -7,7 +7,7 @@ import bpy
 
 from ....core.analysis.statistics_words import class_rows, group_cells, summary_rows
 from ...scene import statistics
-from .panel import GraphPanel
+from ...view.graphs.panel import GraphPanel
 
 MOST_GROUPS = 12
 

@@ -34,23 +34,25 @@ def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGr
         entries.append((f"   {colours.colouring.title.split(' [')[0]}:", look.faint, "", False))
         entries += [(text or "empty", colour, "circle", False) for text, colour in colours.colouring.groups]
     most = LINES_OF_TALL if room.height > TALL * look.text else LINES
-    lines = _lines(entries, look, room.width - look.text, most)
+    bar = colours.colouring.ends if colours.colouring is not None else None
+    lines = _lines(entries, look, room.width - look.text, most, 0.0 if bar is None else _bar_width(bar, look))
     top = room.top - 0.5 * STEP * look.text
     for i, line in enumerate(lines):
         x = room.left + look.text
         for text, colour, shape, hollow in line:
             x = _entry(x, top - i * STEP * look.text, text, colour, shape, hollow, look)
-        if i == len(lines) - 1 and colours.colouring is not None and colours.colouring.ends is not None:
-            _bar(x, top - i * STEP * look.text, colours.colouring.ends, look)
+        if bar is not None and line[-1:] == entries[-1:]:
+            _bar(x, top - i * STEP * look.text, bar, look)
     return len(lines) * STEP * look.text
 
 
-def _lines(entries: list[Entry], look: Look, width: float, most: int) -> list[list[Entry]]:
-    """Entries line by line; those without room are counted."""
+def _lines(entries: list[Entry], look: Look, width: float, most: int, after: float) -> list[list[Entry]]:
+    """Entries line by line, with this room after the last one; those without room are counted."""
     lines: list[list[Entry]] = [[]]
     used, more = 0.0, look.measure("+ 100 more")
     for number, entry in enumerate(entries):
         wide = look.measure(entry[0]) + (2.4 if entry[2] else 1.2) * look.text
+        wide += after if number == len(entries) - 1 else 0.0
         ends = len(lines) == most and number < len(entries) - 1  # then what is left must be counted
         if lines[-1] and used + wide + (more if ends else 0) > width:
             if len(lines) == most:
@@ -73,8 +75,18 @@ def _entry(x: float, y: float, text: str, colour: Rgb, shape: str, hollow: bool,
     return x + drawing.text(x, y, text, look.text, look.ink if shape else look.faint, (0.0, 0.5)) + 1.2 * look.text
 
 
-def _bar(x: float, y: float, ends: tuple[float, float], look: Look) -> None:
+def _bar_ends(ends: tuple[float, float]) -> tuple[str, str]:
     low, high = (f"{value:.3g}".replace("-", "−") for value in ends)
+    return low, high
+
+
+def _bar_width(ends: tuple[float, float], look: Look) -> float:
+    low, high = _bar_ends(ends)
+    return look.measure(low) + look.measure(high) + 8 * look.text
+
+
+def _bar(x: float, y: float, ends: tuple[float, float], look: Look) -> None:
+    low, high = _bar_ends(ends)
     x += drawing.text(x, y, low, look.text, look.ink, (0.0, 0.5)) + 0.5 * look.text
     width = 7 * look.text / len(SPEED_SCALE)
     for i, colour in enumerate(SPEED_SCALE):

@@ -42,7 +42,7 @@ def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGr
         for text, colour, shape, hollow in line:
             x = _entry(x, top - i * STEP * look.text, text, colour, shape, hollow, look)
         if bar is not None and line[-1:] == entries[-1:]:
-            _bar(x, top - i * STEP * look.text, bar, look)
+            _bar(x, top - i * STEP * look.text, bar, room.left + room.width, look)
     return len(lines) * STEP * look.text
 
 
@@ -85,11 +85,13 @@ def _bar_width(ends: tuple[float, float], look: Look) -> float:
     return look.measure(low) + look.measure(high) + 8 * look.text
 
 
-def _bar(x: float, y: float, ends: tuple[float, float], look: Look) -> None:
+def _bar(x: float, y: float, ends: tuple[float, float], right: float, look: Look) -> None:
+    """The scale between its ends, shorter where there is less room."""
     low, high = _bar_ends(ends)
+    whole = max(min(7 * look.text, right - x - _bar_width(ends, look) + 7 * look.text), look.text)
     x += drawing.text(x, y, low, look.text, look.ink, (0.0, 0.5)) + 0.5 * look.text
-    width = 7 * look.text / len(SPEED_SCALE)
+    width = whole / len(SPEED_SCALE)
     for i, colour in enumerate(SPEED_SCALE):
         part = Rectangle(x + i * width, y - 0.4 * look.text, width + 1, 0.8 * look.text)
         drawing.fill(part, (float(colour[0]), float(colour[1]), float(colour[2])))
-    drawing.text(x + 7.5 * look.text, y, high, look.text, look.ink, (0.0, 0.5))
+    drawing.text(x + whole + 0.5 * look.text, y, high, look.text, look.ink, (0.0, 0.5))

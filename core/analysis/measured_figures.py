@@ -46,7 +46,7 @@ def save_measured_figures(
     folder: str | Path,
     specs: Sequence[GraphSpec] = (),
     grouping: Grouping | None = None,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = FORMATS[:1],
 ) -> tuple[Path, ...]:
     """Write the sheet `measured` with the paper's graphs, and a figure of each of `specs`.
 

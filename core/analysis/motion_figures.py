@@ -37,7 +37,7 @@ def save_motion_figures(
     folder: str | Path,
     scale: FrameScale | None = None,
     quantities: Sequence[Quantity] = QUANTITIES,
-    formats: Sequence[str] = FORMATS,
+    formats: Sequence[str] = FORMATS[:1],
 ) -> tuple[Path, ...]:
     """Write one figure of each trajectory that flies, and one of all from their starts on; returns the files.
 

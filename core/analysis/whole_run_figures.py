@@ -34,7 +34,7 @@ ENVELOPE = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 def save_whole_run_figures(
-    comparison: WholeRuns, ground: Ground, folder: str | Path, formats: Sequence[str] = FORMATS
+    comparison: WholeRuns, ground: Ground, folder: str | Path, formats: Sequence[str] = FORMATS[:1]
 ) -> tuple[Path, ...]:
     """Write profiles, sections and whole_runs into a folder; returns the files.
 

@@ -10,6 +10,7 @@ from ..constants import GRAVITY_MPS2
 from .options import (
     add_figure_options,
     add_incident_options,
+    add_model_option,
     add_observed_option,
     add_out,
     add_parameter_options,
@@ -17,6 +18,7 @@ from .options import (
     figure_formats,
     measured_as_asked,
     model_parameters,
+    models_as_asked,
     naming,
     not_negative,
     terrain_as_asked,
@@ -38,20 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
     add_out(parser)
-    parser.add_argument(
-        "--model",
-        action="extend",
-        nargs="+",
-        metavar="NAME",
-        help="models to compare (default: the six of Noël et al. 2018; `rockfall models` lists all)",
-    )
+    add_model_option(parser, "models to compare (default: the six of Noël et al. 2018)")
     add_parameter_options(parser)
     add_observed_option(parser, "default: IMPACTS; a trajectory's impacts are always drawn from those of the others")
     parser.add_argument(
         "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
     )
     add_incident_options(parser)
-    add_figure_options(parser, default="png", without="neither figures nor the page")
+    add_figure_options(parser, without="neither figures nor the page")
     parser.add_argument("--title", default="", metavar="TEXT", help="heading of the page")
     group = parser.add_argument_group(
         "predicted flights: the blocks that leave each impact as a model says, and where they land"
@@ -72,9 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.output import output_folder
     from ..exchange.predicted_flight_tables import write_predicted_flights
     from ..exchange.tables import read_impacts
-    from ..impact_models.registry import COMPARED, find_model
+    from ..impact_models.registry import COMPARED
 
-    models = [find_model(name).name for name in arguments.model or COMPARED]
+    models = models_as_asked(arguments.model, COMPARED)
     parameters = model_parameters(arguments, models)
     measured = measured_as_asked(arguments, models)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):

@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from .options import (
+    add_figure_options,
+    add_model_option,
     add_motion_options,
     add_out,
     add_parameter_options,
     add_terrain_options,
+    figure_formats,
     model_parameters,
+    models_as_asked,
     positive,
     terrain_as_asked,
     whole,
@@ -45,13 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--stops", metavar="FILE", help="where blocks stopped, without footage: release, x_m, y_m (z_m)"
     )
     parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; a project names its own")
-    parser.add_argument(
-        "--model",
-        action="extend",
-        nargs="+",
-        metavar="NAME",
-        help="models to simulate with (default: the project's, else the six of Noël et al. 2018)",
-    )
+    add_model_option(parser, "models to simulate with (default: the project's, else the six of Noël et al. 2018)")
     add_parameter_options(parser)
     parser.add_argument(
         "--number",
@@ -78,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     block.add_argument("--diameter", type=positive, metavar="M", help=f"[m] (default {DIAMETER_M:g})")
     block.add_argument("--density", type=positive, metavar="RHO", help=f"[kg/m³] (default {ROCK_DENSITY_KGPM3:g})")
     add_zone_options(parser)
-    parser.add_argument("--tables-only", action="store_true", help="no figures")
+    add_figure_options(parser)
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
     add_terrain_options(parser)
 
@@ -122,7 +120,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_whole_values(done.comparison, folder / "whole_values.csv")
         write_runs(done.simulations, folder / "runs.csv")
         write_summary(summary(done.simulations, case.inputs, remarks), folder / "summary.json")
-        notes = [] if arguments.tables_only else _draw(done.comparison, case.ground, folder, progress)
+        notes = [] if arguments.tables_only else _draw(arguments, done.comparison, case.ground, folder, progress)
         names = ("whole_runs.csv", "whole_values.csv", "runs.csv", "summary.json", "figures")
         written = [name for name in names if (folder / name).exists()]
     for line in (*remarks, *notes):
@@ -147,7 +145,7 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
     entry = project.stated_simulation
     entry = replace(
         entry,
-        models=tuple(arguments.model or entry.models),
+        models=models_as_asked(arguments.model, entry.models),
         releases=ReleaseEntry(),
         rolling=arguments.rolling or entry.rolling,
         friction=entry.friction if arguments.friction is None else arguments.friction,
@@ -181,7 +179,7 @@ def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case
 
     if not arguments.terrain:
         raise InputError("--terrain is missing", advice="Only a project, project.toml, can do without it")
-    models = [find_model(name) for name in arguments.model or COMPARED]
+    models = [find_model(name) for name in models_as_asked(arguments.model, COMPARED)]
     parameters = model_parameters(arguments, [model.name for model in models])
     given = {name: getattr(arguments, name) for name in ("rolling", "friction") if getattr(arguments, name) is not None}
     gravity = GRAVITY_MPS2 if arguments.gravity is None else arguments.gravity
@@ -282,7 +280,9 @@ def _numbers(text: str | None, option: str) -> list[float]:
     return values
 
 
-def _draw(comparison: "WholeRuns", ground: "Ground", folder: Path, progress: PrintedProgress) -> list[str]:
+def _draw(
+    arguments: argparse.Namespace, comparison: "WholeRuns", ground: "Ground", folder: Path, progress: PrintedProgress
+) -> list[str]:
     """The figures, if their library is there; else what to install."""
     from ..analysis.extras import FIGURES, install_command, is_there
     from ..analysis.whole_run_figures import save_whole_run_figures
@@ -290,5 +290,5 @@ def _draw(comparison: "WholeRuns", ground: "Ground", folder: Path, progress: Pri
     if not is_there(FIGURES):
         return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]
     progress("Drawing the figures")
-    save_whole_run_figures(comparison, ground, folder / "figures")
+    save_whole_run_figures(comparison, ground, folder / "figures", figure_formats(arguments))
     return []

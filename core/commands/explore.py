@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import add_incident_options, naming, whole
+from .options import add_incident_options, add_model_option, models_as_asked, naming, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -19,13 +19,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
-    parser.add_argument(
-        "--model",
-        action="extend",
-        nargs="+",
-        metavar="NAME",
-        help="models to offer (default: the six of Noël et al. 2018; `rockfall models` lists all)",
-    )
+    add_model_option(parser, "models to offer (default: the six of Noël et al. 2018)")
     parser.add_argument("--parameters", metavar="FILE", help="parameters to start with, as saved by this command")
     parser.add_argument(
         "--save", metavar="FILE", help="where Save writes the parameters (default: parameters.toml beside IMPACTS)"
@@ -45,14 +39,13 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.extras import PAGES, demand
     from ..exchange.parameters import read_parameters, write_parameters
     from ..exchange.tables import read_impacts
-    from ..impact_models.registry import COMPARED, find_model
+    from ..impact_models.registry import COMPARED
 
     demand(PAGES)
     if arguments.port > 65535:
         raise InputError(f"There is no port {arguments.port}", advice="Take one up to 65535, or leave --port out")
     given = read_parameters(arguments.parameters) if arguments.parameters else {}
-    names = arguments.model or tuple(dict.fromkeys((*COMPARED, *given)))
-    models = tuple(dict.fromkeys(find_model(name).name for name in names))
+    models = models_as_asked(arguments.model, (*COMPARED, *given))
     target = Path(arguments.save or Path(arguments.impacts).with_name("parameters.toml")).absolute()
 
     def save(settings: "Mapping[str, Mapping[str, Value]]") -> str:

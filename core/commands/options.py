@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..progress import Progress
     from ..terrain.surface import Surface
 
-FIGURE_FORMATS = ("svg", "png", "pdf")
+FIGURE_FORMATS = ("png", "svg", "pdf")
+"""The first is taken where none is asked for."""
 UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
 
@@ -167,22 +168,21 @@ def add_incident_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_figure_options(parser: argparse.ArgumentParser, default: str = "", without: str = "no figures") -> None:
-    """``--format``, of which `default` is taken when none is asked for ("" for all), and ``--tables-only``."""
-    parser.set_defaults(figure_formats=(default,) if default else FIGURE_FORMATS)
+def add_figure_options(parser: argparse.ArgumentParser, without: str = "no figures") -> None:
+    """``--format`` and ``--tables-only``."""
     parser.add_argument(
         "--format",
         action="extend",
         nargs="+",
         choices=FIGURE_FORMATS,
-        help=f"of the figures, one or several (default: {default or 'all'})",
+        help=f"of the figures, one or several (default: {FIGURE_FORMATS[0]})",
     )
     parser.add_argument("--tables-only", action="store_true", help=without)
 
 
 def figure_formats(arguments: argparse.Namespace) -> tuple[str, ...]:
     """What ``--format`` says."""
-    return tuple(dict.fromkeys(arguments.format or arguments.figure_formats))
+    return tuple(dict.fromkeys(arguments.format or FIGURE_FORMATS[:1]))
 
 
 def add_site_option(parser: argparse.ArgumentParser) -> None:
@@ -237,6 +237,33 @@ def tables_as_asked(
         package = Path(path).is_dir() or Path(path).suffix == ".json"
         parts.append(read_package(path) if package else read_source(path, site, licence))
     return parts
+
+
+def add_model_option(parser: argparse.ArgumentParser, text: str, flag: str = "--model") -> None:
+    """``--model NAME …``: several names after one another, or the option again."""
+    parser.add_argument(
+        flag,
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help=f"{text}; several, or given again. `rockfall models` lists all",
+    )
+
+
+def models_as_asked(names: Sequence[str], default: Sequence[str] = (), flag: str = "--model") -> tuple[str, ...]:
+    """The models that `add_model_option` names, each once; without any those of `default`.
+
+    Raises
+    ------
+    InputError : there is no such model; the nearest is suggested.
+    """
+    from ..impact_models.registry import find_model
+
+    for name in names:
+        if Path(name).suffix:
+            raise InputError(f"{flag} takes {name} for a model", advice=f"Write the file before {flag}")
+    return tuple(dict.fromkeys(find_model(name).name for name in names or default))
 
 
 def add_observed_option(parser: argparse.ArgumentParser, default: str) -> None:

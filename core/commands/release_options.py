@@ -2,6 +2,7 @@
 """Arguments of `simulate` about what falls and from where, and about zones of the ground."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -142,7 +143,7 @@ def releases_as_asked(arguments: argparse.Namespace) -> "tuple[ReleaseSource, di
 
 
 def zones_as_asked(
-    arguments: argparse.Namespace, terrain: "Surface | Cloud", models: list[str]
+    arguments: argparse.Namespace, terrain: "Surface | Cloud", models: Sequence[str]
 ) -> "tuple[Zones | None, dict[str, Path]]":
     """The zones of ``--zones``, None without, and the files that they are from.
 

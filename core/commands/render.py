@@ -9,7 +9,7 @@ from ..film.engines import ENGINES
 from ..film.job import GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
-from .options import add_parameter_options, model_parameters, whole
+from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, whole
 from .progress import PrintedProgress
 
 FILES = {"film": "rockfall.mp4", "still": "rockfall.png", "slope": "slope.png"}
@@ -36,20 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="Blender's render engine (default: the preset's; auto takes the quickest that works here)",
     )
-    parser.add_argument(
-        "--model",
-        metavar="NAME",
-        action="append",
-        default=[],
-        help="show beside the real blocks those of an impact model, from the same impacts; may be given several times",
-    )
-    parser.add_argument(
+    add_model_option(parser, "show beside the real blocks those of impact models, from the same impacts")
+    add_model_option(
+        parser,
+        "let blocks of impact models fall beside the real ones, from the same starts to their ends",
         "--simulate",
-        metavar="NAME",
-        action="append",
-        default=[],
-        help="let blocks of an impact model fall beside the real ones, from the same starts to their ends; may be "
-        "given several times",
     )
     parser.add_argument(
         "--number", type=whole, metavar="N", help=f"simulated blocks for each real one and model (default {NUMBER})"
@@ -76,11 +67,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..film.job import FilmJob
     from ..film.maker import film_maker
     from ..film.presets import find_preset
-    from ..impact_models.registry import find_model
 
-    models, simulate = (
-        tuple(dict.fromkeys(find_model(name).name for name in names)) for names in (arguments.model, arguments.simulate)
-    )
+    models = models_as_asked(arguments.model)
+    simulate = models_as_asked(arguments.simulate, flag="--simulate")
     if models and simulate:
         raise InputError(
             "--model and --simulate would show two kinds of blocks in the same colours",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
 from .options import (
+    add_model_option,
     add_motion_options,
     add_observed_option,
     add_out,
@@ -17,6 +18,7 @@ from .options import (
     known_names,
     measured_as_asked,
     model_parameters,
+    models_as_asked,
     positive,
     reading_as_asked,
     terrain_as_asked,
@@ -51,12 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_out(parser)
     parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; a project names its own")
-    parser.add_argument(
-        "--model",
-        action="append",
-        metavar="NAME",
-        help="impact model; may be given several times: each gets the same blocks. `rockfall models` lists all",
-    )
+    add_model_option(parser, "impact models, each of which gets the same blocks")
     add_parameter_options(parser)
     add_observed_option(parser, "needed by that model; a project can give its own")
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
@@ -140,15 +137,14 @@ class _Asked(NamedTuple):
 
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
     """What the options say."""
-    from ..impact_models.registry import find_model
     from ..reconstruction.drag import Drag
     from ..terrain.readers import read_points, read_structure
     from ..workflow.simulation import Scenario
 
     for option in ("terrain", "model"):
-        if getattr(arguments, option) is None:
+        if not getattr(arguments, option):
             raise InputError(f"--{option} is missing", advice="Only a project, project.toml, can do without it")
-    models = [find_model(name).name for name in arguments.model]
+    models = models_as_asked(arguments.model)
     parameters = model_parameters(arguments, models)
     measured = measured_as_asked(arguments, models, needed=True)
     files = _structures(arguments.structure)
@@ -211,7 +207,7 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
         releases = replace(releases, **said)
     entry = replace(
         entry,
-        models=tuple(arguments.model or entry.models),
+        models=models_as_asked(arguments.model, entry.models),
         releases=releases,
         contact=arguments.contact or entry.contact,
         rolling=arguments.rolling or entry.rolling,

@@ -4,11 +4,14 @@
 import os
 import subprocess
 import sys
+from argparse import ArgumentParser
+from importlib import import_module
 
 import laspy
 import numpy as np
 import pytest
 from rockfall.core.cli import main
+from rockfall.core.commands.options import models_as_asked
 from rockfall.core.exchange.tables import read_impacts
 from rockfall.core.film.maker import FilmMaker, inside_blender
 from rockfall.core.terrain.readers import read_terrain
@@ -297,3 +300,19 @@ def test_the_first_line_of_a_long_output():
     assert ended.stdout.split() == [b"parameter", b"default", b"range"]
     assert ended.returncode in (0, 141)  # 0 when all was in the pipe before it was closed
     assert ended.stderr == b""
+
+
+@pytest.mark.parametrize("name", ["compare", "explore", "simulate", "compare_runs", "render"])
+def test_models_are_named_alike_in_every_command(name, tmp_path) -> None:
+    parser = ArgumentParser()
+    import_module(f"rockfall.core.commands.{name}").add_arguments(parser)
+    out = [] if name == "explore" else ["--out", str(tmp_path)]
+    two, again = ["--model", "noel_2017", "wylie"], ["--model", "wyllie_2014", "--model", "noel_2017"]
+    assert parser.parse_args(["file", *two, *out]).model == ["noel_2017", "wylie"]
+    assert models_as_asked(parser.parse_args(["file", *again, *out]).model) == ("wyllie_2014", "noel_2017")
+    assert models_as_asked(parser.parse_args(["file", *out]).model, ("noel_2017",)) == ("noel_2017",)
+
+
+def test_a_file_after_the_models_is_not_taken_for_one(terrain, tmp_path, capsys) -> None:
+    argv = ["simulate", "--terrain", str(terrain), "--model", "noel_2017", "starts.csv"]
+    assert "starts.csv for a model. Write the file before --model" in refused(capsys, tmp_path / "out", *argv)

@@ -114,6 +114,26 @@ def interval_by_cluster(x: Array, y: Array, cluster: Indices, *, origin: bool) -
     return float(slope[0]) - reach, float(slope[0]) + reach
 
 
+def power_interval_by_cluster(x: Array, y: Array, cluster: Indices) -> tuple[float, float]:
+    """The interval (95 %) of a power law's exponent when the points of a cluster may depend on each other.
+
+    Parameters
+    ----------
+    x, y : (n,) points, of which the positive ones count.
+    cluster : (n,) number of the cluster of each, from 0.
+
+    Notes
+    -----
+    As the interval of `power_law`, with the variance of Kendall's count from its sums over clusters, and Student's
+    factor with as many degrees of freedom as there are clusters, less one. NaN with fewer than two clusters.
+    """
+    positive = (x > 0.0) & (y > 0.0)
+    if positive.sum() < FEWEST or is_constant(x[positive]):
+        return float("nan"), float("nan")
+    _, _, low, high = theil_sen(np.log(x[positive]), np.log(y[positive]), CONFIDENCE, True, cluster[positive])
+    return low, high
+
+
 def student(freedom: int) -> float:
     """The factor of a standard error that gives the interval (95 %)."""
     from scipy.special import stdtrit

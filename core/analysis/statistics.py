@@ -10,7 +10,15 @@ from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts, fall_numbers
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask
-from .line_fits import FEWEST, LineFit, interval_by_cluster, line, line_through_origin, power_law
+from .line_fits import (
+    FEWEST,
+    LineFit,
+    interval_by_cluster,
+    line,
+    line_through_origin,
+    power_interval_by_cluster,
+    power_law,
+)
 from .variables import APPARENT, VARIABLES, known_variables, measured_values
 
 PUBLISHED_RT_SLOPE = 0.66
@@ -95,6 +103,7 @@ class ImpactStatistics:
     r_deviation : R on θ_dev, per degree; its intercept is R of an undeflected block.
     r_deviation_by_trajectory : 95 % interval of that slope when the impacts of a trajectory may depend on each other.
     rn_angle : ln R_N on ln θ1 [°] by Theil–Sen, so R_N = a·θ1^b with b the slope and a = exp(intercept).
+    rn_angle_by_trajectory : 95 % interval of that b when the impacts of a trajectory may depend on each other.
     classes : R_N > 1 by incident angle.
     spreads : variable → how its values are spread, for the variables that the table has anything of.
     """
@@ -109,6 +118,7 @@ class ImpactStatistics:
     r_deviation: LineFit
     r_deviation_by_trajectory: tuple[float, float]
     rn_angle: LineFit
+    rn_angle_by_trajectory: tuple[float, float]
     classes: tuple[AngleClass, ...]
     spreads: dict[str, Spread]
 
@@ -155,6 +165,7 @@ class ImpactStatistics:
             ("rn_angle_exponent", self.rn_angle.slope, "", "b of R_N = a·θ1^b"),
             ("rn_angle_exponent_low", self.rn_angle.low, "", "95 % confidence"),
             ("rn_angle_exponent_high", self.rn_angle.high, "", "95 % confidence"),
+            *_cluster_rows("rn_angle_exponent", self.rn_angle_by_trajectory, "", "ranks"),
             ("rn_angle_r2", self.rn_angle.r2, "", "of ln R_N; 1 − SSE/SST about the mean"),
             ("rn_above_one", self.rn_above_one, "", "impacts with R_N > 1"),
             ("rn_above_one_below_20_deg", self.rn_above_one_grazing, "", "of these, with θ1 < 20°"),
@@ -199,14 +210,15 @@ class ImpactStatistics:
             (
                 "rt",
                 rt.slope,
-                f"R_T = {rt.slope:.3f} ({rt.low:.3f}–{rt.high:.3f}{_together(self.rt_by_trajectory)}), "
+                f"R_T = {rt.slope:.3f} ({rt.low:.3f}–{rt.high:.3f}{_together(self.rt_by_trajectory, 3, '–')}), "
                 f"R² {_signed(rt.r2, 3)}: slope of |v_T2| on |v_T1| through the origin. "
                 f"Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
             ),
             (
                 "rn",
                 self.rn_angle.slope,
-                f"R_N = {self.rn_factor:.1f}·θ1^{exponent} (θ1 in degrees; exponent {_span(self.rn_angle)}): {shape}. "
+                f"R_N = {self.rn_factor:.1f}·θ1^{exponent} (θ1 in degrees; exponent {_span(self.rn_angle)}"
+                f"{_together(self.rn_angle_by_trajectory, 2, ' to ')}): {shape}. "
                 f"R_N > 1 at {self.rn_above_one} impacts, {self.rn_above_one_grazing} of them "
                 f"below {PUBLISHED_RN_ANGLE_DEG:.0f}° (published: below about {PUBLISHED_RN_ANGLE_DEG:.0f}°).",
             ),
@@ -292,6 +304,7 @@ def statistics_by_number(
                 r_deviation=line(deviation[here], r[here]),
                 r_deviation_by_trajectory=interval_by_cluster(deviation[here], r[here], cluster, origin=False),
                 rn_angle=power_law(theta1[here], rn[here]),
+                rn_angle_by_trajectory=power_interval_by_cluster(theta1[here], rn[here], cluster),
                 classes=_classes(counts[i], above[i]),
                 spreads={name: columns[i] for name, columns in spreads.items() if columns[i].n or name in APPARENT},
             )
@@ -335,9 +348,9 @@ def _span(fit: LineFit, times: float = 1.0) -> str:
     return f"{times * fit.low:.2f} to {times * fit.high:.2f}".replace("-", "−")
 
 
-def _together(interval: tuple[float, float]) -> str:
-    low, high = interval
-    return f"; {low:.3f}–{high:.3f} if the impacts of a trajectory depend on each other" if np.isfinite(low) else ""
+def _together(interval: tuple[float, float], digits: int, to: str) -> str:
+    low, high = (_signed(value, digits) for value in interval)
+    return f"; {low}{to}{high} if the impacts of a trajectory depend on each other" if np.isfinite(interval[0]) else ""
 
 
 def _line_rows(name: str, fit: LineFit, unit: str, note: str, free: bool, intercept_unit: str = "") -> list[Row]:
@@ -352,8 +365,8 @@ def _line_rows(name: str, fit: LineFit, unit: str, note: str, free: bool, interc
     return rows
 
 
-def _cluster_rows(name: str, interval: Sequence[float], unit: str) -> list[Row]:
-    note = "95 % confidence when the impacts of a trajectory may depend on each other (jackknife)"
+def _cluster_rows(name: str, interval: Sequence[float], unit: str, by: str = "jackknife") -> list[Row]:
+    note = f"95 % confidence when the impacts of a trajectory may depend on each other ({by})"
     return [
         (f"{name}_{end}_by_trajectory", value, unit, note) for end, value in zip(("low", "high"), interval, strict=True)
     ]

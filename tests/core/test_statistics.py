@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 import scipy.stats
 from rockfall.core.analysis.comparison import compare
-from rockfall.core.analysis.line_fits import interval_by_cluster, line, line_through_origin, power_law
+from rockfall.core.analysis.line_fits import (
+    interval_by_cluster,
+    line,
+    line_through_origin,
+    power_interval_by_cluster,
+    power_law,
+)
 from rockfall.core.analysis.robust_slope import theil_sen
 from rockfall.core.analysis.statistics import AngleClass, ImpactStatistics, impact_statistics
 from rockfall.core.reconstruction.impact import Impacts
@@ -131,6 +137,37 @@ def test_the_interval_by_trajectory_holds_where_students_does_not() -> None:
     assert by_student / 1500 < 0.75
 
 
+def test_the_exponents_interval_by_trajectory_holds_where_the_usual_does_not() -> None:
+    """Twelve trajectories of eight impacts, each at angles and with a ground of its own, to a law that is known."""
+    rng = np.random.default_rng(3)
+    cluster = np.repeat(np.arange(12), 8)
+    held, usual = 0, 0
+    for _ in range(400):
+        angle = np.exp(3.0 + 0.6 * rng.standard_normal(12)[cluster] + 0.3 * rng.standard_normal(96))
+        ground = 0.5 * rng.standard_normal(12)[cluster] + 0.3 * rng.standard_t(3, 96)
+        rn = 12.0 * angle**-1.08 * np.exp(ground)
+        low, high = power_interval_by_cluster(angle, rn, cluster)
+        fit = power_law(angle, rn)
+        held += low <= -1.08 <= high
+        usual += fit.low <= -1.08 <= fit.high
+    assert held / 400 == pytest.approx(0.95, abs=0.03)
+    assert usual / 400 < 0.8
+
+
+@pytest.mark.parametrize("n", [300, 3000])
+def test_with_a_cluster_for_each_point_the_interval_is_scipys(n: int) -> None:
+    """Both with few points, whose slopes are listed, and with many, of which some are compared."""
+    rng = np.random.default_rng(n)
+    x = rng.uniform(6, 60, n)
+    y = 12.0 / x * np.exp(0.4 * rng.standard_normal(n))
+    slope, _, low, high = scipy.stats.theilslopes(np.log(y), np.log(x), 0.95)
+    found = power_interval_by_cluster(x, y, np.arange(n))
+    assert found == pytest.approx((low, high), abs=0.04 * (high - low))
+    assert found[0] < slope < found[1]
+    assert np.isnan(power_interval_by_cluster(x, y, np.zeros(n, dtype=int))).all()
+    assert np.isnan(power_interval_by_cluster(np.full(n, 9.0), y, np.arange(n))).all()
+
+
 def test_power_law_is_not_moved_by_the_papers_outliers() -> None:
     theta1_deg = np.concatenate([RNG.uniform(6, 60, 100), [0.3, 1.1, 4.3]])
     rn = 12.0 * theta1_deg**-1.1 * np.exp(0.15 * RNG.standard_normal(103))
@@ -210,7 +247,8 @@ def test_rows_and_sentences(exact: ImpactStatistics) -> None:
     assert texts["rt"].startswith("R_T = 0.660 (0.660–0.660; 0.660–0.660 if the impacts of a trajectory depend on")
     assert "R² 1.000: slope of |v_T2| on |v_T1| through the origin. " in texts["rt"]
     assert texts["rt"].endswith("Published: 0.66, R² 0.31.")
-    assert "·θ1^−1.10 (θ1 in degrees; exponent −1.10 to −1.10): hyperbolic, as published. R_N > 1 at " in texts["rn"]
+    assert "·θ1^−1.10 (θ1 in degrees; exponent −1.10 to −1.10; −1.10 to −1.10 if the impacts of a " in texts["rn"]
+    assert "depend on each other): hyperbolic, as published. R_N > 1 at " in texts["rn"]
     assert texts["r"].startswith("R falls by ")
     assert {remark.severity for remark in exact.remarks()} == {"note"}
 

@@ -80,13 +80,18 @@ class PrintedProgress:
 
 @contextmanager
 def stopped_by_interrupt(progress: Progress) -> Iterator[Progress]:
-    """Progress in which Ctrl+C asks the work to end, so that it can keep what is finished; a second one ends it."""
+    """Progress in which Ctrl+C, or SIGTERM, asks the work to end, so that it can keep what is finished; a second one
+    ends it."""
     asked = False
 
     def ask(number: int, frame: FrameType | None) -> None:
         nonlocal asked
         asked = True
-        signal.signal(signal.SIGINT, before)
+        restore()
+
+    def restore() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
     def told(text: str, done: int = 0, total: int = 0) -> None:
         if asked:
@@ -96,10 +101,10 @@ def stopped_by_interrupt(progress: Progress) -> Iterator[Progress]:
     if current_thread() is not main_thread():  # only there can signals be handled
         yield progress
         return
-    before = signal.signal(signal.SIGINT, ask)
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield told
     except CancelledError as error:
         raise KeyboardInterrupt from error
     finally:
-        signal.signal(signal.SIGINT, before)
+        restore()

@@ -3,8 +3,9 @@
 
 import os
 import time
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any, Literal
@@ -34,9 +35,10 @@ FRICTION = 0.5
 """Coefficient of friction on the ground where none is given."""
 BATCH = 64
 """Runs that one thread takes at a time; larger ones leave a thread without work at the end."""
-WINDOW = 4096
-"""Of so many runs, those that are released near one another are taken one after the other: they find the terrain in the
-processor's cache. After a cancel up to as many finished runs are lost, and never more than a quarter of all."""
+WINDOW, WINDOW_S = 4096, 0.5
+"""Of so many runs, and of no more than take so long, those that are released near one another are taken one after the
+other: they find the terrain in the processor's cache. After a cancel a window that is begun is finished, so that no
+finished run is lost."""
 ENOUGH = 1000
 """So many runs tell how much memory all will need."""
 
@@ -200,7 +202,7 @@ def simulate(
     record : what to keep of the motion, see `RECORDED`; it changes nothing of the runs.
     threads : None takes all cores. The result does not depend on it.
     progress : called with the number of finished blocks. A `CancelledError` raised in it ends the simulation with the
-        runs that are finished, from the first on without a gap.
+        runs that are finished, from the first on without a gap; for that it goes on for up to `WINDOW_S` or one batch.
 
     Raises
     ------
@@ -213,8 +215,7 @@ def simulate(
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
     ground.refuse_small(releases.radius_m)
     tree, zone = ground.tree, ground.zone_in_tree
-    order = _near_one_another(releases.position[:, :2])
-    results, over, rows = np.empty((n, 5)), np.zeros(n, np.bool_), list[Array]()
+    results, rows = np.empty((n, 5)), list[Array]()
 
     from .motion_kernels import COLUMNS
 
@@ -228,37 +229,47 @@ def simulate(
     blocks = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
-    def batch(start: int) -> tuple[int, int]:
-        part = order[start : start + BATCH]
+    def batch(part: NDArray[np.int64]) -> tuple[int, int]:
         ended = np.empty((part.size, 5))
         moments = run_blocks(
             tree, facets, zone, model.compiled, numbers, friction, model.draws, first_run + part, settings.seed,
             *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts, settings.most_s,
             level, ended,
         )  # fmt: skip
-        results[part], over[part] = ended, True
+        results[part] = ended
         rows.append(moments)
         return part.size, len(moments)
 
+    cores = threads or os.cpu_count() or 1
     finished, recorded, started, there = 0, 0, time.perf_counter(), available_bytes()
     progress("Simulating", 0, n)
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        waiting = [pool.submit(batch, start) for start in range(0, n, BATCH)]
+    turns, goes_on, waiting = (
+        _Turns(_along_curve(releases.position[:, :2]), cores),
+        True,
+        set[Future[tuple[int, int]]](),
+    )
+    with ThreadPoolExecutor(cores) as pool:
         try:
-            for done in as_completed(waiting):
-                ended, moments = done.result()
-                finished, recorded = finished + ended, recorded + moments
+            while True:
+                pace = finished / max(time.perf_counter() - started, 1e-9)
+                waiting |= {pool.submit(batch, part) for part in turns.take(2 * cores - len(waiting), pace, goes_on)}
+                if not waiting:
+                    break
+                ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for one in ready:
+                    ended, moments = one.result()
+                    finished, recorded = finished + ended, recorded + moments
                 if finished >= ENOUGH:
                     check_records(n, finished, recorded, there)
-                progress("Simulating", finished, n)
-        except CancelledError:
-            pass
+                if goes_on:
+                    try:
+                        progress("Simulating", finished, n)
+                    except CancelledError:
+                        goes_on = False
         finally:
             for one in waiting:
                 one.cancel()
-    whole = n if over.all() else int(np.argmin(over))
-    if not whole:
-        raise CancelledError
+    whole = turns.begun
     records = _records(_in_turn(rows, first_run, whole, COLUMNS), ground.element, first_run)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
@@ -350,18 +361,43 @@ def _compiled_runs(tree: Any, facets: Any) -> Any:
     return _compiled_for(typeof(tree), typeof(facets))
 
 
-def _near_one_another(places: Array) -> NDArray[np.int64]:
-    """(n,) the order in which runs are taken: in each window along a curve that keeps near places (n, 2) together.
+class _Turns:
+    """Which runs are taken when: window after window, and in each along the curve (n,)."""
+
+    def __init__(self, curve: NDArray[np.uint32], cores: int) -> None:
+        self._curve, self._least = curve, BATCH * cores
+        self._batches = deque[NDArray[np.int64]]()
+        self.begun = 0
+        """So many runs, from the first on, are in windows that are begun."""
+
+    def take(self, count: int, pace: float, goes_on: bool) -> list[NDArray[np.int64]]:
+        """The next batches, at most so many.
+
+        Parameters
+        ----------
+        pace : runs in a second.
+        goes_on : whether new windows may begin.
+        """
+        while len(self._batches) < count and goes_on and self.begun < self._curve.size:
+            size = max(self._least, min(WINDOW, int(WINDOW_S * pace), self._curve.size // 4) // BATCH * BATCH)
+            part = self._curve[self.begun : self.begun + size]
+            window = self.begun + np.argsort(part, kind="stable")
+            self._batches.extend(window[start : start + BATCH] for start in range(0, window.size, BATCH))
+            self.begun += window.size
+        return [self._batches.popleft() for _ in range(min(count, len(self._batches)))]
+
+
+def _along_curve(places: Array) -> NDArray[np.uint32]:
+    """(n,) where places (n, 2) are on a curve that keeps near ones together.
 
     That is Morton's order: the bits of both coordinates, one after the other.
     """
-    n = len(places)
     low = places.min(axis=0)
     cell = ((places - low) * (0xFFFF / max(float((places - low).max()), 1e-9))).astype(np.uint32)
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
         cell = (cell | (cell << np.uint32(shift))) & np.uint32(mask)
-    window = BATCH * max(1, min(WINDOW, n // 4) // BATCH)
-    return np.lexsort((cell[:, 0] | (cell[:, 1] << np.uint32(1)), np.arange(n) // window)).astype(np.int64)
+    curve: NDArray[np.uint32] = cell[:, 0] | (cell[:, 1] << np.uint32(1))
+    return curve
 
 
 def _in_turn(parts: list[Array], first_run: int, whole: int, columns: int) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl+C asks work to end, so that it keeps what is finished; a second one ends it."""
+"""Ctrl+C, or SIGTERM, asks work to end, so that it keeps what is finished; a second one ends it."""
 
 import signal
 from collections.abc import Callable
@@ -21,11 +21,12 @@ def interrupted_work(then: Callable[[], None]) -> None:
         progress("Simulating", 0, 4)
 
 
-def test_the_first_interrupt_is_told_where_the_work_asks() -> None:
-    before, told = signal.getsignal(signal.SIGINT), []
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_interrupt_is_told_where_the_work_asks(number: signal.Signals) -> None:
+    before, told = signal.getsignal(number), []
     with stopped_by_interrupt(lambda *what: told.append(what)) as progress:
         progress("Simulating", 1, 4)
-        interrupt()
+        signal.raise_signal(number)
         kept = False
         try:
             progress("Simulating", 2, 4)
@@ -33,7 +34,7 @@ def test_the_first_interrupt_is_told_where_the_work_asks() -> None:
             kept = True
     assert kept
     assert told == [("Simulating", 1, 4)]
-    assert signal.getsignal(signal.SIGINT) == before
+    assert signal.getsignal(number) == before
 
 
 def test_the_second_interrupt_ends_at_once() -> None:

@@ -316,15 +316,17 @@ def test_every_block_has_an_end() -> None:
 
 
 def test_cancelling_keeps_what_is_finished() -> None:
-    ground, releases = drops(rough(), 400)
+    ground, releases = drops(rough(), 800)
+    finished = [0]
 
     def stop(text: str, done: int = 0, total: int = 0) -> None:
-        if done >= 128:
+        finished.append(done)
+        if done >= 256:
             raise CancelledError
 
-    run = simulate(ground, releases, Settings("noel_2017"), threads=1, progress=stop)
-    assert 0 < len(run) < 400
-    assert run.wanted == 400
+    run = simulate(ground, releases, Settings("noel_2017"), threads=2, progress=stop)
+    assert max(finished) <= len(run) < 800
+    assert run.wanted == 800
     whole = simulate(ground, releases, Settings("noel_2017"))
     np.testing.assert_array_equal(run.position, whole.position[: len(run)])
 

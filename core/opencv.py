@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .output import write_bytes
 
 FFMPEG_QUIET = "-8"
 
@@ -39,11 +40,11 @@ def write_picture(path: Path, picture: np.ndarray) -> None:
 
     Raises
     ------
-    InputError : there is no such format.
+    InputError : there is no such format, or the file cannot be written.
     """
     with quiet_opencv() as cv2:
         try:
             _, data = cv2.imencode(path.suffix, picture)
         except cv2.error as error:
             raise InputError("This is no name of a picture", file=path, advice="Write it as .png") from error
-    path.write_bytes(data.tobytes())
+    write_bytes(path, data.tobytes())

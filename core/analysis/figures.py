@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..impact_models.registry import find_model
+from ..output import output_file
 from .curves import Curve, number
 from .extras import FIGURES, demand
 from .graphs import Graph
@@ -152,7 +153,8 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
     with rc_context(STYLE):
         png: dict[str, Any] = {"pil_kwargs": {"compress_level": COMPRESSION}} if Path(path).suffix == ".png" else {}
-        figure.savefig(path, dpi=DPI, facecolor="white", metadata=undated, **png)
+        with output_file(path) as draft:
+            figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated, **png)
 
 
 def _laid_out(figure: "Figure") -> "Figure":

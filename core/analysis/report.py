@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..impact_models.registry import find_model
+from ..output import write_text
 from ..reconstruction.impact import Impacts
 from .comparison import Predictions, thinned
 from .extras import PAGES, demand
@@ -80,7 +81,7 @@ def write_report(
         template_variables=dict(document.template_variables),
         _always_new=True,
     )
-    Path(path).write_text(html, encoding="utf-8")
+    write_text(path, html)
 
 
 def template() -> str:

@@ -78,8 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..camera.pairs import pair_residuals
     from ..camera.path import fixed
     from ..exchange.cameras import read_pairs, write_camera, write_pair_residuals
-    from ..exchange.output import output_folder
     from ..footage.video import open_video
+    from ..output import output_folder
     from ..workflow.alignment import align
     from ..workflow.following import follow_background
 

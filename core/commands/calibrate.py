@@ -40,10 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, write the tables, print the summary."""
     from ..analysis.calibration import calibrate
     from ..exchange.calibration_tables import write_estimates, write_folds
-    from ..exchange.output import output_folder
     from ..exchange.parameters import write_parameters
     from ..exchange.tables import read_impacts
     from ..impact_models.registry import find_model
+    from ..output import output_folder
 
     model = find_model(arguments.model)
     names, fixed = parameter_names(model, arguments.fit), parameter_values(model, arguments.set)

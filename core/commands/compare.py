@@ -65,10 +65,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.comparison import compare
     from ..analysis.scores import scores
     from ..exchange.comparison_tables import write_predictions, write_scores, write_settings
-    from ..exchange.output import output_folder
     from ..exchange.predicted_flight_tables import write_predicted_flights
     from ..exchange.tables import read_impacts
     from ..impact_models.registry import COMPARED
+    from ..output import output_folder
 
     models = models_as_asked(arguments.model, COMPARED)
     parameters = model_parameters(arguments, models)

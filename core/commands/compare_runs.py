@@ -94,9 +94,9 @@ class _Case(NamedTuple):
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, compare, write the tables, print the summary."""
     from ..analysis.whole_runs import whole_run_remarks
-    from ..exchange.output import output_folder
     from ..exchange.simulation_tables import summary, write_runs, write_summary
     from ..exchange.whole_run_tables import write_whole_runs, write_whole_values
+    from ..output import output_folder
     from ..workflow.whole_runs import compare_whole_runs
 
     project = arguments.table.lower().endswith(".toml")

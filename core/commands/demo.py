@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..film.engines import ENGINES
+from ..output import output_stream
 from ..reconstruction.sampling import STEP_S
 from .progress import PrintedProgress
 
@@ -46,10 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.statistics import impact_statistics
     from ..analysis.truth import compare_with_truth, read_truth, truth_sentences
     from ..exchange.opening import open_project
-    from ..exchange.output import output_folder
     from ..exchange.project import read_project
     from ..film.job import FilmJob
     from ..film.maker import film_maker
+    from ..output import output_folder
     from ..reconstruction.summary import summarise
 
     maker = None if arguments.no_film else film_maker()  # what is missing is told before the work, not after
@@ -91,7 +92,7 @@ def _write_tables(result: "Reconstruction", surface: "Surface | None", folder: P
 
 
 def _write(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with output_stream(path) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)

@@ -30,10 +30,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Find the parameters, write the tables, print the summary."""
     from ..analysis.equivalence import equivalent
     from ..exchange.calibration_tables import write_estimates
-    from ..exchange.output import output_folder
     from ..exchange.parameters import write_parameters
     from ..exchange.tables import read_impacts
     from ..impact_models.registry import find_model
+    from ..output import output_folder
 
     a, b = find_model(arguments.source), find_model(arguments.target)
     names = parameter_names(b, arguments.fit)

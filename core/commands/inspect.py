@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
+from ..output import write_text
 from .options import positive
 from .progress import PrintedProgress
 
@@ -35,9 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Decode all frames, print what there is, and write their times where asked to."""
-    from ..exchange.output import output_folder
     from ..footage.advice import content_advice, rate_advice
     from ..footage.video import open_video
+    from ..output import output_folder
 
     speed = _fastest(arguments.picks) if arguments.picks else arguments.speed
     with PrintedProgress() as progress:
@@ -126,4 +127,4 @@ def _write_frames(video: "Video", path: Path) -> None:
     """frames.csv: ``frame,time_s,step_s``, the step from the frame before."""
     steps = ["", *(f"{step:.6f}" for step in video.step_s)]
     lines = [f"{i},{time:.6f},{step}" for i, (time, step) in enumerate(zip(video.time_s, steps, strict=True))]
-    path.write_text("\n".join(["frame,time_s,step_s", *lines, ""]), encoding="utf-8", newline="\n")
+    write_text(path, "\n".join(["frame,time_s,step_s", *lines, ""]))

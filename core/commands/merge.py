@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..output import output_stream
 from .options import add_out, add_site_option, add_where_option, for_each, tables_as_asked
 from .progress import PrintedProgress
 
@@ -45,8 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, merge, filter, write, print the summary."""
     from ..exchange.database import merge
     from ..exchange.datapackage import write_package
-    from ..exchange.output import output_folder
     from ..exchange.selection import column_of, group_medians, matching
+    from ..output import output_folder
 
     licences = for_each(arguments.licence, arguments.tables, "--licence")
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
@@ -90,7 +91,7 @@ def _write_duplicates(merged: "Merged", path: Path) -> None:
 
 
 def _write_rows(rows: list[dict[str, object]], path: Path) -> None:
-    with path.open("w", encoding="utf-8", newline="") as stream:
+    with output_stream(path) as stream:
         writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)

@@ -33,8 +33,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.motion_graphs import QUANTITIES, motion_courses
     from ..exchange.motion_tables import write_motion, write_track_residuals
     from ..exchange.opening import open_terrain, read_project_picks, reconstruct_project
-    from ..exchange.output import output_folder
     from ..exchange.project import read_project
+    from ..output import output_folder
     from ..workflow.refinement import pixels_of
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:

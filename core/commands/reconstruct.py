@@ -80,8 +80,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, write the tables, print the summary."""
-    from ..exchange.output import output_folder
     from ..exchange.tables import read_picks, write_impacts, write_trajectories
+    from ..output import output_folder
     from ..reconstruction.drag import Drag
     from ..reconstruction.sampling import sample_trajectories
     from ..reconstruction.summary import summarise

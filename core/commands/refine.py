@@ -62,8 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Refine, write the tables and the refined project, print the summary."""
     from ..exchange.footage import name_trajectory, open_footage
     from ..exchange.opening import blocks_of, drag_of, open_terrain
-    from ..exchange.output import output_folder
     from ..exchange.project import read_project
+    from ..output import output_folder
     from ..workflow.refinement import refine_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:

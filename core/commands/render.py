@@ -61,12 +61,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Render the film or the still; the models have the project's parameters where the command line gives none."""
-    from ..exchange.output import output_folder
     from ..exchange.parameters import checked_parameters
     from ..exchange.project import read_project
     from ..film.job import FilmJob
     from ..film.maker import film_maker
     from ..film.presets import find_preset
+    from ..output import output_folder
 
     models = models_as_asked(arguments.model)
     simulate = models_as_asked(arguments.simulate, flag="--simulate")

@@ -92,9 +92,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, write the tables, print the summary."""
-    from ..exchange.output import output_folder
     from ..exchange.simulation_entry import RECORDS
     from ..exchange.simulation_output import default_records, recorded_for, write_simulations
+    from ..output import output_folder
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")

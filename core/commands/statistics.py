@@ -69,9 +69,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, compute, write, print what it says."""
     from ..analysis.group_statistics import group_statistics
     from ..analysis.statistics import impact_statistics
-    from ..exchange.output import output_folder
     from ..exchange.selection import grouping_of
     from ..exchange.statistics_tables import write_statistics
+    from ..output import output_folder
 
     specs = _specs(arguments.graph)
     if arguments.classes and arguments.group is None:

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, mesh where needed, write a binary PLY in survey coordinates, and picture it where Blender is at hand."""
-    from ..exchange.output import output_folder
+    from ..output import output_folder
     from ..terrain.writers import write_ply
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:

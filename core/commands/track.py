@@ -60,13 +60,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Track, write the tables and the picture, print the summary."""
     from ..exchange.footage_tables import write_events, write_track
-    from ..exchange.output import output_folder
     from ..footage.background import background_motion, no_motion
     from ..footage.kinks import find_kinks
     from ..footage.pictures import draw_track
     from ..footage.tracking import track_block
     from ..footage.video import open_video
     from ..opencv import write_picture
+    from ..output import output_folder
 
     clicks, name = _clicks(arguments)
     with PrintedProgress() as progress:

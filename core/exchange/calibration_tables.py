@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..analysis.calibration import Fold
 from ..analysis.estimation import Estimate
+from ..output import output_stream
 
 ESTIMATES_COLUMNS = ("model", "parameter", "unit", "default", "fitted", "low", "high", "verdict")
 """The columns of calibration.csv and equivalent.csv; low and high are the 95 % interval, empty for a choice."""
@@ -27,7 +28,7 @@ def write_folds(folds: Sequence[Fold], path: str | Path) -> None:
 
 
 def _write(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+    with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(rows)

@@ -14,6 +14,7 @@ from ..camera.pairs import Pairs
 from ..camera.path import CameraPath
 from ..georeference import GlobalShift
 from ..least_squares import scales
+from ..output import write_text
 from ..vectors import Array, Mask
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
@@ -131,7 +132,7 @@ def write_camera(
         lines.append(_numbers("rotation", path.rotation[i]))
         deviations = {"sigma_position_m": path.sigma_position_m[i], "sigma_rotation_rad": path.sigma_rotation[i]}
         lines += [_numbers(name, value) for name, value in deviations.items() if value]
-    Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_text(file, "\n".join(lines) + "\n")
 
 
 def read_pairs(path: str | Path, shift: GlobalShift | None = None) -> Pairs:

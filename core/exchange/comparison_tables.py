@@ -11,6 +11,7 @@ import tomli_w
 from ..analysis.comparison import Predictions
 from ..analysis.scores import Score
 from ..errors import InputError
+from ..output import output_stream, write_text
 from ..reconstruction.impact import RUN, Impacts
 from ..vectors import Array
 from .csv_text import TextTable, read_table
@@ -29,7 +30,7 @@ def write_predictions(predictions: Predictions, path: str | Path) -> None:
     last = ({"site": predictions.site} if several else {}) | dict(predictions.runs)
     places = (predictions.trajectory, predictions.impact, *last.values())
     names = list(zip(*(column.tolist() for column in places), strict=True))
-    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+    with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow((*PREDICTIONS_COLUMNS, *last))
         for i, model in enumerate(predictions.models):
@@ -96,7 +97,7 @@ def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
 
 def write_scores(scores: tuple[Score, ...], path: str | Path) -> None:
     """Write scores.csv."""
-    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+    with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(field.name for field in fields(Score))
         for score in scores:
@@ -113,7 +114,7 @@ def write_settings(predictions: Predictions, path: str | Path) -> None:
         "impacts": int(predictions.row.size),
         "models": models,
     }
-    Path(path).write_text(tomli_w.dumps(content), encoding="utf-8")
+    write_text(path, tomli_w.dumps(content))
 
 
 def _columns(predictions: Predictions, i: int, run: int) -> list[list[str]]:

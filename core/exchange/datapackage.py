@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..output import write_text
 from .database import SOURCE, Database, Source, Span, digest
 from .impact_fields import field_of
 from .selection import codes
@@ -58,7 +59,7 @@ def write_package(database: Database, folder: str | Path, title: str = "Measured
     if not licences:
         del content["licenses"]  # the standard has no empty list
     text = json.dumps(content, ensure_ascii=False, indent=2)
-    (folder / DESCRIPTOR).write_text(text + "\n", encoding="utf-8")
+    write_text(folder / DESCRIPTOR, text + "\n")
 
 
 def read_package(path: str | Path) -> Database:

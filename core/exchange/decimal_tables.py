@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..output import output_stream
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
 
@@ -48,10 +49,10 @@ def write_decimal_table(
 
     Raises
     ------
-    OSError : the file cannot be written.
+    InputError : the file cannot be written.
     """
     path, named = Path(path), False
-    with path.open("wb") as stream:
+    with output_stream(path, binary=True) as stream:
         for done, (names, text) in enumerate(_texts(parts, decimals)):
             progress(f"Writing {path.name}", done, len(parts))
             if not named:

@@ -10,6 +10,7 @@ import tomli_w
 from ..errors import InputError
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
+from ..output import write_text
 
 
 def write_parameters(parameters: Mapping[str, Mapping[str, Value]], path: str | Path) -> None:
@@ -20,12 +21,7 @@ def write_parameters(parameters: Mapping[str, Mapping[str, Value]], path: str | 
     InputError : the file cannot be written.
     """
     content = {"models": {name: dict(settings) for name, settings in parameters.items()}}
-    try:
-        Path(path).write_text(tomli_w.dumps(content), encoding="utf-8")
-    except OSError as error:
-        raise InputError(
-            f"The parameters cannot be written ({error.strerror})", file=path, advice="Choose another file"
-        ) from error
+    write_text(path, tomli_w.dumps(content))
 
 
 def read_parameters(path: str | Path) -> dict[str, dict[str, Value]]:

@@ -13,6 +13,7 @@ from typing import Any
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..output import write_text
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
 from .toml_text import TomlTable, Vector3, read_toml
@@ -287,7 +288,7 @@ def write_project(project: Project, path: str | Path) -> None:
         content["simulation"] = simulation_content(project.simulation, relative)
     content["render"] = [_plain(preset) for preset in project.render]
     content = {key: value for key, value in content.items() if value not in ({}, [])} | extra
-    path.write_text(tomli_w.dumps(content), encoding="utf-8", newline="\n")
+    write_text(path, tomli_w.dumps(content))
 
 
 def _plain(part: Any) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..impact_models.registry import find_model
+from ..output import write_text
 from ..remarks import Remark, to_plain
 from ..simulation.blocks import Blocks, draw_blocks
 from ..simulation.convergence import Convergence, convergence
@@ -229,7 +230,7 @@ def _known(values: Convergence) -> dict[str, float | None]:
 
 def write_summary(values: dict[str, Any], path: str | Path) -> None:
     """Write summary.json."""
-    Path(path).write_text(json.dumps(values, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(values, indent=2, ensure_ascii=False) + "\n")
 
 
 def _digest(path: Path) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..analysis.group_statistics import GroupStatistics
 from ..analysis.statistics import ImpactStatistics
+from ..output import output_stream, write_text
 from ..remarks import Remark, to_plain
 from .database import Source
 
@@ -100,11 +101,11 @@ def _write_summary(
             "tests": [{key: _known(value) for key, value in asdict(test).items()} for test in tests.tests],
         }
     content["remarks"] = to_plain(remarks)
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as stream:
+    with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
         writer.writerows([["" if cell != cell else cell for cell in row] for row in rows])

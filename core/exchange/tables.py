@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..georeference import GlobalShift
+from ..output import output_stream
 from ..reconstruction.impact import FLAGS, Impacts, apparent
 from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
@@ -297,7 +298,7 @@ def write_columns(path: str | Path, *tables: Columns) -> None:
 
     Some rows at a time: their text takes many times the memory of the numbers.
     """
-    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+    with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(tables[0])
         for columns in tables:

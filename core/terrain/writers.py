@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..output import output_stream
 from .surface import Surface
 
 
@@ -36,7 +37,7 @@ def write_ply(surface: Surface, path: str | Path, face_values: Mapping[str, NDAr
     faces["count"], faces["vertices"] = 3, surface.faces
     for name, values in attributes.items():
         faces[name] = values
-    with Path(path).open("wb") as file:
+    with output_stream(path, binary=True) as file:
         file.write(header.encode("ascii", "replace"))
         file.write(surface.shift.to_survey(surface.vertices).astype("<f8").tobytes())
         file.write(faces.tobytes())

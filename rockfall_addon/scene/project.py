@@ -10,7 +10,6 @@ import bpy
 
 from ...core.errors import RockfallError
 from ...core.exchange.opening import open_project, open_terrain
-from ...core.exchange.output import output_folder
 from ...core.exchange.parameters import checked_parameters
 from ...core.exchange.project import (
     CameraPlacement,
@@ -25,6 +24,7 @@ from ...core.exchange.simulation_entry import SimulationEntry, StructureEntry, Z
 from ...core.exchange.tables import write_picks
 from ...core.exchange.zones import open_zones, write_attribute_zones
 from ...core.impact_models.registry import COMPARED
+from ...core.output import output_folder
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
 from ...core.terrain.readers import read_structure

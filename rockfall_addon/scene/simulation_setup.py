@@ -12,9 +12,9 @@ import numpy as np
 
 from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
-from ...core.exchange.output import output_folder
 from ...core.exchange.simulation_output import default_records, write_simulations
 from ...core.impact_models.registry import MODELS
+from ...core.output import output_folder
 from ...core.progress import Progress
 from ...core.reconstruction.drag import Drag
 from ...core.remarks import Remark, from_plain, gravest_first, to_plain

@@ -6,7 +6,6 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.output import output_folder
 from rockfall.core.exchange.tables import (
     read_impacts,
     read_picks,
@@ -311,63 +310,3 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
         read_picks(tmp_path / "none.csv")
     with pytest.raises(InputError, match="cannot be read"):
         read_picks(tmp_path)
-
-
-def test_output_appears_whole_and_spares_other_files(tmp_path):
-    out = tmp_path / "deep" / "out"
-    with output_folder(out) as folder:
-        (folder / "a.csv").write_text("1")
-        (folder / "frames").mkdir()
-        (folder / "frames" / "0.png").write_text("2")
-        assert not out.exists()
-    assert (out / "a.csv").read_text() == "1"
-    (out / "mine.txt").write_text("keep")
-    with output_folder(out) as folder:
-        (folder / "a.csv").write_text("3")
-    assert sorted(path.name for path in out.iterdir()) == ["a.csv", "frames", "mine.txt"]
-    assert (out / "a.csv").read_text() == "3"
-    assert [path.name for path in out.parent.iterdir()] == ["out"]
-
-
-def write_and_fail(out):
-    with output_folder(out) as folder:
-        (folder / "a.csv").write_text("half")
-        raise ValueError("half way")
-
-
-def test_nothing_is_left_of_output_that_failed(tmp_path):
-    with pytest.raises(ValueError, match="half way"):
-        write_and_fail(tmp_path / "deep" / "out")
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "a.csv").write_text("old")
-    with pytest.raises(ValueError, match="half way"):
-        write_and_fail(tmp_path / "out")
-    assert (tmp_path / "out" / "a.csv").read_text() == "old"
-    assert [path.name for path in tmp_path.iterdir()] == ["out"]
-
-
-def test_only_an_error_of_the_output_itself_is_called_one(tmp_path):
-    with (
-        pytest.raises(InputError, match=r"out: The output cannot be written \("),
-        output_folder(tmp_path / "out") as out,
-    ):
-        (out / "missing" / "a.csv").write_text("1")
-    with pytest.raises(FileNotFoundError, match=r"other\.csv"), output_folder(tmp_path / "out"):
-        (tmp_path / "other.csv").read_text()
-    with pytest.raises(OSError, match=r"^no file at all$"), output_folder(tmp_path / "out"):
-        raise OSError("no file at all")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_output_does_not_replace_a_file_or_folder_of_another_kind(tmp_path):
-    (tmp_path / "out").write_text("a file")
-    with pytest.raises(InputError, match="This is a file, not a folder"), output_folder(tmp_path / "out"):
-        pass
-    below = tmp_path / "out" / "deep"
-    with pytest.raises(InputError, match=r"deep: The output folder cannot be made \("), output_folder(below):
-        pass
-    (tmp_path / "dir" / "a.csv").mkdir(parents=True)
-    with pytest.raises(InputError, match="folder is where a file"), output_folder(tmp_path / "dir") as folder:
-        (folder / "a.csv").write_text("new")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["dir", "out"]

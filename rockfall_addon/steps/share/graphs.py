@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ....core.exchange.output import output_folder
+from ....core.output import output_folder
 from ...scene import store
 from ...view.graphs import editor, export
 from ...view.reporting import possible, reported

@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ....core.exchange.output import output_folder
 from ....core.exchange.tables import write_impacts, write_picks, write_trajectories
+from ....core.output import output_folder
 from ....core.progress import Progress
 from ....core.reconstruction.sampling import sample_trajectories
 from ...scene import project, reconstruction, simulation, simulation_setup, store, terrain, trails

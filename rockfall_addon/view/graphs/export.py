@@ -15,6 +15,7 @@ from ....core.errors import InputError, RockfallError
 from ....core.exchange.graph_tables import GraphPoints, write_graph_points
 from ....core.exchange.motion_tables import write_motion
 from ....core.opencv import write_picture
+from ....core.output import write_text
 from ...scene import clocks, comparison, graph_settings, timing, videos
 from . import drawing, editor, impact_sheet, motion_sheet
 from .editor import Canvas
@@ -51,7 +52,7 @@ def write(
         svg = Svg(width, height)
         with drawing.onto(svg):
             _draw(context, tree, (width, height), _look(context, 1.0, dark))
-        path.write_text(svg.document(), encoding="utf-8")
+        write_text(path, svg.document())
     else:
         _write_png(context, tree, path, (round(size[0] * scale), round(size[1] * scale)), _look(context, scale, dark))
 

@@ -3,10 +3,13 @@
 
 import bpy
 
+from .view import toolbar
+
 DEMOS = ("rockfall.load_demo", "rockfall.load_footage_demo", "rockfall.open_project")
 STEPS = (
     ("terrain", "1  Terrain", (
         "rockfall.import_terrain", "rockfall.show_relief", "rockfall.reset_relief", "rockfall.toggle_full_terrain",
+        "rockfall.lock_terrain", "rockfall.put_terrain_back",
     )),
     ("videos", "2  Videos", (
         "rockfall.add_video", "rockfall.look_through", "rockfall.fit_footage", None,
@@ -92,6 +95,9 @@ def draw_entry(layout: bpy.types.UILayout, entry: Entry) -> None:
     if identifier in CHOOSING:
         layout.operator_menu_enum(identifier, CHOOSING[identifier])
         return
+    if identifier == "wm.tool_set_by_id" and not toolbar.is_offered(bpy.context, values["name"]):
+        layout = layout.row()
+        layout.enabled = False
     button = layout.operator(identifier, text=text) if text else layout.operator(identifier)
     for name, value in values.items():
         setattr(button, name, value)

@@ -50,8 +50,15 @@ class InstallationPanel(bpy.types.Panel):
 class RockfallPreferences(bpy.types.AddonPreferences):
     bl_idname = ADDON_ID
 
+    folder: bpy.props.StringProperty(
+        name="Folder", description="Where the next file browser opens: beside the file that was read last",
+        subtype="DIR_PATH",
+    )  # fmt: skip
+
     def draw(self, context: bpy.types.Context) -> None:
         draw_state(self.layout, width=90)
+        if not problem:
+            self.layout.prop(self, "folder")
 
 
 CLASSES = (InstallationPanel, RockfallPreferences)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import alignment, camera_paths, migration, places, proposal, sightings, store, videos
+from . import alignment, camera_paths, migration, places, proposal, sightings, store, terrain, videos
 
 PICK_TOOL = "rockfall.pick_tool"
 
@@ -28,6 +28,9 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         demos = ("rockfall.load_footage_demo", "rockfall.load_demo")
         own = ("rockfall.import_terrain", "rockfall.open_project")
         return NextStep("Import your scan, or begin with a demo.", (*demos, *own))
+    if terrain.displaced(scene):
+        sentence = "The scan was moved, so nothing on it fits any more. Put it back; panel Terrain says how far it is."
+        return NextStep(sentence, ("rockfall.put_terrain_back",))
     if camera is None and not picks:
         if store.with_role(scene, store.SIMULATED_BLOCKS_ROLE):
             sentence = "Play the simulated fall; step 7 has the numbers of each run."

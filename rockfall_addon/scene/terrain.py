@@ -38,6 +38,7 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     obj[store.TERRAIN_SUMMARY], obj[store.TERRAIN_FILE] = list(surface.summary), surface.name
     obj[store.THIN_SHARE] = float(np.mean(shading.thin))
     obj[store.REACH] = float(np.abs(surface.bounds).max())
+    set_locked(obj, True)
     store.collection(scene, "Terrain").objects.link(obj)
     _surfaces[obj.session_uid] = _key(obj), surface
     terrain_view.follow(scene)
@@ -98,6 +99,28 @@ def surface_of(obj: bpy.types.Object) -> Surface:
     return known[1]
 
 
+def set_locked(tile: bpy.types.Object, locked: bool) -> None:
+    """Keep a tile from being selected and transformed by hand, or allow it."""
+    tile.hide_select = tile.lock_rotation_w = locked
+    tile.lock_location = tile.lock_rotation = tile.lock_scale = (locked,) * 3
+
+
+def is_locked(tile: bpy.types.Object) -> bool:
+    """Whether a tile is kept from being selected."""
+    return tile.hide_select
+
+
+def displaced(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Locked tiles that are not where their survey is: something has moved them all the same."""
+    return [tile for tile in tiles(scene) if is_locked(tile) and tile.matrix_world != Matrix.Identity(4)]
+
+
+def put_back(tile: bpy.types.Object) -> None:
+    """Return a tile to where its survey is."""
+    tile.parent = None
+    tile.matrix_world = Matrix.Identity(4)
+
+
 def active_terrain(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The first terrain object by name."""
     return next(iter(store.with_role(scene, store.TERRAIN_ROLE)), None)
@@ -115,7 +138,11 @@ def downhill(scene: bpy.types.Scene) -> Vector:
 
 def warnings(scene: bpy.types.Scene) -> list[str]:
     """What needs a person's attention, in sentences."""
-    said = []
+    said = [
+        f"{tile.name} is locked, but was moved by {_way_m(tile):.2f} m: it is not where it was surveyed. "
+        "Put it back, or unlock it if it is to stay there."
+        for tile in displaced(scene)
+    ]
     for tile in store.with_role(scene, store.TERRAIN_ROLE):
         if not has_faces(tile):
             said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
@@ -144,7 +171,8 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
     share = sum(count * part for count, part in thin) / max(1, sum(count for count, _ in thin))
     if share >= LEAST_THIN:
         said.append(f"{100 * share:.0f} % of the points have thin data (bluish): the surface is guessed there.")
-    moved_by_hand = [tile.name for tile in grounds if tile.matrix_world != Matrix.Identity(4)]
+    away = [tile for tile in grounds if tile.matrix_world != Matrix.Identity(4)]
+    moved_by_hand = [tile.name for tile in away if not is_locked(tile)]
     if moved_by_hand:
         said.append(f"Moved, turned or scaled in Blender: {', '.join(moved_by_hand)}. Rockfall takes it where it is.")
     scale = scene.unit_settings.scale_length
@@ -165,6 +193,11 @@ def _read(obj: bpy.types.Object) -> Surface:
     if np.linalg.det(world[:3, :3]) < 0:  # mirrored: the faces would look into the ground
         faces = np.ascontiguousarray(faces[:, ::-1])
     return Surface(local, faces, georeference.read_shift(_scene_of(obj)), obj.name, ())
+
+
+def _way_m(tile: bpy.types.Object) -> float:
+    """How far the corner that has moved most has moved [m]."""
+    return max((tile.matrix_world @ Vector(corner) - Vector(corner)).length for corner in tile.bound_box)
 
 
 def _key(obj: bpy.types.Object) -> tuple:

@@ -8,6 +8,7 @@ import bpy
 
 from .. import view
 from ..scene import comparison_settings, graph_settings, model_parameters, motion_settings, settings
+from ..view import toolbar
 from ..view.reporting import leave_newer_alone
 
 STEPS = (
@@ -30,7 +31,6 @@ STEPS = (
 """In the order of the sidebar."""
 
 _registered: list[ModuleType] = []
-_registered_tools: list[type] = []
 
 
 def parts() -> list[ModuleType]:
@@ -64,15 +64,12 @@ def register() -> None:
             bpy.utils.register_class(cls)
         if hasattr(part, "register"):
             part.register()
-    for number, tool in enumerate(tools()):
-        bpy.utils.register_tool(tool, after={"builtin.cursor"}, separator=number == 0)
-        _registered_tools.append(tool)
+    toolbar.register(tools())
 
 
 def unregister() -> None:
     """The same backwards."""
-    while _registered_tools:
-        bpy.utils.unregister_tool(_registered_tools.pop())
+    toolbar.unregister()
     while _registered:
         part = _registered.pop()
         if hasattr(part, "unregister"):

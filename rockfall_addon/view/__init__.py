@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Between the screen, the pixels of a video and the world; what all steps draw, ask and report with."""
 
-from . import job, loupe, parameters
+from . import arranging, job, loupe, parameters
 
-PARTS = (job, loupe, parameters)
+PARTS = (job, loupe, parameters, arranging)

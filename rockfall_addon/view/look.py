@@ -1,26 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the 3-D view shows the slope: relief, cavities and trajectories in their own colours, without a render."""
 
+from collections.abc import Iterable, Iterator, Sequence
 from math import radians
 
 import bpy
 from mathutils import Quaternion, Vector
 
-from ..scene import store, terrain
+from ..scene import store, terrain, videos
+from .workspace import free_part
 
 AROUND = 1.15  # some air around what is framed
 ASIDE_DEG = 25.0  # so that flights show beside each other and not one behind the other
+HALF_SENSOR_MM = 36.0  # of Blender's free views, along the longer side
+LEAST_DISTANCE_M = 0.5
 
 
 def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
-    """Set every 3-D view of the window to the relief look; optionally look up the slope at all that is ours."""
+    """Set every 3-D view of the window to the relief look; optionally look up the slope at all that is ours.
+
+    A view through the footage stays there, if another one is free.
+    """
     context.scene.view_settings.view_transform = "Standard"
-    if context.window is None:
-        return
-    for area in context.window.screen.areas:
-        if area.type != "VIEW_3D":
-            continue
-        space = area.spaces.active
+    for space in (area.spaces.active for area in _views(context)):
         shading = space.shading
         shading.type, shading.light, shading.color_type = "SOLID", "FLAT", "VERTEX"
         shading.show_cavity, shading.cavity_type = True, "WORLD"  # the other kind breaks thin trails into dots
@@ -31,15 +33,54 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
         space.overlay.show_relationship_lines = space.overlay.show_extras = False
         space.overlay.show_cursor = False
         space.clip_end = max(space.clip_end, 5000.0)
-        if frame_all:
-            space.region_3d.view_perspective = "PERSP"
-            space.region_3d.view_rotation = _up_the_slope(context.scene)
-            _frame(context, area, _ours(context.scene))
+    if frame_all:
+        frame(context, _ours(context.scene))
+
+
+def frame(context: bpy.types.Context, objects: Iterable[bpy.types.Object]) -> None:
+    """Look up the slope at objects in every free 3-D view of the window; in all of them when none is free."""
+    corners = [obj.matrix_world @ Vector(corner) for obj in objects for corner in obj.bound_box]
+    if not corners:
+        return
+    rotation = _up_the_slope(context.scene)
+    areas = list(_views(context))
+    free = [area for area in areas if not _is_through_footage(context.scene, area.spaces.active)]
+    for area in free or areas:
+        _look_at(area, corners, rotation)
+        area.tag_redraw()
+
+
+def _look_at(area: bpy.types.Area, points: Sequence[Vector], rotation: Quaternion) -> None:
+    """Fill what toolbar and sidebar leave free of a view with points, and some air around them."""
+    view, region = area.spaces.active.region_3d, next(each for each in area.regions if each.type == "WINDOW")
+    left, bottom, right, top = free_part(area, region)
+    per_px = 2 * HALF_SENSOR_MM / area.spaces.active.lens / max(region.width, region.height, 1)  # at a distance of 1
+    seen = [rotation.inverted() @ point for point in points]  # x to the right, y up, z towards the viewer
+    low, high = (Vector(map(end, zip(*seen, strict=True))) for end in (min, max))
+    middle = (low + high) / 2
+    distance = AROUND * max(
+        LEAST_DISTANCE_M,
+        *(abs(p.x - middle.x) / (per_px * max(right - left, 1) / 2) + p.z - middle.z for p in seen),
+        *(abs(p.y - middle.y) / (per_px * max(top - bottom, 1) / 2) + p.z - middle.z for p in seen),
+    )
+    aside = Vector((left + right - region.width, bottom + top - region.height, 0.0)) * (per_px * distance / 2)
+    view.view_perspective, view.view_rotation = "PERSP", rotation
+    view.view_location, view.view_distance = rotation @ (middle - aside), distance
+
+
+def _views(context: bpy.types.Context) -> Iterator[bpy.types.Area]:
+    if context.window is not None:
+        yield from (area for area in context.window.screen.areas if area.type == "VIEW_3D")
+
+
+def _is_through_footage(scene: bpy.types.Scene, space: bpy.types.SpaceView3D) -> bool:
+    camera = space.camera if space.use_local_camera else scene.camera
+    return space.region_3d.view_perspective == "CAMERA" and videos.is_video(camera)
 
 
 def _ours(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    terrain, flights = (store.with_role(scene, role) for role in (store.TERRAIN_ROLE, store.FLIGHTS_ROLE))
-    return flights or terrain
+    grounds, flights = (store.with_role(scene, role) for role in (store.TERRAIN_ROLE, store.FLIGHTS_ROLE))
+    return flights or grounds
 
 
 def _up_the_slope(scene: bpy.types.Scene) -> Quaternion:
@@ -49,19 +90,3 @@ def _up_the_slope(scene: bpy.types.Scene) -> Quaternion:
     towards_viewer.rotate(Quaternion((0.0, 0.0, 1.0), radians(ASIDE_DEG)))
     towards_viewer.z = 0.4
     return towards_viewer.to_track_quat("Z", "Y")
-
-
-def _frame(context: bpy.types.Context, area: bpy.types.Area, objects: list[bpy.types.Object]) -> None:
-    """Frame objects and leave the selection as it was."""
-    selected, active = list(context.selected_objects), context.view_layer.objects.active
-    for obj in context.view_layer.objects:
-        obj.select_set(obj in objects)
-    region = next(r for r in area.regions if r.type == "WINDOW")
-    smooth, context.preferences.view.smooth_view = context.preferences.view.smooth_view, 0
-    with context.temp_override(area=area, region=region):
-        bpy.ops.view3d.view_selected()
-    area.spaces.active.region_3d.view_distance *= AROUND
-    context.preferences.view.smooth_view = smooth
-    for obj in context.view_layer.objects:
-        obj.select_set(obj in selected)
-    context.view_layer.objects.active = active

@@ -93,7 +93,7 @@ def fit_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
         here = _rectangle(region, view, scene, camera)
         if here is None:
             continue
-        left, bottom, right, top = _free_part(area, region)
+        left, bottom, right, top = free_part(area, region)
         ratio = MARGIN * min((right - left) / here.width, (top - bottom) / here.height)
         view.view_camera_zoom = _zoom_of(_factor(view.view_camera_zoom) * ratio)
         here = _rectangle(region, view, scene, camera)
@@ -113,7 +113,7 @@ def _rectangle(
     return None if camera is None else image_view.image_rectangle(region, view, scene, camera)
 
 
-def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
+def free_part(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, float, float, float]:
     """Left, bottom, right and top of what no other region covers [px of the region]."""
     left, bottom, right, top = 0, 0, region.width, region.height
     for other in area.regions:

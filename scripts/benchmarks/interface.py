@@ -44,8 +44,8 @@ def case_picks(window):
 
     with window.override():
         assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
-    timer = window.part("rockfall_addon.steps.start.workspace")._arrange
-    yield from window.wait_for(lambda: not bpy.app.timers.is_registered(timer), 60, "arranged")
+    arranging = window.part("rockfall_addon.view.arranging")
+    yield from window.wait_for(lambda: not arranging.is_waiting(), 60, "arranged")
     yield 2.0
     scene = bpy.context.scene
     parts = {name: window.part(f"rockfall_addon.scene.{name}") for name in ("videos", "fingerprints", "sync")}

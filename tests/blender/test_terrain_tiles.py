@@ -113,9 +113,28 @@ def test_a_moved_turned_and_mirrored_tile_is_where_it_is(part, demo) -> None:
     np.testing.assert_allclose(there.vertices, surface.vertices * [-1, 1, 2] + [10, 20, 30], atol=1e-3)
     up = np.nansum(surface.face_normals[:, 2] > 0)
     assert np.nansum(there.face_normals[:, 2] > 0) == pytest.approx(up, abs=5), "still out of the ground"
-    assert any("Moved, turned or scaled" in said for said in terrain.remarks(scene))
+    assert any("is locked, but was moved by" in said for said in terrain.warnings(scene))
+    assert bpy.ops.rockfall.lock_terrain() == {"FINISHED"}
+    assert not terrain.warnings(scene)
+    assert any("Moved, turned or scaled" in said for said in terrain.remarks(scene)), "unlocked: on purpose"
     scene.unit_settings.scale_length = 0.01
     assert any("0.01" in said for said in terrain.remarks(scene))
+
+
+def test_a_locked_scan_that_a_script_has_moved_is_put_back(part, demo) -> None:
+    surface, _ = demo
+    scene = bpy.context.scene
+    (ground,) = add(part, [surface])
+    terrain, following = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.next_step")
+    assert not bpy.ops.rockfall.put_terrain_back.poll()
+    ground.location = (0.0, 0.0, 30.0)
+    bpy.context.view_layer.update()
+    assert any("moved by 30.00 m" in said for said in terrain.warnings(scene))
+    assert following.next_step(scene).actions == ("rockfall.put_terrain_back",)
+    assert bpy.ops.rockfall.put_terrain_back() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert not terrain.warnings(scene)
+    np.testing.assert_allclose(terrain.surface_of_scene(scene).vertices, surface.vertices, atol=1e-4)
 
 
 def test_undo_keeps_the_index_of_a_terrain_that_is_as_it_was(part, demo) -> None:

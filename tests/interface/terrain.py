@@ -97,10 +97,12 @@ def case_coarse_view_switched_and_undone(window):
     assert drawn() == coarse
     (ground,) = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "terrain"]
     region = window.region()
-    with window.override():
-        bpy.ops.object.select_all(action="DESELECT")
-        bpy.ops.view3d.select(location=(region.width // 2, region.height // 2))
-    assert ground.select_get(), "a click on the coarse view selects the terrain"
+    for locked in (True, False):
+        with window.override():
+            bpy.ops.object.select_all(action="DESELECT")
+            bpy.ops.view3d.select(location=(region.width // 2, region.height // 2))
+            assert ground.select_get() != locked, "a click on the coarse view selects the terrain that is not locked"
+            bpy.ops.rockfall.lock_terrain()
 
 
 def colour_sum():

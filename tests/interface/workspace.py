@@ -23,8 +23,8 @@ def open_it(window):
 
 def arranged(window):
     """Wait until the demo's footage is arranged; the first drawing takes long without a graphics card."""
-    timer = window.part("rockfall_addon.steps.start.workspace")._arrange
-    yield from window.wait_for(lambda: not bpy.app.timers.is_registered(timer), 60, "arranged")
+    arranging = window.part("rockfall_addon.view.arranging")
+    yield from window.wait_for(lambda: not arranging.is_waiting(), 60, "arranged")
     yield 2.0
 
 

@@ -44,7 +44,7 @@ class ROCKFALL_OT_import_pairs(OfVideo, FromFile, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        count = files.import_pairs(scene, camera, self.filepath)
+        count = files.import_pairs(scene, camera, self.chosen(context))
         solution = alignment.solution_of(camera)
         fit = f" They fit to {solution.rmse_px:.2f} px." if np.isfinite(solution.rmse_px) else ""
         self.report({"INFO"}, f"{count} pairs.{fit}")
@@ -85,7 +85,7 @@ class ROCKFALL_OT_import_camera(OfVideo, FromFile, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        files.import_camera(scene, camera, self.filepath, lens_only=self.lens_only)
+        files.import_camera(scene, camera, self.chosen(context), lens_only=self.lens_only)
         return {"FINISHED"}
 
 

@@ -385,6 +385,11 @@ class AlignTool(bpy.types.WorkSpaceTool):
     )
 
     @staticmethod
+    def is_needed(context: bpy.types.Context) -> bool:
+        """Whether there is a camera to align."""
+        return videos.active_camera(context.scene) is not None
+
+    @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:
         """What to do next, in the header."""
         layout.label(text=alignment.hint(context.scene, videos.active_camera(context.scene)))

@@ -1,18 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Impacts of other sites beside the scene's own: tables are added, and taken away."""
 
-from pathlib import Path
-
 import bpy
 from bpy.props import IntProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ...scene import databases
+from ...view.from_file import FromFile
 from ...view.panel import Rows
 from ...view.reporting import possible, reported
 
 
-class ROCKFALL_OT_add_database(bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_add_database(FromFile, bpy.types.Operator):
     """Show the impacts of another site in the graphs: impacts.csv of a project, or of rockfall merge"""
 
     bl_idname = "rockfall.add_database"
@@ -23,7 +21,7 @@ class ROCKFALL_OT_add_database(bpy.types.Operator, ImportHelper):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        table = databases.add(context.scene, Path(self.filepath).absolute())
+        table = databases.add(context.scene, self.chosen(context).absolute())
         self.report({"INFO"}, f"{len(table.impacts)} impacts of {', '.join(table.sites)}.")
         return {"FINISHED"}
 

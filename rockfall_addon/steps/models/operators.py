@@ -4,12 +4,12 @@
 import bpy
 import numpy as np
 from bpy.props import EnumProperty, StringProperty
-from bpy_extras.io_utils import ImportHelper
 
 from ....core.analysis.predicted_flights import score_landings
 from ....core.exchange.parameters import read_parameters
 from ....core.impact_models.registry import MODELS
 from ...scene import models, reconstruction, store
+from ...view.from_file import FromFile
 from ...view.reporting import reported
 
 
@@ -57,7 +57,7 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_load_parameters(bpy.types.Operator, ImportHelper):
+class ROCKFALL_OT_load_parameters(FromFile, bpy.types.Operator):
     """Give the models the parameters of a file that rockfall explore or rockfall calibrate has saved"""
 
     bl_idname = "rockfall.load_parameters"
@@ -69,7 +69,7 @@ class ROCKFALL_OT_load_parameters(bpy.types.Operator, ImportHelper):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        models.keep_parameters(scene, read_parameters(self.filepath))
+        models.keep_parameters(scene, read_parameters(self.chosen(context)))
         if models.shown_models(scene):
             models.follow(scene, reconstruction.reconstruct_scene(scene))
         return {"FINISHED"}

@@ -263,6 +263,11 @@ class PickTool(bpy.types.WorkSpaceTool):
     )  # fmt: skip
 
     @staticmethod
+    def is_needed(context: bpy.types.Context) -> bool:
+        """Whether there is a slope to pick on."""
+        return bool(store.with_role(context.scene, store.TERRAIN_ROLE))
+
+    @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:
         settings = context.scene.rockfall_picking
         layout.prop(settings, "trajectory", text="", icon="OUTLINER_OB_CURVE")

@@ -26,7 +26,8 @@ class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        picks = read_picks(self.filepath, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
+        known = georeference.read_shift(scene) if georeference.has_shift(scene) else None
+        picks = read_picks(self.chosen(context), known)
         result = reconstruction.reconstruct_scene(scene, picks)
         if not georeference.has_shift(scene):
             georeference.write_shift(scene, picks.shift)

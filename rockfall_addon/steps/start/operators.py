@@ -6,12 +6,11 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ...scene import clocks, footage_blend, sightings, store, videos
+from ...scene import clocks, footage_blend, sightings, start_up, store, videos
 from ...scene import project as scene_project
-from ...view import look
+from ...view import arranging, look
 from ...view.from_file import FromFile
 from ...view.reporting import possible, reported
-from . import workspace
 
 DEMO = Path(__file__).parents[3] / "assets" / "demo" / "project.toml"
 FOOTAGE = DEMO.parent / "footage" / "project.toml"
@@ -43,7 +42,7 @@ class ROCKFALL_OT_load_demo(_IntoEmptyScene, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        _hide_start_up(scene)
+        start_up.put_away(scene)
         result = scene_project.load_project(scene, DEMO)
         look.show_relief(context, frame_all=True)
         self.report({"INFO"}, f"{len(result.impacts.rn)} impacts on the demo site. Press play to see the blocks fall.")
@@ -59,7 +58,7 @@ class ROCKFALL_OT_load_footage_demo(_IntoEmptyScene, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        _hide_start_up(scene)
+        start_up.put_away(scene)
         scene_project.load_project(scene, FOOTAGE)
         camera = videos.active_camera(scene)
         if camera is not None:
@@ -69,7 +68,7 @@ class ROCKFALL_OT_load_footage_demo(_IntoEmptyScene, bpy.types.Operator):
             scene.rockfall_picking.trajectory = next(iter(sightings.names_in(camera)), "")
             scene.frame_set(round(clocks.frame_at(scene, float(common_s))))
         look.show_relief(context, frame_all=True)
-        workspace.open_workspace(context, arrange=True)
+        arranging.open_workspace(context, arrange=True)
         self.report({"INFO"}, "The demo's footage is aligned and its block tracked. Go on with step 4: pick impacts.")
         return {"FINISHED"}
 
@@ -85,21 +84,14 @@ class ROCKFALL_OT_open_project(_IntoEmptyScene, FromFile, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        result = scene_project.load_project(scene, Path(self.filepath))
-        _hide_start_up(scene)
+        result = scene_project.load_project(scene, self.chosen(context))
+        start_up.put_away(scene)
         if (camera := videos.active_camera(scene)) is not None:
             scene.camera = camera
         look.show_relief(context, frame_all=True)
         count = 0 if result is None else len(result.picks)
         self.report({"INFO"}, f"{count} picks and {len(videos.cameras(scene))} videos.")
         return {"FINISHED"}
-
-
-def _hide_start_up(scene: bpy.types.Scene) -> None:
-    """Put away what Blender's own start-up scene holds."""
-    for obj in [o for o in scene.objects if o.name in ("Cube", "Light")]:
-        obj.hide_set(True)
-        obj.hide_render = True
 
 
 CLASSES = (ROCKFALL_OT_load_demo, ROCKFALL_OT_load_footage_demo, ROCKFALL_OT_open_project)

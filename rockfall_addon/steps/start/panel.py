@@ -11,6 +11,7 @@ LOOKS = {
     "rockfall.load_footage_demo": ("", "FILE_MOVIE"),
     "rockfall.load_demo": ("", "PLAY"),
     "rockfall.import_terrain": ("", "IMPORT"),
+    "rockfall.put_terrain_back": ("", "LOOP_BACK"),
     "rockfall.open_project": ("", "FILE_FOLDER"),
     "rockfall.add_video": ("", "FILE_MOVIE"),
     "rockfall.import_picks": ("", "IMPORT"),
@@ -29,9 +30,8 @@ LOOKS = {
 
 
 class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
-    bl_label = "Start"
+    bl_label = "Next Step"  # only panels with a header have a background, which text needs over footage
     bl_idname = "ROCKFALL_PT_start"
-    bl_options = {"HIDE_HEADER"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

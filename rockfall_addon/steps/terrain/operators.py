@@ -11,15 +11,15 @@ from ....core.georeference import GlobalShift
 from ....core.terrain.advice import sentences
 from ....core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
 from ....core.terrain.shading import shade
-from ...scene import georeference, materials, store, sync, terrain, terrain_look
+from ...scene import georeference, materials, start_up, store, sync, terrain, terrain_look
 from ...view import look
-from ...view.from_file import FromFile
+from ...view.first_import import FirstImport
 from ...view.reporting import possible, reported
 
 TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
 
 
-class ROCKFALL_OT_import_terrain(FromFile, bpy.types.Operator):
+class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     """Import a scanned slope: a mesh, a grid or a point cloud, in survey coordinates"""
 
     bl_idname = "rockfall.import_terrain"
@@ -54,6 +54,7 @@ class ROCKFALL_OT_import_terrain(FromFile, bpy.types.Operator):
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.by_hand = True
         if not self.filepath:
             self.browsing = True
             return super().invoke(context, event)
@@ -93,14 +94,16 @@ class ROCKFALL_OT_import_terrain(FromFile, bpy.types.Operator):
         )
         for name in ("up", "unit_m", "ground", "max_edge_m"):
             layout.prop(self, name)
+        self.draw_offer(context, layout)
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         if self.browsing:
             self.browsing = False
-            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath)
+            return self._ask_again()
+        path, first = self.chosen(context), start_up.is_untouched(context.scene)
         surface = read_terrain(
-            self.filepath,
+            path,
             shift=self._shift(context.scene),
             up=self.up,
             unit_m=float(f"{self.unit_m:.7g}"),
@@ -110,8 +113,18 @@ class ROCKFALL_OT_import_terrain(FromFile, bpy.types.Operator):
         terrain.add_terrain(context.scene, surface, shade(surface))
         sync.recompute(context.scene)
         look.show_relief(context, frame_all=True)
+        if first:
+            self.begin_file(context)
         self.report({"INFO"}, " ".join(surface.summary))
         return {"FINISHED"}
+
+    def _ask_again(self) -> set[str]:
+        """The dialog after the file browser, whose operator ends with it. An error in an operator that is called by
+        another is an exception, which Blender would show as a traceback."""
+        try:
+            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath)
+        except RuntimeError as error:
+            raise RockfallError(str(error).removeprefix("Error: ").strip()) from None
 
     def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:
         """The project's shift, else the one that was given, else None: one is proposed.
@@ -174,6 +187,48 @@ class ROCKFALL_OT_toggle_full_terrain(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_lock_terrain(bpy.types.Operator):
+    """Keep the scan from being selected and moved by hand, or allow it"""
+
+    bl_idname = "rockfall.lock_terrain"
+    bl_label = "Lock or Unlock the Scan"
+    bl_options = {"REGISTER", "UNDO"}
+
+    identifier: StringProperty(description="Id of the tile; all without", options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _has_terrain(cls, context)
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        every = store.with_role(context.scene, store.TERRAIN_ROLE)
+        tiles = [tile for tile in every if self.identifier in ("", tile.get(store.ID))]
+        locked = not all(map(terrain.is_locked, tiles))
+        for tile in tiles:
+            terrain.set_locked(tile, locked)
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_put_terrain_back(bpy.types.Operator):
+    """Return the scan to where it was surveyed"""
+
+    bl_idname = "rockfall.put_terrain_back"
+    bl_label = "Put the Scan Back"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return possible(cls, terrain.displaced(context.scene), "No locked scan was moved")
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for tile in terrain.displaced(context.scene):
+            terrain.put_back(tile)
+        sync.touch(context.scene)
+        return {"FINISHED"}
+
+
 def _has_terrain(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     return possible(cls, store.with_role(context.scene, store.TERRAIN_ROLE), "Import a terrain first")
 
@@ -211,5 +266,7 @@ CLASSES = (
     ROCKFALL_OT_show_relief,
     ROCKFALL_OT_reset_relief,
     ROCKFALL_OT_toggle_full_terrain,
+    ROCKFALL_OT_lock_terrain,
+    ROCKFALL_OT_put_terrain_back,
     ROCKFALL_FH_terrain,
 )

@@ -36,6 +36,8 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         warnings = terrain.warnings(scene)
         for sentence in warnings:
             paragraph(context, layout, sentence, "ERROR")
+        if terrain.displaced(scene):
+            layout.operator("rockfall.put_terrain_back", icon="LOOP_BACK")
         if not warnings:
             advise(context, layout, True, "Ready.")
         self._list_tiles(grounds)
@@ -51,7 +53,11 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     def _list_tiles(self, grounds: list[bpy.types.Object]) -> None:
         column = self.layout.box().column(align=True)
         for ground in grounds:
-            column.label(text=ground.name, icon="MESH_GRID", translate=False)
+            row = column.row(align=True)
+            row.label(text=ground.name, icon="MESH_GRID", translate=False)
+            icon = "LOCKED" if terrain.is_locked(ground) else "UNLOCKED"
+            lock = row.operator("rockfall.lock_terrain", text="", icon=icon, emboss=False)
+            lock.identifier = ground.get(store.ID, "")
             count = terrain.grouped(len(ground.data.polygons) if ground.type == "MESH" else 0)
             file = str(ground.get(store.TERRAIN_FILE, ground.name))
             column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")

@@ -8,8 +8,10 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntPropert
 from mathutils import Matrix
 
 from ....core.errors import RockfallError
-from ...scene import footage, new_videos, store, video_times, videos
-from ...view.from_file import FromFile
+from ...scene import footage, new_videos, start_up, store, video_times, videos
+from ...view import workspace
+from ...view.first_import import FirstImport
+from ...view.from_file import FromFile, remember_folder
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
 from . import proxies
@@ -31,7 +33,7 @@ KEYS = (
 _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
-class ROCKFALL_OT_add_video(FromFile, bpy.types.Operator):
+class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
     """Add videos of the fall: each gets a camera with its footage behind it, and keeps its own timestamps"""
 
     bl_idname = "rockfall.add_video"
@@ -43,12 +45,18 @@ class ROCKFALL_OT_add_video(FromFile, bpy.types.Operator):
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.by_hand = True
         given = self.filepath or any(each.name for each in self.files)
         return self.execute(context) if given else super().invoke(context, event)
+
+    def draw(self, context: bpy.types.Context) -> None:
+        self.draw_offer(context, self.layout)
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         paths = [Path(self.directory) / each.name for each in self.files if each.name] or [Path(self.filepath)]
+        remember_folder(context, paths[0].parent)
+        first = start_up.is_untouched(context.scene)
         added, errors = [], []
         for path in paths:
             try:
@@ -58,6 +66,8 @@ class ROCKFALL_OT_add_video(FromFile, bpy.types.Operator):
         if not added:
             raise RockfallError("\n".join(errors))
         _look_through(context, added[0])
+        if first:
+            self.begin_file(context)
         for error in errors:
             self.report({"WARNING"}, error)
         self.report({"INFO"}, " ".join(videos.summary(camera) for camera in added))
@@ -110,7 +120,7 @@ class ROCKFALL_OT_relink_video(OfVideo, FromFile, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera = videos.active_camera(context.scene)
-        warnings = footage.relink(camera, self.filepath)
+        warnings = footage.relink(camera, self.chosen(context))
         footage.follow(context.scene)
         for sentence in warnings:
             self.report({"WARNING"}, sentence)
@@ -307,6 +317,8 @@ def _look_through(context: bpy.types.Context, camera: bpy.types.Object) -> None:
     view = _view(context)
     if view is not None and view.region_3d is not None:
         view.region_3d.view_perspective = "CAMERA"
+    if not bpy.app.background and context.screen is not None and workspace.is_open(context):
+        workspace.fit_footage(context.scene, context.screen)
 
 
 def register() -> None:

@@ -4,6 +4,7 @@
 import csv
 import io
 import os
+import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -18,6 +19,8 @@ from ..vectors import Array, Indices
 
 DECIMALS = 6
 """Of metres, seconds, joules, degrees and ratios."""
+QUOTED = re.compile(r'[",\r\n]')
+"""Words with one of these are put in quotes."""
 WAITING = 4
 """So many parts for each core may wait to be written: more would fill the memory where the disk is slow."""
 
@@ -94,7 +97,7 @@ def _text(
         if isinstance(cells, Words):
             table[j] = cells.which
             table[j] += len(words)
-            texts = [_line((text,))[:-1].encode() if text else b"" for text in cells.texts]
+            texts = [(_line((text,))[:-1] if QUOTED.search(text) else text).encode() for text in cells.texts]
             words += texts
             width += 1 + max(map(len, texts), default=0)
         else:

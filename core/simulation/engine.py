@@ -4,7 +4,7 @@
 import os
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -215,9 +215,9 @@ def simulate(
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
     ground.refuse_small(releases.radius_m)
     tree, zone = ground.tree, ground.zone_in_tree
-    results, rows = np.empty((n, 5)), list[Array]()
+    results, moments, count = np.empty((n, 5)), list[Array](), np.zeros(n, np.intp)
 
-    from .motion_kernels import COLUMNS
+    from .motion_kernels import COLUMNS, in_turn
 
     progress("Compiling where needed, then simulating", 0, n)
     facets = ground.facets
@@ -231,46 +231,32 @@ def simulate(
 
     def batch(part: NDArray[np.int64]) -> tuple[int, int]:
         ended = np.empty((part.size, 5))
-        moments = run_blocks(
+        rows = run_blocks(
             tree, facets, zone, model.compiled, numbers, friction, model.draws, first_run + part, settings.seed,
             *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts, settings.most_s,
             level, ended,
         )  # fmt: skip
         results[part] = ended
-        rows.append(moments)
-        return part.size, len(moments)
+        count[part] = np.diff(np.flatnonzero(rows[:, 1] == RELEASED), append=len(rows))
+        moments.append(rows)
+        return part.size, len(rows)
 
-    cores = threads or os.cpu_count() or 1
-    finished, recorded, started, there = 0, 0, time.perf_counter(), available_bytes()
+    there, started = available_bytes(), time.perf_counter()
+
+    def told(finished: int, recorded: int) -> None:
+        if finished >= ENOUGH:
+            check_records(n, finished, recorded, there)
+        progress("Simulating", finished, n)
+
     progress("Simulating", 0, n)
-    turns, goes_on, waiting = (
-        _Turns(_along_curve(releases.position[:, :2]), cores),
-        True,
-        set[Future[tuple[int, int]]](),
-    )
+    cores = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
-        try:
-            while True:
-                pace = finished / max(time.perf_counter() - started, 1e-9)
-                waiting |= {pool.submit(batch, part) for part in turns.take(2 * cores - len(waiting), pace, goes_on)}
-                if not waiting:
-                    break
-                ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for one in ready:
-                    ended, moments = one.result()
-                    finished, recorded = finished + ended, recorded + moments
-                if finished >= ENOUGH:
-                    check_records(n, finished, recorded, there)
-                if goes_on:
-                    try:
-                        progress("Simulating", finished, n)
-                    except CancelledError:
-                        goes_on = False
-        finally:
-            for one in waiting:
-                one.cancel()
-    whole = turns.begun
-    records = _records(_in_turn(rows, first_run, whole, COLUMNS), ground.element, first_run)
+        whole = _take_turns(pool, cores, batch, _along_curve(releases.position[:, :2]), told)
+        begin = np.cumsum(count) - count
+        rows = np.empty((int(count.sum()), COLUMNS))
+        # Each batch is given up for its place among all, so that memory lasts.
+        list(pool.map(lambda _: in_turn(moments.pop(), first_run, begin, rows), range(len(moments))))
+    records = _records(rows, ground.element, first_run)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
     if ground.structures:
@@ -361,32 +347,6 @@ def _compiled_runs(tree: Any, facets: Any) -> Any:
     return _compiled_for(typeof(tree), typeof(facets))
 
 
-class _Turns:
-    """Which runs are taken when: window after window, and in each along the curve (n,)."""
-
-    def __init__(self, curve: NDArray[np.uint32], cores: int) -> None:
-        self._curve, self._least = curve, BATCH * cores
-        self._batches = deque[NDArray[np.int64]]()
-        self.begun = 0
-        """So many runs, from the first on, are in windows that are begun."""
-
-    def take(self, count: int, pace: float, goes_on: bool) -> list[NDArray[np.int64]]:
-        """The next batches, at most so many.
-
-        Parameters
-        ----------
-        pace : runs in a second.
-        goes_on : whether new windows may begin.
-        """
-        while len(self._batches) < count and goes_on and self.begun < self._curve.size:
-            size = max(self._least, min(WINDOW, int(WINDOW_S * pace), self._curve.size // 4) // BATCH * BATCH)
-            part = self._curve[self.begun : self.begun + size]
-            window = self.begun + np.argsort(part, kind="stable")
-            self._batches.extend(window[start : start + BATCH] for start in range(0, window.size, BATCH))
-            self.begun += window.size
-        return [self._batches.popleft() for _ in range(min(count, len(self._batches)))]
-
-
 def _along_curve(places: Array) -> NDArray[np.uint32]:
     """(n,) where places (n, 2) are on a curve that keeps near ones together.
 
@@ -400,28 +360,47 @@ def _along_curve(places: Array) -> NDArray[np.uint32]:
     return curve
 
 
-def _in_turn(parts: list[Array], first_run: int, whole: int, columns: int) -> Array:
-    """The rows of the first `whole` runs in their order; each batch is given up for it, so that memory lasts."""
-    count = np.zeros(whole, np.intp)
-    for part in parts:
-        for run, start, stop in _runs_of(part, first_run, whole):
-            count[run] = stop - start
-    begin = (np.cumsum(count) - count).tolist()
-    rows = np.empty((int(count.sum()), columns))
-    while parts:
-        part = parts.pop()
-        for run, start, stop in _runs_of(part, first_run, whole):
-            rows[begin[run] : begin[run] + stop - start] = part[start:stop]
-    return rows
+def _take_turns(
+    pool: ThreadPoolExecutor,
+    cores: int,
+    batch: Callable[[NDArray[np.int64]], tuple[int, int]],
+    curve: NDArray[np.uint32],
+    told: Callable[[int, int], None],
+) -> int:
+    """Do all runs, window after window, in each along the curve (n,); returns how many, from the first, are finished.
 
-
-def _runs_of(rows: Array, first_run: int, whole: int) -> Iterator[tuple[int, int, int]]:
-    """Each of the first `whole` runs among the rows of a batch, with its first row and the one behind its last."""
-    starts = np.flatnonzero(np.diff(rows[:, 0], prepend=-1.0))
-    runs = rows[starts, 0].astype(np.intp) - first_run
-    for run, start, stop in zip(runs.tolist(), starts.tolist(), [*starts[1:].tolist(), len(rows)], strict=True):
-        if run < whole:
-            yield run, start, stop
+    Parameters
+    ----------
+    batch : does some runs, and says how many, and how many moments they have.
+    told : hears of all that are finished; a `CancelledError` raised in it lets no further window begin.
+    """
+    n = curve.size
+    begun, finished, recorded, goes_on, started = 0, 0, 0, True, time.perf_counter()
+    batches, waiting = deque[NDArray[np.int64]](), set[Future[tuple[int, int]]]()
+    try:
+        while True:
+            while len(waiting) < 2 * cores and (batches or (goes_on and begun < n)):
+                if not batches:
+                    in_time = int(WINDOW_S * finished / (time.perf_counter() - started))
+                    size = max(BATCH * cores, min(WINDOW, in_time, n // 4) // BATCH * BATCH)
+                    window = begun + np.argsort(curve[begun : begun + size], kind="stable")
+                    batches.extend(window[start : start + BATCH] for start in range(0, window.size, BATCH))
+                    begun += window.size
+                waiting.add(pool.submit(batch, batches.popleft()))
+            if not waiting:
+                return begun
+            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for one in ready:
+                runs, moments = one.result()
+                finished, recorded = finished + runs, recorded + moments
+            if goes_on:
+                try:
+                    told(finished, recorded)
+                except CancelledError:
+                    goes_on = False
+    finally:
+        for one in waiting:
+            one.cancel()
 
 
 def _records(rows: Array, element: NDArray[np.int32], first_run: int) -> Records:

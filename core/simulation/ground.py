@@ -114,6 +114,17 @@ class Ground:
         return make_pairs(self.index)
 
     @cached_property
+    def terrain_tree(self) -> Any:
+        """What kernels take of the terrain's triangles without structures.
+
+        Raises
+        ------
+        InputError : the terrain is a cloud of points.
+        """
+        index = self.surface.index
+        return (*index.tree, *(self.pairs if index is self.index else make_pairs(index)))
+
+    @cached_property
     def facets(self) -> Any:
         """What lies about each triangle, for blocks that roll: see `facet_kernels`; empty with points."""
         m = 0 if len(self.points) else len(self.faces)

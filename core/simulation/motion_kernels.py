@@ -510,3 +510,15 @@ def run_blocks(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4] = end, time, impacts, length, v_max
     return rows[:count].copy()
+
+
+@kernel
+def in_turn(moments, first_run, begin, rows):  # type: ignore[no-untyped-def]
+    """Put the records of some runs where those of each begin among all."""
+    place, last = 0, -1.0
+    for i in range(len(moments)):
+        if moments[i, 0] != last:
+            last = moments[i, 0]
+            place = begin[np.int64(last) - first_run]
+        rows[place] = moments[i]
+        place += 1

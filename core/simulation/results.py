@@ -31,9 +31,9 @@ class RunFigures:
     Attributes
     ----------
     kinetic_max_j : (n,) ½mv² at the greatest speed [J].
-    height_max_m : (n,) of the centre above the terrain, vertically [m], over all flights: on the rough ground of the
-        demo site less than 0.05 m too low for 99 % of the runs; NaN for a run without a flight, and for all where the
-        moments between were not recorded.
+    height_max_m : (n,) of the centre above the terrain, vertically [m], over all flights: exact above triangles,
+        sampled above points and with drag; NaN for a run without a flight, and for all where the moments between were
+        not recorded.
     energy_line : (n,) angle below the horizontal of the line from the release to the end [rad]; NaN where both have one
         place in plan.
     """
@@ -165,64 +165,56 @@ def _on_flight(simulation: Simulation, start: Indices, elapsed: Array) -> tuple[
 
 
 def _greatest_heights(simulation: Simulation) -> Array:
-    """(n,) see `RunFigures`.
+    """(n,) see `RunFigures`."""
+    n, ground, records = len(simulation), simulation.ground, simulation.records
+    if simulation.recorded == "ends":
+        return np.full(n, np.nan)
+    rows, duration = flights_of(simulation)
+    if isinstance(ground.terrain, Cloud) or simulation.settings.drag is not None:
+        highest = _sampled_greatest(simulation, rows, duration)
+    else:
+        from .height_kernels import greatest_heights
+
+        highest, begin = np.empty(n), np.searchsorted(records.run[rows], np.arange(n + 1))
+        position, velocity = as_rows(records.position[rows]), as_rows(records.v2[rows])
+        tree, gravity = ground.terrain_tree, simulation.settings.gravity_mps2
+        in_chunks(lambda i, j: greatest_heights(tree, begin, position, velocity, gravity, duration, highest, i, j), n)
+    return np.where(np.isfinite(highest), highest, np.nan)
+
+
+def _sampled_greatest(simulation: Simulation, rows: Indices, duration: Array) -> Array:
+    """(n,) greatest heights on any ground and through air, of flights from the records `rows`.
 
     Notes
     -----
     A first value from the longest flights leaves those that rise high enough above their chord, gT²/8, to have a higher
     point; the highest of these are looked at every `SPACING_M` in plan.
     """
-    n = len(simulation)
-    if simulation.recorded == "ends":
-        return np.full(n, np.nan)
-    rows, duration = flights_of(simulation)
     run = simulation.records.run[rows]
     order = np.lexsort((-duration, run))
     rank = np.arange(order.size) - np.searchsorted(run[order], run[order])
-    looked, highest = order[rank < FIRST_FLIGHTS], np.full(n, -np.inf)
+    looked, highest = order[rank < FIRST_FLIGHTS], np.full(len(simulation), -np.inf)
 
-    def look(moments: Indices, more_than: Array) -> Array:
+    def look(moments: Indices) -> Array:
         """The heights of the flights that are `looked` at."""
-        heights = _flight_heights(simulation, rows[looked], duration[looked], moments, more_than)
+        heights = _sampled_heights(simulation, rows[looked], duration[looked], moments)
         np.maximum.at(highest, run[looked], heights)
         return heights
 
-    look(np.full(looked.size, MOMENTS), np.full(looked.size, -np.inf))
+    look(np.full(looked.size, MOMENTS))
     rise = simulation.settings.gravity_mps2 * duration**2 / 8
     looked = np.flatnonzero(rise >= RISING * highest[run])
-    heights = look(np.full(looked.size, MOMENTS), HIGH * highest[run[looked]])
-    looked = looked[heights >= HIGH * highest[run[looked]]]
+    looked = looked[look(np.full(looked.size, MOMENTS)) >= HIGH * highest[run[looked]]]
     length = np.hypot(*(simulation.records.position[rows + 1] - simulation.records.position[rows])[looked, :2].T)
-    moments = np.clip(np.ceil(length / SPACING_M).astype(np.intp) + 1, MOMENTS, MOST_MOMENTS)
-    look(moments, highest[run[looked]])
-    return np.where(np.isfinite(highest), highest, np.nan)
-
-
-def _flight_heights(
-    simulation: Simulation, start: Indices, duration: Array, moments: Indices, more_than: Array
-) -> Array:
-    """(q,) greatest height above the terrain of flights from the records `start`, at so many moments (q,) of each.
-
-    Those that are not above `more_than` (q,) may be −inf.
-    """
-    ground, settings, records = simulation.ground, simulation.settings, simulation.records
-    if isinstance(ground.terrain, Cloud) or settings.drag is not None:
-        return _sampled_heights(simulation, start, duration, moments)
-    from .height_kernels import greatest_heights
-
-    tree, heights = ground.terrain.index.tree, np.empty(start.size)
-    position, velocity = as_rows(records.position[start]), as_rows(records.v2[start])
-    in_chunks(
-        lambda i, j: greatest_heights(
-            tree, position, velocity, settings.gravity_mps2, duration, moments, more_than, heights, i, j
-        ),
-        start.size,
-    )
-    return heights
+    look(np.clip(np.ceil(length / SPACING_M).astype(np.intp) + 1, MOMENTS, MOST_MOMENTS))
+    return highest
 
 
 def _sampled_heights(simulation: Simulation, start: Indices, duration: Array, moments: Indices) -> Array:
-    """`_flight_heights` on any ground and through air."""
+    """(q,) greatest height above the terrain of flights from the records `start`, at so many moments (q,) of each.
+
+    −inf for those that are nowhere above terrain.
+    """
     if not start.size:
         return np.empty(0)
     first = np.cumsum(moments) - moments

@@ -74,7 +74,7 @@ def first_contacts(
 
 
 def test_greatest_heights_are_those_of_all_flights_looked_at_closely(field: campaign.Campaign) -> None:
-    """Every 2 cm of every flight; 0.05 m is what the documentation states for 99 % of the runs."""
+    """Every 2 cm of every flight: none of these is higher than what is found, and one is nearly as high."""
     site = field.terrain
     ground = make_ground(Surface(site.vertices, site.faces, GlobalShift(), "gully"))
     throws = [field.candidate(block, 0)[1] for block in range(campaign.BLOCKS)]
@@ -94,8 +94,7 @@ def test_greatest_heights_are_those_of_all_flights_looked_at_closely(field: camp
     found = run_figures(run).height_max_m
     assert np.median(true) > 2
     assert (found < true + 0.02).all()
-    assert np.quantile(true - found, 0.99) < 0.05
-    assert (true - found).max() < 0.15
+    assert (found > true - 1e-9).all()
 
 
 def test_first_contacts_are_those_of_the_demos_own_code(field: campaign.Campaign, flights: list[Flight]) -> None:

@@ -20,9 +20,10 @@ SPEED_SCALE = np.array(
     ]
 )
 
-OBSERVED_COLOUR = (0.86, 0.16, 0.10)
-"""Of the real blocks. Each impact model has a colour of its own: after Okabe & Ito (2008), distinct with any colour
-vision, and without their vermilion, which is near this one."""
+MEASURED_COLOUR = (0.98, 0.98, 0.98)
+"""Of measured blocks over terrain and in films, which are darker; graphs on a light ground have black. Each model has a
+hue of its own: after Okabe & Ito (2008), distinct with any colour vision, and without their vermilion, since red is
+what passes below the terrain."""
 
 
 def srgb_to_linear(colours: Array) -> Array:

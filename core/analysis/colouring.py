@@ -69,7 +69,7 @@ def group_colour(number: int, dark: bool) -> Rgb:
 def model_colours(models: Sequence[str], *, with_blocks: bool = False) -> dict[str, Rgb]:
     """Model → colour in a graph: red for one alone, else a hue each, that of its blocks in the 3-D view.
 
-    with_blocks : such blocks are shown, so one alone has the hue of its own, too: there red are the real ones.
+    with_blocks : such blocks are shown, so one alone has the hue of its own, too: there, red is below the terrain.
     """
     if len(models) == 1 and not with_blocks:
         return {models[0]: ONE_MODEL}

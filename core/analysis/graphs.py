@@ -170,7 +170,7 @@ def make_graph(
     ----------
     predictions, model : None and "" for the measured impacts alone.
     run : 0 for the model's mean, else the replicate.
-    row : (m,) the impacts that are shown, without predictions; None for all.
+    row : (m,) the impacts that are shown, of those that the model was asked about; None for all.
 
     Raises
     ------
@@ -273,17 +273,16 @@ def _unfitted(
     row: Indices | None = None,
 ) -> Graph:
     """The graph without curves."""
-    if predictions is not None:
-        row = predictions.row
-    elif row is None:
-        row = np.arange(len(impacts))
+    asked = np.arange(len(impacts)) if predictions is None else predictions.row
+    among = np.ones(asked.size, dtype=np.bool_) if row is None else np.isin(asked, row)
+    row = asked[among]
     measured = np.stack([measured_values(impacts, row, name) for name in (spec.x, spec.y)], axis=1)
     modelled = np.full_like(measured, np.nan)
     if predictions is not None and model:
         if not 0 <= run <= predictions.replicates:
             raise InputError(f"There is no replicate {run}", advice=f"There are {predictions.replicates}")
         which = predictions.index(model)
-        columns = [model_values(impacts, predictions, which, run, name) for name in (spec.x, spec.y)]
+        columns = [model_values(impacts, predictions, which, run, name)[among] for name in (spec.x, spec.y)]
         modelled = np.stack(columns, axis=1)
     points = np.concatenate([measured, modelled])
     points = points[_finite(points)]

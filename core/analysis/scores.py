@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..reconstruction.impact import Impacts
-from ..vectors import Array, Indices
+from ..vectors import Array, Indices, Mask
 from .comparison import Predictions
 
 ABSCISSA = {
@@ -55,12 +55,15 @@ class Score:
 
 
 def scores(
-    impacts: Impacts, predictions: Predictions, quantities: Iterable[str] = tuple(ABSCISSA)
+    impacts: Impacts,
+    predictions: Predictions,
+    quantities: Iterable[str] = tuple(ABSCISSA),
+    kept: Mask | None = None,
 ) -> tuple[Score, ...]:
-    """All models and some quantities, by default all of `ABSCISSA`."""
+    """All models and some quantities, by default all of `ABSCISSA`; of the impacts (n,) that are kept, None for all."""
     row, quantities = predictions.row, tuple(quantities)
     return tuple(
-        _score(model, i, quantity, impacts, predictions)
+        _score(model, i, quantity, impacts, predictions, kept)
         for i, model in enumerate(predictions.models)
         for quantity in quantities
         if row.size
@@ -79,19 +82,23 @@ def predicted(predictions: Predictions, model: int, name: str) -> Array:
     return np.degrees(values) if name.endswith("_deg") else values
 
 
-def rmse(impacts: Impacts, predictions: Predictions, model: int, quantity: str) -> float:
+def rmse(impacts: Impacts, predictions: Predictions, model: int, quantity: str, kept: Mask | None = None) -> float:
     """That of a `Score` alone, at once; NaN where nothing is measured. `model` is its place in the predictions."""
-    y, runs, _, _ = _pairs(model, quantity, impacts, predictions)
+    y, runs, _, _ = _pairs(model, quantity, impacts, predictions, kept)
     return float(np.sqrt(np.mean((_drawn(runs).mean(axis=0) - y) ** 2))) if y.size else np.nan
 
 
-def _pairs(i: int, quantity: str, impacts: Impacts, predictions: Predictions) -> tuple[Array, Array, Array, Array]:
+def _pairs(
+    i: int, quantity: str, impacts: Impacts, predictions: Predictions, kept: Mask | None
+) -> tuple[Array, Array, Array, Array]:
     """Of the impacts where both are known: measured (n,), predicted (1 + R, n), and the same of the abscissa."""
     against = ABSCISSA[quantity]
     y, runs = measured(impacts, predictions.row, quantity), predicted(predictions, i, quantity)
     x = measured(impacts, predictions.row, against)
     x_runs = predicted(predictions, i, against) if against in ABSCISSA else np.broadcast_to(x, runs.shape)
     known = np.isfinite(y) & np.isfinite(x) & np.isfinite(runs).all(axis=0) & np.isfinite(x_runs).all(axis=0)
+    if kept is not None:
+        known &= kept[predictions.row]
     return y[known], runs[:, known], x[known], x_runs[:, known]
 
 
@@ -100,10 +107,10 @@ def _drawn(runs: Array) -> Array:
     return runs[1:] if len(runs) > 1 else runs
 
 
-def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions) -> Score:
+def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions, kept: Mask | None) -> Score:
     from scipy.stats import wasserstein_distance
 
-    y, runs, x, x_runs = _pairs(i, quantity, impacts, predictions)
+    y, runs, x, x_runs = _pairs(i, quantity, impacts, predictions, kept)
     n = y.size
     if not n:
         return Score(model, quantity, 0, *[np.nan] * 7)

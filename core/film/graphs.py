@@ -14,14 +14,13 @@ from ..analysis.graphs import PAPER_GRAPHS, Graph, GraphSpec, make_graph
 from ..analysis.motion_graphs import HEIGHT, KINETIC, SPEED, MotionCourse, Quantity, shown_quantities
 from ..analysis.stacked_graphs import quantity_axis, stacked, worth_drawing
 from ..analysis.variables import find_variable
-from ..colours import SPEED_SCALE, scale_colours
+from ..colours import MEASURED_COLOUR, SPEED_SCALE, scale_colours
 from ..impact_models.registry import find_model
 from ..reconstruction.impact import Impacts
-from ..vectors import Array
+from ..vectors import Array, Indices
 from .framing import Margins
 
 Colour = tuple[float, float, float]
-MEASURED: Colour = (0.97, 0.97, 0.97)
 LINK: Colour = (0.36, 0.39, 0.43)
 WIDTH = 0.37
 """Part of the picture's width that graphs take, at its right."""
@@ -98,12 +97,14 @@ class FilmGraphs:
     room : behind them.
     text_px : height of their text.
     cursor_s : display times at the two ends of the x axis, along which a cursor goes; None without a cursor.
+    note : stands above them; may be empty.
     """
 
     room: Rectangle
     text_px: float
     graphs: tuple[FilmGraph, ...]
     cursor_s: tuple[float, float] | None = None
+    note: str = ""
 
 
 def beside_graphs(margins: Margins) -> Margins:
@@ -116,8 +117,8 @@ def impact_graphs(
     offsets: Mapping[str, float],
     size: tuple[int, int],
     predictions: Predictions | None = None,
-    measured: Colour = MEASURED,
     specs: Sequence[GraphSpec] = PAPER_GRAPHS,
+    row: Indices | None = None,
 ) -> FilmGraphs:
     """The graphs of impacts, whose points appear at the moments of the impacts; fitted lines after the last one.
 
@@ -126,23 +127,25 @@ def impact_graphs(
     offsets : trajectory → what is subtracted from its clock for the time of the film [s].
     size : width and height of the picture [px].
     predictions : models whose means are shown beside what was measured, linked to it.
-    measured : colour of what was measured.
+    row : (m,) the impacts that pass the filters; None for all. That some do not is said above the graphs.
     """
     room, text = _room(size), text_height(size)
     since = impacts.time_s - np.array([offsets[name] for name in impacts.trajectory.tolist()])
     models = ("",) if predictions is None else predictions.models
     made = []
     for spec, tile in zip(specs, tiles(room.shrunk(text / 2), len(specs)), strict=True):
-        found = [make_graph(impacts, spec, predictions, model) for model in models]
+        found = [make_graph(impacts, spec, predictions, model, row=row) for model in models]
         x_limits, y_limits = usual_limits(
             spec, (_whole([g.x_limits for g in found]), _whole([g.y_limits for g in found]))
         )
         shown = replace(spec, x_limits=x_limits, y_limits=y_limits)
-        graphs = [make_graph(impacts, shown, predictions, model) for model in models]
+        graphs = [make_graph(impacts, shown, predictions, model, row=row) for model in models]
         x, y = _axis(spec.x, x_limits, spec.x_log), _axis(spec.y, y_limits, spec.y_log)
         axes = frame(tile, x, y, text, lambda words: LETTER * text * len(words))
-        made.append(_impact_graph(axes, graphs, since, text, measured))
-    return FilmGraphs(room, text, tuple(made))
+        made.append(_impact_graph(axes, graphs, since, text))
+    some = row is not None and row.size < len(impacts)
+    note = f"Graphs: {row.size} of {len(impacts)} impacts (filtered)" if row is not None and some else ""
+    return FilmGraphs(room, text, tuple(made), note=note)
 
 
 def motion_graphs(
@@ -199,7 +202,7 @@ def _axis(name: str, limits: Limits, log: bool) -> Axis:
     return Axis(limits, log, variable.label, f"{variable.symbol or variable.title} [{variable.unit or '–'}]")
 
 
-def _impact_graph(axes: Frame, graphs: Sequence[Graph], since: Array, text: float, measured: Colour) -> FilmGraph:
+def _impact_graph(axes: Frame, graphs: Sequence[Graph], since: Array, text: float) -> FilmGraph:
     strokes, dots = [], []
     radius = 0.2 * text
     first = graphs[0]
@@ -211,12 +214,12 @@ def _impact_graph(axes: Frame, graphs: Sequence[Graph], since: Array, text: floa
         ends = np.stack([axes.to_pixels(points[linked]) for points in (graph.measured, graph.modelled)], axis=1)
         strokes.append(_strokes(ends, since[graph.row[linked]], LINK, text / 16))
         dots.append(_dots(axes, graph, graph.modelled, since, colour, radius, corners=4))
-    dots.append(_dots(axes, first, first.measured, since, measured, radius))
+    dots.append(_dots(axes, first, first.measured, since, MEASURED_COLOUR, radius))
     curve = first.measured_curve
     if curve is not None and curve.x.size > 1 and dots[-1].since_s.size:
         line = axes.to_pixels(np.column_stack([curve.x, curve.y]))
         ends = np.stack([line[:-1], line[1:]], axis=1)
-        strokes.append(_strokes(ends, np.full(len(ends), dots[-1].since_s.max()), measured, text / 10))
+        strokes.append(_strokes(ends, np.full(len(ends), dots[-1].since_s.max()), MEASURED_COLOUR, text / 10))
     return FilmGraph(axes, "", True, tuple(strokes), tuple(dots))
 
 

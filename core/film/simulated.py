@@ -16,8 +16,6 @@ MOST_BLOCKS = 50_000
 """More would hide each other, and each frame would take minutes."""
 LONGEST_WAIT_S = 60.0
 """A film goes on for so long at most after the last measured block [s]; it says how many simulated ones still move."""
-MEASURED_COLOUR = (0.98, 0.98, 0.98)
-"""Of measured blocks beside simulated ones: no impact model's colour is near it, with any colour vision."""
 
 
 @dataclass(frozen=True, eq=False)

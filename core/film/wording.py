@@ -41,9 +41,9 @@ def speed_note(time_scale: float) -> str:
 def compared_lines(models: int) -> tuple[str, str]:
     """Two lines that say what is seen when the blocks of models are shown beside the real ones."""
     return (
-        f"Observed (red), and calculated by {models} models"
+        f"Measured (white), and calculated by {models} models"
         if models > 1
-        else "Observed (red), and calculated by a model",
+        else "Measured (white), and calculated by a model",
         "from the same velocity before each impact",
     )
 

@@ -198,6 +198,16 @@ def discard(scene: bpy.types.Scene) -> None:
         _restore(scene, json.loads(scene[store.FIT]))
 
 
+def second_set(scene: bpy.types.Scene) -> dict[str, dict[str, Value]]:
+    """The second set of parameters, without what is merely proposed."""
+    return json.loads(scene[store.FIT])["set_b"] if store.FIT in scene else models.parameters_of(scene, "B")
+
+
+def forget(scene: bpy.types.Scene) -> None:
+    """Another project is shown: a proposal of the last one has nothing to restore."""
+    scene.pop(store.FIT, None)
+
+
 def _restore(scene: bpy.types.Scene, kept: dict) -> None:
     settings = scene.rockfall_comparison
     model_parameters.keep_all(scene, kept["set_b"], "B")

@@ -33,6 +33,7 @@ from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
 from ...core.workflow.simulation import Zones
 from . import (
+    fit,
     georeference,
     models,
     picks,
@@ -46,6 +47,8 @@ from . import (
     terrain,
 )
 
+MODEL_TABLES = {"A": "models", "B": "models_b"}
+"""Set of parameters → its tables in project.toml, [models.NAME] and [models_b.NAME]."""
 ZONE = "zone"
 """Attribute of the written terrain's faces: 0 where there is no zone."""
 
@@ -64,7 +67,10 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     RockfallError : the project or one of its files is bad. The scene is as it was.
     """
     project = read_project(path)
-    parameters = checked_parameters(project.extra["models"], path) if "models" in project.extra else {}
+    parameters = {
+        which: checked_parameters(project.extra[table], path) if table in project.extra else {}
+        for which, table in MODEL_TABLES.items()
+    }
     if project.picks is None and ((project.videos and with_videos) or project.simulation is not None):
         surface, result = open_terrain(project), None
     else:
@@ -83,7 +89,9 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     reconstruction.keep_settings(scene, project, sorted(set(names)))
     scene[store.SITE_DESCRIPTION] = project.site.description
     scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in project.render])
-    models.keep_parameters(scene, parameters)
+    fit.forget(scene)
+    for which, values in parameters.items():
+        models.keep_parameters(scene, values, which)
     if surface is not None and shading is not None:
         tile = terrain.add_terrain(scene, surface, shading)
         if zones is not None:
@@ -132,7 +140,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
         if stated is not None:
             stated = replace(stated, structures=_write_structures(solid, place))
         source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
-        parameters = models.parameters_of(scene)
+        parameters = {"A": models.parameters_of(scene), "B": fit.second_set(scene)}
         project = Project(
             site=Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, ""))),
             terrain=None if surface is None else source,
@@ -143,7 +151,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
             videos=project_videos.write_videos(scene, place),
             render=tuple(_preset(values) for values in json.loads(scene.get(store.RENDER_PRESETS, "[]"))),
             simulation=stated,
-            extra={"models": parameters} if parameters else {},
+            extra={MODEL_TABLES[which]: values for which, values in parameters.items() if values},
         )
         write_project(project, place / "project.toml")
     return folder / "project.toml"

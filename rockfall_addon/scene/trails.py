@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...core.colours import OBSERVED_COLOUR, rounded_top, scale_colours, srgb_to_linear
+from ...core.colours import MEASURED_COLOUR, rounded_top, scale_colours, srgb_to_linear
 from ...core.vectors import Array
 from . import materials, store
 
@@ -130,22 +130,26 @@ def paint(mesh: bpy.types.Mesh, colours: Array) -> None:
     mesh.update()
 
 
-def paint_observed(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None) -> None:
-    """Colour the real flights as the scene's settings say; all in the real blocks' colour beside those of models.
+def paint_observed(
+    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None, *, plain: bool = False
+) -> None:
+    """Colour the measured flights as the scene's settings say; all in the blocks' colour beside those of models.
 
     What passes below the terrain is red in any case, flights that are not up to date are grey.
+
+    objects : None for all.
+    plain : in the blocks' colour in any case.
     """
-    models_shown = bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE)) or beside_models(scene)
+    plain = plain or bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE)) or beside_models(scene)
     for obj in store.with_role(scene, store.FLIGHTS_ROLE) if objects is None else objects:
         mesh = obj.data
         if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
             continue
         if obj.get(store.STALE):
             paint(mesh, np.array(STALE_COLOUR))
-        elif models_shown:
-            paint(mesh, np.array(OBSERVED_COLOUR))
         else:
-            colours = _colours(scene.rockfall, obj)
+            number = len(mesh.vertices)
+            colours = np.tile(MEASURED_COLOUR, (number, 1)) if plain else _colours(scene.rockfall, obj)
             if BELOW_ATTRIBUTE in mesh.attributes:
                 colours[_read(mesh, BELOW_ATTRIBUTE).astype(bool)] = BELOW_COLOUR
             paint(mesh, colours)

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 import bpy
 import numpy as np
 
-from ...core.colours import OBSERVED_COLOUR
+from ...core.colours import MEASURED_COLOUR
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.trajectory import Reconstruction
@@ -279,10 +279,14 @@ def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -
         i += 1
 
 
-def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] = OBSERVED_COLOUR) -> bpy.types.Mesh:
-    """An angular block of radius 1 (convex hull of seeded directions), shared by all blocks of one colour."""
+def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] = MEASURED_COLOUR) -> bpy.types.Mesh:
+    """An angular block of radius 1 (convex hull of seeded directions), shared by all blocks of one colour.
+
+    One from a file of an earlier version may have another colour: it gets this one.
+    """
     existing = bpy.data.meshes.get(name)
     if existing is not None:
+        _colour_block(existing, colour)
         return existing
     import bmesh
 
@@ -297,8 +301,17 @@ def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] 
     mesh = bpy.data.meshes.new(name)
     shape.to_mesh(mesh)
     shape.free()
-    colours = np.tile(materials.linear_colour(colour), len(mesh.vertices)).astype(np.float32)
-    mesh.attributes.new("colour", "FLOAT_COLOR", "POINT").data.foreach_set("color", colours)
+    mesh.attributes.new("colour", "FLOAT_COLOR", "POINT")
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = "colour"
+    _colour_block(mesh, colour)
     mesh.materials.append(materials.shaded_material("Rockfall block", "colour"))
     return mesh
+
+
+def _colour_block(mesh: bpy.types.Mesh, colour: tuple[float, float, float]) -> None:
+    colours = mesh.attributes["colour"].data
+    wanted = np.tile(materials.linear_colour(colour), len(colours)).astype(np.float32)
+    there = np.empty_like(wanted)
+    colours.foreach_get("color", there)
+    if not np.array_equal(there, wanted):
+        colours.foreach_set("color", wanted)

@@ -13,6 +13,8 @@ from ...core.colours import SPEED_SCALE
 WIDTH, HEIGHT, MARGIN, TEXT = 220, 12, 28, 12  # in pixels at interface scale 1
 
 Colour = tuple[float, float, float]
+EDGE: Colour = (0.1, 0.1, 0.1)
+"""Around a swatch, which may be white on a light ground."""
 
 
 def begin(scale: float) -> None:
@@ -29,14 +31,15 @@ def end() -> None:
 
 
 def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], title: str) -> None:
-    """A square and a name for each row, from the lower margin up, and a title above."""
+    """A square with a dark edge and a name for each row, from the lower margin up, and a title above."""
     size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for i, (name, colour) in enumerate(reversed(rows)):
         low = bottom + i * step
-        corners = [(left, low), (left + size, low), (left, low + size), (left + size, low + size)]
-        shader.uniform_float("color", (*colour, 1.0))
-        batch_for_shader(shader, "TRI_STRIP", {"pos": corners}).draw(shader)
+        for more, shade in ((max(1.0, scale), EDGE), (0.0, colour)):
+            a, b, c, d = left - more, left + size + more, low - more, low + size + more
+            shader.uniform_float("color", (*shade, 1.0))
+            batch_for_shader(shader, "TRI_STRIP", {"pos": [(a, c), (b, c), (a, d), (b, d)]}).draw(shader)
         text(left + 1.6 * size, low + 0.1 * size, name)
     text(left, bottom + (len(rows) + 0.2) * step, title)
 

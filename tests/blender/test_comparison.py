@@ -201,3 +201,30 @@ def test_what_a_point_of_a_model_is(scene, comparison_of) -> None:
         assert comparison_of(scene).runs == runs
     settings.replicates = 0
     assert comparison_of(scene).runs == (0,)
+
+
+def test_both_sets_of_parameters_go_out_and_come_in(scene, part, tmp_path: Path) -> None:
+    models = part("rockfall_addon.scene.models")
+    scene.rockfall_parameters.noel_2017.rt = 0.5
+    scene.rockfall_other_parameters.noel_2017.rt = 0.7
+    scene.rockfall_comparison.fitted = "wyllie_2014"
+    sets = {which: models.parameters_of(scene, which) for which in "AB"}
+    assert sets == {"A": {"noel_2017": {"rt": 0.5}}, "B": {"noel_2017": {"rt": 0.7}}}
+    fit, store = part("rockfall_addon.scene.fit"), part("rockfall_addon.scene.store")
+    question = fit.ask(scene)
+    fit.keep(
+        scene,
+        question,
+        part("core.analysis.calibration").calibrate(
+            question.impacts, question.model, question.names, question.fixed, question.options
+        ),
+    )
+    assert models.parameters_of(scene, "B") != sets["B"], "it shows what was fitted"
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    scene = bpy.context.scene
+    scene[store.FIT] = "of another project"
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "out" / "project.toml")) == {"FINISHED"}
+    scene = bpy.context.scene
+    assert {which: models.parameters_of(scene, which) for which in "AB"} == sets
+    assert store.FIT not in scene

@@ -101,6 +101,6 @@ def test_without_a_flight_the_graphs_are_refused_in_words(scene, preset, part) -
     errors = part("core.errors")
     graphs = part("rockfall_addon.steps.film.graphs")
     with pytest.raises(errors.InputError, match="No trajectory has a flight"):
-        graphs.graphs_of(scene, "motion", (640, 360), None, False)
+        graphs.graphs_of(scene, "motion", (640, 360), None)
     with pytest.raises(errors.InputError, match="no impact"):
-        graphs.graphs_of(scene, "impacts", (640, 360), None, False)
+        graphs.graphs_of(scene, "impacts", (640, 360), None)

@@ -185,7 +185,7 @@ def first_colour(obj: bpy.types.Object) -> list[float]:
 
 def test_legend_paths_and_blocks_have_the_models_colours(scene: bpy.types.Scene, part) -> None:
     linear = part("core.colours").srgb_to_linear
-    white = linear(np.array(part("core.film.simulated").MEASURED_COLOUR))
+    white = linear(np.array(part("core.colours").MEASURED_COLOUR))
     for name in ("Film swatch measured", "A block", "A flights", "B block", "B flights"):
         np.testing.assert_allclose(first_colour(scene.objects[name]), white, atol=1e-6)
     for name in MODELS:
@@ -211,11 +211,13 @@ def test_paths_grow_with_the_blocks(scene: bpy.types.Scene) -> None:
 
 def test_the_film_is_taken_away_with_all_its_colours(scene: bpy.types.Scene, part) -> None:
     assert bpy.ops.rockfall.remove_film() == {"FINISHED"}
-    observed = part("core.colours").srgb_to_linear(np.array(part("core.colours").OBSERVED_COLOUR))
+    observed = part("core.colours").srgb_to_linear(np.array(part("core.colours").MEASURED_COLOUR))
     for name in "AB":
         np.testing.assert_allclose(first_colour(scene.objects[f"{name} block"]), observed, atol=1e-6)
         flights = scene.objects[f"{name} flights"]
-        assert np.abs(np.array(first_colour(flights)) - 1.0).max() > 0.1
+        np.testing.assert_allclose(first_colour(flights), observed, atol=1e-6)
+    scene.rockfall_simulation.colour_by = "SPEED"
+    assert all(np.abs(first_colour(scene.objects[f"{name} flights"]) - observed).max() > 0.1 for name in "AB")
     roles = [obj.get("rockfall_role") for obj in scene.objects]
     assert "film" not in roles
     for obj in scene.objects:

@@ -2,6 +2,7 @@
 """Graphs as files: what is drawn is written, as it is set up, without a graphics card."""
 
 import csv
+import errno
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -114,3 +115,71 @@ def test_what_cannot_be_written_is_told_and_leaves_nothing(scene, part, tmp_path
                 export.write(bpy.context, tree, tmp_path / f"a.{kind}", (300, 200), 1.0, dark=False)
     assert set(tmp_path.iterdir()) == before
     assert not bpy.ops.rockfall.export_graphs.poll()
+
+
+def one_graph(scene: bpy.types.Scene, **settings: str) -> None:
+    scene.rockfall_graphs.count = 1
+    for name, value in {"x": "theta1_deg", "y": "rn", **settings}.items():
+        setattr(scene.rockfall_graphs.graph_1, name, value)
+    scene.rockfall_comparison.models = {"noel_2017"}
+
+
+def exported(path: Path) -> str:
+    assert bpy.ops.rockfall.export_graphs(filepath=str(path), kind="IMPACTS", width=900, height=700) == {"FINISHED"}
+    return " | ".join(words(picture(path)))
+
+
+def rmse(compared, rows: np.ndarray) -> float:
+    """Of R_N, from the predicted velocities."""
+    predicted = compared.predictions["A"]["noel_2017"]
+    measured = compared.impacts.rn[predicted.row]
+    counted = np.isfinite(measured) & np.isin(predicted.row, rows)
+    return float(np.sqrt(np.mean((predicted.rn[0, 1:].mean(axis=0) - measured)[counted] ** 2)))
+
+
+def test_a_score_stands_above_the_graph_with_filters_and_without_fits(scene, part, tmp_path: Path) -> None:
+    one_graph(scene)
+    compared = part("rockfall_addon.scene.comparison").comparison_of(scene)
+    whole = rmse(compared, np.arange(len(compared.impacts)))
+    assert f"RMSE {whole:.2f}" in exported(tmp_path / "whole.svg")
+    scene.rockfall_graphs.fits = False
+    assert f"RMSE {whole:.2f} |" in exported(tmp_path / "bare.svg")
+    row = scene.rockfall_graphs.filters.add()
+    row.column, row.texts = "trajectory", "A"
+    some = rmse(compared, np.flatnonzero(compared.impacts.trajectory == "A"))
+    assert f"{some:.2f}" != f"{whole:.2f}"
+    text = exported(tmp_path / "some.svg")
+    assert f"RMSE {some:.2f} filtered" in text
+    assert "measured (3, 4 filtered out)" in text
+    (ranked,) = part("rockfall_addon.scene.comparison_scores").ranking(
+        scene, compared, part("rockfall_addon.scene.comparison_scores").kept_of(scene, compared)
+    )
+    assert (ranked.score.n, ranked.score.rmse) == (3, pytest.approx(some))
+
+
+def test_links_that_are_left_out_are_told(scene, part, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    one_graph(scene)
+    assert "links" not in exported(tmp_path / "all.svg")
+    monkeypatch.setattr(part("rockfall_addon.view.graphs.impact_graphs"), "MOST_LINKS", 2)
+    scene.rockfall_graphs.fits = False
+    assert "links: of selected impacts only" in exported(tmp_path / "some.svg")
+    scene.rockfall_graphs.links = False
+    assert "links" not in exported(tmp_path / "none.svg")
+
+
+@pytest.mark.parametrize("kind", ["svg", "csv"])
+def test_a_full_disk_leaves_the_old_file(scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+    path = tmp_path / f"graphs.{kind}"
+    path.write_bytes(b"old")
+    opened = Path.open
+
+    def full(self: Path, mode: str = "r", *rest: object, **more: object) -> object:
+        if "w" in mode and self.suffix == f".{kind}":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return opened(self, mode, *rest, **more)
+
+    monkeypatch.setattr(Path, "open", full)
+    with pytest.raises(RuntimeError, match="No space left on device.*Make room"):
+        bpy.ops.rockfall.export_graphs(filepath=str(path), kind="IMPACTS")
+    assert [file.name for file in tmp_path.iterdir() if file.name.startswith("graphs")] == [path.name]
+    assert path.read_bytes() == b"old"

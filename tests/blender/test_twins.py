@@ -120,11 +120,11 @@ def test_curves_land_on_the_terrain_in_the_models_colour(shown: bpy.types.Scene,
         own = part("core.impact_models.registry").find_model(obj["rockfall_model"]).colour
         colour = colours.srgb_to_linear(np.array(own))
         np.testing.assert_allclose(obj.data.attributes["speed_colour"].data[0].color[:3], colour, atol=1e-6)
-    red = colours.srgb_to_linear(np.array(colours.OBSERVED_COLOUR))
+    white = colours.srgb_to_linear(np.array(colours.MEASURED_COLOUR))
     measured = of_role(shown, "flights")
     assert {obj["rockfall_trajectory"] for obj in measured} == {"A", "B"}
     for obj in measured:
-        np.testing.assert_allclose(obj.data.attributes["speed_colour"].data[0].color[:3], red, atol=1e-6)
+        np.testing.assert_allclose(obj.data.attributes["speed_colour"].data[0].color[:3], white, atol=1e-6)
 
 
 def names() -> set[str]:
@@ -206,7 +206,7 @@ def test_a_film_says_whose_blocks_they_are(shown: bpy.types.Scene, part) -> None
     film = part("rockfall_addon.steps.film.dressing")
     film.set_up_film(shown, preset, "cycles")
     captions = {obj.name for obj in of_role(shown, "film")}
-    assert {"Film source observed", "Film source Noël et al. 2017", "Film source Wyllie 2014"} <= captions
+    assert {"Film source measured", "Film source Noël et al. 2017", "Film source Wyllie 2014"} <= captions
     assert "Film legend" not in captions
     film.remove_film(shown)
     assert len(of_role(shown, "twin_flights")) == 2
@@ -225,5 +225,5 @@ def test_the_models_colours_are_in_a_rendered_film(shown: bpy.types.Scene, part,
     image = bpy.data.images.load(str(tmp_path / "still.png"))
     pixels = np.array(image.pixels[:]).reshape(108, 192, 4)[:, 24:, :3]  # right of the legend's swatches
     find_model = part("core.impact_models.registry").find_model
-    for colour in (part("core.colours").OBSERVED_COLOUR, *(find_model(name).colour for name in MODELS)):
+    for colour in (part("core.colours").MEASURED_COLOUR, *(find_model(name).colour for name in MODELS)):
         assert (np.abs(pixels - colour).max(axis=2) < 0.15).sum() >= 2, colour

@@ -9,7 +9,7 @@ import pytest
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.graphs import GraphSpec
 from rockfall.core.analysis.motion_graphs import motion_courses
-from rockfall.core.colours import SPEED_SCALE
+from rockfall.core.colours import MEASURED_COLOUR, SPEED_SCALE
 from rockfall.core.film.framing import Margins
 from rockfall.core.film.graphs import FilmGraphs, beside_graphs, impact_graphs, motion_graphs, text_height
 from rockfall.core.impact_models.registry import find_model
@@ -69,11 +69,11 @@ def test_axes_without_limits_hold_all_points_but_for_those_beyond_the_usual(run:
 
 def test_models_have_their_colours_and_links(run: Reconstruction) -> None:
     predictions = compare(run.impacts, ["noel_2017", "wyllie_2014"])
-    (graph,) = impact_graphs(run.impacts, OFFSETS, SIZE, predictions, (0.8, 0.1, 0.1), RT).graphs
+    (graph,) = impact_graphs(run.impacts, OFFSETS, SIZE, predictions, RT).graphs
     assert [dots.colour for dots in graph.dots] == [
         find_model("noel_2017").colour,
         find_model("wyllie_2014").colour,
-        (0.8, 0.1, 0.1),
+        MEASURED_COLOUR,
     ]
     noel, _, measured = graph.dots
     links = graph.strokes[0]
@@ -81,6 +81,17 @@ def test_models_have_their_colours_and_links(run: Reconstruction) -> None:
     assert len(links.ends) == len(measured.place) < len(noel.place)  # nobody saw how the last impact of a run ended
     assert all(np.linalg.norm(noel.place - end, axis=1).min() < 1e-9 for end in links.ends[:, 1])
     np.testing.assert_allclose(links.since_s, measured.since_s[rows])
+
+
+def test_filters_hide_impacts_and_the_film_says_so(run: Reconstruction) -> None:
+    predictions, shown = compare(run.impacts, ["noel_2017"]), np.flatnonzero(run.impacts.trajectory == "b")
+    made = impact_graphs(run.impacts, OFFSETS, SIZE, predictions, RT, shown)
+    assert made.note == f"Graphs: {shown.size} of {len(run.impacts)} impacts (filtered)"
+    whole = impact_graphs(run.impacts, OFFSETS, SIZE, predictions, RT)
+    assert whole.note == ""
+    model, measured = made.graphs[0].dots
+    assert measured.since_s.tolist() == pytest.approx([1.4, 2.3, 3.4])
+    assert len(model.place) == len(whole.graphs[0].dots[0].place) // 2
 
 
 def test_a_line_grows_with_the_time_in_the_colours_of_the_speed(run: Reconstruction) -> None:

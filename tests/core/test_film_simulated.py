@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core import cli
-from rockfall.core.colours import srgb_to_linear
+from rockfall.core.colours import MEASURED_COLOUR, srgb_to_linear
 from rockfall.core.errors import InputError
 from rockfall.core.film import maker as maker_module
 from rockfall.core.film.job import FilmJob
 from rockfall.core.film.maker import FilmMaker, inside_blender
 from rockfall.core.film.simulated import (
     LONGEST_WAIT_S,
-    MEASURED_COLOUR,
     MOST_BLOCKS,
     Group,
     check_number,

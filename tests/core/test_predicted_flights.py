@@ -9,7 +9,7 @@ import pytest
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.predicted_flights import fly_predictions, score_landings
 from rockfall.core.cli import main
-from rockfall.core.colours import OBSERVED_COLOUR
+from rockfall.core.colours import MEASURED_COLOUR
 from rockfall.core.commands.demo import SITE
 from rockfall.core.constants import GRAVITY_MPS2 as G
 from rockfall.core.errors import InputError, RockfallError
@@ -269,11 +269,11 @@ def test_a_film_of_models(tmp_path, capsys):
     assert main(["render", str(SITE / "project.toml"), "--model", "noel", "--out", str(tmp_path / "film")]) == 1
     assert "Did you mean noel_2017?" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
-    assert compared_lines(2)[0] == "Observed (red), and calculated by 2 models"
+    assert compared_lines(2)[0] == "Measured (white), and calculated by 2 models"
 
 
 def test_model_colours_are_told_apart():
-    colours = np.array([OBSERVED_COLOUR, *(model.colour for model in MODELS.values())])
+    colours = np.array([MEASURED_COLOUR, *(model.colour for model in MODELS.values())])
     apart = np.linalg.norm(colours[:, None] - colours, axis=-1)[np.triu_indices(len(colours), 1)]
     assert apart.min() > 0.3
 

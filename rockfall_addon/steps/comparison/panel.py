@@ -91,7 +91,8 @@ class ROCKFALL_PT_compared_scores(GraphPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "quantity", text="")
         column.prop(settings, "measure", text="")
-        ranked = comparison_scores.ranking(scene, found)
+        kept = comparison_scores.kept_of(scene, found)
+        ranked = comparison_scores.ranking(scene, found, kept)
         if not ranked:
             paragraph(context, layout, "No model can be scored yet.", "INFO")
             return
@@ -106,7 +107,10 @@ class ROCKFALL_PT_compared_scores(GraphPanel, bpy.types.Panel):
         n = max(row.score.n for row in ranked)
         words = f"Model − measured of {n} impacts" + (f", in {unit}" if unit else "")
         more = f" --replicates {settings.replicates} --seed {settings.seed}"
-        paragraph(context, layout, f"{words}, as rockfall compare{more} prints it.", "INFO")
+        if kept is None:
+            paragraph(context, layout, f"{words}, as rockfall compare{more} prints it.", "INFO")
+        else:
+            paragraph(context, layout, f"{words}; the filters hide {int((~kept).sum())} others.", "FILTER")
 
 
 def _score_row(layout: bpy.types.UILayout, *cells: str) -> None:

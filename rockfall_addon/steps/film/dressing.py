@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ....core.colours import OBSERVED_COLOUR
+from ....core.colours import MEASURED_COLOUR
 from ....core.exchange.project import RenderPreset
 from ....core.film.engines import IDENTIFIERS
 from ....core.film.framing import View, rounded_scale
@@ -13,7 +13,7 @@ from ....core.film.presets import FilmTiming
 from ....core.film.simulated import Group, LegendEntry, last_moment, legend
 from ....core.film.wording import compared_lines, fastest_speed, notes, simulated_lines
 from ....core.impact_models.registry import find_model
-from ...scene import models, simulation, store, timing
+from ...scene import models, simulation, store, timing, trails
 from . import camera, layout, marks, presence, remembered, simulated
 from . import graphs as film_graphs
 from .engine import use_engine
@@ -72,7 +72,7 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str, graph
     _show_simulated(scene, until_now=True)
     front = _furnish(scene, view, motions, words, preset)
     if graphs is not None:
-        _add_graphs(scene, front, graphs, preset, words.speed_top_mps, bool(groups))
+        _add_graphs(scene, front, graphs, preset, words.speed_top_mps)
     presence.show_while_moving(scene, motions)
     use_engine(scene, engine)
     scene.frame_set(0)
@@ -120,7 +120,7 @@ def remove_film(scene: bpy.types.Scene) -> None:
     for obj in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
         obj.hide_render = False
     simulation.look(scene)
-    simulated.restore_colours(scene)
+    trails.paint_observed(scene)
     if remembered.is_set_up(scene):
         remembered.put_back(scene)
 
@@ -197,11 +197,10 @@ def _add_graphs(
     kind: GraphKind,
     preset: RenderPreset,
     speed_top_mps: float | None,
-    beside_simulated: bool,
 ) -> None:
     """Graphs that follow the time, on the sheet of the captions."""
     size = preset.width, preset.height
-    made = film_graphs.graphs_of(scene, kind, size, speed_top_mps, beside_simulated)
+    made = film_graphs.graphs_of(scene, kind, size, speed_top_mps)
     for obj in film_graphs.lay_out(made, size, timing.frame_rate(scene)):
         _add(scene, obj)
         obj.parent = front
@@ -261,13 +260,13 @@ def _pixel_m(scene: bpy.types.Scene, view: View, motions: list[Motion]) -> float
 
 
 def _show_simulated(scene: bpy.types.Scene, *, until_now: bool) -> None:
-    """Thin paths in place of those of the step, and the measured blocks in white, where there are simulated ones."""
+    """Thin paths in place of those of the step, and the measured flights in one colour beside simulated ones."""
     for obj in simulated.make_paths(scene, simulated.PATH_PART * scene.rockfall.trail_radius_m, until_now=until_now):
         _add(scene, obj)
     for obj in simulation.paths_of(scene):
         obj.hide_render = True
     if simulated.groups_of(scene):
-        simulated.whiten(scene)
+        trails.paint_observed(scene, plain=True)
 
 
 def _sources(names: tuple[str, ...]) -> tuple[LegendEntry, ...]:
@@ -275,7 +274,7 @@ def _sources(names: tuple[str, ...]) -> tuple[LegendEntry, ...]:
     if not names:
         return ()
     known = [find_model(name) for name in names]
-    return LegendEntry("observed", OBSERVED_COLOUR), *(LegendEntry(model.title, model.colour) for model in known)
+    return LegendEntry("measured", MEASURED_COLOUR), *(LegendEntry(model.title, model.colour) for model in known)
 
 
 def _said(motions: list[Motion], shown: tuple[str, ...], groups: list[Group]) -> tuple[str, str]:

@@ -11,15 +11,15 @@ from math import pi
 import bpy
 import numpy as np
 
+from ....core.analysis.columns import passing
 from ....core.analysis.comparison import compare
 from ....core.analysis.graph_layout import GAP, Frame, Rectangle, shown_label
 from ....core.analysis.motion_graphs import motion_courses
-from ....core.colours import OBSERVED_COLOUR, srgb_to_linear
+from ....core.colours import MEASURED_COLOUR, srgb_to_linear
 from ....core.errors import InputError
 from ....core.film import graphs as film_graphs
 from ....core.film.graphs import FilmGraphs
 from ....core.film.job import GraphKind
-from ....core.film.simulated import MEASURED_COLOUR
 from ....core.vectors import Array
 from ...scene import graph_settings, keyframes, materials, models, reconstruction, timing
 from . import captions
@@ -61,14 +61,13 @@ class Shape:
 
 
 def graphs_of(
-    scene: bpy.types.Scene, kind: GraphKind, size: tuple[int, int], speed_top_mps: float | None, simulated: bool
+    scene: bpy.types.Scene, kind: GraphKind, size: tuple[int, int], speed_top_mps: float | None
 ) -> FilmGraphs:
     """What the graphs of a scene's film show.
 
     Parameters
     ----------
     speed_top_mps : at the end of the film's scale of speeds; None when it has none, as the blocks have other colours.
-    simulated : whether the film shows simulated blocks beside the measured ones.
 
     Raises
     ------
@@ -77,20 +76,25 @@ def graphs_of(
     result = reconstruction.reconstruct_scene(scene)
     offsets = timing.shown_offsets(scene, result.picks)
     shown = models.shown_models(scene)
-    measured = MEASURED_COLOUR if simulated else OBSERVED_COLOUR if shown else film_graphs.MEASURED
     if kind == "motion":
         courses = motion_courses(result, reconstruction.ground(scene), quantities=film_graphs.FILMED)
-        colour = None if speed_top_mps is not None else measured
+        colour = None if speed_top_mps is not None else MEASURED_COLOUR
         made = film_graphs.motion_graphs(courses, offsets, size, colour, speed_top_mps or 1.0)
         if not made.graphs:
             raise InputError("No trajectory has a flight to show over time", advice="Make the film without graphs")
         return made
     if not len(result.impacts):
         raise InputError("There is no impact to show in graphs", advice="Make the film without graphs")
+    row = np.flatnonzero(passing(result.impacts, graph_settings.filters_of(scene)))
+    if not row.size:
+        raise InputError(
+            f"The filters of the graphs hide all {len(result.impacts)} impacts",
+            advice="Clear them in Rockfall Graphs, or make the film without graphs",
+        )
     own = {name: values for name, values in models.parameters_of(scene).items() if name in shown}
-    predictions = compare(result.impacts, shown, own) if shown else None
+    predictions = compare(result.impacts, shown, own, spin=scene.rockfall_comparison.spin) if shown else None
     specs = [graph_settings.spec_of(graph_settings.graph(scene, n), n) for n in graph_settings.shown(scene)]
-    return film_graphs.impact_graphs(result.impacts, offsets, size, predictions, measured, specs)
+    return film_graphs.impact_graphs(result.impacts, offsets, size, predictions, specs, row)
 
 
 def lay_out(graphs: FilmGraphs, size: tuple[int, int], rate: float) -> list[bpy.types.Object]:
@@ -224,6 +228,8 @@ def _words(place: _Place, graphs: FilmGraphs) -> list[bpy.types.Object]:
         obj.rotation_euler.z = pi / 2 if upright else 0.0
         objects.append(obj)
 
+    if graphs.note:
+        write(graphs.note, graphs.room.right, graphs.room.top + 0.6 * text, "RIGHT", captions.BRIGHT_GREY)
     for graph in graphs.graphs:
         axes, plot = graph.frame, graph.frame.plot
         xs, ys = _ticks(axes)

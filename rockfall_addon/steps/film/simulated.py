@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated blocks in a film: who they are, and thin paths behind them; the measured blocks are white beside them."""
+"""Simulated blocks in a film: who they are, and thin paths behind them; the measured flights are white beside them."""
 
 import bpy
 import numpy as np
 
+from ....core.colours import MEASURED_COLOUR
 from ....core.film.engines import IDENTIFIERS
-from ....core.film.simulated import MEASURED_COLOUR, Group, group_name, path_opacity
+from ....core.film.simulated import Group, group_name, path_opacity
 from ....core.impact_models.registry import find_model
 from ....core.simulation.engine import ENDS, LEFT_TERRAIN, STOPPED
 from ....core.vectors import Array
-from ...scene import materials, simulated_paths, simulation, store, trails, trajectories
+from ...scene import materials, simulated_paths, simulation, store, trails
 from . import presence
 from .motions import Motion
 
@@ -81,23 +82,6 @@ def make_paths(scene: bpy.types.Scene, radius_m: float, *, until_now: bool) -> l
         materials.set_input(modifier, "Up to now", until_now)
         made.append(path)
     return made
-
-
-def whiten(scene: bpy.types.Scene) -> None:
-    """The measured blocks and their flights in their colour beside simulated ones."""
-    mesh = trajectories.block_mesh("Rockfall measured block", MEASURED_COLOUR)
-    for block in store.with_role(scene, store.BLOCK_ROLE):
-        block.data = mesh
-    for flights in store.with_role(scene, store.FLIGHTS_ROLE):
-        trails.paint(flights.data, np.array(MEASURED_COLOUR))
-
-
-def restore_colours(scene: bpy.types.Scene) -> None:
-    """Undo `whiten`."""
-    mesh = trajectories.block_mesh()
-    for block in store.with_role(scene, store.BLOCK_ROLE):
-        block.data = mesh
-    trails.paint_observed(scene)
 
 
 def _seen(scene: bpy.types.Scene) -> list[bpy.types.Object]:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....core.colours import OBSERVED_COLOUR
+from ....core.colours import MEASURED_COLOUR
 from ....core.impact_models.registry import MODELS
 from ...scene import models, problems, store, trails
 from ...view import legend
@@ -35,8 +35,8 @@ def _draw() -> None:
     legend.begin(scale)
     shown = models.shown_models(scene)
     if shown:
-        rows = [("observed", OBSERVED_COLOUR), *((MODELS[name].title, MODELS[name].colour) for name in shown)]
-        legend.swatches(left, scale, rows, "Real blocks, and where models send them from the same impacts")
+        rows = [("measured", MEASURED_COLOUR), *((MODELS[name].title, MODELS[name].colour) for name in shown)]
+        legend.swatches(left, scale, rows, "Measured, and where models send the blocks from the same impacts")
     elif not trails.beside_models(scene):
         _draw_speeds(settings, left, scale)
     legend.end()

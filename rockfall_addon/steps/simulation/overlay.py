@@ -7,7 +7,7 @@ import gpu
 import numpy as np
 from gpu_extras.batch import batch_for_shader
 
-from ....core.colours import OBSERVED_COLOUR
+from ....core.colours import MEASURED_COLOUR
 from ....core.impact_models.registry import MODELS
 from ...scene import problems, simulated_paths, simulation, store
 from ...view import legend
@@ -154,7 +154,7 @@ def _draw_legend() -> None:
         models = [(MODELS[simulation.model_of(obj)], len(obj.data.curves)) for obj in objects]
         rows = [(f"{model.title}: {count}", model.colour) for model, count in models]
         if store.with_role(scene, store.BLOCK_ROLE):
-            rows.insert(0, ("real blocks", OBSERVED_COLOUR))
+            rows.insert(0, ("measured", MEASURED_COLOUR))
         legend.swatches(left, scale, rows, "Simulated blocks")
     elif settings.colour_by == "SPEED":
         legend.bar(left, scale, speed_top, "Simulated: speed [m/s]")

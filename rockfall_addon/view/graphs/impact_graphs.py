@@ -84,6 +84,7 @@ class ImpactGraph:
     x, y : axes that hold all points, along which `places` count.
     drawn : by source; those of other sites first, then models, the scene's own measured impacts last and on top.
     places : (n, 2) of all points, those of each source together, single precision.
+    linked : whether all links are drawn, where they are wanted; else those of selected impacts alone.
     bars : error bars of all measured points; None until they are wanted.
     ring : for a selection, rings about its points, and its links.
     """
@@ -93,6 +94,7 @@ class ImpactGraph:
     y: Axis
     drawn: list[Drawn]
     places: np.ndarray
+    linked: bool = True
     bars: Lines | None = None
     ring: tuple[Chosen, Points, Lines] | None = None
     outside: dict[tuple[Limits, Limits], list[tuple[float, int, int]]] = field(default_factory=dict)
@@ -287,7 +289,7 @@ def build(
             pieces.append(places.astype(np.float32))
             found.append(_drawn(one, own, places, x, y, spec, settings, start, few, key))
         start += len(one.series.points)
-    return ImpactGraph(spec, x, y, found, np.concatenate(pieces))
+    return ImpactGraph(spec, x, y, found, np.concatenate(pieces), few)
 
 
 def _drawn(

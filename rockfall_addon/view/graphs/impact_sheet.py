@@ -69,7 +69,9 @@ def draw(context: bpy.types.Context, canvas: Canvas) -> None:
     graphs = {number: graph_of(scene, number, compared, look) for number in graph_settings.shown(scene)}
     room = canvas.room.shrunk(0.5 * look.text)
     if scene.rockfall_graphs.legend:
-        taken = legend.draw(room, look, compared, next(iter(graphs.values())), _kept(scene).colours)
+        taken = legend.draw(
+            room, look, compared, next(iter(graphs.values())), _kept(scene).colours, scene.rockfall_graphs.links
+        )
         room = Rectangle(room.left, room.bottom, room.width, max(room.height - taken, 1.0))
     chosen = selection.selected(context)
     if canvas.hit is not None and not _is_there(canvas.hit, graphs.get(canvas.graph)):
@@ -166,8 +168,9 @@ def _draw_graph(
 ) -> None:
     look, settings = canvas.look, scene.rockfall_graphs
     x, y = graph.axes(graph_settings.spec_of(graph_settings.graph(scene, number), number))
-    fits = [one for one in graph.drawn if one.curve is not None]
-    lines = 1 + (len(fits) > 1 and tile.height > FULL_HEIGHT * look.text)
+    fits = [one for one in graph.measured if one.curve is not None]
+    models = [one for one in graph.drawn if one.series.model]
+    lines = 1 + (bool(fits and models) and tile.height > FULL_HEIGHT * look.text)
     seen = frame(tile, x, y, look.text, look.measure, (lines * LINE + 0.4) * look.text)
     canvas.frames[number] = seen
     pointed = canvas.part if canvas.graph == number else ""
@@ -195,7 +198,9 @@ def _draw_graph(
             rings.draw(look.point, bounds)
         if pointed and canvas.hit is not None:
             _draw_pointed(canvas, graph, compared, seen.plot, bounds)
-    _draw_title(canvas, graph, fits, seen, lines, compared)
+    _draw_fits(canvas, graph, fits, seen, lines)
+    if lines > 1 or not fits:
+        _draw_scores(canvas, graph, models, seen, compared, rows_of(scene, compared)[0])
     said = empty.in_graph(graph, compared)
     if said:
         empty.draw_in_plot(seen.plot, look, said)
@@ -229,36 +234,40 @@ def _draw_pointed(
     drawing.Points(np.concatenate(same), look.ink, 2.0, "ring").draw(look.point, bounds)
 
 
-def _draw_title(
-    canvas: Canvas,
-    graph: ImpactGraph,
-    fits: list[Drawn],
-    seen: Frame,
-    lines: int,
-    compared: comparison.SceneComparison,
-) -> None:
-    """Above the plot: the fits to the left, that of the measured points first; what lies beyond to the right."""
+def _draw_fits(canvas: Canvas, graph: ImpactGraph, fits: list[Drawn], seen: Frame, lines: int) -> None:
+    """Above the plot: the fit of the measured points to the left, what lies beyond the axes to the right."""
     look, plot = canvas.look, seen.plot
-    base = plot.top + 0.45 * look.text
-    top, room = base + (lines - 1) * LINE * look.text, plot.width
+    top, room = plot.top + (0.45 + (lines - 1) * LINE) * look.text, plot.width
     outside = graph.beyond(seen.x, seen.y)
     if outside:
-        words = _beyond_text(outside, look, 0.5 * room if fits else room)
+        words = _beyond_text(outside, look, 0.5 * room)
         room -= drawing.text(plot.right, top, words, look.text, look.faint, (1.0, 0.0)) + look.text
-    models = [one for one in fits if one.series.model]
     for one in fits:
-        if not one.series.model:
-            drawing.text(plot.left, top, _fitting(_fit_texts(one, graph), look, room), look.text, one.colour)
-    if lines < 2:
-        return
-    x = plot.left
+        drawing.text(plot.left, top, _fitting(_fit_texts(one, graph), look, room), look.text, one.colour)
+
+
+def _draw_scores(
+    canvas: Canvas,
+    graph: ImpactGraph,
+    models: list[Drawn],
+    seen: Frame,
+    compared: comparison.SceneComparison,
+    kept: Mask,
+) -> None:
+    """Directly above the plot: of each model its fit, where fits are drawn, and how near it comes."""
+    look, plot = canvas.look, seen.plot
+    x, right = plot.left, plot.right
+    if graph.beyond(seen.x, seen.y) and not any(one.curve is not None for one in graph.measured):
+        right -= 0.5 * plot.width  # of the same line
     for one in models:
-        texts, score = _fit_texts(one, graph), _score_text(one, graph, compared)
-        texts = texts if len(models) == 1 else texts[2:]
+        texts = [""] if one.curve is None else _fit_texts(one, graph)
+        score = _score_text(one, graph, compared, kept)
+        texts = texts if len(models) == 1 else texts[2:] or texts
         if score:
             texts = [*(f"{text}, {score}" if text else score for text in texts), ""]
-        words = _fitting(texts, look, plot.right - x)
-        x += drawing.text(x, base, words, look.text, one.colour) + look.text
+        words = _fitting(texts, look, right - x)
+        if words:
+            x += drawing.text(x, plot.top + 0.45 * look.text, words, look.text, one.colour) + look.text
 
 
 def _fit_texts(one: Drawn, graph: ImpactGraph) -> list[str]:
@@ -269,14 +278,12 @@ def _fit_texts(one: Drawn, graph: ImpactGraph) -> list[str]:
     return [curve_text(curve, graph.spec), curve_text(curve, graph.spec, full=False), f"{r2}{rank}", r2, ""]
 
 
-def _score_text(one: Drawn, graph: ImpactGraph, compared: comparison.SceneComparison) -> str:
-    """How near a model comes to all impacts, as `rockfall compare` has it; empty where some are filtered out."""
+def _score_text(one: Drawn, graph: ImpactGraph, compared: comparison.SceneComparison, kept: Mask) -> str:
+    """How near a model comes to the impacts that pass the filters: without any, as `rockfall compare` has it."""
     which = "B" if one.hollow or "A" not in compared.predictions else "A"
-    predicted = compared.predictions[which].get(one.series.model)
-    if predicted is None or one.series.points.shape[0] != predicted.row.size * len(compared.runs):
-        return ""
-    error = comparison_scores.rmse_of(compared, which, one.series.model, graph.spec.y)
-    return f"RMSE {error:.2f}" if np.isfinite(error) else ""
+    some = not kept.all()
+    error = comparison_scores.rmse_of(compared, which, one.series.model, graph.spec.y, kept if some else None)
+    return f"RMSE {error:.2f}{' filtered' if some else ''}" if np.isfinite(error) else ""
 
 
 def _fitting(texts: list[str], look: Look, room: float) -> str:

@@ -4,6 +4,7 @@
 import numpy as np
 
 from ....core.analysis.graph_layout import Rectangle
+from ....core.analysis.graph_series import Series
 from ....core.colours import SPEED_SCALE
 from ...scene.comparison import SceneComparison
 from . import drawing
@@ -21,15 +22,22 @@ Entry = tuple[str, Rgb, str, bool]
 """Text, colour, shape, hollow."""
 
 
-def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGraph, colours: PointColours) -> float:
-    """Draw the legend at the top of a room; the height that it takes [px]."""
+def draw(
+    room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGraph, colours: PointColours, links: bool
+) -> float:
+    """Draw the legend at the top of a room; the height that it takes [px].
+
+    links : whether they are wanted; of very many, only some are drawn.
+    """
     own = next((one for one in graph.drawn if not one.series.model and one.series.source == 0), None)
     entries: list[Entry] = []
     for one in ([own] if own else []) + [each for each in graph.drawn if each is not own]:
-        count = f" ({int(one.series.defined.sum())})" if not one.series.model else ""
+        count = f" ({_count(one.series, compared)})" if not one.series.model else ""
         entries.append((f"{one.series.title}{count}", one.colour, one.shape, one.hollow))
     if compared.impacts is not None and not compared.models:
         entries.append(("no model: choose some in the sidebar (N)", look.faint, "", False))
+    if links and not graph.linked:
+        entries.append(("links: of selected impacts only", look.faint, "", False))
     if colours.colouring is not None:
         entries.append((f"   {colours.colouring.title.split(' [')[0]}:", look.faint, "", False))
         entries += [(text or "empty", colour, "circle", False) for text, colour in colours.colouring.groups]
@@ -44,6 +52,13 @@ def draw(room: Rectangle, look: Look, compared: SceneComparison, graph: ImpactGr
         if bar is not None and line[-1:] == entries[-1:]:
             _bar(x, top - i * STEP * look.text, bar, room.left + room.width, look)
     return len(lines) * STEP * look.text
+
+
+def _count(series: Series, compared: SceneComparison) -> str:
+    """How many points of a source have a place in the graph; with filters, how many impacts do not pass them."""
+    table = compared.impacts if series.source == 0 else compared.others[series.source - 1].impacts
+    shown, there = int(series.defined.sum()), 0 if table is None else len(table)
+    return f"{shown}, {there - series.row.size} filtered out" if series.row.size < there else str(shown)
 
 
 def _lines(entries: list[Entry], look: Look, width: float, most: int, after: float) -> list[list[Entry]]:

@@ -44,11 +44,10 @@ def rows_of(impacts: Impacts, rows: Indices | Mask | slice) -> Impacts:
 
 
 def joined(tables: Sequence[Impacts]) -> Impacts:
-    """All rows of several tables, in one local frame; what a table does not have is undefined there."""
-    survey = [table.shift.to_survey(table.position) for table in tables]
-    finite = np.concatenate([places[np.isfinite(places).all(axis=1)] for places in survey])
-    shift = GlobalShift.proposed(finite.min(axis=0), finite.max(axis=0)) if len(finite) else GlobalShift()
-    made: dict[str, Any] = {"shift": shift, "position": shift.to_local(np.concatenate(survey))}
+    """All rows of several tables, in one local frame: theirs, where they have the same one. What a table does not have
+    is undefined there."""
+    shift, position = _one_frame(tables)
+    made: dict[str, Any] = {"shift": shift, "position": position}
     for one in fields(Impacts):
         if one.name == "flags":
             made["flags"] = {name: np.concatenate([table.flags[name] for table in tables]) for name in FLAGS}
@@ -61,6 +60,17 @@ def joined(tables: Sequence[Impacts]) -> Impacts:
         elif one.name not in made:
             made[one.name] = np.concatenate([getattr(table, one.name) for table in tables])
     return Impacts(**made)
+
+
+def _one_frame(tables: Sequence[Impacts]) -> tuple[GlobalShift, Array]:
+    """The shift and the positions of all rows."""
+    shift = tables[0].shift
+    if all(table.shift == shift for table in tables):
+        return shift, np.concatenate([table.position for table in tables])
+    survey = [table.shift.to_survey(table.position) for table in tables]
+    finite = np.concatenate([places[np.isfinite(places).all(axis=1)] for places in survey])
+    shift = GlobalShift.proposed(finite.min(axis=0), finite.max(axis=0)) if len(finite) else GlobalShift()
+    return shift, shift.to_local(np.concatenate(survey))
 
 
 def matching(impacts: Impacts, conditions: Iterable[str]) -> Mask:

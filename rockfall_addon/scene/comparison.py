@@ -16,12 +16,10 @@ import bpy
 from ...core.analysis.comparison import Predictions, predict, random_numbers
 from ...core.analysis.courses import Courses, find_courses
 from ...core.errors import RockfallError
-from ...core.exchange.selection import joined
 from ...core.impact_models.registry import MODELS
 from ...core.reconstruction.impact import Impacts
-from ...core.reconstruction.trajectory import Reconstruction
 from ...core.vectors import Array
-from . import databases, fingerprints, model_blocks, models, picks, problems, reconstruction, store, timing
+from . import databases, model_blocks, models, own_impacts, picks, problems, reconstruction, store, timing
 from .databases import OtherSites
 
 
@@ -34,14 +32,12 @@ class Measured:
     impacts : n rows; None without a reconstructed trajectory.
     pick : (n,) id of the pick of each row, see `picks.with_id`.
     courses : the impacts that models can be asked about; None without one.
-    reconstruction : of all trajectories; None where one of them has a problem.
     problems : sentences about what is missing.
     """
 
     impacts: Impacts | None = None
     pick: tuple[str, ...] = ()
     courses: Courses | None = None
-    reconstruction: Reconstruction | None = None
     problems: tuple[str, ...] = ()
 
 
@@ -180,7 +176,7 @@ def follow_parameters(scene: bpy.types.Scene, model: str) -> None:
     RockfallError : as `predictions_of`, and without a terrain.
     """
     measured = measured_of(scene)
-    if model not in models.shown_models(scene) or measured.reconstruction is None or measured.impacts is None:
+    if model not in models.shown_models(scene) or measured.impacts is None or measured.problems:
         return
     if len(measured.impacts) > MOST_AT_ONCE and not bpy.app.background:
         if bpy.app.timers.is_registered(follow_later):
@@ -188,17 +184,17 @@ def follow_parameters(scene: bpy.types.Scene, model: str) -> None:
         model_blocks.mark(scene, model, "")
         bpy.app.timers.register(follow_later, first_interval=REST_S)
         return
-    _move_blocks(scene, model, measured.reconstruction)
+    _move_blocks(scene, model, measured.impacts)
 
 
 def catch_up(scene: bpy.types.Scene) -> None:
     """Bring the blocks in line that were moved for other parameters than the scene has now, as after an undo."""
     measured = measured_of(scene)
-    if measured.reconstruction is None:
+    if measured.impacts is None or measured.problems:
         return
     for model, text in model_blocks.marks(scene).items():
         if text != _print(scene, model):
-            _move_blocks(scene, model, measured.reconstruction)
+            _move_blocks(scene, model, measured.impacts)
 
 
 @problems.guarded
@@ -208,11 +204,11 @@ def follow_later() -> None:
         catch_up(scene)
 
 
-def _move_blocks(scene: bpy.types.Scene, model: str, result: Reconstruction) -> None:
+def _move_blocks(scene: bpy.types.Scene, model: str, impacts: Impacts) -> None:
     predictions = predictions_of(scene, model)
     if predictions is not None:
-        flights = models.fly(scene, result, predictions, beside=False)
-        model_blocks.show(scene, flights, timing.shown_offsets(scene, result.picks), keep_blocks=True)
+        flights = models.fly(scene, impacts, predictions, *reconstruction.forces_of(scene), beside=False)
+        model_blocks.show(scene, flights, timing.kept_offsets(scene), keep_blocks=True)
         model_blocks.mark(scene, model, _print(scene, model))
 
 
@@ -254,28 +250,14 @@ def _predictions(
 
 def _measure(scene: bpy.types.Scene) -> Measured:
     """Of each trajectory that can be reconstructed its impacts."""
-    problems: list[str] = []
-    tables, result = [], None
-    try:
-        result = reconstruction.reconstruct_scene(scene)
-        tables = [result.impacts]
-    except RockfallError:
-        for members in fingerprints.by_trajectory(picks.ordered(scene, picks.objects_of(scene))).values():
-            try:
-                part = reconstruction.reconstruct_scene(scene, picks.read(scene, members))
-                tables.append(part.impacts)
-            except RockfallError as error:
-                problems.append(str(error))
-    tables = [table for table in tables if len(table)]
-    if not tables:
-        return Measured(problems=tuple(problems))
-    impacts = tables[0] if len(tables) == 1 else joined(tables)
+    impacts, problems = own_impacts.impacts_of(scene)
+    if impacts is None:
+        return Measured(problems=problems)
     try:
         courses = find_courses(impacts, scene.rockfall_comparison.spin)
     except RockfallError as error:
-        problems.append(str(error))
-        courses = None
-    return Measured(impacts, _pick_ids(scene, impacts), courses, result, tuple(problems))
+        return Measured(impacts, _pick_ids(scene, impacts), None, (*problems, str(error)))
+    return Measured(impacts, _pick_ids(scene, impacts), courses, problems)
 
 
 def _pick_ids(scene: bpy.types.Scene, impacts: Impacts) -> tuple[str, ...]:
@@ -286,25 +268,9 @@ def _pick_ids(scene: bpy.types.Scene, impacts: Impacts) -> tuple[str, ...]:
     return tuple(known.get(place, "") for place in places)
 
 
-def settings_key(scene: bpy.types.Scene) -> tuple[object, ...]:
-    """All that a reconstruction depends on beside the picks: settings and terrain."""
-    settings = scene.rockfall
-    kept = (store.GROUND, store.GROUND_CONTENTS, store.SITE, store.GRAVITY, store.BLOCKS, store.NORMAL_RADIUS)
-    arrays = (store.DRAG, store.DEFAULT_BLOCK)
-    return (
-        *(scene.get(key) for key in kept),
-        *(tuple(scene.get(key, ())) for key in arrays),
-        settings.block_diameter_m,
-        settings.density_kgpm3,
-        settings.normal_radius_m,
-        settings.use_drag,
-        settings.flights_join,
-    )
-
-
 def measured_key(scene: bpy.types.Scene) -> object:
     """All that the scene's impacts depend on: what is shown of the picks, and the settings."""
-    return scene.get(store.SHOWN), settings_key(scene), scene.rockfall_comparison.spin
+    return scene.get(store.SHOWN), own_impacts.settings_key(scene), scene.rockfall_comparison.spin
 
 
 def _of(scene: bpy.types.Scene) -> _Kept:

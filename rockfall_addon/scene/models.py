@@ -11,6 +11,8 @@ from ...core.analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...core.errors import RockfallError
 from ...core.impact_models.machinery.parameters import Value
 from ...core.impact_models.registry import COMPARED, MODELS
+from ...core.reconstruction.drag import Drag
+from ...core.reconstruction.impact import Impacts
 from ...core.reconstruction.trajectory import Reconstruction
 from . import model_blocks, store, terrain, timing, trails
 
@@ -68,13 +70,20 @@ def show_models(
 def find_predictions(scene: bpy.types.Scene, result: Reconstruction, models: Sequence[str]) -> PredictedFlights:
     """The flights that the models predict, by their means, on the scene's terrain; errors as in `show_models`."""
     own = {name: values for name, values in parameters_of(scene).items() if name in models}
-    return fly(scene, result, compare(result.impacts, models, own, spin=scene.rockfall_comparison.spin))
+    predictions = compare(result.impacts, models, own, spin=scene.rockfall_comparison.spin)
+    return fly(scene, result.impacts, predictions, result.gravity_mps2, result.drag)
 
 
 def fly(
-    scene: bpy.types.Scene, result: Reconstruction, predictions: Predictions, *, beside: bool = True
+    scene: bpy.types.Scene,
+    impacts: Impacts,
+    predictions: Predictions,
+    gravity_mps2: float,
+    drag: Drag | None,
+    *,
+    beside: bool = True,
 ) -> PredictedFlights:
-    """The flights of the means of predictions, on the scene's terrain.
+    """The flights of the means of predictions for these impacts, on the scene's terrain.
 
     beside : see `fly_predictions`.
 
@@ -85,9 +94,7 @@ def fly(
     surface = terrain.surface_of_scene(scene)
     if surface is None:
         raise RockfallError("The blocks of the models land on the terrain: import one first.")
-    return fly_predictions(
-        result.impacts, predictions, surface, gravity_mps2=result.gravity_mps2, drag=result.drag, beside=beside
-    )
+    return fly_predictions(impacts, predictions, surface, gravity_mps2=gravity_mps2, drag=drag, beside=beside)
 
 
 def follow(scene: bpy.types.Scene, result: Reconstruction) -> None:

@@ -18,7 +18,7 @@ from ...core.analysis.motion_graphs import QUANTITIES, MotionCourse, delayed, mo
 from ...core.errors import RockfallError
 from ...core.workflow.refinement import pixels_of
 from ...core.workflow.sightings import SeenVideo
-from . import comparison, fingerprints, picks, reconstruction, sightings, store, sync, timing, videos
+from . import fingerprints, own_impacts, picks, reconstruction, sightings, store, sync, timing, videos
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def forget() -> None:
 
 def _keys(scene: bpy.types.Scene) -> dict[str, object]:
     """Trajectory → all that its motion depends on."""
-    common = (comparison.settings_key(scene), tuple(_track_key(one) for one in videos.cameras(scene)))
+    common = (own_impacts.settings_key(scene), tuple(_track_key(one) for one in videos.cameras(scene)))
     offsets = timing.kept_offsets(scene)
     return {
         name: (text, offsets.get(name), common)
@@ -115,12 +115,10 @@ def _compute(scene: bpy.types.Scene, kept: _Kept, names: list[str]) -> None:
     offsets = timing.kept_offsets(scene)
 
     def add(members: Iterable[bpy.types.Object], name: str = "") -> None:
-        if name:  # as `sync` reads what a person may be dragging
-            held, block = sync.held_keys(scene, name), reconstruction.blocks_of(scene, {name})[name]
-            found = picks.read(scene, picks.ordered(scene, members, held), surface, sync.reach_of(block), held)
+        if name:
+            result = sync.reconstruct_trajectory(scene, name, list(members), surface)
         else:
-            found = picks.read(scene, list(members))
-        result = reconstruction.reconstruct_scene(scene, found, surface)
+            result = reconstruction.reconstruct_scene(scene, picks.read(scene, list(members)), surface)
         pixels = pixels_of(seen)[0] if seen else None
         views = [video.view for video in seen]
         if pixels is not None:

@@ -26,18 +26,24 @@ def reconstruct_scene(
     ------
     RockfallError : whatever the core refuses.
     """
-    settings = scene.rockfall
+    gravity_mps2, drag = forces_of(scene)
     picks = pick_objects.trusted(pick_objects.picks_of(scene) if picks is None else picks)
     return reconstruct(
         picks,
         surface=ground(scene) if surface is None else surface,
         block=blocks_of(scene, set(picks.trajectory.tolist())),
-        drag=Drag(*list(scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT)))) if settings.use_drag else None,
-        gravity_mps2=float(scene.get(store.GRAVITY, GRAVITY_MPS2)),
-        normal_radius_m=_exact(scene, store.NORMAL_RADIUS, settings.normal_radius_m) or None,
+        drag=drag,
+        gravity_mps2=gravity_mps2,
+        normal_radius_m=_exact(scene, store.NORMAL_RADIUS, scene.rockfall.normal_radius_m) or None,
         site=str(scene.get(store.SITE, "")),
-        flights=settings.flights_join,
+        flights=scene.rockfall.flights_join,
     )
+
+
+def forces_of(scene: bpy.types.Scene) -> tuple[float, Drag | None]:
+    """Gravity [m/s²], and the drag of the air where it is wanted."""
+    drag = Drag(*list(scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))))
+    return float(scene.get(store.GRAVITY, GRAVITY_MPS2)), drag if scene.rockfall.use_drag else None
 
 
 def ground(scene: bpy.types.Scene) -> Surface | None:

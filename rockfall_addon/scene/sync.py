@@ -7,7 +7,7 @@ While a person drags, picks are read where they are dragged to; what was done is
 """
 
 import uuid
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -15,7 +15,9 @@ import numpy as np
 
 from ...core.errors import RockfallError
 from ...core.reconstruction.block import Block
+from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
+from ...core.terrain.surface import Surface
 from . import (
     block_keys,
     fingerprints,
@@ -187,9 +189,19 @@ def reach_of(block: Block) -> float:
     return max(LEAST_REACH_M, REACH_RADII * block.radius_m)
 
 
-def held_keys(scene: bpy.types.Scene, name: str) -> picks.Held:
-    """What a person is just doing to the keys of a trajectory's block; nothing when nobody drags."""
-    return _held(name, trajectories.parts_of(scene, [name])) if is_dragging() else picks.NOTHING_HELD
+def reconstruct_trajectory(
+    scene: bpy.types.Scene, name: str, members: Sequence[bpy.types.Object], surface: Surface | None
+) -> Reconstruction:
+    """One trajectory as it is shown, also while a person drags its picks or its block's keys.
+
+    Raises
+    ------
+    RockfallError : whatever the core refuses.
+    """
+    held = _held(name, trajectories.parts_of(scene, [name])) if is_dragging() else picks.NOTHING_HELD
+    reach = reach_of(reconstruction.blocks_of(scene, {name})[name])
+    found = picks.read(scene, picks.ordered(scene, members, held), surface, reach, held)
+    return reconstruction.reconstruct_scene(scene, found, surface)
 
 
 def recompute(scene: bpy.types.Scene) -> None:

@@ -205,6 +205,7 @@ def test_what_a_point_of_a_model_is(scene, comparison_of) -> None:
 
 def test_both_sets_of_parameters_go_out_and_come_in(scene, part, tmp_path: Path) -> None:
     models = part("rockfall_addon.scene.models")
+    import_picks(tmp_path, [(name, 30.0 * i, 3.0 * i) for i, name in enumerate("ABCD")])
     scene.rockfall_parameters.noel_2017.rt = 0.5
     scene.rockfall_other_parameters.noel_2017.rt = 0.7
     scene.rockfall_comparison.fitted = "wyllie_2014"
@@ -228,3 +229,33 @@ def test_both_sets_of_parameters_go_out_and_come_in(scene, part, tmp_path: Path)
     scene = bpy.context.scene
     assert {which: models.parameters_of(scene, which) for which in "AB"} == sets
     assert store.FIT not in scene
+
+
+def test_a_moved_pick_has_its_own_trajectory_reconstructed_alone(
+    scene, part, comparison_of, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, reconstruction = comparison_of(scene).impacts, part("rockfall_addon.scene.reconstruction")
+    asked, kept = [], reconstruction.reconstruct_scene
+
+    def counted(scene, picks=None, surface=None):
+        found = kept(scene, picks, surface)
+        asked.append(set(found.picks.trajectory.tolist()))
+        return found
+
+    pick = next(obj for obj in picks(scene) if obj["rockfall_trajectory"] == "A" and obj["rockfall_time_s"] == TIMES[1])
+    pick.location.x += 0.5
+    pick.location.z -= 0.5 * SLOPE
+    part("rockfall_addon.scene.sync").sync(scene)
+    monkeypatch.setattr(reconstruction, "reconstruct_scene", counted)
+    second = comparison_of(scene).impacts
+    assert asked == [{"A"}]
+    whole = kept(scene).impacts
+    for name in ("trajectory", "impact", "position", "v1", "v2", "rn", "theta_dev"):
+        np.testing.assert_array_equal(getattr(second, name), getattr(whole, name))
+    assert np.array_equal(second.v1[3:], first.v1[3:], equal_nan=True)
+    assert not np.array_equal(second.v1[:3], first.v1[:3], equal_nan=True)
+    for obj in [obj for obj in picks(scene) if obj["rockfall_trajectory"] == "A"]:
+        bpy.data.objects.remove(obj)
+    part("rockfall_addon.scene.sync").sync(scene)
+    assert comparison_of(scene).impacts.trajectory.tolist() == ["B"] * 3
+    assert asked == [{"A"}]

@@ -11,10 +11,14 @@ import sys
 from collections.abc import Sequence
 from errno import EINVAL
 from importlib import import_module
+from pathlib import Path
+from traceback import extract_tb
 
-from .errors import RockfallError
+from .errors import InputError, RockfallError
 
 DONE, BAD_INPUT, USAGE, INTERRUPTED = 0, 1, 2, 130
+TRACEBACK = "ROCKFALL_TRACEBACK"
+"""Variable of the environment with which an error that nobody has foreseen is shown as Python shows it."""
 CLOSED_PIPE = 141
 """What a shell says of a tool that a closed pipe has ended, as in ``rockfall models | head -1``."""
 
@@ -76,7 +80,28 @@ def _run(argv: Sequence[str]) -> int:
     except KeyboardInterrupt:
         print("rockfall: interrupted, nothing was written.", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        if (isinstance(error, OSError) and _is_closed_pipe(error)) or os.environ.get(TRACEBACK):
+            raise
+        print(f"rockfall: {_in_words(error)}", file=sys.stderr)
+        return BAD_INPUT
     return status
+
+
+def _in_words(error: Exception) -> InputError:
+    """What no reader and no writer has put into words."""
+    match error:
+        case OSError():
+            problem = f"The system refuses a file ({error.strerror or error})"
+            return InputError(problem, file=error.filename, advice="Check its permissions, and the room on the disk")
+        case MemoryError():
+            return InputError("This needs more memory than there is", advice="Give less at once, or a coarser terrain")
+    place = extract_tb(error.__traceback__)[-1]
+    said = f"{type(error).__name__}: {error}, {Path(place.filename).name} line {place.lineno}"
+    return InputError(
+        f"Something is wrong in Rockfall itself, and nothing was written ({said})",
+        advice=f"Report it with the command and its files; with {TRACEBACK}=1 it says more",
+    )
 
 
 def _is_closed_pipe(error: OSError) -> bool:

@@ -5,7 +5,14 @@ The message says what is wrong, where (file, row, trajectory), and what to do. T
 exits with status 1, the Blender operators report it and cancel.
 """
 
+import re
 from pathlib import Path
+
+MOST_LETTERS = 390
+"""A message is no longer, so that it is read."""
+MOST_OF_PATH, MOST_OF_ADVICE, LEAST_OF_PROBLEM = 150, 220, 60
+UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ud800-\udfff\ufeff]")
+"""Characters that a terminal would obey instead of showing them."""
 
 
 class RockfallError(Exception):
@@ -35,15 +42,25 @@ class InputError(RockfallError):
         place = [
             text
             for text in (
-                str(file) if file is not None else "",
+                readable(str(file), MOST_OF_PATH) if file is not None else "",
                 f"row {row}" if row is not None else "",
-                f"trajectory {trajectory}" if trajectory is not None else "",
+                f"trajectory {readable(trajectory, LEAST_OF_PROBLEM)}" if trajectory is not None else "",
             )
             if text
         ]
-        message = f"{', '.join(place)}: {problem}" if place else problem
-        super().__init__(f"{message}. {advice}." if advice else f"{message}.")
+        where = f"{', '.join(place)}: " if place else ""
+        what_to_do = f" {readable(advice, MOST_OF_ADVICE)}." if advice else ""
+        room = max(MOST_LETTERS - len(where) - len(what_to_do), LEAST_OF_PROBLEM)
+        super().__init__(f"{where}{readable(problem, room)}.{what_to_do}")
 
 
 class DependencyError(RockfallError):
     """A library or system component is missing; the message names the command that installs it."""
+
+
+def readable(text: str, most: int) -> str:
+    """A text on one line, of so many letters at most: control characters are escaped, and its middle is left out."""
+    text = UNSEEN.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), " ".join(text.split("\n")))
+    if len(text) <= most:
+        return text
+    return f"{text[: (most - 1) // 2]}…{text[len(text) - most // 2 :]}"

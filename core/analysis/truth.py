@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..reading import reader
 from ..reconstruction.impact import Impacts, apparent
 from ..vectors import Array, Indices, Names, angle_between, norm
 
@@ -58,6 +59,7 @@ class Deviation:
     typical: float
 
 
+@reader("table of true impacts")
 def read_truth(path: str | Path) -> Truth:
     """Read a table of true impacts; it needs the columns in `COLUMNS`, others are not looked at.
 
@@ -66,22 +68,17 @@ def read_truth(path: str | Path) -> Truth:
     InputError : the file cannot be read, lacks a column, or has a cell that is no number.
     """
     path = Path(path)
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                raise InputError(
-                    f"The table of true impacts lacks the column {missing[0]}",
-                    file=path,
-                    row=1,
-                    advice=f"It needs {', '.join(COLUMNS)}",
-                )
-            rows = list(reader)
-    except OSError as error:
-        raise InputError(
-            f"The table of true impacts cannot be read ({error.strerror})", file=path, advice="Check the path"
-        ) from error
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        cells = csv.DictReader(file)
+        missing = [name for name in COLUMNS if name not in (cells.fieldnames or ())]
+        if missing:
+            raise InputError(
+                f"The table of true impacts lacks the column {missing[0]}",
+                file=path,
+                row=1,
+                advice=f"It needs {', '.join(COLUMNS)}",
+            )
+        rows = list(cells)
 
     def number(row: int, name: str) -> float:
         cell = rows[row][name] or ""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..reading import reader
 from ..simulation.block_shapes import Shape
 from ..simulation.blocks import Blocks, MeasuredSizes, block_of
 from ..simulation.distributions import Distribution, parse_distribution
@@ -20,6 +21,7 @@ THREE = re.compile(r"^\s*([^x×]+)[x×]([^x×]+)[x×]([^x×]+)$")
 """1.2x0.8x0.5"""
 
 
+@reader("table of blocks")
 def read_sizes(path: str | Path) -> MeasuredSizes:
     """Read a table of measured blocks: d1_m, d2_m, d3_m or diameter_m, and density_kgpm3 where it was measured.
 

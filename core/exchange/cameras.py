@@ -15,6 +15,7 @@ from ..camera.path import CameraPath
 from ..georeference import GlobalShift
 from ..least_squares import scales
 from ..output import write_text
+from ..reading import reader
 from ..vectors import Array, Mask
 from .csv_text import read_table
 from .tables import POSITION, Columns, vector_columns, write_columns
@@ -55,6 +56,7 @@ class CameraFile:
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 
+@reader("camera")
 def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFile:
     """Read camera.toml.
 
@@ -135,6 +137,7 @@ def write_camera(
     write_text(file, "\n".join(lines) + "\n")
 
 
+@reader("table of pairs")
 def read_pairs(path: str | Path, shift: GlobalShift | None = None) -> Pairs:
     """Read pairs.csv: pixels and the terrain points seen there.
 

@@ -12,6 +12,7 @@ from ..analysis.comparison import Predictions
 from ..analysis.scores import Score
 from ..errors import InputError
 from ..output import output_stream, write_text
+from ..reading import reader
 from ..reconstruction.impact import RUN, Impacts
 from ..vectors import Array
 from .csv_text import TextTable, read_table
@@ -43,6 +44,7 @@ def write_predictions(predictions: Predictions, path: str | Path) -> None:
                     writer.writerow((model, run, trajectory, impact, *cells, flag, *more))
 
 
+@reader("table of predictions")
 def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
     """Read predictions.csv, of these impacts.
 

@@ -10,12 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, readable
+from ..plausibility import implausible, limits
+from ..reading import reader
 from ..vectors import Array, Names
 from .units import OtherUnit, if_in_unit, other_units, unknown_unit, unknown_units
 
 BLOCK_ROWS, BETWEEN = 20_000, "\0"
 """So many rows of a column are kept as one text, cells between zero bytes: a fifth of the memory of single cells."""
+MOST_OF_CELL = 60
+"""Letters of a cell that a message shows."""
 EXPORT_ADVICE = "Export it as comma-separated text in UTF-8, with . decimals"
 
 
@@ -65,7 +69,11 @@ class TextTable:
             there = self.converted[name].name if name in self.converted else name
             raise next(error for i in range(len(self)) if (error := self._mistake(there, i, cells[i], required)))
         values = np.concatenate(good)
-        return values * self.converted[name].factor if name in self.converted else values
+        values = values * self.converted[name].factor if name in self.converted else values
+        low, high = limits(name)
+        for i in np.flatnonzero((values < low) | (values > high))[:1].tolist():
+            raise self.error(i, f"{name} {implausible(name, values[i])}", "Correct the cell, or the unit of the column")
+        return values
 
     def has_numbers(self, name: str) -> bool:
         """Whether there are numbers in a column that is there, and nothing else."""
@@ -84,9 +92,11 @@ class TextTable:
             value = None
         if value is None or "_" in cell:
             advice = "Write decimals with a point" if "," in cell else f"Correct the cell{or_empty}"
-            return self.error(i, f"'{cell}' in column {name} is not a number", advice)
+            return self.error(i, f"'{readable(cell, MOST_OF_CELL)}' in column {name} is not a number", advice)
         if not np.isfinite(value):
-            return self.error(i, f"'{cell}' in column {name} is not finite", f"Correct the cell{or_empty}")
+            return self.error(
+                i, f"'{readable(cell, MOST_OF_CELL)}' in column {name} is not finite", f"Correct the cell{or_empty}"
+            )
         return None
 
     def vectors(self, names: Sequence[str], *, required: bool = False) -> Array:
@@ -104,6 +114,7 @@ class TextTable:
         return InputError(problem, file=self.source, row=self.row[i], trajectory=name, advice=advice)
 
 
+@reader("table", EXPORT_ADVICE)
 def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
     """Read a comma-separated table, its columns in the units of `known`.
 
@@ -119,7 +130,7 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         row with too many or too few cells, no rows, numbers in a unit that is not known.
     """
     path = Path(path)
-    data = _checked(path, _read_bytes(path))
+    data = _checked(path, path.read_bytes())
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True)
     header: list[str] = []
     blocks: list[list[str]] = []
@@ -203,15 +214,6 @@ def _numbers(cells: list[str], required: bool) -> Array | None:
         return None
     allowed = 0 if required else cells.count("")
     return values if np.isfinite(values).sum() == len(cells) - allowed and "_" not in "".join(cells) else None
-
-
-def _read_bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError("There is no such file", file=path, advice="Check the name and the folder") from error
-    except OSError as error:
-        raise InputError(f"The file cannot be read ({error.strerror})", file=path, advice="Check the path") from error
 
 
 def _checked(path: Path, data: bytes) -> bytes:

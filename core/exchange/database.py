@@ -10,6 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ..errors import InputError
+from ..reading import reader
 from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices, Mask
 from .duplicates import Duplicates, find_duplicates
@@ -91,6 +92,7 @@ class Merged:
     everything: Database
 
 
+@reader("table of impacts")
 def read_source(path: str | Path, site: str = "", licence: str = "") -> Database:
     """Read one table of impacts, with its units checked.
 

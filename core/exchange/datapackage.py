@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..output import write_text
+from ..reading import reader, reading
 from .database import SOURCE, Database, Source, Span, digest
 from .impact_fields import field_of
 from .selection import codes
@@ -62,6 +63,7 @@ def write_package(database: Database, folder: str | Path, title: str = "Measured
     write_text(folder / DESCRIPTOR, text + "\n")
 
 
+@reader("package")
 def read_package(path: str | Path) -> Database:
     """Read a package that `write_package` wrote, from its folder or its datapackage.json.
 
@@ -71,19 +73,13 @@ def read_package(path: str | Path) -> Database:
     """
     path = Path(path)
     path = path / DESCRIPTOR if path.is_dir() else path
-    try:
+    with reading(path, "JSON of the package", "Write the package again"):
         content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"The package cannot be read ({error.strerror})", file=path, advice="Check the path"
-        ) from error
-    except ValueError as error:
-        raise InputError(f"This is no JSON file ({error})", file=path, advice="Write the package again") from error
     try:
         resource = content["resources"][0]
         table, expected = PurePosixPath(resource["path"]), str(resource["hash"])
         sources = tuple(_read_source(source) for source in content["sources"])
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, OverflowError) as error:
         raise InputError(
             f"This is no package of impacts with its sources ({error!r})", file=path, advice="Make it by rockfall merge"
         ) from error

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..reading import reader
 from ..vectors import Array, Indices, Mask, Names
 from ..workflow.sightings import Events, Sightings
 from .csv_text import TextTable, read_table
@@ -82,6 +83,7 @@ class EventTable(Events):
         return _error(self.source, self.row, self.trajectory, index, problem, advice)
 
 
+@reader("table")
 def read_clicks(path: str | Path) -> Clicks:
     """Read clicks.csv: frames and pixels where a person saw the block.
 
@@ -99,6 +101,7 @@ def read_clicks(path: str | Path) -> Clicks:
     )
 
 
+@reader("table")
 def read_track(path: str | Path) -> Track:
     """Read track.csv: the block's centre, frame by frame.
 
@@ -137,6 +140,7 @@ def write_track(track: Track, path: str | Path) -> None:
     write_columns(path, columns | dict(track.extra))
 
 
+@reader("table")
 def read_events(path: str | Path) -> EventTable:
     """Read events.csv: impacts and other events as seen in one video.
 

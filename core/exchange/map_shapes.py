@@ -20,6 +20,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..plausibility import GREATEST_M
+from ..reading import reader, reading
 from ..simulation.polygons import Polygon
 from ..terrain.crs import surely_different
 from ..vectors import Array
@@ -53,6 +55,7 @@ class MapShape:
     properties: Mapping[str, object] = field(default_factory=dict)
 
 
+@reader("map")
 def read_lines(path: str | Path, shift: GlobalShift) -> tuple[MapShape, ...]:
     """The lines of a file.
 
@@ -64,6 +67,7 @@ def read_lines(path: str | Path, shift: GlobalShift) -> tuple[MapShape, ...]:
     return _read(Path(path), "line", shift)
 
 
+@reader("map")
 def read_polygons(path: str | Path, shift: GlobalShift) -> tuple[MapShape, ...]:
     """The polygons of a file; see `read_lines`."""
     return _read(Path(path), "polygon", shift)
@@ -152,14 +156,8 @@ def _read_geojson(path: Path, kind: Kind, shift: GlobalShift) -> tuple[MapShape,
 
 
 def _json(path: Path) -> dict[str, Any]:
-    try:
+    with reading(path, "GeoJSON file", "Export it again"):
         content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError as error:
-        raise InputError("There is no such file", file=path, advice="Check the name and the folder") from error
-    except OSError as error:
-        raise InputError(f"The file cannot be read ({error.strerror})", file=path, advice="Check the path") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"This is no GeoJSON ({error})", file=path, advice="Export it again") from error
     if not isinstance(content, dict):
         raise InputError("This is no GeoJSON: it has no object", file=path, advice="Export it again")
     return content
@@ -207,13 +205,15 @@ def _places(value: object, what: str, path: Path, shift: GlobalShift) -> Array:
     rows = _listed(value, what, path)
     try:
         places = np.array([[float(row[0]), float(row[1]), float(row[2]) if len(row) > 2 else np.nan] for row in rows])
-    except (TypeError, ValueError, IndexError, KeyError) as error:
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
         raise InputError(
             f"{what} has a point that is not two or three numbers", file=path, advice="Correct it"
         ) from error
     places = places.reshape(-1, 3)
     if not np.isfinite(places[:, :2]).all():
         raise InputError(f"{what} has a coordinate that is not finite", file=path, advice="Correct it")
+    if (np.abs(places) >= GREATEST_M).any():
+        raise InputError(f"{what} has a coordinate beyond every survey (1e9 m)", file=path, advice="Correct it")
     if shift.vector[:2].any() and len(places) and (np.abs(places[:, :2]) <= (180.0, 90.0)).all():
         raise InputError(
             f"{what} seems to be in degrees, the terrain is not",

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Parameters of impact models in a TOML file: ``[models.NAME]`` and one line for each, as in comparison.toml."""
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,6 +10,8 @@ from ..errors import InputError
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..output import write_text
+from ..reading import reader
+from .toml_text import read_toml
 
 
 def write_parameters(parameters: Mapping[str, Mapping[str, Value]], path: str | Path) -> None:
@@ -24,6 +25,7 @@ def write_parameters(parameters: Mapping[str, Mapping[str, Value]], path: str | 
     write_text(path, tomli_w.dumps(content))
 
 
+@reader("file of parameters")
 def read_parameters(path: str | Path) -> dict[str, dict[str, Value]]:
     """Model → parameter → checked value; what else is in the file is not looked at.
 
@@ -32,15 +34,7 @@ def read_parameters(path: str | Path) -> dict[str, dict[str, Value]]:
     InputError : the file cannot be read, is no TOML, has no models, an unknown model or parameter, a value out of
         range.
     """
-    try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"The parameters cannot be read ({error.strerror})", file=path, advice="Check the path"
-        ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"This is no TOML file ({error})", file=path, advice="Correct the line") from error
-    return checked_parameters(content.get("models"), path)
+    return checked_parameters(read_toml(Path(path), "file of parameters").get("models"), path)
 
 
 def checked_parameters(models: object, path: str | Path) -> dict[str, dict[str, Value]]:

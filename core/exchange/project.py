@@ -14,6 +14,7 @@ from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..output import write_text
+from ..reading import reader
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
 from .toml_text import TomlTable, Vector3, read_toml
@@ -221,6 +222,7 @@ class Project:
         return found
 
 
+@reader("project")
 def read_project(path: str | Path) -> Project:
     """Read ``project.toml``.
 

@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.registry import find_model
 from ..output import write_text
+from ..reading import reader
 from ..remarks import Remark, to_plain
 from ..simulation.blocks import Blocks, draw_blocks
 from ..simulation.convergence import Convergence, convergence
@@ -40,6 +41,7 @@ DEEP = 0.01
 """A release may be in the ground by this part of its radius, as rounded tables put it there."""
 
 
+@reader("table of releases")
 def read_releases(path: str | Path, ground: Ground, blocks: Blocks, number: int = 1, seed: int = 0) -> Releases:
     """Read releases.csv: places of blocks' centres in survey coordinates.
 

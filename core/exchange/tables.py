@@ -11,6 +11,7 @@ import numpy as np
 
 from ..georeference import GlobalShift
 from ..output import output_stream
+from ..reading import reader
 from ..reconstruction.impact import FLAGS, Impacts, apparent
 from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
@@ -72,6 +73,7 @@ IMPACTS_COLUMNS = ("site", "trajectory", "impact", *(column[0] for column in _NU
 """The columns of impacts.csv that are always there, in order."""
 
 
+@reader("table of picks")
 def read_picks(path: str | Path, shift: GlobalShift | None = None) -> Picks:
     """Read picks.csv.
 
@@ -158,6 +160,7 @@ def spin_and_energies(impacts: Impacts) -> dict[str, Array]:
     return {column[0]: _of(impacts, column) for column in (*_SPIN, *_MORE) if column[1] in _SIMULATED}
 
 
+@reader("table of impacts")
 def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     """Read impacts.csv.
 

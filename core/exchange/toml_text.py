@@ -10,9 +10,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..plausibility import implausible
+from ..reading import reading
 from ..vectors import Array
 
 Vector3 = tuple[float, float, float]
+MOST = 10**300
+"""Whole numbers have no end in TOML, others do."""
 REQUIRED: Any = object()
 """The default of a key that must be there."""
 
@@ -24,22 +28,20 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     ------
     InputError : the file is missing, no UTF-8 text or no TOML, with the row.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"The {what} cannot be read ({error.strerror})", file=path, advice="Check the path") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"The {what} is not UTF-8 text", file=path, advice="Save it as UTF-8") from error
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        row = re.search(r"line (\d+)", str(error))
-        raise InputError(
-            f"This is not valid TOML: {error}",
-            file=path,
-            row=int(row[1]) if row else text.count("\n") + 1,
-            advice="Text stands in quotation marks, a section's name in square brackets",
-        ) from error
+    with reading(path, what, "Correct it, or write it again"):
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+            return tomllib.loads(text)
+        except UnicodeDecodeError as error:
+            raise InputError(f"The {what} is not UTF-8 text", file=path, advice="Save it as UTF-8") from error
+        except tomllib.TOMLDecodeError as error:
+            row = re.search(r"line (\d+)", str(error))
+            raise InputError(
+                f"This is not valid TOML: {error}",
+                file=path,
+                row=int(row[1]) if row else text.count("\n") + 1,
+                advice="Text stands in quotation marks, a section's name in square brackets",
+            ) from error
 
 
 class TomlTable:
@@ -102,17 +104,25 @@ class TomlTable:
             raise self.wrong(key, f"is {value!r}", "Write true or false, without quotation marks")
         return value
 
-    def signed(self, key: str, default: float = REQUIRED) -> float:
+    def _number(self, key: str, default: float) -> float:
         value = self._taken(key, default, "a number")
         if not is_number(value):
             raise self.wrong(key, f"is {value!r}, not a number", "Write a number without quotation marks")
         return float(value)
 
+    def signed(self, key: str, default: float = REQUIRED) -> float:
+        return self._plausible(key, self._number(key, default))
+
+    def _plausible(self, key: str, value: float) -> float:
+        if problem := implausible(key, value):
+            raise self.wrong(key, problem, "Correct it, or its unit")
+        return value
+
     def number(self, key: str, default: float = REQUIRED, zero_allowed: bool = False) -> float:
-        value = self.signed(key, default)
+        value = self._number(key, default)
         if value < 0.0 or (value == 0.0 and not zero_allowed):
             raise self.wrong(key, f"is {value:g}", f"Give a number {'not below' if zero_allowed else 'above'} zero")
-        return value
+        return self._plausible(key, value)
 
     def deviation(self, key: str) -> float:
         """Zero when it is missing; infinite where nothing is known."""
@@ -129,13 +139,13 @@ class TomlTable:
             raise self.wrong(
                 key, f"is {value!r}", f"Give a whole number {'not below' if zero_allowed else 'above'} zero"
             )
-        return value
+        return int(self._plausible(key, value))
 
     def vector(self, key: str) -> Vector3:
         value = self._taken(key, REQUIRED, "three numbers, [x, y, z]")
         if not isinstance(value, list) or len(value) != 3 or not all(is_number(item) for item in value):
             raise self.wrong(key, f"is {value!r}", "Give three numbers, [x, y, z]")
-        x, y, z = (float(item) for item in value)
+        x, y, z = (float(self._plausible(key, item)) for item in value)
         return x, y, z
 
     def points(self, key: str) -> tuple[tuple[float, ...], ...]:
@@ -145,7 +155,7 @@ class TomlTable:
         for row in rows:
             if not (isinstance(row, list) and len(row) in (2, 3) and all(map(is_number, row))):
                 raise self.wrong(key, "is not a list of points", "Write [[x, y], [x, y, z]]; without z on the terrain")
-        return tuple(tuple(map(float, row)) for row in rows)
+        return tuple(tuple(float(self._plausible("position", item)) for item in row) for row in rows)
 
     def numbers(self, key: str, shape: tuple[int, ...]) -> Array:
         """An array of this shape; its rows are the inner lists."""
@@ -157,6 +167,8 @@ class TomlTable:
             array = np.empty(0)
         if array.shape != shape or array.dtype.kind not in "if" or not np.isfinite(array).all():
             raise self.wrong(key, f"is not {wanted}", f"Give {wanted}" + (", [x, y, z]" if shape == (3,) else ""))
+        for value in array.ravel().tolist():
+            self._plausible(key, value)
         return array.astype(np.float64)
 
     def optional_vector(self, key: str) -> Vector3 | None:
@@ -186,4 +198,6 @@ class TomlTable:
 
 def is_number(value: Any) -> bool:
     """A finite number, and no boolean."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    if isinstance(value, bool):
+        return False
+    return (isinstance(value, float) and isfinite(value)) or (isinstance(value, int) and abs(value) < MOST)

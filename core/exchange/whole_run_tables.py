@@ -9,6 +9,7 @@ from ..analysis.observed_runs import Observed, observe_stops
 from ..analysis.sections import Section
 from ..analysis.whole_runs import QUANTILES, Compared, WholeRuns
 from ..errors import InputError
+from ..reading import reader
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
 from .csv_text import read_table
@@ -38,6 +39,7 @@ def read_section(name: str, path: str | Path, ground: Ground) -> Section:
     return Section(name, line=line)
 
 
+@reader("table of stops")
 def read_stops(path: str | Path, releases: Releases, ground: Ground) -> Observed:
     """Read where real blocks stopped: release, x_m, y_m and, if not on the terrain, z_m, in survey coordinates.
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..impact_models.registry import MODELS, find_model
+from ..reading import reader
 from ..remarks import Remark
 from ..simulation.ground import element_places
 from ..simulation.zones import ZoneCover, face_values, nearest_values, zones_of_values, zones_within
@@ -42,6 +43,7 @@ class _Properties:
     unused: dict[str, None] = field(default_factory=dict)
 
 
+@reader("map of zones")
 def read_zones(path: str | Path, terrain: Surface | Cloud, models: Sequence[str]) -> Zones:
     """Zones of the polygons in a file, GeoJSON or a table; see `zones_within` for what overlaps.
 
@@ -65,6 +67,7 @@ def read_zones(path: str | Path, terrain: Surface | Cloud, models: Sequence[str]
     return _zones(cover, found, models)
 
 
+@reader("table of zones")
 def read_attribute_zones(
     path: str | Path, terrain: Surface | Cloud, attribute: PlyAttribute, places: Array, models: Sequence[str]
 ) -> Zones:

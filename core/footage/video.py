@@ -17,6 +17,7 @@ from ..constants import SAME_TIME_S
 from ..errors import InputError
 from ..opencv import opencv, quiet_opencv
 from ..progress import Progress, silent
+from ..reading import reader
 from ..vectors import Array, Indices
 from .containers import codec_name, container_of, holds_sound, lacks_index
 
@@ -165,6 +166,7 @@ class Video:
         return np.flatnonzero(self.step_s < SAME_TIME_S) + 1
 
 
+@reader("video")
 def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool = False) -> Video:
     """Find the frames of a video file and their timestamps.
 

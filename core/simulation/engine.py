@@ -17,11 +17,12 @@ from ..constants import GRAVITY_MPS2
 from ..errors import InputError
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
+from ..memory import available_bytes
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
 from ..vectors import Array, Indices, Mask
 from .ground import Ground
-from .memory import available_bytes, check_records
+from .memory import check_records
 from .release import Releases
 from .structures import held_by
 

@@ -2,20 +2,23 @@
 """Point clouds: LAS, LAZ and tables of coordinates (XYZ, TXT, CSV)."""
 
 import re
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..reading import check_promise, reading
 from ..vectors import Array
 from .crs import crs_beside, crs_from_geokeys, crs_from_wkt
 from .source import Source
 from .text import number_table, read_text
 
+DAMAGED = "It is truncated or damaged: copy or export it again"
 GROUND_CLASS = 2
 """ASPRS LAS 1.4 R15, table 17."""
+LAS_HEADER_BYTES, RECORD_HEADER_BYTES, EXTENDED_HEADER_BYTES = 227, 54, 60
+"""ASPRS LAS 1.4 R15, tables 3, 6 and 7."""
 AXIS_NAMES = (
     ("x", "x_m", "easting", "east", "e", "x_coord", "//x"),
     ("y", "y_m", "northing", "north", "n", "y_coord"),
@@ -75,21 +78,13 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     with path.open("rb") as file:
         if file.read(4) != b"LASF":
             raise InputError('Not a LAS file: it does not begin with "LASF"', file=path, advice="Check its extension")
-    try:
-        with laspy.open(path) as reader:
-            header = reader.header
-    except (
-        laspy.errors.LaspyException,
-        ValueError,
-        OSError,
-        RuntimeError,
-        LookupError,
-        TypeError,
-        struct.error,
-    ) as error:
-        raise _damaged(path, error) from error
+    _check_records(path, size)
+    with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
+        header = opened.header
     needed = header.offset_to_point_data + header.point_count * header.point_format.size
     compressed = header.are_points_compressed
+    if compressed:
+        check_promise(f"{header.point_count} points", header.point_count * header.point_format.size, size, path, True)
     if compressed and header.point_count:
         # The first eight bytes of the points say where their table of chunks is: behind the end in a truncated file.
         with path.open("rb") as file:
@@ -101,6 +96,21 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     if not header.point_count:
         raise InputError("The cloud has no points", file=path, advice="Export it again")
     return header, *_las_crs(header, path)
+
+
+def _check_records(path: Path, size: int) -> None:
+    """The variable length records of a header, each of which has a header of its own, are within the file."""
+    with path.open("rb") as file:
+        start = file.read(LAS_HEADER_BYTES)
+    if len(start) < LAS_HEADER_BYTES:
+        raise InputError("The file is truncated within its header", file=path, advice="Copy or export it again")
+    count = int.from_bytes(start[100:104], "little")
+    check_promise(f"{count} records", count * RECORD_HEADER_BYTES, size, path)
+    if start[25] >= 4:  # extended records come with version 1.4
+        with path.open("rb") as file:
+            file.seek(243)
+            extended = int.from_bytes(file.read(4), "little")
+        check_promise(f"{extended} extended records", extended * EXTENDED_HEADER_BYTES, size, path)
 
 
 def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
@@ -120,21 +130,13 @@ def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray]:
     points = np.empty((header.point_count, 3))
     classes = np.empty(header.point_count, np.uint8)
     at = 0
-    try:
-        with laspy.open(path) as reader:
-            for chunk in reader.chunk_iterator(2_000_000):
-                part = slice(at, at + len(chunk))
-                for axis, name in enumerate("XYZ"):
-                    points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
-                classes[part] = np.asarray(chunk.classification)
-                at += len(chunk)
-    except (laspy.errors.LaspyException, ValueError, OSError, RuntimeError, LookupError, struct.error) as error:
-        raise _damaged(path, error) from error
-    except BaseException as error:
-        # A panic inside the Rust decoder is no ordinary Exception, and has no importable name.
-        if type(error).__name__ != "PanicException":
-            raise
-        raise _damaged(path, error) from error
+    with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
+        for chunk in opened.chunk_iterator(2_000_000):
+            part = slice(at, at + len(chunk))
+            for axis, name in enumerate("XYZ"):
+                points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
+            classes[part] = np.asarray(chunk.classification)
+            at += len(chunk)
     return points[:at], classes[:at]
 
 
@@ -144,12 +146,6 @@ def _truncated(path: Path, promised: int, held: int | None) -> InputError:
         f"The file is truncated: its header promises {promised} points, {found}",
         file=path,
         advice="Copy or export it again",
-    )
-
-
-def _damaged(path: Path, error: BaseException) -> InputError:
-    return InputError(
-        f"The cloud cannot be read ({error})", file=path, advice="It is truncated or damaged: copy or export it again"
     )
 
 

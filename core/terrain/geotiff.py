@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Elevation grids as GeoTIFF: tifffile reads the tags and what is uncompressed or deflated, OpenCV decodes the rest."""
 
-import struct
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..memory import check_memory
 from ..opencv import quiet_opencv
+from ..reading import check_promise, reading
 from ..vectors import Array
 from .crs import crs_beside, crs_from_geokeys
 from .source import Source
 
 PIXEL_IS_POINT, RASTER_TYPE = 2, 1025
+BYTES_OF_HEIGHT = 200
+"""Of memory, while a grid is read and meshed (measured)."""
 NO_HEIGHT = 1e30
 """Beyond this a value is a filler that the file forgot to declare, as float32's lowest number often is."""
 NONE, LZW, PACKBITS, DEFLATE = 1, 5, 32773, (8, 32946)
@@ -23,6 +25,7 @@ READABLE = (NONE, LZW, PACKBITS, *DEFLATE)
 FLOATING_POINT = 3
 """Of the predictors, the one that tifffile leaves to other libraries."""
 PHOTOMETRIC, ORIENTATION = 262, 274
+DAMAGED = "It may be truncated: copy or export it again"
 EXPORT_ADVICE = "Export the heights alone, uncompressed or with LZW or deflate, as 16-bit integers or 32-bit floats"
 
 
@@ -35,27 +38,18 @@ def read_geotiff(path: Path) -> Source:
     """
     import tifffile
 
-    damaged = (
-        *(tifffile.TiffFileError, struct.error, zlib.error, ValueError, OSError),
-        *(RuntimeError, LookupError, TypeError),
-    )
     if not path.stat().st_size:
         raise InputError("The file is empty", file=path, advice="Export it again")
-    try:
-        with tifffile.TiffFile(path) as tiff:
-            page = tiff.pages.first
-            tags = {tag.code: tag.value for tag in page.tags}
-            heights = _first_band(page, path).astype(np.float64)
-            bands = page.samplesperpixel
-    except damaged as error:
-        raise InputError(
-            f"The TIFF file cannot be read ({error})", file=path, advice="It may be truncated: copy or export it again"
-        ) from error
+    with reading(path, "TIFF file", DAMAGED), tifffile.TiffFile(path) as tiff:
+        page = tiff.pages.first
+        tags = {tag.code: tag.value for tag in page.tags}
+        heights = _first_band(page, path).astype(np.float64)
+        bands = page.samplesperpixel
     nodata = str(tags.get(42113, "")).strip("\0 ")
     try:
         no_value = float(nodata) if nodata else np.nan
     except ValueError as error:
-        raise InputError(f'The NODATA value "{nodata}" is not a number', file=path) from error
+        raise InputError(f'The NODATA value "{nodata}" is not a number', file=path, advice=DAMAGED) from error
     heights[(heights == no_value) | (heights == np.float64(np.float32(no_value))) | (np.abs(heights) > NO_HEIGHT)] = (
         np.nan
     )
@@ -85,7 +79,9 @@ def _first_band(page: Any, path: Path) -> NDArray[Any]:
             f"The TIFF is a picture of {bands} bands, not heights", file=path, advice="Choose the elevation model"
         )
     if kind is None or kind.kind not in "iuf" or min(page.imagelength, page.imagewidth) < 2 or page.imagedepth > 1:
-        raise InputError(f"The TIFF holds no grid of heights (shape {page.shape})", file=path)
+        shape = " × ".join(map(str, page.shape))
+        raise InputError(f"The TIFF holds no grid of heights ({shape})", file=path, advice=EXPORT_ADVICE)
+    _check_size(page, path)
     if page.bitspersample != 8 * kind.itemsize:
         raise InputError(f"The TIFF has heights of {page.bitspersample} bits", file=path, advice=EXPORT_ADVICE)
     compression = getattr(page.compression, "name", page.compression)
@@ -101,6 +97,18 @@ def _first_band(page: Any, path: Path) -> NDArray[Any]:
             advice=EXPORT_ADVICE,
         )
     return _decoded(page, path)
+
+
+def _check_size(page: Any, path: Path) -> None:
+    """Before memory is taken: the strips or tiles that are there can hold so much, and it fits into the memory."""
+    rows, columns = page.imagelength, page.imagewidth
+    what = f"{rows} × {columns} heights"
+    pieces = page.chunked if isinstance(page.chunked, tuple) else ()
+    number = max(int(np.prod(pieces, dtype=np.float64)), 1)
+    held = sum(1 for count in page.databytecounts if count)
+    size = page.dtype.itemsize * page.samplesperpixel * rows * columns * min(held / number, 1.0)
+    check_promise(what, int(size), path.stat().st_size, path, packed=page.compression != NONE)
+    check_memory(f"A grid of {what}", rows * columns * BYTES_OF_HEIGHT, path)
 
 
 def _decoded(page: Any, path: Path) -> NDArray[Any]:

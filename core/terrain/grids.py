@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..reading import AGAIN
 from ..vectors import Array
 from .crs import crs_beside
 from .source import Source
@@ -53,7 +54,9 @@ def read_ascii_grid(path: Path) -> Source:
         try:
             header[key] = float(words[1])
         except ValueError as error:
-            raise InputError(f'"{words[1]}" is not a number, for {key}', file=path, row=row + 1) from error
+            raise InputError(
+                f'"{shown(words[1].encode())}" is not a number, for {key}', file=path, row=row + 1, advice=AGAIN
+            ) from error
     else:
         raise InputError("The grid has no heights after its header", file=path, advice="Export it again")
     columns, rows = _count(header, "ncols", path), _count(header, "nrows", path)
@@ -82,8 +85,8 @@ def _count(header: dict[str, float], key: str, path: Path) -> int:
     value = header.get(key)
     if value is None:
         raise InputError(f"The header has no {key}", file=path, advice="Check that this is an ESRI ASCII grid")
-    if value != int(value) or value < 2:
-        raise InputError(f"{key} is {value:g}, where a whole number of at least 2 is needed", file=path)
+    if not value >= 2 or not np.isfinite(value) or value % 1:
+        raise InputError(f"{key} is {value:g}, where a whole number of at least 2 is needed", file=path, advice=AGAIN)
     return int(value)
 
 

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mesh files other than PLY: Wavefront OBJ, STL and glTF."""
+"""Meshes in Wavefront OBJ and STL."""
 
 import re
-import struct
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading import AGAIN
 from ..vectors import Array
 from .source import Source, check_face_indices
 from .text import all_numbers, number_table, read_text, shown
@@ -43,19 +43,19 @@ def _obj_faces(
 ) -> NDArray[np.int32]:
     """(m, 3) polygons of any number of corners as fans of triangles; corners are counted from the front or back."""
 
-    def wrong(face: int, problem: str, advice: str | None = None) -> InputError:
+    def wrong(face: int, problem: str, advice: str) -> InputError:
         return InputError(problem, file=path, row=int(face_rows[face]) + 1, advice=advice)
 
     text = re.sub(rb"/\S*", b"", b"\n".join(line[2:] for line in lines))
     number = _whole_numbers(text)
     if number is None:
         face = next(i for i, line in enumerate(text.split(b"\n")) if _whole_numbers(line) is None)
-        raise wrong(face, f'"{shown(lines[face])}" is no face')
+        raise wrong(face, f'"{shown(lines[face])}" is no face', AGAIN)
     code = np.frombuffer(text, np.uint8)
     begins = np.flatnonzero((code > BLANK) & np.r_[True, code[:-1] <= BLANK])
     corners = np.diff(np.searchsorted(begins, [0, *np.flatnonzero(code == NEWLINE).tolist(), code.size]))
     if (corners < 3).any():
-        raise wrong(int(np.argmax(corners < 3)), "A face needs three vertices")
+        raise wrong(int(np.argmax(corners < 3)), "A face needs three vertices", AGAIN)
     # Numbers count from 1; negative ones count back from the last vertex before the face.
     of_face = np.repeat(np.arange(len(lines)), corners)
     vertex = np.where(number > 0, number - 1, np.searchsorted(vertex_rows, face_rows)[of_face] + number)
@@ -113,57 +113,3 @@ def read_stl(path: Path) -> Source:
         raise InputError("Not an STL file", file=path, advice="Check its extension or export it again")
     points = corners.reshape(-1, 3)
     return Source(points, check_face_indices(np.arange(len(points)).reshape(-1, 3), len(points), path))
-
-
-def read_gltf(path: Path) -> Source:
-    """Read all meshes of a glTF or GLB scene, in the places its nodes give them; Y is up by the standard.
-
-    Raises
-    ------
-    InputError : damaged, a buffer is missing, no triangles.
-    """
-    import trimesh
-
-    if not path.stat().st_size:
-        raise InputError("The file is empty", file=path, advice="Export it again")
-    if path.suffix.lower() == ".glb":
-        with path.open("rb") as file:
-            beginning = file.read(12)
-        if beginning[:4] != b"glTF":
-            raise InputError('Not a GLB file: it does not begin with "glTF"', file=path, advice="Check its extension")
-        if int.from_bytes(beginning[8:12], "little") > path.stat().st_size:
-            raise InputError("The file is truncated", file=path, advice="Copy or export it again")
-    damaged = (
-        ValueError,
-        KeyError,
-        IndexError,
-        TypeError,
-        AttributeError,
-        AssertionError,
-        OSError,
-        RuntimeError,
-        struct.error,
-    )
-    try:
-        scene = trimesh.load_scene(path, process=False)
-        points, faces, offset = [], [], 0
-        for node in sorted(scene.graph.nodes_geometry):
-            transform, name = scene.graph[node]
-            geometry = scene.geometry[name]
-            if not isinstance(geometry, trimesh.Trimesh):
-                continue
-            vertices = np.asarray(geometry.vertices, np.float64)
-            points.append(vertices @ transform[:3, :3].T + transform[:3, 3])
-            triangles = np.asarray(geometry.faces, np.int64)
-            faces.append(check_face_indices(triangles, len(vertices), path).astype(np.int64) + offset)
-            offset += len(vertices)
-    except damaged as error:
-        raise InputError(
-            f"The glTF file cannot be read ({type(error).__name__}: {error})",
-            file=path,
-            advice="Export it again, as GLB or with its .bin beside it",
-        ) from error
-    if not faces:
-        raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
-    notes = (f"{len(faces)} meshes of the scene were joined.",) if len(faces) > 1 else ()
-    return Source(np.concatenate(points), check_face_indices(np.concatenate(faces), offset, path), up="y", notes=notes)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading import AGAIN
 from .source import Source, check_face_indices, triangulated
 from .text import even_table, number_table, shown
 
@@ -17,6 +18,7 @@ TYPES = {
     "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "float": "f4", "double": "f8", "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8",
 }  # fmt: skip
+PLAIN = "Export the mesh without colours, textures and attributes"
 FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -95,13 +97,29 @@ def read_header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element]
                 case _:
                     raise ValueError
         except (KeyError, ValueError, IndexError) as error:
-            raise InputError(f'"{line.strip()}" is no PLY header line', file=path, row=row) from error
+            raise InputError(
+                f'"{line.strip()[:60]}" is no PLY header line', file=path, row=row, advice=AGAIN
+            ) from error
     if order is None:
         raise InputError("The PLY header names no format", file=path, advice="Export the file again")
+    for element in elements:
+        _check_element(element, path)
     vertex = next((e for e in elements if e.name == "vertex"), None)
-    if vertex is None or not {"x", "y", "z"} <= {p.name for p in vertex.properties}:
+    if vertex is None or not {"x", "y", "z"} <= {p.name for p in vertex.properties if not p.count_type}:
         raise InputError("The PLY file has no vertices with x, y and z", file=path, advice="Export a mesh or a cloud")
     return order, elements, line_end + 1, len(lines) + 1, crs
+
+
+def _check_element(element: Element, path: Path) -> None:
+    names = [p.name for p in element.properties]
+    twice = next((name for name in names if names.count(name) > 1), "")
+    if twice:
+        raise InputError(f"The {element.name} has the property {twice} twice", file=path, advice="Export it again")
+    if element.rows and not names:
+        raise InputError(f'The element "{element.name}" has rows without properties', file=path, advice=AGAIN)
+    for p in element.properties:
+        if p.count_type.startswith("f"):
+            raise InputError(f"The list {p.name} has a count that is no whole number", file=path, advice=AGAIN)
 
 
 def _read_binary(
@@ -199,12 +217,15 @@ def _read_ascii(
         rows, lines = [row for row, _ in block], [line for _, line in block]
         if element.name == "vertex":
             if any(p.count_type for p in element.properties):
-                raise InputError("The vertices hold lists, which is not supported", file=path)
+                raise InputError("The vertices hold lists, which is not supported", file=path, advice=PLAIN)
             names = [p.name for p in element.properties]
             table = number_table(lines, rows, path, f"{len(names)} coordinates and properties")
             if len(lines) and table.shape[1] != len(names):
                 raise InputError(
-                    f"{table.shape[1]} values, where the header promises {len(names)}", file=path, row=rows[0]
+                    f"{table.shape[1]} values, where the header promises {len(names)}",
+                    file=path,
+                    row=rows[0],
+                    advice=AGAIN,
                 )
             points = table[:, [names.index(axis) for axis in "xyz"]] if len(lines) else points
         elif element.name == "face" and element.rows:
@@ -218,7 +239,7 @@ def _ascii_faces(element: Element, lines: list[bytes], rows: list[int], path: Pa
     if index < 0:
         raise InputError("The faces have no vertex_indices", file=path, advice="Export the mesh again")
     if any(p.count_type for p in element.properties[:index]):
-        raise InputError(f"The list {names[0]} before the vertex indices is not supported", file=path)
+        raise InputError(f"The list {names[0]} before the vertex indices is not supported", file=path, advice=PLAIN)
     triangles = even_table(lines, len(names) + 3)
     if triangles is not None and (triangles[:, index] == 3).all() and (triangles % 1 == 0).all():
         return triangles[:, index + 1 : index + 4].astype(np.int64)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..reading import reader
 from ..vectors import Array
 from .ply import FACE_LISTS, Element, list_counts, read_header, read_ply, row_type
 from .text import number_table
@@ -35,6 +36,7 @@ class PlyAttribute:
         return np.stack([places[:, 0], -places[:, 2], places[:, 1]], axis=1) if up == "y" else places
 
 
+@reader("terrain")
 def read_ply_attribute(path: str | Path, name: str) -> PlyAttribute:
     """The attribute of a name; of the faces where both have it.
 

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..plausibility import GREATEST_M
 from ..progress import Progress, silent
+from ..reading import reader
 from ..vectors import Array
-from . import advice, cleaning, clouds, geotiff, grids, meshes, ply, triangulation, winding
+from . import advice, cleaning, clouds, geotiff, gltf, grids, meshes, ply, triangulation, winding
 from .cloud import Cloud
 from .crs import surely_different
 from .source import Source
@@ -22,8 +24,8 @@ READERS: dict[str, Callable[[Path], Source]] = {
     ".ply": ply.read_ply,
     ".obj": meshes.read_obj,
     ".stl": meshes.read_stl,
-    ".gltf": meshes.read_gltf,
-    ".glb": meshes.read_gltf,
+    ".gltf": gltf.read_gltf,
+    ".glb": gltf.read_gltf,
     ".asc": grids.read_ascii_grid,
     ".tif": geotiff.read_geotiff,
     ".tiff": geotiff.read_geotiff,
@@ -61,6 +63,7 @@ class TerrainInfo:
     summary: tuple[str, ...]
 
 
+@reader("terrain")
 def read_terrain(
     path: str | Path,
     *,
@@ -91,6 +94,7 @@ def read_terrain(
     return _surface(_opened(path, shift, up, unit_m, ground_only), max_edge_m, progress)
 
 
+@reader("terrain")
 def read_points(
     path: str | Path,
     *,
@@ -109,6 +113,7 @@ def read_points(
     return _cloud(_opened(path, shift, up, unit_m, ground_only))
 
 
+@reader("terrain")
 def read_structure(
     path: str | Path,
     *,
@@ -172,21 +177,19 @@ def _surface(opened: _Opened, max_edge_m: float | None, progress: Progress) -> S
     source, path, shift = opened.source, opened.path, opened.shift
     before, after = opened.notes, opened.advice
     progress("Meshing" if source.kind != "mesh" else "Orienting faces", 1, 2)
-    try:
-        if source.grid_shape is not None:
-            meshed = triangulation.mesh_grid(source.points, source.grid_shape)
-        elif source.faces is None:
-            meshed = triangulation.mesh_cloud(source.points, max_edge_m)
-        else:
-            meshed = triangulation.Meshed(source.points, source.faces, ())
-        kind = source.kind
-        del source, opened  # their points are as large as what follows
-        vertices, faces, done = _cleaned(meshed, kind)
-    except InputError as error:
-        raise InputError(error.problem, file=path, advice=error.advice) from error
+    if source.grid_shape is not None:
+        meshed = triangulation.mesh_grid(source.points, source.grid_shape)
+    elif source.faces is None:
+        meshed = triangulation.mesh_cloud(source.points, max_edge_m)
+    else:
+        meshed = triangulation.Meshed(source.points, source.faces, ())
+    kind = source.kind
+    del source, opened  # their points are as large as what follows
+    vertices, faces, done = _cleaned(meshed, kind)
     return Surface(vertices, faces, shift, path.name, (*before, *meshed.notes, *done, *after))
 
 
+@reader("terrain")
 def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) -> TerrainInfo:
     """Box, counts, CRS and proposed shift, without meshing; from the header alone where it tells (LAS, LAZ).
 
@@ -197,7 +200,7 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     path = Path(path)
     if path.suffix.lower() in LAS_EXTENSIONS:
         _check_path(path)
-        box, count, crs, geographic = _guarded(path, lambda: clouds.inspect_las(path))
+        box, count, crs, geographic = clouds.inspect_las(path)
         source = Source(box, crs=crs, geographic=geographic, notes=(f"Cloud of {count:,} points.",))
     else:
         source = _read(path, None)
@@ -227,20 +230,10 @@ def _read(path: Path, ground_only: bool | None) -> Source:
     _check_path(path)
     extension = path.suffix.lower()
     if extension in LAS_EXTENSIONS:
-        return _guarded(path, lambda: clouds.read_las(path, ground_only))
+        return clouds.read_las(path, ground_only)
     if ground_only:
         raise InputError("Only LAS and LAZ files have a ground class", file=path, advice="Read it without ground_only")
-    return _guarded(path, lambda: READERS[extension](path))
-
-
-def _guarded[T](path: Path, read: Callable[[], T]) -> T:
-    """What reading gives; troubles of the system, not of the contents, as InputError too."""
-    try:
-        return read()
-    except OSError as error:
-        raise InputError(f"The file cannot be read ({error})", file=path, advice="Check its permissions") from error
-    except MemoryError as error:
-        raise InputError("The file is too large for the memory", file=path, advice="Reduce it first") from error
+    return READERS[extension](path)
 
 
 def _placed(source: Source, up: str, unit_m: float, path: Path) -> Array:
@@ -265,6 +258,13 @@ def _placed(source: Source, up: str, unit_m: float, path: Path) -> Array:
         )
     if unit_m != 1.0:
         points = points * unit_m
+    reach = float(np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0))
+    if reach >= GREATEST_M:
+        raise InputError(
+            f"A coordinate of {reach:g} m is beyond every survey (1e9 m)",
+            file=path,
+            advice="The file is damaged or in another unit: export it again, or give the length of its unit",
+        )
     if up == "y" or (up == "auto" and source.up == "y"):
         points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
     return np.ascontiguousarray(points)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.memory import available_bytes
 from rockfall.core.progress import CancelledError
 from rockfall.core.simulation import engine, memory
 from rockfall.core.simulation.engine import Settings, simulate
@@ -169,4 +170,4 @@ def test_memory_that_is_not_there_is_said_with_what_is_needed(
 
 
 def test_the_memory_that_is_there_is_known() -> None:
-    assert 1e8 < memory.available_bytes() < 1e14
+    assert 1e8 < available_bytes() < 1e14

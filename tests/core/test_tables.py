@@ -308,5 +308,5 @@ def test_what_is_not_text_in_utf_8_is_refused(tmp_path, data, message):
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_picks(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"This is a folder\. Choose the table itself"):
         read_picks(tmp_path)

@@ -260,10 +260,10 @@ def test_damaged_compressed_tiff(tmp_path, capfd):
 @pytest.mark.parametrize(
     ("heights", "problem"),
     [
-        (np.zeros((1, 20), np.float32), "The TIFF holds no grid of heights (shape (1, 20))"),
-        (np.zeros((20, 1), np.float32), "The TIFF holds no grid of heights (shape (20, 1))"),
-        (np.zeros((20, 20), bool), "The TIFF holds no grid of heights (shape (20, 20))"),
-        (np.zeros((20, 20), np.complex64), "The TIFF holds no grid of heights (shape (20, 20))"),
+        (np.zeros((1, 20), np.float32), "The TIFF holds no grid of heights (1 × 20)"),
+        (np.zeros((20, 1), np.float32), "The TIFF holds no grid of heights (20 × 1)"),
+        (np.zeros((20, 20), bool), "The TIFF holds no grid of heights (20 × 20)"),
+        (np.zeros((20, 20), np.complex64), "The TIFF holds no grid of heights (20 × 20)"),
     ],
 )
 def test_tiff_without_a_grid_of_heights(tmp_path, heights, problem):

@@ -339,9 +339,9 @@ def test_the_first_of_several_bands_of_a_geotiff_is_the_height(tmp_path, layout)
     [
         (
             PermissionError(13, "Permission denied"),
-            "The file cannot be read .*Permission denied.*Check its permissions",
+            "The terrain cannot be read .*Permission denied.*Check its permissions",
         ),
-        (MemoryError(), "The file is too large for the memory. Reduce it first"),
+        (MemoryError(), "The terrain needs more memory than there is. Reduce it"),
     ],
 )
 def test_troubles_of_the_system_are_refusals_too(tmp_path, monkeypatch, trouble, told):

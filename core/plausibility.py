@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a number can be, by its name: what is far beyond is a mistake of a file, and would end in infinities or never.
+
+The limits are far outside of everything that is filmed or simulated; they are no advice.
+"""
+
+from collections.abc import Mapping
+from math import inf
+
+from .errors import InputError
+
+GREATEST_M = 1e9
+"""Coordinates: survey systems have less than 1e8 m."""
+OF_UNIT: Mapping[str, float] = {
+    "m": GREATEST_M, "s": 1e10, "px": 1e7, "mps": 1e5, "radps": 1e6, "kg": 1e15, "J": 1e25, "deg": 1e5, "hz": 1e7,
+}  # fmt: skip
+"""Unit at the end of a name → the greatest amount, of either sign."""
+BETWEEN: Mapping[str, tuple[float, float]] = {
+    **dict.fromkeys(("d1_m", "d2_m", "d3_m", "diameter_m"), (1e-5, 1e4)),
+    "density_kgpm3": (0.1, 1e5),
+    "air_density_kgpm3": (0.0, 2e3),
+    "drag_coefficient": (0.0, 100.0),
+    "gravity_mps2": (0.0, 1e3),
+    "unit_m": (1e-7, 1e7),
+    **dict.fromkeys(("fx", "fy"), (1e-3, 1e7)),
+    **dict.fromkeys(("cx", "cy"), (-1e7, 1e7)),
+    **dict.fromkeys(("width", "height"), (1, 1e5)),
+    **dict.fromkeys(("nx", "ny", "nz"), (-1e3, 1e3)),
+    **dict.fromkeys(("rn", "rt", "r"), (-1e9, 1e9)),
+    **dict.fromkeys(("position", "target", "shift"), (-GREATEST_M, GREATEST_M)),
+}
+"""Name → the least and the greatest that can be."""
+UNDEFINED = ("sigma_", "weight_")
+"""Beginnings of names that may be anything: a standard deviation of 1e20 says that nothing is known."""
+
+
+def limits(name: str) -> tuple[float, float]:
+    """The least and the greatest that a number of this name can be."""
+    if name in BETWEEN:
+        return BETWEEN[name]
+    greatest = inf if name.startswith(UNDEFINED) else OF_UNIT.get(name.rpartition("_")[2], inf)
+    return -greatest, greatest
+
+
+def implausible(name: str, value: float) -> str:
+    """What is wrong with a finite number of this name; empty when nothing is."""
+    low, high = limits(name)
+    return "" if low <= value <= high else f"is {value:g}, beyond what can be ({low:g} to {high:g})"
+
+
+def check_plausible(name: str, value: float, what: str) -> None:
+    """Refuse a number that cannot be.
+
+    Parameters
+    ----------
+    name : with its unit, as in files.
+    what : it is, in words.
+
+    Raises
+    ------
+    InputError : it cannot be.
+    """
+    if problem := implausible(name, value):
+        raise InputError(f"The {what} {problem}", advice="Check it and its unit")

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes in glTF and GLB."""
+
+import json
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from ..errors import InputError
+from ..reading import check_promise, reading
+from .source import Source, check_face_indices
+
+DAMAGED = "Export it again, as GLB or with its .bin beside it"
+COMPONENT_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+"""Of a component by its type: glTF 2.0, 3.6.2.2."""
+
+
+def read_gltf(path: Path) -> Source:
+    """Read all meshes of a glTF or GLB scene, in the places its nodes give them; Y is up by the standard.
+
+    Raises
+    ------
+    InputError : damaged, a buffer is missing, no triangles.
+    """
+    import trimesh
+
+    size = path.stat().st_size
+    if not size:
+        raise InputError("The file is empty", file=path, advice="Export it again")
+    with reading(path, "glTF file", DAMAGED):
+        _check_accessors(_document(path, size), size, path)
+        scene = trimesh.load_scene(path, process=False)
+        points, faces, offset = [], [], 0
+        for node in sorted(scene.graph.nodes_geometry):
+            transform, name = scene.graph[node]
+            geometry = scene.geometry[name]
+            if not isinstance(geometry, trimesh.Trimesh):
+                continue
+            vertices = np.asarray(geometry.vertices, np.float64)
+            points.append(vertices @ transform[:3, :3].T + transform[:3, 3])
+            triangles = np.asarray(geometry.faces, np.int64)
+            faces.append(check_face_indices(triangles, len(vertices), path).astype(np.int64) + offset)
+            offset += len(vertices)
+    if not faces:
+        raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
+    notes = (f"{len(faces)} meshes of the scene were joined.",) if len(faces) > 1 else ()
+    return Source(np.concatenate(points), check_face_indices(np.concatenate(faces), offset, path), up="y", notes=notes)
+
+
+def _document(path: Path, size: int) -> dict[str, Any]:
+    """What the file says of itself: the whole of a glTF, the first part of a GLB."""
+    if path.suffix.lower() != ".glb":
+        return json.loads(path.read_bytes())
+    with path.open("rb") as file:
+        beginning = file.read(20)
+        if beginning[:4] != b"glTF":
+            raise InputError('Not a GLB file: it does not begin with "glTF"', file=path, advice="Check its extension")
+        promised, length = (int.from_bytes(beginning[at : at + 4], "little") for at in (8, 12))
+        if promised > size or length > size:
+            raise InputError("The file is truncated", file=path, advice="Copy or export it again")
+        return json.loads(file.read(length))
+
+
+def _check_accessors(document: dict[str, Any], size: int, path: Path) -> None:
+    """Every table of numbers is as long as the buffers at the most, which may be in files beside this one."""
+    for buffer in document.get("buffers", []):
+        uri = unquote(buffer.get("uri", ""))
+        if uri and not uri.startswith("data:"):
+            beside = path.parent / uri
+            if not beside.is_file():
+                raise InputError(f"The glTF file cannot be read: {uri} is not beside it", file=path, advice=DAMAGED)
+            size += beside.stat().st_size
+    for number, accessor in enumerate(document.get("accessors", [])):
+        count, component = int(accessor["count"]), COMPONENT_BYTES[accessor["componentType"]]
+        check_promise(f"{count} rows in accessor {number}", count * component, size, path)
+        if count < 0:
+            raise InputError(f"The accessor {number} has {count} rows", file=path, advice=DAMAGED)

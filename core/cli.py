@@ -7,6 +7,7 @@ when it is asked for, so that help is quick.
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from errno import EINVAL
@@ -15,8 +16,10 @@ from pathlib import Path
 from traceback import extract_tb
 
 from .errors import InputError, RockfallError
+from .interrupts import Interrupt, handled, interrupt
 
-DONE, BAD_INPUT, USAGE, INTERRUPTED = 0, 1, 2, 130
+DONE, BAD_INPUT, USAGE, SIGNALLED = 0, 1, 2, 128
+"""The exit status; of a process that a signal has ended it is `SIGNALLED` plus its number: 130 after Ctrl+C."""
 TRACEBACK = "ROCKFALL_TRACEBACK"
 """Variable of the environment with which an error that nobody has foreseen is shown as Python shows it."""
 CLOSED_PIPE = 141
@@ -56,36 +59,43 @@ examples:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted, 141 output closed."""
     try:
-        status = _run(list(sys.argv[1:] if argv is None else argv))
-        sys.stdout.flush()
+        with handled(interrupt):
+            status = _run(list(sys.argv[1:] if argv is None else argv))
+            sys.stdout.flush()
     except OSError as error:
-        if not _is_closed_pipe(error):
-            raise
-        for stream in (sys.stdout, sys.stderr):  # what is still to be written would fail again when Python ends
+        closed = _is_closed_pipe(error)
+        if not closed:
+            print(f"rockfall: What is said here cannot be written ({error.strerror}).", file=sys.stderr)
+        for stream in (sys.stdout, sys.stderr) if closed else (sys.stdout,):  # it would fail again when Python ends
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-        return CLOSED_PIPE
+        return CLOSED_PIPE if closed else BAD_INPUT
     return status
 
 
 def _run(argv: Sequence[str]) -> int:
     try:
         arguments = _parser(argv).parse_args(argv)
+        status: int = arguments.run(arguments)
     except SystemExit as leaving:  # argparse has printed its help or its complaint
         return leaving.code if isinstance(leaving.code, int) else USAGE
-    try:
-        status: int = arguments.run(arguments)
     except RockfallError as error:
         print(f"rockfall: {error}", file=sys.stderr)
         return BAD_INPUT
-    except KeyboardInterrupt:
-        print("rockfall: interrupted, nothing was written.", file=sys.stderr)
-        return INTERRUPTED
+    except KeyboardInterrupt as error:
+        return _interrupted(error)
     except Exception as error:
         if (isinstance(error, OSError) and _is_closed_pipe(error)) or os.environ.get(TRACEBACK):
             raise
+        if isinstance(error.__context__, KeyboardInterrupt):  # a library has made something else of it
+            return _interrupted(error.__context__)
         print(f"rockfall: {_in_words(error)}", file=sys.stderr)
         return BAD_INPUT
     return status
+
+
+def _interrupted(error: KeyboardInterrupt) -> int:
+    print(f"rockfall: interrupted, {error if error.args else 'nothing was written'}.", file=sys.stderr)
+    return SIGNALLED + (error.number if isinstance(error, Interrupt) else signal.SIGINT)
 
 
 def _in_words(error: Exception) -> InputError:

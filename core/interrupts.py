@@ -22,7 +22,7 @@ class Interrupt(KeyboardInterrupt):
     """
 
     def __init__(self, number: int = signal.SIGINT, said: str = "") -> None:
-        super().__init__(said)
+        super().__init__(*([said] if said else []))
         self.number = number
 
 

@@ -6,10 +6,8 @@ kept with a digest of its own code and of all functions and constants that it re
 """
 
 import hashlib
-import os
 import pickle
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cached_property
@@ -18,6 +16,9 @@ from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
+
+from .errors import InputError
+from .output import write_bytes
 
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype)
 
@@ -81,13 +82,8 @@ class KeptCode:
             return
         code = dumps(self._numba.reduce(compiled))
         file = self._file(signature, compiled.codegen)
-        with suppress(OSError):  # a full disk, or another process that has the file open
-            with tempfile.NamedTemporaryFile(dir=file.parent, suffix=".tmp", delete=False) as draft:
-                draft.write(self._check(code) + code)
-            try:
-                os.replace(draft.name, file)
-            except OSError:
-                os.unlink(draft.name)
+        with suppress(InputError):  # a full disk, or another process that has the file open
+            write_bytes(file, self._check(code) + code)
 
     def flush(self) -> None:
         """Nothing is kept open."""

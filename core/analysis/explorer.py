@@ -4,7 +4,6 @@
 It listens on this machine only, and answers only pages that it served itself.
 """
 
-import socket
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
@@ -21,11 +20,11 @@ from .courses import Courses
 from .estimation import FitOptions, FittedModel
 from .extras import PAGES, demand
 from .linked_graphs import SHEET, WEB, LinkedGraphs, curve_tables, link_graphs, model_columns
+from .local_server import ADDRESS, local_server
 from .parameter_inputs import ParameterInputs, parameter_inputs
 from .report import looks, score_table, summary, template
 from .scores import Score, scores
 
-ADDRESS = "127.0.0.1"
 REPLICATES = 6
 """Draws of a random model that its scores are computed with: few, so that they keep pace with the slider."""
 
@@ -72,33 +71,19 @@ def serve(exploration: Exploration, port: int = 0, ready: Callable[[str], None] 
     RockfallError : the port is taken.
     """
     demand(PAGES)
-    from bokeh.server.server import Server
-
     try:
-        port = port or free_port()
-        server = Server(
-            {"/": lambda document: open_page(document, exploration)},
-            port=port,
-            address=ADDRESS,
-            allow_websocket_origin=[f"{ADDRESS}:{port}", f"localhost:{port}"],
-        )
+        server, port = local_server(lambda document: open_page(document, exploration), port)
     except OSError as error:
         raise RockfallError(
             f"Port {port} cannot be used ({error.strerror}). Leave --port out to take a free one."
         ) from error
     server.start()
     if ready is not None:
-        server.io_loop.add_callback(ready, f"http://{ADDRESS}:{server.port}/")
+        server.io_loop.add_callback(ready, f"http://{ADDRESS}:{port}/")
     try:
         server.io_loop.start()
     finally:
         server.stop()
-
-
-def free_port() -> int:
-    """A port of this machine that nobody listens to."""
-    with socket.create_server((ADDRESS, 0)) as probe:
-        return int(probe.getsockname()[1])
 
 
 def open_page(document: Any, exploration: Exploration) -> None:

@@ -2,7 +2,6 @@
 """``rockfall explore``: the live page on this machine, with a slider for every parameter."""
 
 import argparse
-import signal
 import webbrowser
 from collections.abc import Mapping
 from pathlib import Path
@@ -61,7 +60,6 @@ def run(arguments: argparse.Namespace) -> int:
         progress(f"Reading {arguments.impacts}")
         impacts = read_impacts(arguments.impacts)
         courses = find_courses(impacts, arguments.spin, arguments.radius)
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         serve(
             Exploration(
@@ -72,6 +70,4 @@ def run(arguments: argparse.Namespace) -> int:
         )
     except KeyboardInterrupt:
         print("\nStopped.")
-    finally:
-        signal.signal(signal.SIGTERM, before)
     return 0

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Progress on standard error, for work that takes more than a second."""
 
-import signal
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Timer, current_thread, main_thread
+from threading import Timer
 from types import FrameType, TracebackType
 from typing import TextIO
 
+from ..interrupts import Interrupt, handled, interrupt
 from ..progress import CancelledError, Progress
 
 QUIET_S = 1.0
@@ -82,29 +82,21 @@ class PrintedProgress:
 def stopped_by_interrupt(progress: Progress) -> Iterator[Progress]:
     """Progress in which Ctrl+C, or SIGTERM, asks the work to end, so that it can keep what is finished; a second one
     ends it."""
-    asked = False
+    asked = 0
 
     def ask(number: int, frame: FrameType | None) -> None:
         nonlocal asked
-        asked = True
-        restore()
-
-    def restore() -> None:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        if asked:
+            interrupt(number)
+        asked = number
 
     def told(text: str, done: int = 0, total: int = 0) -> None:
         if asked:
             raise CancelledError
         progress(text, done, total)
 
-    if current_thread() is not main_thread():  # only there can signals be handled
-        yield progress
-        return
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield told
-    except CancelledError as error:
-        raise KeyboardInterrupt from error
-    finally:
-        restore()
+    with handled(ask):
+        try:
+            yield told
+        except CancelledError as error:
+            raise Interrupt(asked) from error

@@ -8,8 +8,10 @@ process of their own.
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
+from tempfile import TemporaryFile
 
 from ..errors import DependencyError
+from .children import child
 
 ENGINES = ("auto", "cycles", "workbench", "eevee")
 PROBE_LIMIT_S = 180.0  # EEVEE compiles its shaders when it is first used
@@ -17,7 +19,12 @@ IDENTIFIERS = {"workbench": "BLENDER_WORKBENCH", "eevee": "BLENDER_EEVEE", "cycl
 PASSED = "engine works:"
 
 PROBE = """
-import os, bpy
+import os, threading
+def watch():
+    os.read(0, 1)
+    os._exit(1)
+threading.Thread(target=watch, daemon=True).start()
+import bpy
 scene = bpy.data.scenes.new("probe")
 camera = bpy.data.objects.new("probe", bpy.data.cameras.new("probe"))
 scene.collection.objects.link(camera)
@@ -33,7 +40,8 @@ except SystemError:
 print("{passed}", kind, flush=True)
 os._exit(0)
 """
-"""What the other process does; `os._exit` because Blender may crash at the end after work on the graphics card."""
+"""What the other process does, as long as this one lives; `os._exit` because Blender may crash at the end after work on
+the graphics card."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +60,15 @@ def probe_script(engine: str) -> str:
 def probe(command: Sequence[str], limit_s: float = PROBE_LIMIT_S) -> Probe:
     """Run a command that tries an engine; a crash or silence means that it does not work."""
     try:
-        done = subprocess.run(
-            list(command), capture_output=True, text=True, errors="replace", timeout=limit_s, check=False
-        )
+        with TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
+            with child(command, stdout=log, stderr=subprocess.DEVNULL) as process:
+                status = process.wait(limit_s)
+            log.seek(0)
+            lines = log.read().splitlines()
     except (OSError, subprocess.TimeoutExpired):
         return Probe(False)
-    said = next((line for line in done.stdout.splitlines() if line.startswith(PASSED)), None)
-    if done.returncode != 0 or said is None:
+    said = next((line for line in lines if line.startswith(PASSED)), None)
+    if status != 0 or said is None:
         return Probe(False)
     return Probe(True, software=said.removeprefix(PASSED).strip() == "SOFTWARE")
 

@@ -4,19 +4,21 @@
 import importlib.util
 import subprocess
 import sys
-import tempfile
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
+from threading import Thread
 
 from ..dependencies import require_blender_libraries
 from ..errors import DependencyError, RockfallError
 from ..progress import Progress, silent
+from .children import child
 from .engines import choose_engine
 from .job import FilmJob
 
 CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try --engine cycles."
-LINES_TOLD = 5
+LINES_TOLD, MOST_KEPT = 5, 200
 
 
 @dataclass(frozen=True)
@@ -83,31 +85,34 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str,
     ------
     RockfallError : with what the process says is wrong, or the last lines that it printed when it crashed.
     """
-    problem, remarks = "", []
-    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as log:
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, encoding="utf-8", errors="replace") as child:
-            try:
-                assert child.stdout is not None
-                for line in child.stdout:
-                    word, _, rest = line.strip().partition(" ")
-                    if word == "progress":
-                        done, total, text = rest.split(maxsplit=2)
-                        progress(text, int(done), int(total))
-                    elif word == "remark":
-                        remarks.append(rest)
-                    elif word == "error":
-                        problem = rest
-                status = child.wait()
-            except BaseException:
-                child.kill()
-                raise
-        if problem:
-            raise RockfallError(problem)
-        if status != 0:
-            log.seek(0)
-            lines = [line.strip() for line in log if line.strip() and "EGL" not in line][-LINES_TOLD:]
-            said = f" It said: {' / '.join(lines)}." if lines else ""
-            raise RockfallError(CRASHED.format(name=name, status=status, said=said))
+    problem, remarks, said = "", [], deque[str](maxlen=MOST_KEPT)
+    with child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        listener = Thread(target=said.extend, args=(process.stderr,))
+        listener.start()
+        try:
+            for line in process.stdout:
+                word, _, rest = line.strip().partition(" ")
+                if word == "progress":
+                    done, total, text = rest.split(maxsplit=2)
+                    progress(text, int(done), int(total))
+                elif word == "remark":
+                    remarks.append(rest)
+                elif word == "error":
+                    problem = rest
+            status = process.wait()
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            listener.join()
+    if problem:
+        raise RockfallError(problem)
+    if status != 0:
+        lines = [line.strip() for line in said if line.strip() and "EGL" not in line][-LINES_TOLD:]
+        words = f" It said: {' / '.join(lines)}." if lines else ""
+        raise RockfallError(CRASHED.format(name=name, status=status, said=words))
     return tuple(remarks)
 
 

@@ -46,6 +46,7 @@ CORE_FLOORS = (
     {"film"},
     {"commands"},
     {"cli"},
+    {"start"},
 )
 """A module imports from the floors below its own; rooms of the lowest floor also from each other."""
 

@@ -13,11 +13,13 @@ import bpy
 
 from .... import rockfall_addon
 from ....core.errors import RockfallError
+from ....core.film.children import end_with_parent
 from ....core.film.job import FilmJob
 from .render import make
 
 
 def main(text: str) -> NoReturn:
+    end_with_parent()
     parent = os.fdopen(os.dup(1), "w", encoding="utf-8", buffering=1)
     os.dup2(2, 1)
 

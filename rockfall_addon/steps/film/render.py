@@ -7,6 +7,7 @@ import bpy
 
 from ....core.errors import InputError, RockfallError
 from ....core.exchange.project import Project, RenderPreset, read_project
+from ....core.film.check import check_film, check_picture
 from ....core.film.falls import fall_beside
 from ....core.film.job import FilmJob
 from ....core.film.presets import HD, FilmTiming, find_preset
@@ -58,7 +59,7 @@ def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | No
 
     Raises
     ------
-    RockfallError : the range lies outside the film, or Blender wrote nothing.
+    RockfallError : the range lies outside the film, or the file is not whole.
     """
     first, last = frames or (scene.frame_start, scene.frame_end)
     if first > scene.frame_end:
@@ -81,7 +82,7 @@ def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | No
         bpy.app.handlers.render_write.remove(written)
     if done != total:
         raise RockfallError(f"Blender rendered {done} of {total} frames of the film.")
-    _check(path)
+    check_film(path, total, _size(scene), progress)
 
 
 def use_movie(scene: bpy.types.Scene, path: Path) -> None:
@@ -99,7 +100,7 @@ def render_picture(scene: bpy.types.Scene, path: Path) -> None:
 
     Raises
     ------
-    RockfallError : Blender wrote nothing.
+    RockfallError : the file is not whole.
     """
     render = scene.render
     render.filepath, render.use_file_extension = str(path), True
@@ -109,7 +110,7 @@ def render_picture(scene: bpy.types.Scene, path: Path) -> None:
         bpy.ops.render.render(write_still=True, scene=scene.name)
     except RuntimeError as error:
         raise RockfallError(f"Blender could not render the picture: {error}") from error
-    _check(path)
+    check_picture(path, _size(scene))
 
 
 def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Reconstruction:
@@ -145,6 +146,7 @@ def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     dressing.set_up_picture(scene, HD, job.engine, title=job.title or job.source.name, subtitle=facts)
 
 
-def _check(path: Path) -> None:
-    if not path.is_file() or not path.stat().st_size:
-        raise RockfallError(f"Blender wrote no file {path.name}. Is the disk full?")
+def _size(scene: bpy.types.Scene) -> tuple[int, int]:
+    """Width and height of what is rendered [px]."""
+    render = scene.render
+    return tuple(side * render.resolution_percentage // 100 for side in (render.resolution_x, render.resolution_y))

@@ -41,10 +41,10 @@ def check_film(path: Path, frames: int, size: tuple[int, int], progress: Progres
                 progress("Checking the film", min(count, frames), frames)
         finally:
             film.release()
-    if count != frames:
-        raise _damaged(path, f"{count} of its {frames} frames can be read")
     if found != size:
         raise _damaged(path, f"its frames have {found[0]} × {found[1]} pixels instead of {size[0]} × {size[1]}")
+    if count != frames:
+        raise _damaged(path, f"{count} of its {frames} frames can be read")
 
 
 def check_picture(path: Path, size: tuple[int, int]) -> None:

@@ -194,13 +194,33 @@ def test_film_of_three_frames(scene, preset, part, tmp_path: Path) -> None:
     part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
     scene.cycles.samples = 1
     path, reported = tmp_path / "film.mp4", []
-    part("rockfall_addon.steps.film.render").render_film(scene, path, (10, 12), lambda *done: reported.append(done[1:]))
-    assert reported == [(1, 3), (2, 3), (3, 3)]
+    part("rockfall_addon.steps.film.render").render_film(scene, path, (10, 12), lambda *done: reported.append(done))
+    assert reported == [(what, i, 3) for what in ("Rendering", "Checking the film") for i in (1, 2, 3)]
     assert [file.name for file in tmp_path.iterdir() if file.suffix == ".mp4"] == ["film.mp4"]
     clip = bpy.data.movieclips.load(str(path))
     assert tuple(clip.size) == (64, 36)
     assert clip.frame_duration == 3
     assert clip.fps == pytest.approx(25.0)
+
+
+def test_a_film_that_is_not_whole_is_refused(scene, preset, part, tmp_path: Path) -> None:
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, preset, "cycles")
+    scene.cycles.samples = 1
+    render, check, path = part("rockfall_addon.steps.film.render"), part("core.film.check"), tmp_path / "film.mp4"
+    render.render_film(scene, path, (10, 12), lambda *_: None)
+    with pytest.raises(part("core.errors").RockfallError, match="3 of its 4 frames can be read"):
+        check.check_film(path, 4, (64, 36))
+    with pytest.raises(part("core.errors").RockfallError, match="64 × 36 pixels instead of 64 × 38"):
+        check.check_film(path, 3, (64, 38))
+    render.render_picture(scene, tmp_path / "still.png")
+    for whole, verify in (
+        (path, lambda: check.check_film(path, 3, (64, 36))),
+        (tmp_path / "still.png", lambda: check.check_picture(tmp_path / "still.png", (64, 36))),
+    ):
+        verify()
+        whole.write_bytes(whole.read_bytes()[:-100])
+        with pytest.raises(part("core.errors").RockfallError, match=f"Blender has not made {whole.name} as it should"):
+            verify()
 
 
 def test_frames_beyond_the_film(scene, preset, part, tmp_path: Path) -> None:

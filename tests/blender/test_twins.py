@@ -217,9 +217,9 @@ def test_the_models_colours_are_in_a_rendered_film(shown: bpy.types.Scene, part,
     preset = part("core.exchange.project").RenderPreset("tiny", width=192, height=108, fps=25.0, engine="cycles")
     part("rockfall_addon.steps.film.dressing").set_up_film(shown, preset, "cycles")
     render = part("rockfall_addon.steps.film.render")
-    done: list[tuple[int, int]] = []
-    render.render_film(shown, tmp_path / "film.mp4", (60, 61), lambda *count: done.append(count[1:]))
-    assert done == [(1, 2), (2, 2)]
+    done: list[tuple[str, int, int]] = []
+    render.render_film(shown, tmp_path / "film.mp4", (60, 61), lambda *count: done.append(count))
+    assert done[:2] == [("Rendering", 1, 2), ("Rendering", 2, 2)]
     shown.frame_set(60)
     render.render_picture(shown, tmp_path / "still.png")
     image = bpy.data.images.load(str(tmp_path / "still.png"))

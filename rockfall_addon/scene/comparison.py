@@ -19,7 +19,7 @@ from ...core.errors import RockfallError
 from ...core.impact_models.registry import MODELS
 from ...core.reconstruction.impact import Impacts
 from ...core.vectors import Array
-from . import databases, model_blocks, models, own_impacts, picks, problems, reconstruction, store, timing
+from . import databases, model_blocks, models, own_impacts, picks, preparation, problems, reconstruction, store, timing
 from .databases import OtherSites
 
 
@@ -57,6 +57,7 @@ class SceneComparison:
     others : tables of other sites.
     in_view : models whose blocks are in the 3-D view.
     problems : sentences about what is not shown, and why.
+    waiting : chosen models that are still being prepared in the background; they are not among the predictions.
     """
 
     version: int
@@ -67,6 +68,7 @@ class SceneComparison:
     others: tuple[OtherSites, ...]
     in_view: tuple[str, ...]
     problems: tuple[str, ...]
+    waiting: tuple[str, ...] = ()
 
     @property
     def impacts(self) -> Impacts | None:
@@ -108,10 +110,12 @@ def comparison_of(scene: bpy.types.Scene) -> SceneComparison:
     sets = tuple(models.PARAMETER_SETS) if settings.sets == "BOTH" else (settings.sets,)
     texts = tuple(scene.get(key, "{}") for key in models.PARAMETER_SETS.values())
     measured, in_view = measured_of(scene), models.shown_models(scene)
-    key = (measured, chosen, sets, settings.points, settings.replicates, settings.seed, texts, others, in_view)
+    waiting = preparation.pending(chosen)
+    key = (measured, chosen, sets, settings.points, settings.replicates, settings.seed, texts, others, in_view, waiting)
     if kept.found is None or kept.key != key:
         problems = [*measured.problems, *(one.problem for one in others if one.problem)]
-        predictions = _predictions(scene, kept, measured, chosen, sets, problems)
+        ready = tuple(name for name in chosen if name not in waiting)
+        predictions = _predictions(scene, kept, measured, ready, sets, problems)
         runs = {"MEAN": (0,), "DRAW": (1,), "ALL": tuple(range(1, 1 + settings.replicates))}[settings.points]
         kept.found = SceneComparison(
             version=next(_versions),
@@ -122,6 +126,7 @@ def comparison_of(scene: bpy.types.Scene) -> SceneComparison:
             others=others,
             in_view=in_view,
             problems=tuple(dict.fromkeys(problems)),
+            waiting=waiting,
         )
         kept.key = key
     return kept.found

@@ -2,15 +2,14 @@
 """The statistics of the measured impacts that the graphs show, of all and of the groups that colour them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
-import numpy as np
 
 from ...core.analysis.columns import column_titles, find_column, passing
-from ...core.analysis.group_statistics import Grouping, group_by_number, group_by_text
+from ...core.analysis.group_statistics import Grouping, GroupStatistics
 from ...core.analysis.statistics import ImpactStatistics, impact_statistics, statistics_by_number
-from ...core.exchange.selection import joined, rows_of
+from ...core.exchange.selection import grouping_of, joined, rows_of
 from ...core.reconstruction.impact import Impacts
 from . import comparison, graph_settings
 
@@ -27,11 +26,23 @@ class SceneStatistics:
     whole : of all; None without an impact that passes the filters.
     column : title of the column that makes the groups; empty for none.
     groups : name → statistics.
+    impacts, grouping : what the groups are of, and which impact is in which; None without groups.
+    tests : whether the groups differ, once that was asked for.
     """
 
     whole: ImpactStatistics | None = None
     column: str = ""
     groups: Mapping[str, ImpactStatistics] = field(default_factory=dict)
+    impacts: Impacts | None = None
+    grouping: Grouping | None = None
+    tests: GroupStatistics | None = None
+
+    @property
+    def command(self) -> str:
+        """What says the same on the command line."""
+        name = "" if self.grouping is None else self.grouping.column
+        numbers = self.impacts is not None and find_column(self.impacts, name).numbers is not None
+        return f"rockfall statistics --group {name}{f' --classes {CLASSES_OF_NUMBERS}' if numbers else ''}"
 
 
 _kept: dict[int, tuple[object, SceneStatistics]] = {}  # session_uid of a scene → what for, and what was found
@@ -49,6 +60,14 @@ def statistics_of(scene: bpy.types.Scene) -> SceneStatistics:
     return _kept[scene.session_uid][1]
 
 
+def keep_tests(scene: bpy.types.Scene, asked: SceneStatistics, tests: GroupStatistics) -> bool:
+    """Show beside the statistics whether their groups differ; whether they are still those that were asked about."""
+    if statistics_of(scene) is not asked:
+        return False
+    _kept[scene.session_uid] = _kept[scene.session_uid][0], replace(asked, tests=tests)
+    return True
+
+
 def _find(scene: bpy.types.Scene, compared: comparison.SceneComparison, column: str) -> SceneStatistics:
     tables = [one for one in (compared.impacts, *(other.impacts for other in compared.others)) if one is not None]
     filters = graph_settings.filters_of(scene)
@@ -60,13 +79,7 @@ def _find(scene: bpy.types.Scene, compared: comparison.SceneComparison, column: 
     titles = column_titles([impacts])
     if column not in titles:
         return SceneStatistics(impact_statistics(impacts))
-    grouping = _grouping(impacts, column)
-    groups = statistics_by_number(impacts, grouping.number, len(grouping.names))
-    return SceneStatistics(impact_statistics(impacts), titles[column], dict(zip(grouping.names, groups, strict=True)))
-
-
-def _grouping(impacts: Impacts, name: str) -> Grouping:
-    column = find_column(impacts, name)
-    if column.numbers is not None:
-        return group_by_number(name, column.numbers, CLASSES_OF_NUMBERS)
-    return group_by_text(name, np.zeros(len(impacts), dtype="U1") if column.texts is None else column.texts)
+    numbers = find_column(impacts, column).numbers is not None
+    grouping = grouping_of(impacts, column, CLASSES_OF_NUMBERS if numbers else 0)
+    groups = dict(zip(grouping.names, statistics_by_number(impacts, grouping.number, len(grouping.names)), strict=True))
+    return SceneStatistics(impact_statistics(impacts), titles[column], groups, impacts, grouping)

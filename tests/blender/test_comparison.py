@@ -259,3 +259,19 @@ def test_a_moved_pick_has_its_own_trajectory_reconstructed_alone(
     part("rockfall_addon.scene.sync").sync(scene)
     assert comparison_of(scene).impacts.trajectory.tolist() == ["B"] * 3
     assert asked == [{"A"}]
+
+
+def test_graphs_do_not_wait_for_a_model_that_is_being_prepared(scene, part, comparison_of) -> None:
+    preparation = part("rockfall_addon.scene.preparation")
+    preparation.begin(["wyllie_2014", "stevens_1998"])
+    try:
+        first = comparison_of(scene)
+        assert first.waiting == ("wyllie_2014",)
+        assert list(first.predictions["A"]) == ["noel_2017"]
+        preparation.done("wyllie_2014")
+        second = comparison_of(scene)
+        assert (second.waiting, set(second.predictions["A"])) == ((), TWO)
+        assert second.predictions["A"]["noel_2017"] is first.predictions["A"]["noel_2017"]
+    finally:
+        preparation.end()
+    assert preparation.pending(["stevens_1998"]) == ()

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The statistics beside the graphs: of the demo's impacts, of those that pass the filters, of groups by colour."""
 
+import csv
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -74,3 +77,26 @@ def test_kept_until_a_pick_changes(scene, part, statistics_of) -> None:
 
 def test_no_impacts(rockfall, statistics_of) -> None:
     assert statistics_of(bpy.context.scene).whole is None
+
+
+def test_whether_groups_differ_is_told_as_on_the_command_line(scene, part, statistics_of, tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="poll"):
+        bpy.ops.rockfall.test_groups()
+    bpy.ops.rockfall.colour_graphs(column="theta1_deg")
+    assert statistics_of(scene).tests is None
+    assert bpy.ops.rockfall.test_groups() == {"FINISHED"}
+    found = statistics_of(scene)
+    assert found.command == "rockfall statistics --group theta1_deg --classes 3"
+    assert len(found.tests.tests.pairs) == 3 * len(found.tests.tests.tests)
+    table, out = tmp_path / "impacts.csv", tmp_path / "out"
+    part("core.exchange.tables").write_impacts(
+        part("rockfall_addon.scene.comparison").comparison_of(scene).impacts, table
+    )
+    command = ["statistics", str(table), "--group", "theta1_deg", "--classes", "3", "--tables-only", "--out", str(out)]
+    assert part("core.cli").main(command) == 0
+    for name, tests in (("group_tests", found.tests.tests.tests), ("group_pairs", found.tests.tests.pairs)):
+        with (out / f"{name}.csv").open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
+        assert [float(row["p"]) for row in rows] == pytest.approx([one.p for one in tests], rel=1e-4)
+    scene.rockfall_graphs.filters.add().column = "rn"
+    assert statistics_of(scene).tests is None, "of other impacts nothing is told yet"

@@ -136,6 +136,13 @@ def load_case(file: str, name: str) -> Iterator[float]:
     return getattr(module, name)(Window(name))
 
 
+def is_preparing() -> bool:
+    """Whether models are compiled in the background, which takes long in a Blender that never ran them."""
+    scene = f"{EXTENSION}.rockfall_addon.scene"
+    preparation, models = (importlib.import_module(f"{scene}.{name}") for name in ("preparation", "models"))
+    return bool(preparation.pending(models.ORDER))
+
+
 def new_file() -> None:
     """What a person has who has just started Blender."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
@@ -159,6 +166,8 @@ def main() -> None:
 
     def step() -> float | None:
         try:
+            if not steps and is_preparing():
+                return BETWEEN_EVENTS_S
             if not steps:
                 print(f"{BEGINS}{waiting[0][1]}", flush=True)
                 faulthandler.dump_traceback_later(float(seconds), exit=True)

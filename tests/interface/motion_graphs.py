@@ -176,3 +176,19 @@ def case_motion_graphs_of_footage(window):
     yield 2.0
     assert abs(scene.frame_current - time_s * scene.render.fps / scene.render.fps_base) <= 1
     window.screenshot("footage")
+
+
+def case_motion_graphs_and_those_of_impacts_change_places(window):
+    """One click in the header shows the other kind of graphs in the same area, and one more the first again."""
+    yield from open_graphs(window)
+    header = window.region("HEADER", "NODE_EDITOR")
+    scale = bpy.context.preferences.system.ui_scale
+    y = header.y + header.height // 2
+    window.screenshot("motion")
+    yield from window.click(header.x + 90 * scale, y)
+    yield 1.0
+    assert window.area("NODE_EDITOR").ui_type == "RockfallImpactGraphs"
+    window.screenshot("impacts")
+    yield from window.click(header.x + 150 * scale, y)
+    yield 1.0
+    assert window.area("NODE_EDITOR").ui_type == TREE

@@ -94,7 +94,8 @@ class ROCKFALL_PT_compared_scores(GraphPanel, bpy.types.Panel):
         kept = comparison_scores.kept_of(scene, found)
         ranked = comparison_scores.ranking(scene, found, kept)
         if not ranked:
-            paragraph(context, layout, "No model can be scored yet.", "INFO")
+            waits = "The models are being prepared …" if found.waiting else "No model can be scored yet."
+            paragraph(context, layout, waits, "INFO")
             return
         several = len(found.predictions) > 1
         box = layout.box().column(align=True)

@@ -23,6 +23,7 @@ def register() -> None:
     editor.add(
         editor.Content(
             editor.IMPACTS,
+            "Impacts",
             impact_sheet.draw,
             menus.draw_header,
             impact_sheet.point,

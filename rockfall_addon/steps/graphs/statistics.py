@@ -5,9 +5,16 @@ from collections.abc import Sequence
 
 import bpy
 
+from ....core.analysis.group_statistics import group_statistics
 from ....core.analysis.statistics_words import class_rows, group_cells, summary_rows
-from ...scene import statistics
+from ....core.errors import RockfallError
+from ....core.progress import Progress
+from ...scene import graph_settings, statistics
+from ...view import job
 from ...view.graphs.panel import GraphPanel
+from ...view.job import InBackground, Work
+from ...view.panel import paragraph, show_remarks
+from ...view.reporting import possible
 
 MOST_GROUPS = 12
 
@@ -37,7 +44,45 @@ class ROCKFALL_PT_graph_statistics(GraphPanel, bpy.types.Panel):
             _table(body, rows)
             if len(found.groups) > MOST_GROUPS:
                 body.label(text=f"and {len(found.groups) - MOST_GROUPS} more")
-            body.label(text="Tests: rockfall statistics --group", icon="INFO")
+            _draw_tests(context, body, found)
+
+
+def _draw_tests(context: bpy.types.Context, layout: bpy.types.UILayout, found: statistics.SceneStatistics) -> None:
+    """Whether the groups differ, or how to find out."""
+    job.draw(context, layout, "graphs")
+    if found.tests is None:
+        layout.operator("rockfall.test_groups", icon="VIEWZOOM")
+        return
+    show_remarks(context, layout, found.tests.remarks())
+    paragraph(context, layout, f"As {found.command} tells of these impacts.", "INFO")
+
+
+class ROCKFALL_OT_test_groups(InBackground, bpy.types.Operator):
+    """Test whether the groups that colour the points differ, and which pairs of them, in the background"""
+
+    bl_idname = "rockfall.test_groups"
+    bl_label = "Test Whether Groups Differ"
+    bl_options = {"REGISTER"}
+    looks_only = True
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        there = len(statistics.statistics_of(context.scene).groups) > 1
+        return possible(cls, there, "Colour the points by a column with several groups first") and job.is_free(cls)
+
+    def prepare(self, context: bpy.types.Context) -> Work:
+        asked = statistics.statistics_of(context.scene)
+
+        def compute(progress: Progress) -> object:
+            return group_statistics(asked.impacts, asked.grouping, progress=progress)
+
+        def keep(scene: bpy.types.Scene, found: object) -> str:
+            if not statistics.keep_tests(scene, asked, found):
+                raise RockfallError("Impacts, filters or colours have changed meanwhile: test the groups again.")
+            graph_settings.redraw()
+            return f"{found.remarks()[0].text}"
+
+        return Work("graphs", compute, keep)
 
 
 def _table(layout: bpy.types.UILayout, rows: Sequence[Sequence[str]]) -> None:
@@ -57,4 +102,4 @@ def _column(layout: bpy.types.UILayout, cells: Sequence[str], side: str) -> None
         column.label(text=cell)
 
 
-CLASSES = (ROCKFALL_PT_graph_statistics,)
+CLASSES = (ROCKFALL_OT_test_groups, ROCKFALL_PT_graph_statistics)

@@ -54,6 +54,7 @@ def register() -> None:
     editor.add(
         editor.Content(
             editor.MOTION,
+            "Motion",
             motion_sheet.draw,
             draw_header,
             motion_sheet.point,

@@ -64,6 +64,7 @@ class Content:
     Attributes
     ----------
     tree : identifier of the type.
+    name : short, for the switch between the types.
     draw : draws into a canvas and fills in its frames and buttons.
     header : the layout of the header's own part.
     point : (context, canvas) → what is under the mouse in `canvas.graph`, None for nothing; kept in `canvas.hit`.
@@ -72,6 +73,7 @@ class Content:
     """
 
     tree: str
+    name: str
     draw: Callable[[bpy.types.Context, Canvas], None]
     header: Callable[[bpy.types.Context, bpy.types.UILayout], None]
     point: Callable[[bpy.types.Context, Canvas], Any]
@@ -250,10 +252,20 @@ def _begin() -> None:
             theirs(self, context)
             return
         self.layout.template_header()
+        _draw_switch(context, self.layout)
         content.header(context, self.layout)
 
     _header.append(theirs)
     bpy.types.NODE_HT_header.draw = draw
+
+
+def _draw_switch(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    """One click from one type of graphs to the other."""
+    if len(_contents) < 2:
+        return
+    row = layout.row(align=True)
+    for tree, one in _contents.items():
+        row.prop_enum(context.area, "ui_type", tree, text=one.name)
 
 
 def _end() -> None:

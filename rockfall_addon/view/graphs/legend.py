@@ -6,6 +6,7 @@ import numpy as np
 from ....core.analysis.graph_layout import Rectangle
 from ....core.analysis.graph_series import Series
 from ....core.colours import SPEED_SCALE
+from ....core.impact_models.registry import MODELS
 from ...scene.comparison import SceneComparison
 from . import drawing
 from .impact_graphs import ImpactGraph
@@ -36,6 +37,9 @@ def draw(
         entries.append((f"{one.series.title}{count}", one.colour, one.shape, one.hollow))
     if compared.impacts is not None and not compared.models:
         entries.append(("no model: choose some in the sidebar (N)", look.faint, "", False))
+    if compared.waiting:
+        names = ", ".join(MODELS[name].title for name in compared.waiting)
+        entries.append((f"preparing {names} …", look.faint, "", False))
     if links and not graph.linked:
         entries.append(("links: of selected impacts only", look.faint, "", False))
     if colours.colouring is not None:

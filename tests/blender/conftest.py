@@ -6,14 +6,21 @@ leave nothing behind: that is looked at whenever it is disabled, at the latest a
 """
 
 import importlib
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 
 import addon_utils
 import bpy
 import numpy as np
 import pytest
+
+sys.path.append(str(Path(__file__).parent))  # what several test files share
+pytest.register_assert_rewrite("two_runs")
+
+from two_runs import scene, slope, table, terrain_file  # noqa: E402, F401
 
 NAME = "bl_ext.user_default.rockfall" if bpy.app.binary_path else "rockfall"
 """The installed extension in a real Blender, the package of the checkout in Blender as a module."""
@@ -198,6 +205,7 @@ def scan(part) -> bpy.types.Scene:
     faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
     shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
     surface = part("core.terrain.surface").Surface(np.column_stack([x, y, z]), faces, shift, "scan", ())
-    scene = bpy.context.scene
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    return scene
+    part("rockfall_addon.scene.terrain").add_terrain(
+        bpy.context.scene, surface, part("core.terrain.shading").shade(surface)
+    )
+    return bpy.context.scene

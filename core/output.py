@@ -58,7 +58,7 @@ def output_folder(path: str | Path) -> Iterator[Path]:
                 yield draft
                 files = [file for file in sorted(draft.rglob("*")) if not file.is_dir() and file != staging / LOCK]
                 for file in files:
-                    with _told(file, _final(file)):
+                    with _told(file, final_path(file)):
                         _sync(file)
                 with uninterrupted(f"{path} is complete"):
                     _move(draft, files, path)
@@ -67,7 +67,7 @@ def output_folder(path: str | Path) -> Iterator[Path]:
                 in_the_way = error.filename is not None and str(error.filename).startswith((str(draft), str(path)))
                 if not in_the_way and error.errno not in FULL:
                     raise
-                place = path if error.filename is None else _final(Path(error.filename))
+                place = path if error.filename is None else final_path(Path(error.filename))
                 raise _refusal("The output cannot be written", error, place) from error
     finally:
         if not complete:
@@ -85,7 +85,7 @@ def output_file(path: str | Path) -> Iterator[Path]:
     InputError : the file cannot be written; the old one, if there is one, is as it was.
     """
     path = Path(path)
-    place = _final(path)
+    place = final_path(path)
     if place != path or (path.exists() and not path.is_file() and not path.is_dir()):  # staged, or a device
         with _told(path, place):
             yield path
@@ -227,7 +227,7 @@ def _refusal(problem: str, error: OSError, place: Path) -> InputError:
     return InputError(f"{problem} ({error.strerror})", file=place, advice=advice)
 
 
-def _final(path: Path) -> Path:
+def final_path(path: Path) -> Path:
     """Where a staged file will be; any other path as it is."""
     for folder in (path, *path.parents):
         if folder.name.startswith(".") and folder.name.endswith(PART) and (folder / LOCK).exists():

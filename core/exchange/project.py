@@ -13,7 +13,7 @@ from typing import Any
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..output import write_text
+from ..output import final_path, write_text
 from ..reading import reader
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
@@ -265,11 +265,11 @@ def write_project(project: Project, path: str | Path) -> None:
     import tomli_w
 
     path = Path(path)
-    folder = path.resolve().parent
+    folder = final_path(path.resolve()).parent
 
     def relative(file: Path) -> str:
         try:
-            return file.resolve().relative_to(folder, walk_up=True).as_posix()
+            return final_path(file.resolve()).relative_to(folder, walk_up=True).as_posix()
         except ValueError:  # another drive
             return file.resolve().as_posix()
 

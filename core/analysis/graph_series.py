@@ -2,7 +2,8 @@
 """The points of a graph by their source: the impacts that were measured here or elsewhere, and those of each model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,10 +37,16 @@ class Series:
     row: Indices
     points: Array
 
-    @property
+    @cached_property
     def defined(self) -> Mask:
         """(n,) points that have a place."""
         return np.asarray(np.isfinite(self.points).all(axis=1))
+
+    @cached_property
+    def corners(self) -> Array:
+        """(2, 2) the least and the greatest of the points that have a place; (0, 2) without one."""
+        points = self.points[self.defined]
+        return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else points
 
 
 def measured_series(impacts: Impacts, x: str, y: str, row: Indices, title: str = "", source: int = 0) -> Series:
@@ -83,11 +90,16 @@ def pair_links(measured: Series, model: Series) -> Array:
 
 def whole_limits(series: Sequence[Series], log: tuple[bool, bool]) -> tuple[Limits, Limits]:
     """Round limits of both axes that hold all points."""
-    points = np.concatenate([np.empty((0, 2)), *(one.points[one.defined] for one in series)])
-    seen = np.ones(len(points), dtype=np.bool_)
-    for i, wanted in enumerate(log):
-        seen &= (points[:, i] > 0) | (not wanted)
-    return axis_limits(points[seen, 0], log[0]), axis_limits(points[seen, 1], log[1])
+    points = np.concatenate([np.empty((0, 2)), *(_corners(one, log) for one in series)])
+    return axis_limits(points[:, 0], log[0]), axis_limits(points[:, 1], log[1])
+
+
+def _corners(series: Series, log: tuple[bool, bool]) -> Array:
+    """`Series.corners` of the points that have a place on such axes."""
+    if not any(log):
+        return series.corners
+    seen = ((series.points > 0) | ~np.array(log)).all(axis=1)
+    return replace(series, row=series.row[seen], points=series.points[seen]).corners
 
 
 def usual_limits(spec: GraphSpec, whole: tuple[Limits, Limits]) -> tuple[Limits, Limits]:

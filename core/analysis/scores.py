@@ -59,11 +59,16 @@ def scores(
     predictions: Predictions,
     quantities: Iterable[str] = tuple(ABSCISSA),
     kept: Mask | None = None,
+    *,
+    distances: bool = True,
 ) -> tuple[Score, ...]:
-    """All models and some quantities, by default all of `ABSCISSA`; of the impacts (n,) that are kept, None for all."""
+    """All models and some quantities, by default all of `ABSCISSA`; of the impacts (n,) that are kept, None for all.
+
+    distances : whether those between distributions and clouds are wanted, which take longest; NaN where they are not.
+    """
     row, quantities = predictions.row, tuple(quantities)
     return tuple(
-        _score(model, i, quantity, impacts, predictions, kept)
+        _score(model, i, quantity, impacts, predictions, kept, distances)
         for i, model in enumerate(predictions.models)
         for quantity in quantities
         if row.size
@@ -107,7 +112,9 @@ def _drawn(runs: Array) -> Array:
     return runs[1:] if len(runs) > 1 else runs
 
 
-def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions, kept: Mask | None) -> Score:
+def _score(
+    model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions, kept: Mask | None, distances: bool
+) -> Score:
     from scipy.stats import wasserstein_distance
 
     y, runs, x, x_runs = _pairs(i, quantity, impacts, predictions, kept)
@@ -125,8 +132,10 @@ def _score(model: str, i: int, quantity: str, impacts: Impacts, predictions: Pre
         float(np.median(np.abs(error))),
         _coverage(y, draws, *HALF) if predictions.replicates else np.nan,
         _coverage(y, draws, *MOST) if predictions.replicates else np.nan,
-        float(wasserstein_distance(y, draws.ravel())),
-        energy_distance(np.stack([x, y], axis=1), np.stack([x_draws.ravel(), draws.ravel()], axis=1)),
+        float(wasserstein_distance(y, draws.ravel())) if distances else np.nan,
+        energy_distance(np.stack([x, y], axis=1), np.stack([x_draws.ravel(), draws.ravel()], axis=1))
+        if distances
+        else np.nan,
     )
 
 

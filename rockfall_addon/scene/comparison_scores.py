@@ -20,7 +20,11 @@ from .comparison import SceneComparison
 Filtered = tuple[str, bytes]
 """A quantity, and which impacts pass the filters; no bytes for all."""
 
+DISTANCES = ("wasserstein", "energy_distance")
+"""Measures that are computed only where they are shown: they take as long as a picture may."""
+
 _known: WeakKeyDictionary[Predictions, dict[Filtered, Score]] = WeakKeyDictionary()
+_without_distances: WeakKeyDictionary[Predictions, dict[Filtered, Score]] = WeakKeyDictionary()
 _errors: WeakKeyDictionary[Predictions, dict[Filtered, float]] = WeakKeyDictionary()
 
 
@@ -38,12 +42,16 @@ class Ranked:
         return MODELS[self.model].title
 
 
-def score_of(impacts: Impacts, predictions: Predictions, quantity: str, kept: Mask | None = None) -> Score:
-    """The score of the predictions of one model, of the impacts (n,) that are kept; None for all."""
-    known, key = _known.setdefault(predictions, {}), _key(quantity, kept)
+def score_of(impacts: Impacts, predictions: Predictions, quantity: str, kept: Mask | None, *, distances: bool) -> Score:
+    """The score of the predictions of one model, of the impacts (n,) that are kept; None for all.
+
+    distances : as in `scores`.
+    """
+    known = (_known if distances else _without_distances).setdefault(predictions, {})
+    key = _key(quantity, kept)
     if key not in known:
         _forget_filtered(known)
-        known[key] = scores(impacts, predictions, [quantity], kept)[0]
+        known[key] = scores(impacts, predictions, [quantity], kept, distances=distances)[0]
     return known[key]
 
 
@@ -80,8 +88,9 @@ def ranking(scene: bpy.types.Scene, comparison: SceneComparison, kept: Mask | No
     impacts = comparison.impacts
     if impacts is None:
         return []
+    distances = settings.measure in DISTANCES
     rows = [
-        Ranked(which, model, score_of(impacts, predictions, settings.quantity, kept))
+        Ranked(which, model, score_of(impacts, predictions, settings.quantity, kept, distances=distances))
         for which, of_model in comparison.predictions.items()
         for model, predictions in of_model.items()
         if predictions.row.size

@@ -81,10 +81,19 @@ def write_location_keys(obj: bpy.types.Object, keys: Keys, rate: float, *, in_pl
     frames = keys.time_s * rate
     same = np.flatnonzero(np.diff(frames) < JUMP_FRAMES) + 1  # a jump: two positions at one time
     frames[same] += JUMP_FRAMES
-    third = np.diff(frames) / 3
     count = len(frames)
     if in_place and [len(curve.keyframe_points) for curve in location_curves(obj)] != [count] * 3:
         return False
+    co = np.empty((3, count, 2), dtype=np.float64)
+    co[:, :, 0], co[:, :, 1] = frames, keys.position.T
+    third = np.diff(frames) / 3
+    left, right = co.copy(), co.copy()
+    right[:, :-1, 0] += third
+    right[:, :-1, 1] += third / rate * keys.velocity_after[:-1].T
+    left[:, 1:, 0] -= third
+    left[:, 1:, 1] -= third / rate * keys.velocity_before[1:].T
+    co, left, right = (values.astype(np.float32).reshape(3, -1) for values in (co, left, right))  # as Blender has them
+    free = np.zeros(count, dtype=np.int32)
     interpolation = np.where(keys.held, CONSTANT, BEZIER).astype(np.int32)
     bag = _channelbag(obj)
     for axis in range(3):
@@ -93,15 +102,11 @@ def write_location_keys(obj: bpy.types.Object, keys: Keys, rate: float, *, in_pl
         if len(points) != count:
             points.clear()
             points.add(count)
-        value = keys.position[:, axis]
-        left, right = np.column_stack([frames, value]), np.column_stack([frames, value])
-        right[:-1] += np.column_stack([third, third / rate * keys.velocity_after[:-1, axis]])
-        left[1:] -= np.column_stack([third, third / rate * keys.velocity_before[1:, axis]])
-        points.foreach_set("co", np.column_stack([frames, value]).ravel())
-        points.foreach_set("handle_left_type", np.zeros(count, dtype=np.int32))
-        points.foreach_set("handle_right_type", np.zeros(count, dtype=np.int32))
-        points.foreach_set("handle_left", left.ravel())
-        points.foreach_set("handle_right", right.ravel())
+        points.foreach_set("co", co[axis])
+        points.foreach_set("handle_left_type", free)
+        points.foreach_set("handle_right_type", free)
+        points.foreach_set("handle_left", left[axis])
+        points.foreach_set("handle_right", right[axis])
         points.foreach_set("interpolation", interpolation)
         curve.update()
     return True
@@ -112,13 +117,14 @@ def write_visibility_keys(obj: bpy.types.Object, spans_s: Sequence[tuple[float, 
     bag = _channelbag(obj)
     changes = [(-1.0, 1.0)] + [change for start, end in spans_s for change in ((start, 0.0), (end, 1.0))]
     changes[0] = (min(-1.0, changes[1][0] - 1.0) if spans_s else -1.0, 1.0)
+    co = (np.array(changes) * (rate, 1.0)).astype(np.float32).ravel()
     for name in ("hide_viewport", "hide_render"):
         curve = bag.fcurves.find(name) or bag.fcurves.new(name)
         points = curve.keyframe_points
         if len(points) != len(changes):
             points.clear()
             points.add(len(changes))
-        points.foreach_set("co", [value for time, hidden in changes for value in (time * rate, hidden)])
+        points.foreach_set("co", co)
         points.foreach_set("interpolation", np.full(len(changes), CONSTANT, dtype=np.int32))
         curve.update()
 

@@ -69,7 +69,7 @@ def _from_0(scene: bpy.types.Scene) -> None:
             timing.keep_offsets(scene, timing.offsets_of(scene, picks.picks_of(scene)))
         except RockfallError:  # two picks at one time: the panel will say so
             timing.keep_offsets(scene, {})
-    if store.with_role(scene, store.BLOCK_ROLE):
+    if store.has_role(scene, store.BLOCK_ROLE):
         trajectories.block_mesh()
     if materials.TRAIL_GROUP in bpy.data.node_groups:
         materials.trail_group()

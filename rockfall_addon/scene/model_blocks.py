@@ -29,23 +29,22 @@ def show(
     keep_blocks : those that are not needed now are hidden, not removed: more may be needed in a moment.
     """
     begin_s = _begins(predicted, offsets)
-    reals = {obj[store.TRAJECTORY]: obj for obj in store.with_role(scene, store.BLOCK_ROLE)}
-    there = {_name_of(obj): obj for obj in store.with_role(scene, store.MODEL_BLOCK_ROLE)}
-    curves = {obj[store.MODEL]: obj for obj in store.with_role(scene, store.MODEL_FLIGHTS_ROLE)}
-    rate = timing.keyed_rate(scene)
+    real, blocks, flights = store.by_role(scene, store.BLOCK_ROLE, store.MODEL_BLOCK_ROLE, store.MODEL_FLIGHTS_ROLE)
+    reals, there = {obj[store.TRAJECTORY]: obj for obj in real}, {_name_of(obj): obj for obj in blocks}
+    curves, rate = {obj[store.MODEL]: obj for obj in flights}, timing.keyed_rate(scene)
     for model in predicted.models:
         which = np.flatnonzero((predicted.model == model) & (predicted.duration_s > 0))
         _show_flights(scene, model, predicted, which, begin_s, curves.get(model))
-        used = set()
-        for name, own in _by_trajectory(predicted, which).items():
-            if name not in reals:
-                continue
-            for number, lane in enumerate(_lanes(begin_s[own], predicted.duration_s[own])):
-                key = model, name, number
-                block = there.get(key) or _new_block(scene, *key)
-                _key_block(block, reals[name], predicted, own[lane], begin_s, rate)
-                used.add(key)
-        spare = [obj for key, obj in there.items() if key[0] == model and key not in used]
+        lanes = {
+            (model, name, number): own[lane]
+            for name, own in _by_trajectory(predicted, which).items()
+            if name in reals
+            for number, lane in enumerate(_lanes(begin_s[own], predicted.duration_s[own]))
+        }
+        for (key, lane), keys in zip(lanes.items(), _keys(predicted, list(lanes.values()), begin_s), strict=True):
+            block = there.get(key) or _new_block(scene, *key)
+            _key_block(block, reals[key[1]], keys, begin_s[lane], predicted.duration_s[lane], rate)
+        spare = [obj for key, obj in there.items() if key[0] == model and key not in lanes]
         if keep_blocks:
             for obj in spare:
                 keyframes.write_visibility_keys(obj, [], rate)
@@ -127,31 +126,31 @@ def _new_block(scene: bpy.types.Scene, model: str, trajectory: str, number: int)
 
 
 def _key_block(
-    obj: bpy.types.Object,
-    real: bpy.types.Object,
-    predicted: PredictedFlights,
-    which: Indices,
-    begin_s: Array,
-    rate: float,
+    obj: bpy.types.Object, real: bpy.types.Object, keys: keyframes.Keys, begin_s: Array, duration_s: Array, rate: float
 ) -> None:
-    """Let a block fly the flights `which`, which follow each other without overlap."""
+    """Let a block fly flights that follow each other without overlap."""
     if obj.scale != real.scale or obj.delta_location != real.delta_location:
         obj.scale, obj.delta_location = real.scale, real.delta_location
-    keyframes.write_location_keys(obj, _keys(predicted, which, begin_s), rate)
-    ends = begin_s[which] + predicted.duration_s[which] + LINGER_S
-    ends[:-1] = np.minimum(ends[:-1], begin_s[which[1:]])
-    keyframes.write_visibility_keys(obj, list(zip(begin_s[which].tolist(), ends.tolist(), strict=True)), rate)
+    keyframes.write_location_keys(obj, keys, rate)
+    ends = begin_s + duration_s + LINGER_S
+    ends[:-1] = np.minimum(ends[:-1], begin_s[1:])
+    keyframes.write_visibility_keys(obj, list(zip(begin_s.tolist(), ends.tolist(), strict=True)), rate)
 
 
-def _keys(predicted: PredictedFlights, which: Indices, begin_s: Array) -> keyframes.Keys:
-    """Of each flight its ends, which make the parabola; with drag, more of them."""
+def _keys(predicted: PredictedFlights, lanes: list[Indices], begin_s: Array) -> list[keyframes.Keys]:
+    """Keys of each lane: of each flight its ends, which make the parabola; with drag, more of them."""
+    if not lanes:
+        return []
+    which = np.concatenate(lanes)
     dragged = predicted.launches.drag_per_m[which] > 0
     count, clock = trails.parts(predicted.duration_s[which], np.where(dragged, keyframes.DRAG_KEY_STEP_S, np.inf))
     flight = np.repeat(which, count)
     position, velocity = predicted.launches.states(flight, clock)
     held = np.zeros(flight.size, dtype=np.bool_)
     held[np.cumsum(count) - 1] = True
-    return keyframes.Keys(begin_s[flight] + clock, position, velocity, velocity, held)
+    cuts = np.cumsum(count)[np.cumsum([lane.size for lane in lanes])[:-1] - 1]
+    parts = (np.split(values, cuts) for values in (begin_s[flight] + clock, position, velocity, velocity, held))
+    return [keyframes.Keys(*part) for part in zip(*parts, strict=True)]
 
 
 def _lanes(begin_s: Array, duration_s: Array) -> list[list[int]]:

@@ -24,7 +24,7 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         return NextStep(migration.warning(scene))
     camera = videos.active_camera(scene)
     picks = store.with_role(scene, store.PICK_ROLE)
-    if not store.with_role(scene, store.TERRAIN_ROLE) and not picks:
+    if not store.has_role(scene, store.TERRAIN_ROLE) and not picks:
         demos = ("rockfall.load_footage_demo", "rockfall.load_demo")
         own = ("rockfall.import_terrain", "rockfall.open_project")
         return NextStep("Import your scan, or begin with a demo.", (*demos, *own))
@@ -32,7 +32,7 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         sentence = "The scan was moved, so nothing on it fits any more. Put it back; panel Terrain says how far it is."
         return NextStep(sentence, ("rockfall.put_terrain_back",))
     if camera is None and not picks:
-        if store.with_role(scene, store.SIMULATED_BLOCKS_ROLE):
+        if store.has_role(scene, store.SIMULATED_BLOCKS_ROLE):
             sentence = "Play the simulated fall; step 7 has the numbers of each run."
             return NextStep(sentence, ("screen.animation_play", "rockfall.select_run"))
         sentence = "Add the videos of the fall, or import a table of timed picks. Without either, simulate in step 7."

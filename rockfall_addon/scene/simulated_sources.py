@@ -29,7 +29,7 @@ SAME_TIME_S = 1e-6
 def missing(scene: bpy.types.Scene) -> str:
     """What the chosen source still needs, in a sentence; empty when all is there."""
     settings = scene.rockfall_simulation
-    if settings.source in FILMED and not store.with_role(scene, store.PICK_ROLE):
+    if settings.source in FILMED and not store.has_role(scene, store.PICK_ROLE):
         return "Nothing is measured yet. Release blocks from a drawn line or area, from steep terrain, or pick first."
     if settings.source == "PICK" and selected_pick(scene) is None:
         return "Select a release or an impact in the view: blocks will start there."

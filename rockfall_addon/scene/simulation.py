@@ -115,7 +115,7 @@ def show_prepared(
     scene: bpy.types.Scene, prepared: Sequence[Prepared], origins: Mapping[str, Origin] | None = None
 ) -> list[bpy.types.Object]:
     """`show` what was prepared before."""
-    if not (store.with_role(scene, store.FLIGHTS_ROLE) or blocks_of(scene)):
+    if not (store.has_role(scene, store.FLIGHTS_ROLE) or blocks_of(scene)):
         _choose_sizes(scene.rockfall, prepared)
     remove(scene)
     if store.KEYED_RATE not in scene:  # nothing is measured: time begins at frame 0

@@ -159,7 +159,7 @@ def missing(scene: bpy.types.Scene) -> str:
         return "Blocks fall on the terrain: import it first, in step 1."
     if not settings.models:
         return "Choose at least one model."
-    if "observed" in settings.models and not store.with_role(scene, store.PICK_ROLE):
+    if "observed" in settings.models and not store.has_role(scene, store.PICK_ROLE):
         return "The model of measured rebounds needs measured impacts: pick some, or leave it out."
     return simulated_sources.missing(scene) or structures.problem(scene)
 

@@ -116,6 +116,21 @@ def with_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
     return sorted((o for o in scene.objects if o.get(ROLE) == role), key=lambda o: o.name)
 
 
+def has_role(scene: bpy.types.Scene, role: str) -> bool:
+    """Whether the scene has an object of a role: quicker than to list them, for what is asked at every redraw."""
+    return any(o.get(ROLE) == role for o in scene.objects)
+
+
+def by_role(scene: bpy.types.Scene, *roles: str) -> list[list[bpy.types.Object]]:
+    """The scene's objects of each of some roles, in the order of the scene."""
+    found: dict[str, list[bpy.types.Object]] = {role: [] for role in roles}
+    for obj in scene.objects:
+        role = obj.get(ROLE)
+        if role in found:
+            found[role].append(obj)
+    return list(found.values())
+
+
 def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
     """The collection at a path below "Rockfall", created where it is missing."""
     parent = scene.collection

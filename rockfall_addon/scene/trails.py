@@ -140,7 +140,7 @@ def paint_observed(
     objects : None for all.
     plain : in the blocks' colour in any case.
     """
-    plain = plain or bool(store.with_role(scene, store.MODEL_FLIGHTS_ROLE)) or beside_models(scene)
+    plain = plain or store.has_role(scene, store.MODEL_FLIGHTS_ROLE) or beside_models(scene)
     for obj in store.with_role(scene, store.FLIGHTS_ROLE) if objects is None else objects:
         mesh = obj.data
         if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
@@ -159,7 +159,7 @@ def beside_models(scene: bpy.types.Scene) -> bool:
     """Whether simulated paths are shown in the colours of their models, so that colours do not mean speeds."""
     settings = scene.rockfall_simulation
     coloured = settings.show_paths and settings.colour_by == "MODEL"
-    return coloured and bool(store.with_role(scene, store.SIMULATED_PATHS_ROLE))
+    return coloured and store.has_role(scene, store.SIMULATED_PATHS_ROLE)
 
 
 def set_tops(scene: bpy.types.Scene) -> bool:

@@ -38,7 +38,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     settings = scene.rockfall
     timing.follow_frame_rate(scene)
     scene[store.KEYED_RATE] = timing.frame_rate(scene)
-    first = not store.with_role(scene, store.FLIGHTS_ROLE)
+    first = not store.has_role(scene, store.FLIGHTS_ROLE)
     if first:
         _choose_sizes(settings, result)
     offsets = timing.offsets_of(scene, result.picks)
@@ -58,7 +58,7 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     impact_rows.fill(scene)
     scene.frame_start = 0
     end = int(np.ceil((last + 1.0) * timing.frame_rate(scene)))
-    filmed = bool(store.with_role(scene, store.CAMERA_ROLE))  # a video may go on after the last pick
+    filmed = store.has_role(scene, store.CAMERA_ROLE)  # a video may go on after the last pick
     scene.frame_end = max(end, scene.frame_end) if filmed else end
     if first and not filmed:
         scene.frame_set(0)

@@ -203,6 +203,6 @@ def _keep_events(camera: bpy.types.Object, events: dict[int, float]) -> None:
 
 def _shown_again(scene: bpy.types.Scene) -> None:
     fit_range(scene)
-    if store.with_role(scene, store.PICK_ROLE):
+    if store.has_role(scene, store.PICK_ROLE):
         reconstruction.refresh(scene)
     footage.follow(scene)

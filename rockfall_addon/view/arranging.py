@@ -41,7 +41,7 @@ def _arrange() -> None:
         workspace.show_tab(window.screen)
         with bpy.context.temp_override(window=window):
             workspace.look_through_footage(window.scene, window.screen)
-            if store.with_role(window.scene, store.TERRAIN_ROLE):
+            if store.has_role(window.scene, store.TERRAIN_ROLE):
                 look.show_relief(bpy.context, frame_all=True)
             workspace.fit_footage(window.scene, window.screen)
             workspace.take_pick_tool(window.scene, window.screen)

@@ -27,7 +27,7 @@ class RockfallPanel:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return not cls.needs or bool(store.with_role(context.scene, cls.needs))
+        return not cls.needs or store.has_role(context.scene, cls.needs)
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State | None:

@@ -47,7 +47,7 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return possible(
             cls,
-            store.with_role(context.scene, store.FLIGHTS_ROLE),
+            store.has_role(context.scene, store.FLIGHTS_ROLE),
             "There are no trajectories to film: import picks first",
         )
 

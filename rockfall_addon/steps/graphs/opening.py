@@ -73,7 +73,7 @@ def _arrange() -> None:
             if area.ui_type == editor.IMPACTS:
                 area.ui_type = "VIEW_3D"
         areas.show_largest(window, editor.IMPACTS, OWN_SHARE)
-        if store.with_role(window.scene, store.TERRAIN_ROLE):
+        if store.has_role(window.scene, store.TERRAIN_ROLE):
             with bpy.context.temp_override(window=window):
                 look.show_relief(bpy.context, frame_all=True)
 

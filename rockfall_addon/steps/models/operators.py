@@ -30,10 +30,10 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not store.with_role(context.scene, store.PICK_ROLE):
+        if not store.has_role(context.scene, store.PICK_ROLE):
             cls.poll_message_set("Import picks first, or load the demo")
             return False
-        if not store.with_role(context.scene, store.TERRAIN_ROLE):
+        if not store.has_role(context.scene, store.TERRAIN_ROLE):
             cls.poll_message_set("The blocks of the models land on the terrain: import one first")
             return False
         return True

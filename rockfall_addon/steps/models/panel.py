@@ -19,7 +19,7 @@ class ROCKFALL_PT_models(RockfallPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         scene = context.scene
-        return bool(store.with_role(scene, store.FLIGHTS_ROLE) and store.with_role(scene, store.TERRAIN_ROLE))
+        return store.has_role(scene, store.FLIGHTS_ROLE) and store.has_role(scene, store.TERRAIN_ROLE)
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

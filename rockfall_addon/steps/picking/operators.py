@@ -265,7 +265,7 @@ class PickTool(bpy.types.WorkSpaceTool):
     @staticmethod
     def is_needed(context: bpy.types.Context) -> bool:
         """Whether there is a slope to pick on."""
-        return bool(store.with_role(context.scene, store.TERRAIN_ROLE))
+        return store.has_role(context.scene, store.TERRAIN_ROLE)
 
     @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:

@@ -15,7 +15,7 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
-        if not store.with_role(context.scene, store.PICK_ROLE):
+        if not store.has_role(context.scene, store.PICK_ROLE):
             return "TO_DO"
         return "ATTENTION" if problems.remarks(context.scene) else "READY"
 
@@ -24,7 +24,7 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
         picks = store.with_role(scene, store.PICK_ROLE)
         flights = store.with_role(scene, store.FLIGHTS_ROLE)
         if not picks:
-            with_video = bool(store.with_role(scene, store.CAMERA_ROLE))
+            with_video = store.has_role(scene, store.CAMERA_ROLE)
             way = "Click the block at its impacts in the footage, or import" if with_video else "Import"
             advise(context, layout, False, f"{way} a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
@@ -101,7 +101,7 @@ class ROCKFALL_PT_tracking(RockfallPanel, bpy.types.Panel):
 
 
 def _advice(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> tuple[bool, str]:
-    if not store.with_role(scene, store.TERRAIN_ROLE):
+    if not store.has_role(scene, store.TERRAIN_ROLE):
         return False, "Import the terrain first: picks lie on it."
     if camera is None:
         return True, "Without a video, picks go on the terrain in the 3-D view, at the time of the timeline."

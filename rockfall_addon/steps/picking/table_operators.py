@@ -47,7 +47,7 @@ class ROCKFALL_OT_reconstruct(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, store.with_role(context.scene, store.PICK_ROLE), "Import picks first, or load the demo")
+        return possible(cls, store.has_role(context.scene, store.PICK_ROLE), "Import picks first, or load the demo")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -28,7 +28,7 @@ def _draw() -> None:
     settings = scene.rockfall
     if not (settings.show_legend and context.space_data.overlay.show_overlays):
         return
-    if not store.with_role(scene, store.FLIGHTS_ROLE):
+    if not store.has_role(scene, store.FLIGHTS_ROLE):
         return
     scale = context.preferences.system.ui_scale
     left = legend.MARGIN * scale + legend.covered_left(context.area)

@@ -53,7 +53,7 @@ class ROCKFALL_OT_export_graphs(bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return possible(
             cls,
-            store.with_role(context.scene, store.PICK_ROLE) or editor.content_of(context) is not None,
+            store.has_role(context.scene, store.PICK_ROLE) or editor.content_of(context) is not None,
             "There is nothing in the graphs: import picks first, or load the demo",
         )
 

@@ -27,7 +27,7 @@ class _IntoFolder:
     def poll(cls, context: bpy.types.Context) -> bool:
         return possible(
             cls,
-            store.with_role(context.scene, store.PICK_ROLE),
+            store.has_role(context.scene, store.PICK_ROLE),
             "There is nothing to export: import picks first, or load the demo",
         )
 
@@ -95,7 +95,7 @@ class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        there = any(store.with_role(context.scene, role) for role in (store.PICK_ROLE, store.TERRAIN_ROLE))
+        there = any(store.has_role(context.scene, role) for role in (store.PICK_ROLE, store.TERRAIN_ROLE))
         return possible(cls, there, "There is nothing to export: import a terrain or picks first, or load the demo")
 
     @reported

@@ -14,7 +14,7 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return any(store.with_role(context.scene, role) for role in (store.PICK_ROLE, store.TERRAIN_ROLE))
+        return any(store.has_role(context.scene, role) for role in (store.PICK_ROLE, store.TERRAIN_ROLE))
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:

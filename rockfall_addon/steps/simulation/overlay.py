@@ -153,7 +153,7 @@ def _draw_legend() -> None:
     if settings.colour_by == "MODEL" or not settings.show_paths:
         models = [(MODELS[simulation.model_of(obj)], len(obj.data.curves)) for obj in objects]
         rows = [(f"{model.title}: {count}", model.colour) for model, count in models]
-        if store.with_role(scene, store.BLOCK_ROLE):
+        if store.has_role(scene, store.BLOCK_ROLE):
             rows.insert(0, ("measured", MEASURED_COLOUR))
         legend.swatches(left, scale, rows, "Simulated blocks")
     elif settings.colour_by == "SPEED":

@@ -19,7 +19,7 @@ class ROCKFALL_PT_simulation(RockfallPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         roles = (store.TERRAIN_ROLE, store.SIMULATED_BLOCKS_ROLE)  # what is shown can be removed without a terrain
-        return any(store.with_role(context.scene, role) for role in roles)
+        return any(store.has_role(context.scene, role) for role in roles)
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
@@ -209,7 +209,7 @@ def _draw_source(context: bpy.types.Context, layout: bpy.types.UILayout, setting
         column.prop(settings, "steeper_than_deg")
     elif settings.source == "DRAWN":
         column.prop(settings, "drawn", text="")
-    if settings.source == "DRAWN" or not store.with_role(context.scene, store.PICK_ROLE):
+    if settings.source == "DRAWN" or not store.has_role(context.scene, store.PICK_ROLE):
         row = column.row(align=True)
         for kind, text, icon in (
             ("line", "Line", "IPO_LINEAR"), ("polygon", "Area", "MESH_PLANE"), ("points", "Points", "DOT"),

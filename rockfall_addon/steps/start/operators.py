@@ -28,7 +28,7 @@ class _IntoEmptyScene:
     def poll(cls, context: bpy.types.Context) -> bool:
         return possible(
             cls,
-            not store.with_role(context.scene, store.TERRAIN_ROLE),
+            not store.has_role(context.scene, store.TERRAIN_ROLE),
             "This scene has a terrain already: begin a new scene or file first",
         )
 

@@ -230,7 +230,7 @@ class ROCKFALL_OT_put_terrain_back(bpy.types.Operator):
 
 
 def _has_terrain(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    return possible(cls, store.with_role(context.scene, store.TERRAIN_ROLE), "Import a terrain first")
+    return possible(cls, store.has_role(context.scene, store.TERRAIN_ROLE), "Import a terrain first")
 
 
 class ROCKFALL_FH_terrain(bpy.types.FileHandler):

@@ -15,7 +15,7 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
         scene = context.scene
-        if not store.with_role(scene, store.TERRAIN_ROLE):
+        if not store.has_role(scene, store.TERRAIN_ROLE):
             return "ATTENTION" if scene.get(store.GROUND) else "TO_DO"
         return "ATTENTION" if terrain.warnings(scene) else "READY"
 

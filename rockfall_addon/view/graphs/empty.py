@@ -52,7 +52,7 @@ def nothing(scene: bpy.types.Scene, compared: SceneComparison, kept: list[Mask])
         )
     if compared.problems:
         return Said("There are no impacts to show", " ".join(compared.problems))
-    if store.with_role(scene, store.PICK_ROLE):
+    if store.has_role(scene, store.PICK_ROLE):
         return Said(
             "There are no impacts yet",
             "Picks alone have no velocities: it takes two picks of one block for a flight, and three for an impact "

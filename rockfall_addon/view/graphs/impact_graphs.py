@@ -4,6 +4,7 @@
 A graph's points are placed along axes that hold them all; zooming and panning change a matrix, not the batches.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import bpy
@@ -59,7 +60,8 @@ class Drawn:
     links : from the measured points, for a model.
     curve : fitted; its batch `line`.
     start : place of its first point among all of the graph.
-    key : all that it depends on.
+    made_of : all that the series depends on.
+    key : all that the rest depends on.
     """
 
     series: Series
@@ -71,6 +73,7 @@ class Drawn:
     curve: Curve | None
     line: Lines | None
     start: int
+    made_of: object
     key: object
 
 
@@ -243,7 +246,7 @@ class Source:
     ----------
     series, colour, shape, hollow : as in `Drawn`.
     shades : (n, 3) colours of the single points; None for the colour of the source.
-    made_of : what the points come from; compared by identity.
+    made_of : what the points come from, compared by identity, and what is shown of that.
     """
 
     series: Series
@@ -251,7 +254,7 @@ class Source:
     shape: str
     hollow: bool
     shades: Array | None
-    made_of: tuple[object, ...]
+    made_of: object
 
 
 def build(
@@ -270,16 +273,16 @@ def build(
     before : the graph as it was; what has not changed of it stays, so that a slider moves the points of its model only.
     """
     settings = scene.rockfall_graphs
-    sources = _sources(spec, compared, kept, colours, look)
+    known = [] if before is None else before.drawn
+    sources = _sources(spec, compared, kept, filters, colours, look, known)
     whole = whole_limits([one.series for one in sources], (spec.x_log, spec.y_log))
     x, y = axis_of(spec.x, whole[0], spec.x_log), axis_of(spec.y, whole[1], spec.y_log)
     own = next((one.series for one in sources if not one.series.model and one.series.source == 0), None)
-    known = [] if before is None else before.drawn
     few = sum(len(one.series.points) for one in sources if one.series.model) <= MOST_LINKS
     found, pieces, start = [], [np.empty((0, 2), dtype=np.float32)], 0
     for one in sources:
         how = spec.fitted, settings.links and few, settings.fits, one.colour, one.shape, one.hollow
-        key = (*one.made_of, filters, compared.runs, x, y, *how)
+        key = (one.made_of, x, y, *how)
         same = next((each for each in known if each.key == key), None)
         if same is not None and before is not None:
             found.append(replace(same, start=start))
@@ -321,35 +324,52 @@ def _drawn(
     if curve is not None and curve.is_fitted:
         line = Lines(np.stack([x.places(curve.x), y.places(curve.y)], axis=1))
     points = Points(places, shades, opacity, one.shape)
-    return Drawn(series, one.colour, one.shape, one.hollow, points, links, curve, line, start, key)
+    return Drawn(series, one.colour, one.shape, one.hollow, points, links, curve, line, start, one.made_of, key)
 
 
 def _sources(
-    spec: GraphSpec, compared: SceneComparison, kept: list[Mask], colours: PointColours, look: Look
+    spec: GraphSpec,
+    compared: SceneComparison,
+    kept: list[Mask],
+    filters: object,
+    colours: PointColours,
+    look: Look,
+    known: list[Drawn],
 ) -> list[Source]:
-    """What is to be drawn; what is on top comes last."""
+    """What is to be drawn; what is on top comes last.
+
+    known : what was drawn before, whose series are used again where nothing of them has changed.
+    """
     found: list[Source] = []
+    shown = spec.x, spec.y, filters, compared.runs
+
+    def series_of(made_of: object, make: Callable[..., Series], *given: object) -> Series:
+        same = next((one.series for one in known if one.made_of == made_of), None)
+        return make(*given) if same is None else same
+
     impacts, several = compared.impacts, len(compared.predictions) > 1
     hues = model_colours(compared.models, with_blocks=bool(compared.in_view))
     for i, other in enumerate(compared.others):
         if other.impacts is not None:
             rows = np.flatnonzero(kept[i + 1])
             title = ", ".join(other.sites[:3]) or other.path.name
-            series = measured_series(other.impacts, spec.x, spec.y, rows, title, i + 1)
+            made_of = other.impacts, i, title, colours, shown
+            series = series_of(made_of, measured_series, other.impacts, spec.x, spec.y, rows, title, i + 1)
             grey = mixed(look.plot, look.measured, 0.6)
-            made_of = other.impacts, colours
             found.append(Source(series, grey, "circle", True, colours.of(i + 1, rows), made_of))
     if impacts is not None:
         for which, predictions in compared.predictions.items():
             for model, predicted in predictions.items():
                 title = f"{MODELS[model].title}{f', {which}' if several else ''}"
-                series = model_series(impacts, predicted, model, compared.runs, spec.x, spec.y, kept[0], title)
+                made_of = impacts, predicted, title, shown
+                given = impacts, predicted, model, compared.runs, spec.x, spec.y, kept[0], title
+                series = series_of(made_of, model_series, *given)
                 hollow = several and which == "B"
                 colour = readable(hues[model], look)
-                found.append(Source(series, colour, model_shape(model), hollow, None, (impacts, predicted, title)))
-        rows = np.flatnonzero(kept[0])
-        series = measured_series(impacts, spec.x, spec.y, rows, "measured")
-        found.append(Source(series, look.measured, "circle", False, colours.of(0, rows), (impacts, colours)))
+                found.append(Source(series, colour, model_shape(model), hollow, None, made_of))
+        rows, made_of = np.flatnonzero(kept[0]), (impacts, colours, shown)
+        series = series_of(made_of, measured_series, impacts, spec.x, spec.y, rows, "measured")
+        found.append(Source(series, look.measured, "circle", False, colours.of(0, rows), made_of))
     return found
 
 

@@ -176,7 +176,7 @@ def _nothing(scene: bpy.types.Scene, found: motion.SceneMotion, quantities: tupl
         return empty.Said(f"Nothing is known of: {lacking}", advice)
     if found.problems:
         return empty.Said("There is no motion to show", " ".join(found.problems))
-    if store.with_role(scene, store.PICK_ROLE):
+    if store.has_role(scene, store.PICK_ROLE):
         return empty.Said("There is no motion yet", "It takes two picks of one block. Pick its next impact in step 4.")
     step = next_step.next_step(scene)
     return empty.Said(

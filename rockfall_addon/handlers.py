@@ -18,7 +18,7 @@ from .scene import (
     timing,
     video_files,
 )
-from .view import job
+from .view import job, strip
 from .view.graphs import editor, impact_sheet, motion_sheet, selection
 
 _owner = object()
@@ -58,6 +58,7 @@ def _loaded(_path: str, _unused: object = None) -> None:
     motion_sheet.forget()
     motion.forget()
     selection.forget()
+    strip.forget()
     _listen()  # subscriptions do not survive loading
     _catch_up()
 
@@ -113,6 +114,7 @@ def _selected_otherwise() -> None:
     """Graphs show what is selected in the scene."""
     selection.notice()
     graph_settings.redraw()
+    strip.redraw()
 
 
 def _keep_rate(scene: bpy.types.Scene) -> None:

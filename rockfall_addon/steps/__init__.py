@@ -18,6 +18,7 @@ STEPS = (
     "alignment",
     "picking",
     "impacts",
+    "strip",
     "refinement",
     "models",
     "comparison",

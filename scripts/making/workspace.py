@@ -20,7 +20,7 @@ import bpy
 
 OUT = Path(__file__).resolve().parents[2] / "assets" / "workspace.blend"
 NAME, KEY = "Rockfall", "rockfall_workspace"  # as rockfall_addon/view/workspace.py knows them
-CAMERA_SHARE, TIMELINE_SHARE = 0.66, 0.13
+CAMERA_SHARE, TIMELINE_SHARE = 0.66, 0.18
 SIDEBAR = 300  # width at interface scale 1 [px]
 SETTLE_S = 0.4
 

@@ -22,9 +22,10 @@ OVER_GRAPHS = {
     "rockfall.zoom_graph", "rockfall.pan_graph", "rockfall.reset_graphs", "rockfall.show_all_points",
     "rockfall.maximise_graph", "rockfall.select_in_graphs", "rockfall.colour_graphs", "rockfall.add_graph_filter",
     "rockfall.filter_graph_text", "rockfall.remove_graph_filter", "rockfall.clear_graph_filters",
-    "rockfall.press_in_motion", "rockfall.test_groups",
+    "rockfall.press_in_motion", "rockfall.test_groups", "rockfall.press_in_strip", "rockfall.point_in_strip",
+    "rockfall.leave_strip",
 }  # fmt: skip
-"""What the editor of graphs has in menus, keys and panels of its own."""
+"""What the editors of graphs and the timeline have in menus, keys and panels of its own."""
 LARGEST_WORKSPACE_BYTES = 200_000
 
 

@@ -5,22 +5,10 @@ import math
 
 import bpy
 
-from ....core.reconstruction.summary import MEANINGS
 from ...scene import store
+from ...view import impact_words
 from ...view.panel import RockfallPanel, facts, paragraph
 
-FLAG_WORDS = {
-    "first": "First of its chain: no incident velocity",
-    "last": "Last of its chain: no restituted velocity",
-    "departing": "Leaves the ground before it touches it: no coefficients",
-    "into_ground": "Goes on into the ground",
-    "below_terrain": "Beside a flight that passes under the terrain",
-    "gap": "The chain is cut here (shattered or discarded)",
-    "contact": "Rolls or slides before or after it",
-    "doubtful": "Marked as doubtful",
-    "shattered": "The block shatters here",
-    "discarded": "Discarded: not used",
-}
 NUMBERS = (  # what is shown, key of the result, key of its standard deviation, unit, digits
     ("Incident speed", "incident_mps", "sigma_speed1", " m/s", 2),
     ("Restituted speed", "restituted_mps", "sigma_speed2", " m/s", 2),
@@ -56,8 +44,12 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
         if result is None:
             return
         facts(layout, [_fact(result, *how) for how in NUMBERS if how[1] in result])
-        for flag in filter(None, result["flags"].split(";")):
-            paragraph(context, layout, FLAG_WORDS.get(flag) or MEANINGS.get(flag, flag), "INFO")
+        reasons = impact_words.reasons(pick)
+        for reason in reasons:
+            paragraph(context, layout, reason, "ERROR")
+        for said in map(impact_words.meaning, filter(None, result["flags"].split(";"))):
+            if said not in reasons:
+                paragraph(context, layout, said, "INFO")
         if "sigma_r" not in result:
             paragraph(context, layout, "Give a confidence, and the numbers get their errors.")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from ...scene import impact_rows, store
+from ...scene import impact_marks, impact_rows, store
 from ...view.panel import RockfallPanel, Rows
 
 WIDTHS = {  # of the columns in pixels at interface scale 1, in the order in which they are shown
@@ -141,7 +141,7 @@ class ROCKFALL_UL_impacts(Rows, bpy.types.UIList):
 
 
 def _alarming(row: bpy.types.PropertyGroup) -> bool:
-    return any(flag in row.flags for flag in ("departing", "into_ground", "below_terrain")) or row.r > 1.0
+    return row.r > 1.0 or any(flag in impact_marks.ALARMING for flag in row.flags.split(";"))
 
 
 class ROCKFALL_PT_impact_table(RockfallPanel, bpy.types.Panel):

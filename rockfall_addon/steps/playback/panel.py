@@ -24,6 +24,7 @@ class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
         row.scale_y = 1.4
         row.operator("screen.animation_play", text="Pause" if playing else "Play", icon="PAUSE" if playing else "PLAY")
         layout.operator("rockfall.open_motion_graphs", icon="FCURVE")
+        layout.operator("rockfall.open_keys", icon="ACTION")
         layout.use_property_split = True
         layout.prop(settings, "playback", expand=True)
         column = layout.column(align=True)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An impact in words: what its card says, and what its flags mean."""
+
+import math
+
+import bpy
+
+from ...core.reconstruction.summary import MEANINGS
+from ..scene import impact_marks, store
+
+FLAG_WORDS = {
+    "first": "First of its chain: no incident velocity",
+    "last": "Last of its chain: no restituted velocity",
+    "departing": "Leaves the ground before it touches it: no coefficients",
+    "into_ground": "Goes on into the ground",
+    "below_terrain": "Beside a flight that passes under the terrain",
+    "gap": "The chain is cut here (shattered or discarded)",
+    "contact": "Rolls or slides before or after it",
+    "doubtful": "Marked as doubtful",
+    "shattered": "The block shatters here",
+    "discarded": "Discarded: not used",
+}
+TOO_FAST = "R over 1: faster after the impact than before it"
+
+
+def title(pick: bpy.types.Object) -> str:
+    """Which pick it is, and when."""
+    result = pick.get(store.RESULT)
+    name = f"impact {result['number']}" if result is not None else pick[store.KIND]
+    return f"{pick[store.TRAJECTORY]}, {name}, {pick[store.TIME]:.3f} s"
+
+
+def numbers(pick: bpy.types.Object) -> list[str]:
+    """Speeds, coefficients and energies with their standard deviations; nothing without a result."""
+    result = pick.get(store.RESULT)
+    if result is None:
+        return []
+    speeds = _pair(result, "incident_mps", "restituted_mps", "sigma_speed1", "sigma_speed2", 1.0, 1)
+    energies = _pair(result, "kinetic1_j", "kinetic2_j", "sigma_kinetic1_j", "sigma_kinetic2_j", 1e-3, 2)
+    coefficients = [
+        (name, _number(result, key, f"sigma_{key}", 1.0, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))
+    ]
+    known = "   ".join(f"{name} {value}" for name, value in coefficients if value)
+    return [f"v {speeds} m/s", *([known] if known else []), f"E {energies} kJ"]
+
+
+def reasons(pick: bpy.types.Object) -> list[str]:
+    """Why it should be looked at, a sentence each; nothing when it need not."""
+    if not impact_marks.is_alarming(pick):
+        return []
+    result = pick.get(store.RESULT)
+    flags = [] if result is None else [flag for flag in result["flags"].split(";") if flag in impact_marks.ALARMING]
+    status = pick.get(store.STATUS, "ok")
+    if status != "ok" and status not in flags:
+        flags.append(status)
+    said = [meaning(flag) for flag in flags]
+    return [*said, TOO_FAST] if result is not None and result["r"][0] > 1.0 else said
+
+
+def meaning(flag: str) -> str:
+    """A flag in words."""
+    return FLAG_WORDS.get(flag) or MEANINGS.get(flag, flag)
+
+
+def _number(result: dict[str, object], key: str, sigma_key: str, factor: float, digits: int) -> str:
+    """A value with its standard deviation; empty where it is not defined."""
+    value = factor * (math.hypot(*result[key]) if len(result[key]) == 3 else result[key][0])
+    sigma = factor * result[sigma_key][0] if sigma_key in result else math.nan
+    if math.isnan(value):
+        return ""
+    return f"{value:.{digits}f}" + ("" if math.isnan(sigma) else f" ± {sigma:.{digits}f}")
+
+
+def _pair(
+    result: dict[str, object], before: str, after: str, sigma1: str, sigma2: str, factor: float, digits: int
+) -> str:
+    """A value before and after the impact."""
+    both = (_number(result, key, sigma, factor, digits) for key, sigma in ((before, sigma1), (after, sigma2)))
+    return " → ".join(value or "?" for value in both)

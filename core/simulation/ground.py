@@ -83,7 +83,7 @@ class Ground:
         raise InputError(
             "The terrain is a cloud of points, where a surface is needed",
             file=self.terrain.name,
-            advice="Let blocks meet the meshed terrain: --contact mesh",
+            advice="Let blocks meet the surface (contact: mesh)",
         )
 
     @cached_property
@@ -206,7 +206,7 @@ class Ground:
                     f"The points of {name}, {spacing:.3g} m apart, are too few for {few} of {radius_m.size} blocks, "
                     f"which would hang on single points: the smallest has a diameter of {2 * radius_m.min():.3g} m",
                     advice=f"Blocks need {2 * FEWEST * spacing:.3g} m there, or these blocks a point every "
-                    f"{radius_m.min() / FEWEST:.2g} m; or let them meet the meshed cloud: --contact mesh",
+                    f"{radius_m.min() / FEWEST:.2g} m; or let them meet the surface (contact: mesh)",
                 )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The surface back into a file."""
+"""A surface, or a cloud, back into a file."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,36 +8,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output import output_stream
+from .cloud import Cloud
 from .surface import Surface
 
 
-def write_ply(surface: Surface, path: str | Path, face_values: Mapping[str, NDArray[np.integer]] | None = None) -> None:
-    """Write a binary PLY in survey coordinates, double precision: nothing is lost.
+def write_ply(
+    terrain: Surface | Cloud, path: str | Path, face_values: Mapping[str, NDArray[np.integer]] | None = None
+) -> None:
+    """Write a binary PLY in survey coordinates, double precision: nothing is lost. A cloud has no faces there.
 
     Parameters
     ----------
     face_values : name → (m,) whole numbers, attributes of the faces.
     """
     attributes = face_values or {}
+    is_cloud = isinstance(terrain, Cloud)
+    points = terrain.points if isinstance(terrain, Cloud) else terrain.vertices
+    corners = np.empty((0, 3), np.int32) if isinstance(terrain, Cloud) else terrain.faces
+    of_faces = [
+        f"element face {len(corners)}",
+        "property list uchar int vertex_indices",
+        *(f"property int {name}" for name in attributes),
+    ]
     header = "\n".join(
         [
             "ply",
             "format binary_little_endian 1.0",
-            *([f"comment crs {surface.shift.crs}"] if surface.shift.crs else []),
-            f"element vertex {len(surface.vertices)}",
+            *([f"comment crs {terrain.shift.crs}"] if terrain.shift.crs else []),
+            f"element vertex {len(points)}",
             *(f"property double {axis}" for axis in "xyz"),
-            f"element face {len(surface.faces)}",
-            "property list uchar int vertex_indices",
-            *(f"property int {name}" for name in attributes),
+            *([] if is_cloud else of_faces),
             "end_header\n",
         ]
     )
     more = [(name, "<i4") for name in attributes]
-    faces = np.empty(len(surface.faces), np.dtype([("count", "u1"), ("vertices", "<i4", 3), *more]))
-    faces["count"], faces["vertices"] = 3, surface.faces
+    faces = np.empty(len(corners), np.dtype([("count", "u1"), ("vertices", "<i4", 3), *more]))
+    faces["count"], faces["vertices"] = 3, corners
     for name, values in attributes.items():
         faces[name] = values
     with output_stream(path, binary=True) as file:
         file.write(header.encode("ascii", "replace"))
-        file.write(surface.shift.to_survey(surface.vertices).astype("<f8").tobytes())
+        file.write(terrain.shift.to_survey(points).astype("<f8").tobytes())
         file.write(faces.tobytes())

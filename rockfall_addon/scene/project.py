@@ -27,6 +27,7 @@ from ...core.impact_models.registry import COMPARED
 from ...core.output import output_folder
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
+from ...core.terrain.cloud import Cloud
 from ...core.terrain.readers import read_structure
 from ...core.terrain.shading import shade
 from ...core.terrain.surface import Surface
@@ -76,7 +77,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     else:
         surface, result = open_project(project)
     zones = _zones(project, surface)
-    solid, left_out = _structures(project, surface)
+    met, left_out = _structures(project, surface)
     shading = None if surface is None else shade(surface)
     known = surface.shift if surface is not None else None if result is None else result.picks.shift
     found = project_videos.read_videos(project, known) if with_videos else []
@@ -96,7 +97,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         tile = terrain.add_terrain(scene, surface, shading)
         if zones is not None:
             simulated_zones.keep(scene, zones, tile)
-    for name, structure in solid.items():
+    for name, structure in met.items():
         structures.make(scene, name, structure)
     project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
     if result is not None:
@@ -126,8 +127,8 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
     zones = None
     if surface is not None and stated is not None:
         zones = simulated_zones.zones_of(scene, surface, stated.models)
-    solid = structures.surfaces_of(scene)
-    if solid and stated is None:
+    met = structures.met_of(scene)
+    if met and stated is None:
         stated = SimulationEntry()
     with output_folder(folder) as place:
         if table is not None:
@@ -138,7 +139,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
             write_attribute_zones(zones, place / "zones.csv")
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
         if stated is not None:
-            stated = replace(stated, structures=_write_structures(solid, place))
+            stated = replace(stated, structures=_write_structures(met, place))
         source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
         parameters = {"A": models.parameters_of(scene), "B": fit.second_set(scene)}
         project = Project(
@@ -157,20 +158,18 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
     return folder / "project.toml"
 
 
-def _structures(project: Project, surface: Surface | None) -> tuple[dict[str, Surface], list[str]]:
-    """The structures that Blender can hold, by name, and those that it leaves out: clouds have no faces."""
+def _structures(project: Project, surface: Surface | None) -> tuple[dict[str, Surface | Cloud], list[str]]:
+    """The structures by name, and those that are left out: all where there is no terrain."""
     entry, source = project.simulation, project.terrain
     if entry is None or surface is None or source is None:
         return {}, [] if entry is None else [f"the structure {each.name}" for each in entry.structures]
-    read = {each.name: read_structure(each.file, up=source.up, unit_m=source.unit_m) for each in entry.structures}
-    solid = {name: structure for name, structure in read.items() if isinstance(structure, Surface)}
-    return solid, [f"the structure {name}, a cloud without faces" for name in read if name not in solid]
+    return {each.name: read_structure(each.file, up=source.up, unit_m=source.unit_m) for each in entry.structures}, []
 
 
-def _write_structures(solid: Mapping[str, Surface], place: Path) -> tuple[StructureEntry, ...]:
+def _write_structures(met: Mapping[str, Surface | Cloud], place: Path) -> tuple[StructureEntry, ...]:
     """Names are free, and may be none of a file: the files are numbered."""
     entries = []
-    for number, (name, structure) in enumerate(solid.items(), start=1):
+    for number, (name, structure) in enumerate(met.items(), start=1):
         file = place / f"structure_{number}.ply"
         write_ply(structure, file)
         entries.append(StructureEntry(name, file))

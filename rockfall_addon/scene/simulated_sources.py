@@ -15,6 +15,7 @@ from ...core.reconstruction.picks import take
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.simulation.distributions import Distribution
 from ...core.simulation.engine import Rolling
+from ...core.simulation.ground import Contact
 from ...core.simulation.measured_releases import start_times
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ReleaseSource
@@ -49,6 +50,7 @@ def entry_of(scene: bpy.types.Scene) -> SimulationEntry:
     return SimulationEntry(
         models=tuple(name for name in models.ORDER if name in settings.models),
         releases=_release_entry(scene),
+        contact=cast(Contact, settings.contact),
         rolling=cast(Rolling, settings.rolling),
         friction=store.double(settings.friction),
         drag=settings.use_drag,
@@ -66,6 +68,7 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
     settings, releases = scene.rockfall_simulation, entry.releases
     if entry.models:
         settings.models = set(entry.models)
+    settings.contact = entry.contact
     settings.rolling, settings.friction, settings.use_drag = entry.rolling, entry.friction, entry.drag
     settings.seed, settings.number = entry.seed, releases.number
     settings.shape = releases.shape or "sphere"
@@ -85,7 +88,6 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
         settings.source = "DRAWN"
         settings.drawn = _drawing(scene, releases)
     absent = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
-    absent += ["contact with points"] if entry.contact == "points" else []
     absent += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
     absent += left_out
     return f"Of the project's simulation Blender leaves out {', '.join(absent)}." if absent else ""

@@ -15,6 +15,7 @@ from ...core.errors import RockfallError
 from ...core.exchange.zones import zones_with
 from ...core.simulation.ground import element_places
 from ...core.simulation.zones import face_values, nearest_values, zones_of_parts
+from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import Zones
 from . import terrain, terrain_mesh
@@ -27,8 +28,8 @@ _painted: dict[tuple[int, str], tuple[object, np.ndarray, bool]] = {}
 """By mesh and name: the mesh's contents then, the values, whether they are of faces."""
 
 
-def zones_of(scene: bpy.types.Scene, surface: Surface, models: Sequence[str]) -> Zones | None:
-    """The scene's zones on its terrain; None without.
+def zones_of(scene: bpy.types.Scene, met: Surface | Cloud, models: Sequence[str]) -> Zones | None:
+    """The scene's zones on its terrain, or on the points of that; None without.
 
     Raises
     ------
@@ -37,8 +38,8 @@ def zones_of(scene: bpy.types.Scene, surface: Surface, models: Sequence[str]) ->
     rows = scene.rockfall_simulation.zones
     if not rows:
         return None
-    parts = [(row.name, _faces_in(scene, surface, row.name)) for row in rows]
-    cover = zones_of_parts(surface, parts, "Paint or assign the vertex groups of the zones")
+    parts = [(row.name, _elements_in(scene, met, row.name)) for row in rows]
+    cover = zones_of_parts(met, parts, "Paint or assign the vertex groups of the zones")
     return zones_with(cover, {row.name: properties_of(row) for row in rows}, models)
 
 
@@ -87,8 +88,8 @@ def fingerprint(scene: bpy.types.Scene) -> list[object]:
     return found
 
 
-def _faces_in(scene: bpy.types.Scene, surface: Surface, name: str) -> np.ndarray:
-    """(m,) whether each face of the joined terrain is in a zone: of vertices, two of its corners decide."""
+def _elements_in(scene: bpy.types.Scene, met: Surface | Cloud, name: str) -> np.ndarray:
+    """(m,) whether each face, or point, of the joined terrain is in a zone: of vertices, two of its corners decide."""
     vertices, of_vertices, middles, of_faces = [], [], [], []
     for tile in terrain.tiles(scene):
         values, own = _values(tile, name), terrain.surface_of(tile)
@@ -101,12 +102,13 @@ def _faces_in(scene: bpy.types.Scene, surface: Surface, name: str) -> np.ndarray
         else:
             vertices.append(own.vertices)
             of_vertices.append(values[0])
-    inside = np.zeros(len(surface.faces), np.bool_)
+    inside = np.zeros(len(element_places(met)), np.bool_)
     if vertices:
-        near = nearest_values(surface.vertices, np.concatenate(vertices), np.concatenate(of_vertices) >= HALF)
-        inside |= face_values(surface, near.astype(np.float64)) > 0
+        places = met.points if isinstance(met, Cloud) else met.vertices
+        near = nearest_values(places, np.concatenate(vertices), np.concatenate(of_vertices) >= HALF)
+        inside |= near if isinstance(met, Cloud) else face_values(met, near.astype(np.float64)) > 0
     if middles:
-        near = nearest_values(element_places(surface), np.concatenate(middles), np.concatenate(of_faces) >= HALF)
+        near = nearest_values(element_places(met), np.concatenate(middles), np.concatenate(of_faces) >= HALF)
         inside |= near
     return inside
 

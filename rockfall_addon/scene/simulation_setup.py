@@ -19,6 +19,7 @@ from ...core.progress import Progress
 from ...core.reconstruction.drag import Drag
 from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.simulation.engine import Simulation
+from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import Scenario, ground_of, remarks_of, run_models
 from . import (
@@ -67,21 +68,22 @@ def plan(scene: bpy.types.Scene) -> Plan:
     if lacking:
         raise RockfallError(lacking)
     surface, entry = ground(scene), simulated_sources.entry_of(scene)
+    met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
     source, origins = simulated_sources.source_of(scene, entry, surface)
     how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
     measured = None
     if any(MODELS[name].draws_from_impacts for name in entry.models):
         measured = measured_rebounds(reconstruction.reconstruct_scene(scene, surface=surface).impacts)
     scenario = Scenario(
-        surface,
+        met,
         source,
         {name: parameters.get(name, {}) for name in entry.models},
         measured,
-        structures=structures.surfaces_of(scene),
+        structures=structures.met_of(scene),
         rolling=entry.rolling,
         friction=entry.friction,
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
-        zones=simulated_zones.zones_of(scene, surface, list(entry.models)),
+        zones=simulated_zones.zones_of(scene, met, list(entry.models)),
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
     )

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Walls, fences, ditches, roads and houses that blocks meet beside the terrain: mesh objects that are marked as such.
 
-Their names are those of the objects. What counts is the object's own mesh where the object stands, in double precision.
+Their names are those of the objects. What counts is the object's own mesh where the object stands, in double precision;
+one without faces is a cloud, whose vertices are the points that blocks meet.
 """
 
 import uuid
@@ -11,6 +12,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.terrain.cloud import Cloud
 from ...core.terrain.joining import moved
 from ...core.terrain.surface import Surface
 from . import georeference, materials, store, terrain, terrain_mesh
@@ -33,11 +35,11 @@ def mark(objects: Sequence[bpy.types.Object]) -> None:
 
     Raises
     ------
-    RockfallError : one of them has no faces; then none is marked.
+    RockfallError : one of them is empty; then none is marked.
     """
     for obj in objects:
-        if not terrain.has_faces(obj):
-            raise RockfallError(f"{obj.name} has no faces that a block could meet. Choose a mesh with faces.")
+        if not obj.data.vertices:
+            raise RockfallError(f"{obj.name} has nothing that a block could meet. Choose a mesh with faces or points.")
     for obj in objects:
         obj[store.ROLE], obj[store.ID] = store.STRUCTURE_ROLE, uuid.uuid4().hex
 
@@ -51,15 +53,20 @@ def unmark(obj: bpy.types.Object) -> None:
 def problem(scene: bpy.types.Scene) -> str:
     """What is wrong with the structures, in a sentence; empty when nothing is."""
     for obj in objects_of(scene):
-        if not terrain.has_faces(obj):
-            return f"The structure {obj.name} has no faces that a block could meet. Give it some, or remove it below."
+        if not obj.data.vertices:
+            return f"The structure {obj.name} has nothing that a block could meet. Give it faces, or remove it below."
         if any(modifier.show_viewport or modifier.show_render for modifier in obj.modifiers):
             return f"Apply the modifiers of the structure {obj.name}: blocks meet its own mesh, which looks otherwise."
     return ""
 
 
-def surfaces_of(scene: bpy.types.Scene) -> dict[str, Surface]:
-    """Name → surface in local coordinates.
+def is_cloud(obj: bpy.types.Object) -> bool:
+    """Whether blocks meet a structure's points, as it has no faces."""
+    return not terrain.has_faces(obj)
+
+
+def met_of(scene: bpy.types.Scene) -> dict[str, Surface | Cloud]:
+    """Name → surface or cloud in local coordinates.
 
     Raises
     ------
@@ -68,14 +75,19 @@ def surfaces_of(scene: bpy.types.Scene) -> dict[str, Surface]:
     wrong = problem(scene)
     if wrong:
         raise RockfallError(wrong)
-    return {obj.name: terrain.surface_of(obj) for obj in objects_of(scene)}
+    return {obj.name: _cloud(obj, scene) if is_cloud(obj) else terrain.surface_of(obj) for obj in objects_of(scene)}
 
 
-def make(scene: bpy.types.Scene, name: str, surface: Surface) -> bpy.types.Object:
+def _cloud(obj: bpy.types.Object, scene: bpy.types.Scene) -> Cloud:
+    return Cloud(terrain_mesh.placed_vertices(obj), georeference.read_shift(scene), obj.name)
+
+
+def make(scene: bpy.types.Scene, name: str, structure: Surface | Cloud) -> bpy.types.Object:
     """A structure of a project as a marked object."""
-    vertices = moved(surface, georeference.read_shift(scene)).vertices
+    here = moved(structure, georeference.read_shift(scene))
+    vertices, faces = (here.points, []) if isinstance(here, Cloud) else (here.vertices, here.faces.tolist())
     mesh = bpy.data.meshes.new(name)
-    mesh.from_pydata(vertices.tolist(), [], surface.faces.tolist())
+    mesh.from_pydata(vertices.tolist(), [], faces)
     colours = np.tile(materials.linear_colour(GREY), len(vertices)).astype(np.float32)
     mesh.attributes.new(COLOUR, "FLOAT_COLOR", "POINT").data.foreach_set("color", colours)
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = COLOUR

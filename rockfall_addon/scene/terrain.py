@@ -187,10 +187,9 @@ def grouped(count: int) -> str:
 
 
 def _read(obj: bpy.types.Object) -> Surface:
-    vertices, faces = terrain_mesh.mesh_arrays(obj.data)
-    world = np.array(obj.matrix_world)
-    local = vertices.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
-    if np.linalg.det(world[:3, :3]) < 0:  # mirrored: the faces would look into the ground
+    _, faces = terrain_mesh.mesh_arrays(obj.data)
+    local = terrain_mesh.placed_vertices(obj)
+    if np.linalg.det(np.array(obj.matrix_world)[:3, :3]) < 0:  # mirrored: the faces would look into the ground
         faces = np.ascontiguousarray(faces[:, ::-1])
     return Surface(local, faces, georeference.read_shift(_scene_of(obj)), obj.name, ())
 

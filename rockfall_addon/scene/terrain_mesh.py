@@ -43,7 +43,9 @@ def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) in single precision and triangles (m, 3) of a mesh, in its own coordinates."""
     vertices = np.empty(3 * len(mesh.vertices), dtype=np.float32)
     mesh.attributes["position"].data.foreach_get("vector", vertices)  # many times as quick as mesh.vertices
-    if len(mesh.loops) == 3 * len(mesh.polygons):
+    if not mesh.polygons:
+        faces = np.empty(0, dtype=np.int32)
+    elif len(mesh.loops) == 3 * len(mesh.polygons):
         faces = np.empty(len(mesh.loops), dtype=np.int32)
         mesh.attributes[".corner_vert"].data.foreach_get("value", faces)
     else:
@@ -51,6 +53,12 @@ def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
         faces = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
         mesh.loop_triangles.foreach_get("vertices", faces)
     return vertices.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def placed_vertices(obj: bpy.types.Object) -> np.ndarray:
+    """(n, 3) vertices of an object's mesh where it stands, in double precision."""
+    world = np.array(obj.matrix_world)
+    return mesh_arrays(obj.data)[0].astype(np.float64) @ world[:3, :3].T + world[:3, 3]
 
 
 def contents_of(mesh: bpy.types.Mesh) -> Contents:

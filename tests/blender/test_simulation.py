@@ -385,3 +385,23 @@ def test_tables_are_of_the_shown_runs_in_survey_coordinates(drawn: bpy.types.Sce
     }  # fmt: skip
     drawn.rockfall_simulation.seed += 1
     assert not bpy.ops.rockfall.export_simulation.poll(), "what is shown is not what would be written"
+
+
+def test_blocks_meet_the_points_of_the_terrain_where_that_is_chosen(drawn: bpy.types.Scene, part, tmp_path) -> None:
+    """Vertices 2 m apart are too few for blocks of 0.5 m, which is said, and enough for blocks of 12 m."""
+    settings = drawn.rockfall_simulation
+    settings.models, settings.number = {"noel_2017"}, 4
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    settings.contact = "points"
+    assert part("rockfall_addon.scene.simulation_setup").is_stale(drawn)
+    with pytest.raises(RuntimeError, match="would hang on single points"):
+        bpy.ops.rockfall.simulate()
+    settings.diameter_m = 12.0
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert "Blocks meet the points of the terrain, 2" in " ".join(
+        remark.text for remark in part("rockfall_addon.scene.simulation_setup").remarks(drawn)
+    )
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "out" / "project.toml")) == {"FINISHED"}
+    assert bpy.context.scene.rockfall_simulation.contact == "points"

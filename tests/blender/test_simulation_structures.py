@@ -130,7 +130,7 @@ def test_a_project_takes_structures_along(
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
     scene = bpy.context.scene
-    again = part("rockfall_addon.scene.structures").surfaces_of(scene)
+    again = part("rockfall_addon.scene.structures").met_of(scene)
     assert list(again) == ["wall"]
     np.testing.assert_allclose(again["wall"].bounds, [[WALL_X, -6.0, -20.0], [WALL_X, 124.0, 80.0]], atol=1e-5)
     if with_releases:
@@ -138,16 +138,27 @@ def test_a_project_takes_structures_along(
         assert farthest(scene) < WALL_X + 1e-3
 
 
-def test_what_blender_cannot_take_from_a_project_is_said(slope: bpy.types.Scene, part, tmp_path: Path) -> None:
+def test_a_cloud_without_faces_is_a_structure_and_goes_along_with_a_project(
+    slope: bpy.types.Scene, part, tmp_path: Path
+) -> None:
+    """A wall of points 0.12 m apart; blocks meet the terrain's triangles all the same."""
+    mesh = bpy.data.meshes.new("net")
+    mesh.from_pydata([(0.0, y, z) for y in np.arange(0.0, 119.0, 0.12) for z in np.arange(14.0, 36.0, 0.12)], [], [])
+    points, net = len(mesh.vertices), bpy.data.objects.new("net", mesh)
+    net.location.x = WALL_X
+    slope.collection.objects.link(net)
+    bpy.context.view_layer.update()
+    assert use(net) == {"FINISHED"}
+    slope.rockfall_simulation.diameter_m = 1.0
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert farthest(slope) < WALL_X
+    assert "hit net" in said(part, slope)
     assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
-    project = tmp_path / "out" / "project.toml"
-    points = "\n".join(f"{2_600_070.0},{1_200_000.0 + y},{10.0 + y % 7}" for y in range(60))
-    (tmp_path / "out" / "net.xyz").write_text(points.replace(",", " ") + "\n", encoding="utf-8")
-    net = '\n[[simulation.structures]]\nname = "net"\nfile = "net.xyz"\n'
-    project.write_text(project.read_text(encoding="utf-8") + net, encoding="utf-8")
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
-    assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
-    assert "leaves out the structure net, a cloud" in said(part, bpy.context.scene)
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "out" / "project.toml")) == {"FINISHED"}
+    again = part("rockfall_addon.scene.structures").met_of(bpy.context.scene)["net"]
+    np.testing.assert_allclose(again.points.min(axis=0), [WALL_X, 0.0, 14.0], atol=1e-5)
+    assert len(again.points) == points
 
 
 def test_what_cannot_be_a_structure_is_refused(slope: bpy.types.Scene, wall: bpy.types.Object, part) -> None:
@@ -157,7 +168,7 @@ def test_what_cannot_be_a_structure_is_refused(slope: bpy.types.Scene, wall: bpy
     assert not bpy.ops.rockfall.use_as_structure.poll(), "terrain is no structure"
     empty = bpy.data.objects.new("empty", bpy.data.meshes.new("empty"))
     slope.collection.objects.link(empty)
-    with pytest.raises(RuntimeError, match="no faces"):
+    with pytest.raises(RuntimeError, match="nothing that a block could meet"):
         use(wall, empty)
     assert not part("rockfall_addon.scene.structures").objects_of(slope), "all or none"
     use(wall)

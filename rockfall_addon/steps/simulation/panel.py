@@ -111,6 +111,7 @@ class ROCKFALL_PT_simulation_motion(_Sub, bpy.types.Panel):
         layout, settings = self.layout, context.scene.rockfall_simulation
         layout.use_property_split = True
         layout.use_property_decorate = False
+        layout.row().prop(settings, "contact", expand=True)
         layout.prop(settings, "rolling")
         row = layout.row()
         row.active = settings.rolling != "none"
@@ -156,12 +157,15 @@ class ROCKFALL_PT_simulation_structures(_Sub, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, found = self.layout, structures.objects_of(context.scene)
         if not found:
-            text = "Walls, fences, ditches, roads, houses: meshes of your own that blocks meet. Select them."
+            text = (
+                "Walls, fences, ditches, roads, houses: meshes of your own that blocks meet, clouds of vertices by "
+                "their points. Select them."
+            )
             paragraph(context, layout, text, "INFO")
         column = layout.column(align=True)
         for obj in found:
             row = column.row(align=True)
-            row.prop(obj, "name", text="", icon="MESH_CUBE")
+            row.prop(obj, "name", text="", icon="OUTLINER_OB_POINTCLOUD" if structures.is_cloud(obj) else "MESH_CUBE")
             row.operator("rockfall.remove_structure", text="", icon="X").name = obj.name
         layout.operator("rockfall.use_as_structure", icon="ADD")
 

@@ -107,6 +107,15 @@ class SimulationSettings(bpy.types.PropertyGroup):
         name="Models", description="Impact models that carry the same blocks down",
         items=models.CHOICES, options={"ENUM_FLAG"}, default={"noel_2017"},
     )  # fmt: skip
+    contact: EnumProperty(
+        name="Blocks meet", description="What of the terrain blocks touch",
+        items=[
+            ("mesh", "Surface", "The triangles of the terrain; clouds were meshed when they were imported"),
+            ("points", "Points", "The points of the terrain alone, its vertices, without a surface between them: for "
+             "dense scans. They need a third of a block's radius between them, or less"),
+        ],
+        default="mesh",
+    )  # fmt: skip
     rolling: EnumProperty(
         name="On the ground", description="How a block moves that no longer bounces",
         items=[

@@ -15,18 +15,22 @@ from ..impact_models.registry import find_model
 from ..progress import Progress
 from ..reconstruction.impact import Impacts
 from .background import Job
-from .comparison import predict
+from .comparison import predict, thinned
 from .courses import Courses
 from .estimation import FitOptions, FittedModel
 from .extras import PAGES, demand
-from .linked_graphs import SHEET, WEB, LinkedGraphs, curve_tables, link_graphs, model_columns
+from .linked_columns import model_columns
+from .linked_graphs import SHEET, WEB, LinkedGraphs, link_graphs
 from .local_server import ADDRESS, local_server
 from .parameter_inputs import ParameterInputs, parameter_inputs
-from .report import looks, score_table, summary, template
+from .report import MOST_SHOWN, fewer_sentence, frame, score_table, summary, template
 from .scores import Score, scores
 
 REPLICATES = 6
 """Draws of a random model that its scores are computed with: few, so that they keep pace with the slider."""
+
+FIRST_MS, POINT_MS = 15, 0.05
+"""Between two changes of what is shown, and more for each point: the browser has to draw them."""
 
 Settings = dict[str, dict[str, Value]]
 """Model → parameter → value, of what is not at its default."""
@@ -44,6 +48,7 @@ class Exploration:
     seed : of the random numbers.
     origin : name of the table of impacts.
     title : heading of the page; "" for the usual one.
+    shown : models that are shown at first; the first one alone, if empty.
     save : writes model → all parameters, and returns where.
     """
 
@@ -55,6 +60,7 @@ class Exploration:
     seed: int = 0
     origin: str = ""
     title: str = ""
+    shown: Sequence[str] = ()
 
 
 def serve(exploration: Exploration, port: int = 0, ready: Callable[[str], None] | None = None) -> None:
@@ -95,10 +101,10 @@ def open_page(document: Any, exploration: Exploration) -> None:
     document.template = template()
     document.template_variables.update(
         heading=exploration.title or "Explore impact models",
-        summary=summary(page.first, len(exploration.impacts), exploration.origin, chance=False),
+        summary=summary(page.first, len(exploration.impacts), exploration.origin, chance=False) + page.less,
         after="",
         live=True,
-        **looks(),
+        **frame(page.linked.graphs),
     )
     document.on_session_destroyed(lambda _context: page.job.cancel())
 
@@ -114,17 +120,33 @@ class _Page:
     """The state of one open page: the chosen model, its parameters, and the widgets that show them."""
 
     def __init__(self, document: Any, exploration: Exploration) -> None:
-        from bokeh.models import Div, InlineStyleSheet
+        from bokeh.models import Div, InlineStyleSheet, Select
 
         self.document, self.start = document, exploration
         self.given: Settings = {name: dict(exploration.given.get(name, {})) for name in exploration.models}
         self.model, self.run, self.seed = exploration.models[0], 0, exploration.seed
+        self.behind: set[str] = set()
+        self.scoring: Any = None
         self.sheet = InlineStyleSheet(css=SHEET)
         self.job = Job(document, self._say)
         self.first = predict(
             exploration.impacts, exploration.courses, exploration.models, self.given, replicates=1, seed=self.seed
         )
-        self.linked: LinkedGraphs = link_graphs(exploration.impacts, self.first, self.model, self.run)
+        titles = [(name, find_model(name).title) for name in exploration.models]
+        self.select = Select(
+            title="Parameters of",
+            value=self.model,
+            options=titles,
+            name="model",
+            stylesheets=[self.sheet],
+            sizing_mode="stretch_width",
+        )
+        shown = thinned(self.first, MOST_SHOWN)
+        self.less = fewer_sentence(self.first, shown)
+        self.pace_ms = FIRST_MS + round(shown.row.size * POINT_MS)
+        self.linked: LinkedGraphs = link_graphs(
+            exploration.impacts, shown, self.run, exploration.shown or [self.model], edited=self.select
+        )
         css = InlineStyleSheet(css=(WEB / "page.css").read_text(encoding="utf-8"))
         self.scores = Div(name="scores", stylesheets=[self.sheet, css], sizing_mode="stretch_width")
         self.status = Div(
@@ -132,16 +154,14 @@ class _Page:
         )
         self.defaults = {name: self._scores_of(name, {}) for name in exploration.models}
         self.inputs = {name: self._inputs(name) for name in exploration.models}
-        self._show()
+        self._show_scores()
 
     def roots(self) -> tuple[Any, ...]:
         """What the page's frame asks for."""
         from bokeh.layouts import column, row
-        from bokeh.models import Button, MultiChoice, RadioButtonGroup, Select
+        from bokeh.models import Button, MultiChoice, RadioButtonGroup
 
         common: dict[str, Any] = {"stylesheets": [self.sheet], "sizing_mode": "stretch_width"}
-        titles = [(name, find_model(name).title) for name in self.start.models]
-        self.select = Select(title="Model", value=self.model, options=titles, name="model", **common)
         self.select.on_change("value", lambda _attribute, _old, new: self._choose(new))
         self.runs = RadioButtonGroup(labels=["Mean", "One draw per impact"], active=0, name="run", **common)
         self.runs.on_change("active", lambda _attribute, _old, new: self._draw(new))
@@ -167,7 +187,7 @@ class _Page:
             sizing_mode="stretch_width",
             spacing=10,
         )
-        return controls, self.linked.layout, self.linked.selection, self.scores
+        return controls, *self.linked.graphs.values(), self.linked.selection, self.scores
 
     def _inputs(self, name: str) -> ParameterInputs:
         model = find_model(name)
@@ -195,11 +215,11 @@ class _Page:
     def _draw(self, run: int) -> None:
         self.run = run
         self._offer_draws()
-        self._show()
+        self._show(self.start.models)
 
     def _draw_again(self) -> None:
         self.seed += 1
-        self._show()
+        self._show(self.start.models)
 
     def _reset(self) -> None:
         self.given[self.model].clear()
@@ -262,18 +282,32 @@ class _Page:
         )
         return list(scores(self.start.impacts, found))
 
-    def _show(self) -> None:
-        """Bring the page in line with the parameters."""
-        impacts, name = self.start.impacts, self.model
-        replicates = REPLICATES if find_model(name).is_random else 0
-        run = min(self.run, replicates)
-        found = predict(impacts, self.start.courses, [name], self.given, replicates=replicates, seed=self.seed)
-        for graph, table in curve_tables(impacts, found, name, run).items():
-            self.linked.curves[graph].data = table
-        data = {**self.linked.source.data, **model_columns(impacts, found, name, run)}
-        self.linked.source.data = data
-        rows = {"Now": list(scores(impacts, found)), "Defaults": self.defaults[name]}
-        self.scores.text = score_table(rows, find_model(name).title)
+    def _show(self, models: Sequence[str] = ()) -> None:
+        """Soon bring the page in line with the parameters of the chosen model, or of some.
+
+        A slider asks for it many times a second: what it asked for in the meantime is done once.
+        """
+        if not self.behind:
+            self.document.add_timeout_callback(self._show_points, self.pace_ms)
+        self.behind |= {self.model, *models}
+
+    def _show_points(self) -> None:
+        impacts, columns = self.start.impacts, dict[str, Any]()
+        for name in self.behind:
+            run = self.run if find_model(name).is_random else 0
+            found = predict(impacts, self.start.courses, [name], self.given, replicates=run, seed=self.seed)
+            place = self.start.models.index(name)
+            columns |= model_columns(impacts, thinned(found, MOST_SHOWN), name, run, place)
+        self.behind.clear()
+        self.linked.source.data.update(columns)
+        if self.scoring is not None:
+            self.document.remove_timeout_callback(self.scoring)
+        self.scoring = self.document.add_timeout_callback(self._show_scores, self.pace_ms)
+
+    def _show_scores(self) -> None:
+        self.scoring = None
+        rows = {"Now": self._scores_of(self.model, self.given[self.model]), "Defaults": self.defaults[self.model]}
+        self.scores.text = score_table(rows, find_model(self.model).title)
 
     def _say(self, text: str) -> None:
         self.status.text = text

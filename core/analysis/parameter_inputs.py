@@ -9,7 +9,8 @@ from typing import Any
 from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.parameters import ParameterSpec, Value
 from ..impact_models.machinery.sliders import slider_range
-from .linked_graphs import MUTED, SHEET
+from .linked_columns import LOOKS
+from .linked_graphs import SHEET
 
 Changed = Callable[[str, Value], None]
 """Called with the parameter's name and its new value."""
@@ -85,7 +86,7 @@ def _input(
         name=name,
         stylesheets=[sheet],
         sizing_mode="stretch_width",
-        bar_color=MUTED,
+        bar_color=LOOKS["light"]["muted"],
     )
     field = Spinner(
         value=float(value),
@@ -122,6 +123,6 @@ def _label(spec: ParameterSpec) -> str:
     unit = f" [{escape(spec.unit)}]" if spec.unit else ""
     letter, _, index = escape(spec.symbol).partition("_")
     low = f"<sub>{index}</sub>" if index else ""
-    symbol = f' <i style="color:{MUTED}">{letter}{low}</i>' if letter else ""
+    symbol = f' <i style="color:var(--muted)">{letter}{low}</i>' if letter else ""
     hint = escape(". ".join(note for note in notes if note), quote=True)
     return f'<span title="{hint}">{spec.name}{symbol}{unit}</span>'

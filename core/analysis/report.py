@@ -15,8 +15,8 @@ from ..output import write_text
 from ..reconstruction.impact import Impacts
 from .comparison import Predictions, thinned
 from .extras import PAGES, demand
-from .figures import LINK, MEASURED, MODELLED
-from .linked_graphs import SHEET, WEB, curve_tables, link_graphs, model_columns, symbol_html
+from .linked_columns import symbol_html
+from .linked_graphs import WEB, link_graphs
 from .scores import Score
 from .variables import VARIABLES
 
@@ -25,11 +25,6 @@ MOST_SHOWN = 3000
 """Impacts that a page's graphs show: more make it slow, and too large to be sent."""
 PARTS = {"bias": "bias", "rmse": "RMSE", "energy_distance": "distance"}
 DECIMALS = {"theta_dev_deg": 1}
-SHOW_MODEL = """
-const shown = store[`${model.value} ${run.active}`];
-for (const [name, table] of Object.entries(shown.curves)) curves[name].data = table;
-source.data = {...source.data, ...shown.columns};
-"""
 
 
 def write_report(
@@ -60,19 +55,17 @@ def write_report(
     run = min(1, predictions.replicates)
     total = predictions
     predictions = thinned(predictions, MOST_SHOWN)
-    shown = predictions.row.size
-    less = f" The graphs and their fits show {shown} of them, evenly spaced." if shown < total.row.size else ""
-    linked = link_graphs(impacts, predictions, first, run)
+    linked = link_graphs(impacts, predictions, run, [first], other_run=0 if run else None)
     document = Document()
     document.title = title or f"Rockfall: {origin or 'impact models'}"
-    for root in (_controls(impacts, predictions, first, run, linked), linked.layout, linked.selection):
+    for root in (*linked.graphs.values(), linked.selection):
         document.add_root(root)
     document.template_variables.update(
         heading=title or "Impact models against measured impacts",
-        summary=summary(total, len(impacts), origin) + less,
+        summary=summary(total, len(impacts), origin) + fewer_sentence(total, predictions),
         after=score_table(by_model(scores)) + provenance(predictions, origin),
         live=False,
-        **looks(),
+        **frame(linked.graphs),
     )
     html = file_html(
         document,
@@ -90,11 +83,11 @@ def template() -> str:
     return text.split("{% extends base %}", 1)[1]
 
 
-def looks() -> dict[str, Any]:
+def frame(graphs: Mapping[str, Any]) -> dict[str, Any]:
     """What the frame needs besides its text."""
     return {
         "style": (WEB / "page.css").read_text(encoding="utf-8"),
-        "colours": {"measured": MEASURED, "modelled": MODELLED, "link": LINK},
+        "graphs": [graph.name for graph in graphs.values()],
     }
 
 
@@ -109,6 +102,12 @@ def summary(predictions: Predictions, total: int, origin: str = "", chance: bool
         f"{predictions.row.size} of {total} impacts{of}, {runs} trajectories; "
         f"{models} model{'s' if models > 1 else ''} with the measured incident velocities imposed{drawn}."
     )
+
+
+def fewer_sentence(all_of_them: Predictions, shown: Predictions) -> str:
+    """That graphs show fewer impacts than there are; "" where they show all."""
+    fewer = shown.row.size < all_of_them.row.size
+    return f" The graphs, their fits and scores show {shown.row.size} of them, evenly spaced." if fewer else ""
 
 
 def score_table(scores: Mapping[str, Sequence[Score]], title: str = "Scores") -> str:
@@ -184,44 +183,6 @@ def _settings_row(model: str, settings: Mapping[str, Any]) -> str:
         f"<tr><td title='{escape(found.reference, quote=True)}'>{escape(found.title)}</td>"
         f"<td style='text-align:left; white-space:normal'>{escape(values)}</td></tr>"
     )
-
-
-def _controls(impacts: Impacts, predictions: Predictions, first: str, run: int, linked: Any) -> Any:
-    from bokeh.layouts import column
-    from bokeh.models import CustomJS, InlineStyleSheet, RadioButtonGroup, Select
-
-    sheet = InlineStyleSheet(css=SHEET)
-    runs = ["Mean", "One draw per impact"][: min(predictions.replicates, 1) + 1]
-    model = Select(
-        title="Model",
-        value=first,
-        options=[(name, find_model(name).title) for name in predictions.models],
-        name="model",
-        stylesheets=[sheet],
-        sizing_mode="stretch_width",
-    )
-    choose = RadioButtonGroup(labels=runs, active=run, stylesheets=[sheet], sizing_mode="stretch_width")
-    store = {
-        f"{name} {i}": {
-            "columns": model_columns(impacts, predictions, name, i),
-            "curves": curve_tables(impacts, predictions, name, i),
-        }
-        for name in predictions.models
-        for i in range(len(runs))
-    }
-    show = CustomJS(
-        args={
-            "store": store,
-            "model": model,
-            "run": choose,
-            "source": linked.source,
-            "curves": dict(linked.curves),
-        },
-        code=SHOW_MODEL,
-    )
-    model.js_on_change("value", show)
-    choose.js_on_change("active", show)
-    return column(*([model, choose] if len(runs) > 1 else [model]), name="controls", sizing_mode="stretch_width")
 
 
 def _nearest_model(scores: Sequence[Score]) -> str:

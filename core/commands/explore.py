@@ -63,7 +63,15 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         serve(
             Exploration(
-                impacts, courses, models, save, given, arguments.seed, Path(arguments.impacts).name, arguments.title
+                impacts,
+                courses,
+                models,
+                save,
+                given,
+                arguments.seed,
+                Path(arguments.impacts).name,
+                arguments.title,
+                shown=models if arguments.model else (),
             ),
             arguments.port,
             ready,

@@ -16,8 +16,10 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rockfall
 from rockfall.core.cli import main
@@ -51,7 +53,10 @@ MODEL = "return Bokeh.documents[0].get_model_by_name(arguments[0])"
 ELEMENT = """
 const model = Bokeh.documents[0].get_model_by_name(arguments[0]);
 const element = Bokeh.index.find_one(model).el;
-return arguments[1] ? element.shadowRoot.querySelector(arguments[1]) : element;
+if (!arguments[1]) return element;
+const inside = element.shadowRoot.querySelector(arguments[1]);
+inside?.scrollIntoView({ block: "nearest", behavior: "instant" });
+return inside;
 """
 INK = """
 // drawn pixels of one graph that are far from white, and those that are faint
@@ -131,7 +136,7 @@ def until(browser: webdriver.Chrome, condition) -> None:
 
 
 def text(browser: webdriver.Chrome, name: str) -> str:
-    return browser.execute_script(MODEL + "?.text ?? ''", name)
+    return browser.execute_script(MODEL + "?.text ?? ''", name).replace("\xa0", " ")
 
 
 def values(browser: webdriver.Chrome, column: str) -> list:
@@ -148,6 +153,15 @@ def selected(browser: webdriver.Chrome) -> list[int]:
 
 def element(browser: webdriver.Chrome, name: str, inside: str = ""):
     return browser.execute_script(ELEMENT, name, inside)
+
+
+def shown_alone(browser: webdriver.Chrome, model: str) -> None:
+    browser.execute_script("document.querySelector(`#model-${arguments[0]} button`).click()", model)
+
+
+def picked(browser: webdriver.Chrome, menu: str, column: str) -> None:
+    """A column in the page's menu of colours or of filters."""
+    Select(browser.find_element("id", menu)).select_by_value(column)
 
 
 def choose(browser: webdriver.Chrome, name: str, value: str) -> None:
@@ -190,8 +204,8 @@ def test_the_report_draws_four_graphs_and_selects_in_all(browser, tables) -> Non
 
 def test_the_report_shows_another_model_and_other_variables(browser, tables) -> None:
     opened(browser, (tables / "report.html").as_uri())
-    choose(browser, "model", "azimi_desvarreux_1977")
-    until(browser, lambda: {round(value, 6) for value in values(browser, "p_rn")} == {0.35})
+    shown_alone(browser, "azimi_desvarreux_1977")
+    until(browser, lambda: "= 0.350" in text(browser, "rn_theta1_note"))
     choose(browser, "rn_vn1_y", "kinetic2_j")
     until(browser, lambda: "kinetic energy" in browser.execute_script(MODEL + ".left[0].axis_label", "rn_vn1"))
     assert ink(browser, "rn_vn1")[0] > 1000
@@ -202,22 +216,142 @@ def test_the_report_shows_another_model_and_other_variables(browser, tables) -> 
     assert_quiet_console(browser)
 
 
-@pytest.mark.parametrize(("x", "y"), [("vn1_mps", "kinetic2_j"), ("theta1_deg", "rn"), ("v1_mps", "theta_dev_deg")])
-@pytest.mark.parametrize("log", [(False, False), (True, True), (False, True), (True, False)])
-def test_any_pair_has_its_fit(browser, tables, x, y, log) -> None:
-    """With the numbers that the core finds."""
-    from rockfall.core.analysis.graphs import GraphSpec, make_graph
+def test_the_other_run_is_shown_and_the_first_again(browser, tables) -> None:
+    from rockfall.core.analysis.variables import model_values
+
+    impacts, predictions = compared(tables)
+    wyllie = predictions.models.index("wyllie_2014")
+    opened(browser, (tables / "report.html").as_uri())
+    for run in (0, 1, 0):
+        browser.find_elements("css selector", "#run input")[run].click()
+        truth = model_values(impacts, predictions, wyllie, run, "rn")
+        until(browser, lambda truth=truth: np.allclose(values(browser, f"p{wyllie}_rn"), truth, rtol=1e-6))
+    assert_quiet_console(browser)
+
+
+def compared(tables):
+    """What the report was made of."""
+    from rockfall.core.analysis.comparison import compare
     from rockfall.core.exchange.tables import read_impacts
 
-    graph = make_graph(read_impacts(tables / "impacts.csv"), GraphSpec("any", x, y, *log))
-    truth = graph.measured_curve.text("", "").partition(" R² = ")[2]
+    impacts = read_impacts(tables / "impacts.csv")
+    return impacts, compare(impacts, replicates=4)
+
+
+def numbers_of(words: str) -> str:
+    """R², rank correlation and number of points of a fit in words."""
+    return words.partition(" R² = ")[2]
+
+
+@pytest.mark.parametrize(("x", "y"), [("vn1_mps", "kinetic2_j"), ("theta1_deg", "rn"), ("v1_mps", "theta_dev_deg")])
+def test_any_pair_has_its_fit(browser, tables, x, y) -> None:
+    """With the numbers that the core finds, on axes of every kind."""
+    from rockfall.core.analysis.graphs import GraphSpec, make_graph
+
+    impacts, predictions = compared(tables)
     opened(browser, (tables / "report.html").as_uri())
+    shown_alone(browser, "noel_2017")
     choose(browser, "r_theta_dev_y", y)
     choose(browser, "r_theta_dev_x", x)
-    for number, wanted in enumerate(log, 1):
-        if wanted:
-            element(browser, "r_theta_dev_log", f"button:nth-child({number})").click()
-    until(browser, lambda: truth.rpartition(", n")[0] in text(browser, "r_theta_dev_note"))
+    now = (False, False)
+    for log in ((False, False), (True, False), (True, True), (False, True)):
+        for number, (wanted, has) in enumerate(zip(log, now, strict=True), 1):
+            if wanted != has:
+                element(browser, "r_theta_dev_log", f"button:nth-child({number})").click()
+        now = log
+        graph = make_graph(impacts, GraphSpec("any", x, y, *log), predictions, "noel_2017", run=1)
+        for curve in (graph.measured_curve, graph.modelled_curve):
+            truth = numbers_of(curve.text("", ""))
+            until(browser, lambda truth=truth: truth in text(browser, "r_theta_dev_note"))
+    assert_quiet_console(browser)
+
+
+def test_fits_and_scores_of_what_the_filters_leave(browser, tables) -> None:
+    """As the core finds them for those impacts alone."""
+    from rockfall.core.analysis.columns import Filter, passing
+    from rockfall.core.analysis.curves import fit_curve
+    from rockfall.core.analysis.graph_scores import graph_scores
+    from rockfall.core.analysis.graphs import PAPER_GRAPHS, make_graph
+    from rockfall.core.reconstruction.impact import fall_numbers
+
+    impacts, predictions = compared(tables)
+    falls = frozenset(sorted(set(impacts.trajectory.tolist()))[1:7])
+    kept = passing(impacts, [Filter("theta1_deg", low=10.0, high=30.0), Filter("trajectory", texts=falls)])
+    opened(browser, (tables / "report.html").as_uri())
+    shown_alone(browser, "noel_2017")
+    picked(browser, "filter", "theta1_deg")
+    low, high = browser.find_elements("css selector", ".range input")
+    low.send_keys("10", Keys.TAB)
+    high.send_keys("30", Keys.TAB)
+    picked(browser, "filter", "trajectory")
+    for label in browser.find_elements("css selector", ".texts label"):
+        if label.text in falls:
+            label.click()
+    here = kept[predictions.row]
+    until(browser, lambda: browser.find_element("id", "left").text.startswith(f"{here.sum()} of {here.size} impacts"))
+    browser.save_screenshot(str(SHOTS / "report_filtered.png"))
+    for spec in PAPER_GRAPHS:
+        whole = make_graph(impacts, spec, predictions, "noel_2017", run=1)
+        graph = replace(whole, row=whole.row[here], measured=whole.measured[here], modelled=whole.modelled[here])
+        shown = text(browser, f"{spec.name}_note")
+        for _, points in graph.series:
+            points = points[np.isfinite(points).all(axis=1)]
+            assert numbers_of(fit_curve(spec.fitted, points, graph.x_limits, graph.y_limits).text("", "")) in shown
+        for score in graph_scores(graph, fall_numbers(impacts)):
+            assert score.text() in shown
+    browser.find_element("css selector", ".filter button").click()
+    browser.find_element("css selector", ".filter button").click()
+    until(browser, lambda: browser.find_element("id", "left").text == "")
+    assert_quiet_console(browser)
+
+
+def test_points_have_the_colours_of_a_column(browser, tables) -> None:
+    impacts, predictions = compared(tables)
+    trajectory = predictions.trajectory.tolist()
+    opened(browser, (tables / "report.html").as_uri())
+    picked(browser, "colours", "trajectory")
+    first = browser.find_element("css selector", "#colours-legend li").text.split()
+    assert first == [trajectory[0], str(trajectory.count(trajectory[0]))]
+    picked(browser, "colours", "normal_spread_deg")
+    low, high = (float(end.text) for end in browser.find_elements("css selector", ".ends span"))
+    spread = np.degrees(impacts.normal_spread[predictions.row])
+    assert (low, high) == pytest.approx(np.quantile(spread[np.isfinite(spread)], [0.02, 0.98]), rel=5e-3)
+    assert_quiet_console(browser)
+
+
+def test_several_models_at_once_in_the_dark(browser, tables) -> None:
+    """Each with its colour, its fit and its score; on a dark page the canvas is dark, too."""
+    dark = [{"name": "prefers-color-scheme", "value": "dark"}]
+    opened(browser, (tables / "report.html").as_uri())
+    try:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": dark})
+        for box in browser.find_elements("css selector", "#models input"):
+            box.click() if not box.is_selected() else None
+        until(browser, lambda: text(browser, "vt2_vt1_note").count("RMSE") == 6)
+        assert "Wyllie 2014: " in text(browser, "vt2_vt1_note")
+        colours = browser.execute_script(MODEL + ".data.colour", "vt2_vt1_lines")
+        assert len(set(colours)) == 7
+        paper = browser.execute_script(MODEL + ".background_fill_color", "vt2_vt1")
+        assert browser.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(22, 25, 29)"
+        assert paper == "#16191d"
+        browser.save_screenshot(str(SHOTS / "report_dark.png"))
+        assert_quiet_console(browser)
+    finally:
+        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+@pytest.mark.parametrize(("rows", "said"), [(1, "too few points for a fit, n = 1"), (0, "no impact has both points")])
+def test_a_page_of_one_impact_and_of_none_with_a_rebound(browser, tables, tmp_path, rows, said) -> None:
+    from rockfall.core.analysis.comparison import compare
+    from rockfall.core.analysis.report import write_report
+    from rockfall.core.exchange.selection import rows_of
+    from rockfall.core.exchange.tables import read_impacts
+
+    impacts = read_impacts(tables / "impacts.csv")
+    impacts = rows_of(impacts, np.flatnonzero(impacts.complete)[:1] if rows else impacts.flags["last"])
+    write_report(impacts, compare(impacts), (), tmp_path / "report.html")
+    browser.get((tmp_path / "report.html").as_uri())
+    until(browser, lambda: said in text(browser, "rn_theta1_note"))
     assert_quiet_console(browser)
 
 
@@ -235,11 +369,11 @@ def test_moving_a_slider_moves_the_model(browser, address) -> None:
     scores, curve = text(browser, "scores"), text(browser, "rn_theta1_note")
     handle = element(browser, "azimi_desvarreux_1977.rn", ".noUi-handle")
     handle.send_keys(Keys.ARROW_RIGHT * 10)
-    until(browser, lambda: {round(value, 6) for value in values(browser, "p_rn")} == {0.45})
+    until(browser, lambda: {round(value, 6) for value in values(browser, "p0_rn")} == {0.45})
     until(browser, lambda: text(browser, "scores") != scores and text(browser, "rn_theta1_note") != curve)
     browser.save_screenshot(str(SHOTS / "explore.png"))
     element(browser, "reset", "button").click()
-    until(browser, lambda: {round(value, 6) for value in values(browser, "p_rn")} == {0.35})
+    until(browser, lambda: {round(value, 6) for value in values(browser, "p0_rn")} == {0.35})
     until(browser, lambda: text(browser, "scores") == scores)
     assert_quiet_console(browser)
 
@@ -249,10 +383,10 @@ def test_another_model_a_draw_and_saved_parameters(browser, address, tables) -> 
 
     opened(browser, address)
     choose(browser, "model", "noel_2017")
-    until(browser, lambda: max(value for value in values(browser, "p_rn") if value is not None) > 1)
-    mean = values(browser, "p_rn")
+    until(browser, lambda: browser.execute_script(MODEL + ".visible", "run"))
+    mean = values(browser, "p2_rn")
     element(browser, "run", "button:nth-child(2)").click()
-    until(browser, lambda: values(browser, "p_rn") != mean)
+    until(browser, lambda: values(browser, "p2_rn") != mean)
     field = element(browser, "noel_2017.rt.field", "input")
     field.send_keys(Keys.END, Keys.BACKSPACE * 8, "0.5", Keys.ENTER)
     until(browser, lambda: browser.execute_script(MODEL + ".value", "noel_2017.rt") == 0.5)
@@ -280,7 +414,7 @@ def test_calibrate(browser, address) -> None:
     element(browser, "calibrate", "button").click()
     until(browser, lambda: element(browser, "calibrate", "button").text == "Cancel")
     until(browser, lambda: element(browser, "calibrate", "button").text == "Calibrate")
-    assert text(browser, "scores") != scores
+    until(browser, lambda: text(browser, "scores") != scores)
     beginnings = (
         "warning", "rn: It ended at the upper limit of its range, 1: the best value may lie beyond.",
         "note", "On impacts it was not fitted to, the model is ",

@@ -169,7 +169,7 @@ def test_a_page_shows_some_of_many_impacts_and_says_so(impacts, predictions, mon
     report.write_report(impacts, predictions, scores(impacts, predictions), tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert f"{predictions.row.size} of {len(impacts)} impacts" in page
-    assert "The graphs and their fits show 5 of them, evenly spaced." in page
+    assert "The graphs, their fits and scores show 5 of them, evenly spaced." in page
     few = thinned(predictions, 5)
     every = [list(predictions.row).index(row) for row in few.row]
     assert (every[0], every[-1], len(every)) == (0, predictions.row.size - 1, 5)

@@ -10,7 +10,16 @@ import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, Mask, norm
-from .options import add_out, add_terrain_options, known_names, not_negative, positive, terrain_as_asked, whole
+from .options import (
+    add_out,
+    add_terrain_options,
+    known_names,
+    naming,
+    not_negative,
+    positive,
+    terrain_as_asked,
+    whole,
+)
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -94,7 +103,9 @@ def run(arguments: argparse.Namespace) -> int:
         video = open_video(arguments.video, progress) if arguments.video else None
         _check_frames(arguments, pairs, video)
         progress("Solving the camera")
-        aligned = align(pairs, _options(arguments, pairs, video))
+        options = _options(arguments, pairs, video)
+        with naming(arguments.pairs):
+            aligned = align(pairs, options)
         path, motion = fixed(aligned.found.camera), list[str]()
         if arguments.moving and video is not None:
             first, last = arguments.frames or (0, 0)
@@ -137,6 +148,7 @@ def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None
     from ..camera.model import focal_of_view, pinhole
     from ..camera.resection.problem import FREE_LENS
     from ..exchange.cameras import read_camera
+    from ..plausibility import check_plausible
     from ..workflow.alignment import AlignmentOptions
 
     size = (video.width, video.height) if video is not None else _size(arguments.size)
@@ -148,6 +160,7 @@ def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None
             raise InputError(f"--fov {arguments.fov:g} is no angle of view", advice=advice)
         focal = focal_of_view(size[0], arguments.fov)
     if focal is not None:
+        check_plausible("fx", focal, "focal length")
         free, start = (), pinhole(*size, focal, pairs.shift)
     if arguments.camera:
         start = read_camera(arguments.camera, pairs.shift).path.reference

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .options import add_figure_options, add_out, figure_formats
+from .options import add_figure_options, add_out, figure_formats, naming
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..output import output_folder
     from ..workflow.refinement import pixels_of
 
-    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
         progress(f"Reading {arguments.project}")
         project = read_project(arguments.project)
         if project.picks is None and any(video.track is not None for video in project.videos):

@@ -9,7 +9,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import DependencyError, InputError, RockfallError
 
 if TYPE_CHECKING:
     from ..exchange.database import Database
@@ -95,6 +95,10 @@ def naming(file: str) -> Iterator[None]:
         raise InputError(
             error.problem, file=file, row=error.row, trajectory=error.trajectory, advice=error.advice
         ) from error
+    except DependencyError:
+        raise
+    except RockfallError as error:
+        raise RockfallError(f"{file}: {error}") from error
 
 
 def add_motion_options(group: "argparse._ArgumentGroup") -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..reconstruction.sampling import STEP_S
-from .options import add_out, add_terrain_options, not_negative, positive, terrain_as_asked
+from .options import add_out, add_terrain_options, naming, not_negative, positive, terrain_as_asked
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -91,18 +91,21 @@ def run(arguments: argparse.Namespace) -> int:
         progress(f"Reading {arguments.picks}")
         picks = read_picks(arguments.picks)
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
+        block = _block(arguments)
+        drag = Drag(arguments.air_density, arguments.drag_coefficient) if arguments.drag else None
         progress("Reconstructing")
-        reconstruction = reconstruct(
-            picks,
-            surface=surface,
-            block=_block(arguments),
-            gravity_mps2=arguments.gravity,
-            drag=Drag(arguments.air_density, arguments.drag_coefficient) if arguments.drag else None,
-            normal_radius_m=arguments.normal_radius,
-            site=arguments.site,
-            eq10=arguments.eq10,
-            flights=arguments.flights,
-        )
+        with naming(arguments.picks):
+            reconstruction = reconstruct(
+                picks,
+                surface=surface,
+                block=block,
+                gravity_mps2=arguments.gravity,
+                drag=drag,
+                normal_radius_m=arguments.normal_radius,
+                site=arguments.site,
+                eq10=arguments.eq10,
+                flights=arguments.flights,
+            )
         progress("Writing the tables")
         write_impacts(reconstruction.impacts, folder / "impacts.csv")
         write_trajectories(sample_trajectories(reconstruction, arguments.step, surface), folder / "trajectories.csv")

@@ -11,7 +11,7 @@ import numpy as np
 from ..reconstruction.choices import FREE, LOSSES, Loss
 from ..reconstruction.sampling import STEP_S
 from ..vectors import Array, norm
-from .options import add_out, known_names, not_negative, positive
+from .options import add_out, known_names, naming, not_negative, positive
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..output import output_folder
     from ..workflow.refinement import refine_picks
 
-    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
         progress(f"Reading {arguments.project}")
         project = read_project(arguments.project)
         how = _settings(project.refinement, arguments)

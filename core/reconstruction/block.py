@@ -9,6 +9,7 @@ import numpy as np
 
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import RockfallError
+from ..plausibility import check_plausible
 from ..vectors import Array
 from .picks import Picks
 
@@ -27,7 +28,7 @@ class Block:
 
     Raises
     ------
-    RockfallError : a diameter or the density is not a positive number, or the shape is unknown.
+    RockfallError : a diameter or the density is not a positive number or such as no block has, or the shape is unknown.
 
     Notes
     -----
@@ -44,6 +45,7 @@ class Block:
         for name, value in (("d1", self.d1), ("d2", self.d2), ("d3", self.d3), ("density", self.density)):
             if not (isfinite(value) and value > 0):
                 raise RockfallError(f"The block's {name} must be a positive number, not {value}.")
+            check_plausible(f"{name}_kgpm3" if name == "density" else f"{name}_m", value, f"block's {name}")
         if self.shape not in SHAPES:
             raise RockfallError(f"Unknown block shape {self.shape!r}: use one of {', '.join(SHAPES)}.")
 

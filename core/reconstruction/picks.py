@@ -15,6 +15,8 @@ from ..vectors import Array, Indices, Mask, Names, norm
 
 KINDS = ("impact", "release", "pass", "contact", "stop")
 STATUSES = ("ok", "doubtful", "shattered", "discarded")
+LONGEST_S = 86_400.0
+"""A day: what lasts longer has a wrong time, and would be sampled for ever."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,6 +199,11 @@ def _check_times(picks: Picks) -> None:
         late, early = float(picks.time_s[i]), float(picks.time_s[i + 1])
         problem = f"The times are not sorted: {early!r} s comes after {late!r} s{before}"
         raise picks.error(i + 1, problem, "Put the rows of a trajectory in time order, or correct the time")
+    first = np.repeat(picks.group_starts, np.diff(np.append(picks.group_starts, len(picks))))
+    lasting = picks.time_s - picks.time_s[first]
+    if (i := _first(lasting > LONGEST_S)) is not None:
+        problem = f"The trajectory lasts for {lasting[i]:.4g} s, longer than any fall"
+        raise picks.error(i, problem, "Correct the time, or give the next run a trajectory name of its own")
 
 
 def _check_releases(picks: Picks) -> None:

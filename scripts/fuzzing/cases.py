@@ -123,11 +123,12 @@ def _videos() -> dict[str, Case]:
 
 
 def _projects(terrain: bytes) -> dict[str, Case]:
-    from rockfall.core.exchange.opening import open_project
+    from rockfall.core.exchange.opening import open_terrain, read_project_picks
     from rockfall.core.exchange.project import read_project
 
     def opened(at: Path) -> object:
-        return open_project(read_project(at / "project.toml"))
+        project = read_project(at / "project.toml")
+        return read_project_picks(project, open_terrain(project))
 
     files = {"project.toml": examples.PROJECT, "terrain.ply": terrain, "picks.csv": examples.PICKS}
     return {"project": Case(files, ("project.toml",), opened), "project's picks": Case(files, ("picks.csv",), opened)}

@@ -86,7 +86,7 @@ def judge(case: Case, folder: Path) -> tuple[str, str]:
         printed.seek(0)
         text = printed.read().decode("utf-8", "replace")
     if case.command and not problem:
-        lines = [line for line in text.split("\n") if line]
+        lines = [line for line in text.split("\n") if line and not line.endswith("…")]  # progress
         if result not in (0, 1):
             problem, said = f"status {result}", text[-300:]
         elif result == 1:

@@ -18,6 +18,8 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.plausibility import implausible
 from rockfall.core.progress import CancelledError
 from rockfall.core.reading import reader
+from rockfall.core.reconstruction.block import Block
+from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.terrain.readers import inspect_terrain, read_terrain
 
 PLANE = "0 0 0\n4 0 1\n0 4 0\n4 4 1\n"
@@ -232,3 +234,13 @@ def test_a_nested_geojson_is_refused(tmp_path):
     path = tmp_path / "a.geojson"
     path.write_text('{"type": "Polygon", "coordinates": ' + "[" * 100_000)
     assert "nested too deeply" in refusal(read_polygons, path, GlobalShift())
+
+
+def test_blocks_air_and_times_that_cannot_be_are_refused(tmp_path):
+    with pytest.raises(RockfallError, match=r"block's d1 is 1e\+300, beyond what can be"):
+        Block(1e300, 1.0, 1.0)
+    with pytest.raises(RockfallError, match=r"density of the air is 1e\+09"):
+        Drag(1e9)
+    path = tmp_path / "picks.csv"
+    path.write_text("trajectory,time_s,x_m,y_m,z_m\nA,0,0,0,0\nA,1e9,1,0,0\n")
+    assert "The trajectory lasts for 1e+09 s, longer than any fall" in refusal(read_picks, path)

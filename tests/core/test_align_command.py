@@ -303,7 +303,7 @@ def test_a_tripod_needs_one_pose(tmp_path, capsys):
         (["--size", "1920x1080", "--fov", "180"], ["below 180"]),
         (["--size", "640x480"], ["pairs.csv, row ", "outside the image of 640 × 480 px"]),
         (["--video", "none.mp4"], ["none.mp4"]),
-        (["--size", "1920x1080", "--camera", "none.toml"], ["none.toml", "cannot be read"]),
+        (["--size", "1920x1080", "--camera", "none.toml"], ["none.toml", "no such file"]),
     ],
 )  # fmt: skip
 def test_mistakes_are_named(pairs, capsys, options, said):

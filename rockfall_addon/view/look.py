@@ -11,8 +11,6 @@ from ..scene import store, terrain, videos
 from .workspace import free_part
 
 AROUND = 1.15  # some air around what is framed
-EDGE = (0.02, 0.02, 0.02)
-"""Around trails and blocks: white ones stand out from a bright slope, too."""
 ASIDE_DEG = 25.0  # so that flights show beside each other and not one behind the other
 HALF_SENSOR_MM = 36.0  # of Blender's free views, along the longer side
 LEAST_DISTANCE_M = 0.5
@@ -29,7 +27,7 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
         shading.type, shading.light, shading.color_type = "SOLID", "FLAT", "VERTEX"
         shading.show_cavity, shading.cavity_type = True, "WORLD"  # the other kind breaks thin trails into dots
         shading.cavity_ridge_factor, shading.cavity_valley_factor = 0.2, 0.6
-        shading.show_object_outline, shading.object_outline_color = True, EDGE
+        shading.show_object_outline = False  # it covers trails that are one or two pixels wide
         shading.background_type, shading.background_color = "VIEWPORT", (0.055, 0.065, 0.08)
         space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
         space.overlay.show_relationship_lines = space.overlay.show_extras = False

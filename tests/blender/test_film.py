@@ -143,10 +143,10 @@ def test_trails_and_impact_rings_grow(scene, preset, part) -> None:
 
 def test_a_ring_for_each_impact_where_and_when_it_was(scene, part) -> None:
     marks = part("rockfall_addon.steps.film.marks").impact_marks(scene, 0.5)
-    corners = np.array([vertex.co[:] for vertex in marks.data.vertices]).reshape(-1, 32, 3)
+    corners = np.array([vertex.co[:] for vertex in marks.data.vertices]).reshape(-1, 64, 3)
     times = np.array(
         [each.value for each in marks.data.attributes[part("rockfall_addon.scene.materials").TIME_ATTRIBUTE].data]
-    ).reshape(-1, 32)
+    ).reshape(-1, 64)
     impacts = [o for o in scene.objects if o.get("rockfall_role") == "pick" and o["rockfall_kind"] == "impact"]
     assert len(corners) == len(impacts) > 1
     for pick in impacts:
@@ -154,7 +154,7 @@ def test_a_ring_for_each_impact_where_and_when_it_was(scene, part) -> None:
         middle = np.array(pick.location) + 0.25 * 0.5 * up
         (i,) = np.flatnonzero(np.linalg.norm(corners.mean(axis=1) - middle, axis=1) < 1e-4)
         outer = np.linalg.norm(corners[i] - middle, axis=1)
-        np.testing.assert_allclose(outer, [0.5] * 16 + [0.31] * 16, atol=1e-4)
+        np.testing.assert_allclose(outer, [0.5] * 16 + [0.31] * 16 + [0.61] * 16 + [0.5] * 16, atol=1e-4)
         np.testing.assert_allclose((corners[i] - middle) @ up, 0.0, atol=1e-4)
         np.testing.assert_allclose(times[i], pick["rockfall_key_frame"] / scene.render.fps, atol=1e-4)
 

@@ -9,7 +9,11 @@ from . import captions
 
 GROUP = "Rockfall impact marks"
 CORNERS = 16
-COLOUR = (0.96, 0.96, 0.96)
+BANDS = (
+    (1.0, 0.62, (0.96, 0.96, 0.96)),
+    (1.22, 1.0, (0.05, 0.05, 0.05)),
+)
+"""Outer and inner radius of the bands of a ring, and their colours: it stands out from a white trail, too."""
 
 
 def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | None:
@@ -19,9 +23,12 @@ def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | 
         return None
     angles = np.linspace(0.0, 2 * np.pi, CORNERS, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(CORNERS)])
-    ring = np.vstack([circle, 0.62 * circle]) * radius_m + (0.0, 0.0, 0.25 * radius_m)
+    edges = np.vstack([part * circle for outer, inner, _ in BANDS for part in (outer, inner)])
+    ring = edges * radius_m + (0.0, 0.0, 0.25 * radius_m)
+    colours = np.repeat([materials.linear_colour(colour) for _, _, colour in BANDS], 2 * CORNERS, axis=0)
     following = (np.arange(CORNERS) + 1) % CORNERS
-    faces = np.column_stack([np.arange(CORNERS), following, CORNERS + following, CORNERS + np.arange(CORNERS)])
+    band = np.column_stack([np.arange(CORNERS), following, CORNERS + following, CORNERS + np.arange(CORNERS)])
+    faces = np.vstack([band + 2 * CORNERS * number for number in range(len(BANDS))])
     rate = timing.frame_rate(scene)
     corners, times = [], []
     for obj in objects:
@@ -32,7 +39,7 @@ def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | 
     mesh.from_pydata(np.vstack(corners).tolist(), [], (faces[None] + steps[:, None, None]).reshape(-1, 4).tolist())
     attribute = mesh.attributes.new(materials.TIME_ATTRIBUTE, "FLOAT", "POINT")
     attribute.data.foreach_set("value", np.concatenate(times).astype(np.float32))
-    captions.mark_colour(mesh, np.tile(materials.linear_colour(COLOUR), (len(mesh.vertices), 1)))
+    captions.mark_colour(mesh, np.tile(colours, (len(objects), 1)))
     mesh.materials.append(materials.emission_material("Rockfall caption", captions.COLOUR_ATTRIBUTE))
     marks = bpy.data.objects.new("Film impacts", mesh)
     marks.modifiers.new("Up to now", "NODES").node_group = until_now_group()

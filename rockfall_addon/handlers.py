@@ -18,7 +18,7 @@ from .scene import (
     timing,
     video_files,
 )
-from .view import job, strip
+from .view import job, strip, trail_lines
 from .view.graphs import editor, impact_sheet, motion_sheet, selection
 
 _owner = object()
@@ -59,6 +59,7 @@ def _loaded(_path: str, _unused: object = None) -> None:
     motion.forget()
     selection.forget()
     strip.forget()
+    trail_lines.forget()
     _listen()  # subscriptions do not survive loading
     _catch_up()
 
@@ -115,6 +116,7 @@ def _selected_otherwise() -> None:
     selection.notice()
     graph_settings.redraw()
     strip.redraw()
+    trail_lines.forget()
 
 
 def _keep_rate(scene: bpy.types.Scene) -> None:

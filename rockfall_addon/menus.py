@@ -57,8 +57,8 @@ STEPS = (
         "rockfall.simulate", "rockfall.select_run", "rockfall.remove_simulation",
     )),
     ("playback", "8  Playback", (
-        ("screen.animation_play", "Play or Pause", {}), "rockfall.open_motion_graphs", "rockfall.open_keys",
-        "rockfall.show_relief",
+        ("screen.animation_play", "Play or Pause", {}), "rockfall.frame_trajectory",
+        "rockfall.open_motion_graphs", "rockfall.open_keys", "rockfall.show_relief",
     )),
     ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
     ("share", "10  Share", (

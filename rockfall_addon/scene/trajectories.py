@@ -111,14 +111,19 @@ def show_trajectory(
     trails.paint_observed(scene, [trail])
 
 
+def flights_of(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
+    """What is shown of the flights of a trajectory; nothing before it has any."""
+    return [obj for obj in store.with_role(scene, store.FLIGHTS_ROLE) if obj.get(store.TRAJECTORY) == name]
+
+
 def _choose_sizes(settings: bpy.types.PropertyGroup, result: Reconstruction) -> None:
     """Sizes at which markers, trails and blocks are seen when the whole slope is; to be changed at will."""
     extent = float(np.ptp(result.picks.position, axis=0).max(initial=0.0))
     blocks = [result.block] if isinstance(result.block, Block) else list(result.block.values())
     radius = float(np.mean([block.radius_m for block in blocks]))
     settings.marker_radius_m = max(radius, 0.006 * extent)
-    settings.trail_radius_m = max(0.2 * radius, 0.0025 * extent)
-    settings.block_scale = max(1.0, round(0.008 * extent / radius * 2) / 2)
+    settings.trail_radius_m = 0.2 * radius  # the 3-D view draws lines of constant width besides
+    settings.block_scale = 1.0  # and a ring about small blocks
 
 
 def _block_of(result: Reconstruction, name: str) -> Block:

@@ -37,15 +37,18 @@ def show_relief(context: bpy.types.Context, frame_all: bool = False) -> None:
         frame(context, _ours(context.scene))
 
 
-def frame(context: bpy.types.Context, objects: Iterable[bpy.types.Object]) -> None:
-    """Look up the slope at objects in every free 3-D view of the window; in all of them when none is free."""
+def frame(context: bpy.types.Context, objects: Iterable[bpy.types.Object], *, beside: bool = False) -> None:
+    """Look up the slope at objects in every free 3-D view of the window; in all of them when none is free.
+
+    beside : only in free views beside the one that is worked in, which stays as it is.
+    """
     corners = [obj.matrix_world @ Vector(corner) for obj in objects for corner in obj.bound_box]
     if not corners:
         return
     rotation = _up_the_slope(context.scene)
     areas = list(_views(context))
     free = [area for area in areas if not _is_through_footage(context.scene, area.spaces.active)]
-    for area in free or areas:
+    for area in [area for area in free if area != context.area] if beside else free or areas:
         _look_at(area, corners, rotation)
         area.tag_redraw()
 

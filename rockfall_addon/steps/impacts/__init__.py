@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The selected impact, and the table of all."""
 
-from . import operators, panel, properties, table
+from . import operators, overlay, panel, properties, table
 
-PARTS = (properties, operators, panel, table)
+PARTS = (overlay, properties, operators, panel, table)

@@ -6,7 +6,8 @@ from bpy.props import EnumProperty
 
 from ....core.errors import RockfallError
 from ...scene import clicks, picks, pictures, places, sightings, store
-from ...view import pointing
+from ...scene.trajectories import flights_of
+from ...view import look, pointing
 from ...view.reporting import possible, reported
 from . import editing
 from .properties import KINDS
@@ -72,6 +73,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         """Take the pick under the mouse, or make one; False when the click was all: nothing is to be dragged."""
         scene = context.scene
         obj = pointing.pick_at(context, self._xy, any_time=any_time)
+        self._flew = bool(flights_of(scene, places.trajectory(scene) if obj is None else obj[store.TRAJECTORY]))
         if obj is None:
             name, kind = places.trajectory(scene), scene.rockfall_picking.kind
             if kind == "pass" and pointing.camera_of(context) is not None:
@@ -126,6 +128,8 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         if self._place is not None:
             editing.move(scene, obj, camera, self._place)
         editing.finish(scene, obj)
+        if not self._flew:
+            look.frame(context, flights_of(scene, obj[store.TRAJECTORY]), beside=True)
         warning = self._place.warning if self._place is not None else ""
         if warning:
             self.report({"WARNING"}, warning)

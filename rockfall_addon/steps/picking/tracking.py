@@ -7,7 +7,8 @@ from ....core.errors import RockfallError
 from ....core.footage.tracking import BlockTrack, track_block
 from ....core.progress import Progress
 from ...scene import clocks, places, sightings, store, video_files, videos
-from ...view import job
+from ...scene.trajectories import flights_of
+from ...view import job, look
 from ...view.of_video import has_video
 from ...view.reporting import possible, reported
 from . import tracks
@@ -79,7 +80,10 @@ class ROCKFALL_OT_propose_impacts(_OfTrack, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         camera, name = _solved_name(context)
+        new = not flights_of(context.scene, name)
         made = tracks.propose(context.scene, camera, name)
+        if new:
+            look.frame(context, flights_of(context.scene, name), beside=True)
         passes = sum(obj[store.KIND] == "pass" for obj in made)
         count = f"{len(made) - passes} impacts are" if len(made) - passes != 1 else "One impact is"
         ends = f", and {passes} points in flight where the track begins or ends" if passes else ""

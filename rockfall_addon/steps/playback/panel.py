@@ -23,6 +23,7 @@ class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.scale_y = 1.4
         row.operator("screen.animation_play", text="Pause" if playing else "Play", icon="PAUSE" if playing else "PLAY")
+        layout.operator("rockfall.frame_trajectory", icon="ZOOM_SELECTED")
         layout.operator("rockfall.open_motion_graphs", icon="FCURVE")
         layout.operator("rockfall.open_keys", icon="ACTION")
         layout.use_property_split = True

@@ -12,6 +12,17 @@ from .reporting import reported
 _items: dict[str, list[tuple[str, str, str]]] = {}  # Blender does not keep the texts of a menu
 
 
+class OfModel:
+    """Mix-in of operators about one model: the tooltip says whose it is."""
+
+    model: StringProperty()
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        model = MODELS[properties.model]
+        return f"{model.title} ({model.name}): {model.reference}"
+
+
 class ROCKFALL_OT_reset_parameter(bpy.types.Operator):
     """Give the parameter its default again"""
 

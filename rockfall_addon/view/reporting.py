@@ -33,6 +33,17 @@ def possible(cls: type[bpy.types.Operator], can: object, otherwise: str) -> bool
     return bool(can)
 
 
+class InWindow:
+    """Mix-in of operators that arrange a window, and change nothing of the scene."""
+
+    bl_options = {"REGISTER"}
+    looks_only = True
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return possible(cls, context.window is not None and not bpy.app.background, "There is no window")
+
+
 def leave_newer_alone(cls: type) -> None:
     """Make a class that is to be registered leave a scene of a newer version as it is.
 

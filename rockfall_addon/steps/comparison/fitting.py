@@ -13,8 +13,6 @@ from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
 
-HAS_NONE = "Nothing was fitted, or it is applied or discarded already"
-
 
 class _Fit(InBackground):
     """Mix-in: impacts are there, and nothing else is at work."""
@@ -94,16 +92,22 @@ class ROCKFALL_OT_choose_fitted(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_apply_fit(bpy.types.Operator):
-    """Make the fitted values the scene's own: for the graphs, the blocks in the 3-D view and the simulation"""
+class _OfProposal:
+    """Mix-in: decides on what was fitted."""
 
-    bl_idname = "rockfall.apply_fit"
-    bl_label = "Apply Fitted Parameters"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, store.FIT in context.scene, HAS_NONE)
+        there = store.FIT in context.scene
+        return possible(cls, there, "Nothing was fitted, or it is applied or discarded already")
+
+
+class ROCKFALL_OT_apply_fit(_OfProposal, bpy.types.Operator):
+    """Make the fitted values the scene's own: for the graphs, the blocks in the 3-D view and the simulation"""
+
+    bl_idname = "rockfall.apply_fit"
+    bl_label = "Apply Fitted Parameters"
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -111,16 +115,11 @@ class ROCKFALL_OT_apply_fit(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_discard_fit(bpy.types.Operator):
+class ROCKFALL_OT_discard_fit(_OfProposal, bpy.types.Operator):
     """Forget the fitted values; the second set is what it was before"""
 
     bl_idname = "rockfall.discard_fit"
     bl_label = "Discard Fitted Parameters"
-    bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, store.FIT in context.scene, HAS_NONE)
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

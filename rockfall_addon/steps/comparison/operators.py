@@ -8,22 +8,16 @@ from bpy_extras.io_utils import ExportHelper
 from ....core.exchange.parameters import write_parameters
 from ....core.impact_models.registry import MODELS
 from ...scene import model_parameters, models, store
+from ...view.parameters import OfModel
 from ...view.reporting import possible, reported
 
 
-class ROCKFALL_OT_compare_model(bpy.types.Operator):
+class ROCKFALL_OT_compare_model(OfModel, bpy.types.Operator):
     """Show this model in the graphs, or leave it out"""
 
     bl_idname = "rockfall.compare_model"
     bl_label = "Compare Model"
     bl_options = {"INTERNAL", "UNDO"}
-
-    model: StringProperty()
-
-    @classmethod
-    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        model = MODELS[properties.model]
-        return f"{model.title} ({model.name}): {model.reference}"
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

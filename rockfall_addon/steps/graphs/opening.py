@@ -6,7 +6,7 @@ import bpy
 from ...scene import problems, store
 from ...view import look
 from ...view.graphs import areas, editor
-from ...view.reporting import possible, reported
+from ...view.reporting import InWindow, reported
 
 OWN_SHARE = 0.62
 """Of a lone 3-D view, that the graphs take in a workspace of their own."""
@@ -14,18 +14,7 @@ NAME = "Graphs"
 AFTER_S = 0.3  # a new workspace is shown when events are handled
 
 
-class _InWindow:
-    """Mix-in: needs a window."""
-
-    bl_options = {"REGISTER"}
-    looks_only = True
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, context.window is not None and not bpy.app.background, "There is no window")
-
-
-class ROCKFALL_OT_open_graphs(_InWindow, bpy.types.Operator):
+class ROCKFALL_OT_open_graphs(InWindow, bpy.types.Operator):
     """Show the graphs of the impacts in the free view, or beside the 3-D view; again to have the view back"""
 
     bl_idname = "rockfall.open_graphs"
@@ -37,7 +26,7 @@ class ROCKFALL_OT_open_graphs(_InWindow, bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_open_graphs_workspace(_InWindow, bpy.types.Operator):
+class ROCKFALL_OT_open_graphs_workspace(InWindow, bpy.types.Operator):
     """Open a workspace of their own for the graphs, with the parameters of the models beside them"""
 
     bl_idname = "rockfall.open_graphs_workspace"

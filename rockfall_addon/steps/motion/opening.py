@@ -4,21 +4,15 @@
 import bpy
 
 from ...view.graphs import areas, editor
-from ...view.reporting import possible, reported
+from ...view.reporting import InWindow, reported
 
 
-class ROCKFALL_OT_open_motion_graphs(bpy.types.Operator):
+class ROCKFALL_OT_open_motion_graphs(InWindow, bpy.types.Operator):
     """Show speed, height, energy and residuals of tracks over time in the free view, or beside the 3-D view; again for
     the free view"""
 
     bl_idname = "rockfall.open_motion_graphs"
     bl_label = "Motion Graphs"
-    bl_options = {"REGISTER"}
-    looks_only = True
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, context.window is not None and not bpy.app.background, "There is no window")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -3,11 +3,11 @@
 
 import bpy
 
-from ....core.impact_models.registry import MODELS
 from ....core.progress import Progress
 from ...scene import simulated_sources, simulation, simulation_setup, store
 from ...view import job
 from ...view.job import InBackground, Work
+from ...view.parameters import OfModel
 from ...view.reporting import possible, reported
 
 
@@ -57,19 +57,12 @@ class ROCKFALL_OT_remove_simulation(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_choose_simulated_model(bpy.types.Operator):
+class ROCKFALL_OT_choose_simulated_model(OfModel, bpy.types.Operator):
     """Simulate with this model, or leave it out"""
 
     bl_idname = "rockfall.choose_simulated_model"
     bl_label = "Choose Model"
     bl_options = {"INTERNAL", "UNDO"}
-
-    model: bpy.props.StringProperty()
-
-    @classmethod
-    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
-        model = MODELS[properties.model]
-        return f"{model.title} ({model.name}): {model.reference}"
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -4,20 +4,14 @@
 import bpy
 
 from ...view import arranging, workspace
-from ...view.reporting import possible, reported
+from ...view.reporting import InWindow, possible, reported
 
 
-class ROCKFALL_OT_open_workspace(bpy.types.Operator):
+class ROCKFALL_OT_open_workspace(InWindow, bpy.types.Operator):
     """Open the workspace for rockfalls: the camera's view, a free view, the timeline, and the tab Rockfall"""
 
     bl_idname = "rockfall.open_workspace"
     bl_label = "Open Rockfall Workspace"
-    bl_options = {"REGISTER"}
-    looks_only = True
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, context.window is not None and not bpy.app.background, "There is no window")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

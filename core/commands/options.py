@@ -103,7 +103,7 @@ def naming(file: str) -> Iterator[None]:
 
 def add_motion_options(group: "argparse._ArgumentGroup") -> None:
     """How simulated blocks move between and after their impacts."""
-    group.add_argument("--drag", action="store_true", help="flights with the drag of air")
+    group.add_argument("--drag", action="store_true", help="drag of air, in flight and on the ground")
     group.add_argument(
         "--rolling",
         choices=("azzoni_1995", "coulomb", "none"),

@@ -61,7 +61,7 @@ class Settings:
     zones : zone → parameters of its own there.
     rolling : how a block moves on the ground: Azzoni et al. 1995, Coulomb's sliding, or none, which stops it there.
     friction : coefficient μ of either; `zone_friction` where a zone has its own.
-    drag : None for none.
+    drag : in flight and on the ground; None for none.
     seed : of all random numbers.
     most_impacts, most_s : a run that is longer ends with "limit".
     """

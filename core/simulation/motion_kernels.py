@@ -13,13 +13,14 @@ On the ground the direction follows gravity along the terrain, the speed follows
     v² ← v² − 2 A g (Δz + μ cosβ Δs)
 
 which gives the same energy line for any step. A is 1 for sliding (Coulomb) and 1/(1 + c) for rolling (Azzoni et al.
-1995), with the inertia c m r²; μ is the coefficient of friction of the zone.
+1995), with the inertia c m r²; μ is the coefficient of friction of the zone. Drag takes exp(−2 A k Δs) of it, with k of
+the flight: exact for drag alone, and legs are short enough for both.
 
 A block whose three moments of inertia are not the same turns freely in flight (`rotation`): the spin that it hits with
 is not the one that it left with. Its attitude is drawn at the release, kept at contacts and while it rolls.
 """
 
-from math import inf, sqrt
+from math import exp, inf, sqrt
 
 import numpy as np
 
@@ -229,6 +230,13 @@ def _moved(p, q, v, towards, gravity, mu):  # type: ignore[no-untyped-def]
 
 
 @borrowing
+def _dragged(v, drag, ds):  # type: ignore[no-untyped-def]
+    """What drag leaves of a velocity on the way ds: drag [1/m] is that of the mass that moves."""
+    kept = exp(-drag * ds)
+    return kept * v[0], kept * v[1], kept * v[2]
+
+
+@borrowing
 def _lands(tree, stack, times, nearby, p, v, gravity, radius):  # type: ignore[no-untyped-def]
     """Where a block that hops on the ground lands: `first_contact`, looked for nearby first."""
     a = (0.0, 0.0, -gravity)
@@ -371,9 +379,12 @@ def run_block(  # type: ignore[no-untyped-def]
         moves, leaves = False, False
         if len(tree) == 6:
             if edge == ON_TRIANGLE:
-                e, hit = n, place
+                e, hit, longest = n, place, most_s - time
+                if drag > 0.0:
+                    k = drag * speed
+                    longest = min(longest, 2.0 * DRAG_CHANGE / (k + sqrt(k * k + 2.0 * DRAG_CHANGE * drag * gravity)))
                 t, q, turned, edge = leg(
-                    tree, facets, stack, nearby, p, v, n, place, radius, gravity, factor, mu, most_s - time
+                    tree, facets, stack, nearby, p, v, n, place, radius, gravity, factor, mu, longest
                 )
                 moves = t > 0.0
                 if moves and edge == AT_ANOTHER:
@@ -408,6 +419,8 @@ def run_block(  # type: ignore[no-untyped-def]
         if moves:
             part, p, v, ds = _moved(p, q, v, turned, factor * gravity, mu * max(cosine, 0.0))
             time, length = time + part * t, length + part * ds
+            if drag > 0.0:
+                v = _dragged(v, factor * drag, part * ds)
             n, place, came = e, hit, v
             if len(tree) == 6 and part == 1.0 and 0 <= edge < AT_ANOTHER and facets[1][place, edge] > 0.0:
                 v, n, place, edge = onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, dt)
@@ -476,6 +489,8 @@ def run_block(  # type: ignore[no-untyped-def]
                 v = (turned[0] / size * now, turned[1] / size * now, turned[2] / size * now)
                 time += 2.0 * ds / (speed + now)
                 p, length = away, length + ds
+                if drag > 0.0:
+                    v = _dragged(v, factor * drag, ds)
         w = _rolling(n, v, radius)
         v_max = max(v_max, sqrt(_dot(v, v)))
         if record == ALL or (record == IMPACTS and not marked):

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from rockfall.core.constants import GRAVITY_MPS2
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import make_releases
+from rockfall.core.terrain.cloud import Cloud
 from rockfall.core.terrain.raycast import closest_points
 from rockfall.core.terrain.surface import Surface
 
@@ -107,3 +109,30 @@ def test_what_a_sphere_is_clear_of_does_not_depend_on_who_asked_before() -> None
 
     forth, back = ends(make_ground(surface), [*range(40)]), ends(make_ground(surface), [*range(39, -1, -1)])
     assert forth == back
+
+
+@pytest.mark.parametrize(("law", "part"), [("azzoni_1995", 5 / 7), ("coulomb", 1.0)])
+@pytest.mark.parametrize("points", [False, True])
+def test_drag_slows_blocks_on_the_ground_as_in_closed_form(law: str, part: float, points: bool) -> None:
+    """Down a plane, v² = v∞² (1 − exp(−2 A k s)) with v∞² = g (sin β − μ cos β)/k, in air 200 times as dense."""
+    slope, mu = np.radians(35.0), 0.4
+    line, across = (
+        (np.arange(0.0, 60.0, 0.2), np.arange(0.0, 4.0, 0.2)) if points else np.array([[0, 30, 60], [0, 2, 4]])
+    )
+    surface = sheet(line, across, lambda x, y: -np.tan(slope) * x)
+    cloud = Cloud(surface.vertices, GlobalShift(), "plane")
+    up = np.array([np.sin(slope), 0.0, np.cos(slope)])
+    place = np.array([[4.0, 1.9, -np.tan(slope) * 4.0]]) + 0.5 * up
+    releases = make_releases(place, diameter_m=1.0)
+    thick = Drag(air_density=240.0)
+    settings = Settings("azimi_desvarreux_1977", ROLLS, drag=thick, rolling=law, friction=mu)
+    records = simulate(make_ground(cloud if points else surface), releases, settings).records
+    rolls = records.what == engine.ON_GROUND
+    k = releases.drag_per_m(thick)[0]
+    way = np.linalg.norm(records.position[rolls] - place, axis=1)
+    true = np.sqrt(GRAVITY_MPS2 * (np.sin(slope) - mu * np.cos(slope)) / k * -np.expm1(-2 * part * k * way))
+    speed = np.linalg.norm(records.v2[rolls], axis=1)
+    far = (way > 3.0) & (way < 45.0)
+    assert far.sum() > 20
+    assert 2 * part * k * way[far].max() > 2
+    np.testing.assert_allclose(speed[far], true[far], rtol=0.01)

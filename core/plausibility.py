@@ -23,29 +23,30 @@ BETWEEN: Mapping[str, tuple[float, float]] = {
     "gravity_mps2": (0.0, 1e3),
     "unit_m": (1e-7, 1e7),
     **dict.fromkeys(("fx", "fy"), (1e-3, 1e7)),
-    **dict.fromkeys(("cx", "cy"), (-1e7, 1e7)),
+    **dict.fromkeys(("cx", "cy"), (0.0, 1e7)),
     **dict.fromkeys(("width", "height"), (1, 1e5)),
-    **dict.fromkeys(("nx", "ny", "nz"), (-1e3, 1e3)),
-    **dict.fromkeys(("rn", "rt", "r"), (-1e9, 1e9)),
-    **dict.fromkeys(("position", "target", "shift"), (-GREATEST_M, GREATEST_M)),
+    **dict.fromkeys(("nx", "ny", "nz"), (0.0, 1e3)),
+    **dict.fromkeys(("rn", "rt", "r"), (0.0, 1e9)),
+    **dict.fromkeys(("position", "target", "shift"), (0.0, GREATEST_M)),
 }
-"""Name → the least and the greatest that can be."""
+"""Name → the least amount, of either sign, that can be if it is not zero, and the greatest."""
 UNDEFINED = ("sigma_", "weight_")
 """Beginnings of names that may be anything: a standard deviation of 1e20 says that nothing is known."""
 
 
 def limits(name: str) -> tuple[float, float]:
-    """The least and the greatest that a number of this name can be."""
+    """The least and the greatest amount of a number of this name; signs and zeros are for its reader to judge."""
     if name in BETWEEN:
         return BETWEEN[name]
-    greatest = inf if name.startswith(UNDEFINED) else OF_UNIT.get(name.rpartition("_")[2], inf)
-    return -greatest, greatest
+    return 0.0, inf if name.startswith(UNDEFINED) else OF_UNIT.get(name.rpartition("_")[2], inf)
 
 
 def implausible(name: str, value: float) -> str:
     """What is wrong with a finite number of this name; empty when nothing is."""
-    low, high = limits(name)
-    return "" if low <= value <= high else f"is {value:g}, beyond what can be ({low:g} to {high:g})"
+    least, greatest = limits(name)
+    if value == 0.0 or least <= abs(value) <= greatest:
+        return ""
+    return f"is {value:g}, beyond what can be ({f'{least:g}' if least else '±'}{' to ' if least else ''}{greatest:g})"
 
 
 def check_plausible(name: str, value: float, what: str) -> None:

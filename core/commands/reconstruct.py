@@ -82,6 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, write the tables, print the summary."""
     from ..exchange.tables import read_picks, write_impacts, write_trajectories
     from ..output import output_folder
+    from ..plausibility import check_plausible
     from ..reconstruction.drag import Drag
     from ..reconstruction.sampling import sample_trajectories
     from ..reconstruction.summary import summarise
@@ -92,6 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
         picks = read_picks(arguments.picks)
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         block = _block(arguments)
+        check_plausible("air_density_kgpm3", arguments.air_density, "density of the air")
+        check_plausible("drag_coefficient", arguments.drag_coefficient, "drag coefficient")
         drag = Drag(arguments.air_density, arguments.drag_coefficient) if arguments.drag else None
         progress("Reconstructing")
         with naming(arguments.picks):

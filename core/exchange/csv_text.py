@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reading comma-separated text into columns, with every mistake located."""
+"""Reading comma-separated text into columns, with every mistake located.
+
+Semicolons or tabs between cells, and decimal commas with them, are read too, as spreadsheets in Europe write them.
+"""
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -33,12 +37,14 @@ class TextTable:
     columns : name → texts of some rows each, see `BLOCK_ROWS`.
     row : (n,) row in a text editor, the header being row 1.
     converted : the columns whose numbers are in another unit in the file.
+    decimal : mark of its numbers, a comma where other programs wrote semicolons or tabs between cells.
     """
 
     source: Path
     columns: Mapping[str, Sequence[str]]
     row: Sequence[int]
     converted: Mapping[str, OtherUnit] = field(default_factory=dict)
+    decimal: str = "."
 
     def __len__(self) -> int:
         return len(self.row)
@@ -62,7 +68,7 @@ class TextTable:
         """
         if name not in self.columns:
             return np.full(len(self), np.nan)
-        blocks = [_numbers(block.split(BETWEEN), required) for block in self.columns[name]]
+        blocks = [_numbers(self._with_points(block).split(BETWEEN), required) for block in self.columns[name]]
         good = [block for block in blocks if block is not None]
         if len(good) < len(blocks):
             cells = self.cells(name)
@@ -70,16 +76,20 @@ class TextTable:
             raise next(error for i in range(len(self)) if (error := self._mistake(there, i, cells[i], required)))
         values = np.concatenate(good)
         values = values * self.converted[name].factor if name in self.converted else values
-        low, high = limits(name)
-        for i in np.flatnonzero((values < low) | (values > high))[:1].tolist():
+        least, greatest = limits(name)
+        amount = np.abs(values)
+        for i in np.flatnonzero((amount > greatest) | ((amount < least) & (amount > 0)))[:1].tolist():
             raise self.error(i, f"{name} {implausible(name, values[i])}", "Correct the cell, or the unit of the column")
         return values
 
     def has_numbers(self, name: str) -> bool:
         """Whether there are numbers in a column that is there, and nothing else."""
-        blocks = [_numbers(block.split(BETWEEN), False) for block in self.columns[name]]
+        blocks = [_numbers(self._with_points(block).split(BETWEEN), False) for block in self.columns[name]]
         good = [block for block in blocks if block is not None]
         return len(good) == len(blocks) and bool(np.isfinite(np.concatenate(good)).any())
+
+    def _with_points(self, text: str) -> str:
+        return text.replace(self.decimal, ".") if self.decimal != "." else text
 
     def _mistake(self, name: str, i: int, cell: str, required: bool) -> InputError | None:
         """What is wrong with a cell that must be a number."""
@@ -87,7 +97,7 @@ class TextTable:
         if not cell:
             return self.error(i, f"The cell of {name} is empty", "Give a number") if required else None
         try:
-            value = float(cell)
+            value = float(self._with_points(cell))
         except ValueError:
             value = None
         if value is None or "_" in cell:
@@ -106,7 +116,10 @@ class TextTable:
     def rest(self, known: Sequence[str]) -> dict[str, Names]:
         """The columns that are not among `known`."""
         left = [name for name in self.columns if name not in known]
-        return {name: np.array(self.text(name), dtype=np.str_) for name in left}
+        cells = {name: self.text(name) for name in left}
+        if self.decimal != ".":
+            cells |= {name: list(map(self._with_points, cells[name])) for name in left if self.has_numbers(name)}
+        return {name: np.array(text, dtype=np.str_) for name, text in cells.items()}
 
     def error(self, i: int, problem: str, advice: str) -> InputError:
         """An `InputError` that points at one row."""
@@ -116,7 +129,7 @@ class TextTable:
 
 @reader("table", EXPORT_ADVICE)
 def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
-    """Read a comma-separated table, its columns in the units of `known`.
+    """Read a table separated by commas, semicolons or tabs, its columns in the units of `known`.
 
     Parameters
     ----------
@@ -126,12 +139,13 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
 
     Raises
     ------
-    InputError : no such file, no text, an empty file, another separator, a required column missing, a column twice, a
+    InputError : no such file, no text, an empty file, a required column missing, a column twice, a
         row with too many or too few cells, no rows, numbers in a unit that is not known.
     """
     path = Path(path)
     data = _checked(path, path.read_bytes())
-    reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True)
+    separator = _separator(data)
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True, delimiter=separator)
     header: list[str] = []
     blocks: list[list[str]] = []
     rows: list[list[str]] = []
@@ -156,7 +170,7 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
             start = reader.line_num + 1
     except csv.Error as error:
         raise InputError(
-            f"The row cannot be read as comma-separated text ({error})",
+            f"The row cannot be read as separated text ({error})",
             file=path,
             row=max(start, 1),
             advice="Look for a quote that is not closed",
@@ -167,11 +181,27 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         raise InputError("The table has a header but no rows", file=path, advice="Add a row for each pick")
     _add_block(blocks, rows)
     columns = {name: texts for name, texts in zip(header, blocks, strict=True) if name}
-    table = TextTable(path, columns, numbers, converted)
+    table = TextTable(path, columns, numbers, converted, _decimal(data, separator))
     for name, ours in unknown_units(header, known).items():
         if table.has_numbers(name):
             raise unknown_unit(path, name, ours, top)
     return table
+
+
+def _separator(data: bytes) -> str:
+    """What stands between the cells, by the header: a comma, else semicolons or tabs."""
+    header = next((line for line in data.splitlines() if line.strip()), b"")
+    return next((sign for sign in (",", ";", "\t") if sign.encode() in header), ",")
+
+
+def _decimal(data: bytes, separator: str) -> str:
+    """A comma where cells are numbers with a comma, and none with a point."""
+    if separator == ",":
+        return "."
+    sign = separator.encode()
+    cell = rb"(?:^|%s)[ \"]*[-+]?\d*\%%s\d+(?:[eE][-+]?\d+)?[ \"]*(?=%s|\r|\n|$)" % (sign, sign)
+    commas, points = (re.search(cell % mark, data, re.MULTILINE) for mark in (b",", b"."))
+    return "," if commas and not points else "."
 
 
 def _in_our_units(
@@ -231,9 +261,6 @@ def _checked(path: Path, data: bytes) -> bytes:
 
 
 def _check_header(path: Path, header: list[str], required: Sequence[str], known: Sequence[str], row: int) -> None:
-    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
-        if len(header) == 1 and separator in header[0]:
-            raise InputError(f"The cells are separated by {name}", file=path, row=row, advice=EXPORT_ADVICE)
     named = [name for name in header if name]
     double = [name for name in dict.fromkeys(named) if named.count(name) > 1]
     if double:

@@ -10,7 +10,6 @@ import numpy as np
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT
 from ..errors import RockfallError
 from ..least_squares import damped_step
-from ..plausibility import check_plausible
 from ..vectors import Array, norm
 from .block import Block
 from .observations import Observations
@@ -28,18 +27,10 @@ class Drag:
     ----------
     air_density : ρ [kg/m³].
     coefficient : C_D [-].
-
-    Raises
-    ------
-    InputError : what no air has.
     """
 
     air_density: float = AIR_DENSITY_KGPM3
     coefficient: float = DRAG_COEFFICIENT
-
-    def __post_init__(self) -> None:
-        check_plausible("air_density_kgpm3", self.air_density, "density of the air")
-        check_plausible("drag_coefficient", self.coefficient, "drag coefficient")
 
     def per_metre(self, block: Block) -> float:
         """½ρC_D·A/m [1/m]: the deceleration is this times |v|v."""

@@ -19,6 +19,8 @@ GROUND_CLASS = 2
 """ASPRS LAS 1.4 R15, table 17."""
 LAS_HEADER_BYTES, RECORD_HEADER_BYTES, EXTENDED_HEADER_BYTES = 227, 54, 60
 """ASPRS LAS 1.4 R15, tables 3, 6 and 7."""
+COMPRESSED, NOT_KNOWN_YET = 0xC0, 2**64 - 1
+"""Bits of the point format, and the place of the table of parts when it was written to a stream: LAZ specification."""
 AXIS_NAMES = (
     ("x", "x_m", "easting", "east", "e", "x_coord", "//x"),
     ("y", "y_m", "northing", "north", "n", "y_coord"),
@@ -78,7 +80,7 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     with path.open("rb") as file:
         if file.read(4) != b"LASF":
             raise InputError('Not a LAS file: it does not begin with "LASF"', file=path, advice="Check its extension")
-    _check_records(path, size)
+    _check_promises(path, size)
     with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
         header = opened.header
     needed = header.offset_to_point_data + header.point_count * header.point_format.size
@@ -98,19 +100,27 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     return header, *_las_crs(header, path)
 
 
-def _check_records(path: Path, size: int) -> None:
-    """The variable length records of a header, each of which has a header of its own, are within the file."""
+def _check_promises(path: Path, size: int) -> None:
+    """What the header counts is within the file, before libraries take memory for it: the decoder of LAZ ends the
+    whole process when it gets none."""
+
+    def number(at: int, length: int) -> int:
+        file.seek(at)
+        return int.from_bytes(file.read(length), "little")
+
     with path.open("rb") as file:
-        start = file.read(LAS_HEADER_BYTES)
-    if len(start) < LAS_HEADER_BYTES:
-        raise InputError("The file is truncated within its header", file=path, advice="Copy or export it again")
-    count = int.from_bytes(start[100:104], "little")
-    check_promise(f"{count} records", count * RECORD_HEADER_BYTES, size, path)
-    if start[25] >= 4:  # extended records come with version 1.4
-        with path.open("rb") as file:
-            file.seek(243)
-            extended = int.from_bytes(file.read(4), "little")
-        check_promise(f"{extended} extended records", extended * EXTENDED_HEADER_BYTES, size, path)
+        if size < LAS_HEADER_BYTES:
+            raise InputError("The file is truncated within its header", file=path, advice="Copy or export it again")
+        records = number(100, 4)
+        check_promise(f"{records} records", records * RECORD_HEADER_BYTES, size, path)
+        if number(25, 1) >= 4:  # extended records come with version 1.4
+            extended = number(243, 4)
+            check_promise(f"{extended} extended records", extended * EXTENDED_HEADER_BYTES, size, path)
+        if number(104, 1) & COMPRESSED:
+            table = number(number(96, 4), 8)
+            table = number(size - 8, 8) if table == NOT_KNOWN_YET else table
+            chunks = number(table + 4, 4) if table < size else 0
+            check_promise(f"{chunks} parts", chunks, size, path)
 
 
 def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
@@ -159,8 +169,8 @@ def read_xyz(path: Path) -> Source:
     InputError : a row without three numbers, with its row.
     """
     text = read_text(path)
-    if b";" in text[:4096] and re.search(rb"\d,\d+\s*;", text[:4096]):
-        raise InputError("The numbers have decimal commas", file=path, advice="Export the table with decimal points")
+    if _has_decimal_commas(text):
+        text = text.replace(b",", b".")
     lines = re.sub(rb"[,;\t]", b" ", text).split(b"\n")
     original = text.split(b"\n")
     rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith((b"#", b"//"))]
@@ -183,6 +193,15 @@ def read_xyz(path: Path) -> Source:
     crs, geographic = crs_beside(path)
     note = f"Cloud of {len(table):,} points."
     return Source(np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=(note,))
+
+
+def _has_decimal_commas(text: bytes) -> bool:
+    """Commas inside of numbers that semicolons, tabs or blanks separate, and no points."""
+    number = rb"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?"
+    row = rb"^[ \t]*%s(?:(?:[ \t]*;[ \t]*|[ \t]+)%s)+[ \t;]*$" % (number, number)
+    beginning = text[:4096].rpartition(b"\n")[0] or text
+    rows = re.findall(row, beginning, re.MULTILINE)
+    return b"." not in b"".join(rows) and any(b"," in found for found in rows)
 
 
 def _named_columns(line: bytes, path: Path, row: int) -> list[int]:

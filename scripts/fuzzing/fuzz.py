@@ -249,8 +249,9 @@ def main() -> int:
 
 
 def _keep(options: argparse.Namespace, number: int) -> None:
-    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(None):
-        every = chosen(cases(Path(folder)), options)
+    with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        (Path(folder) / "made").mkdir()
+        every = chosen(cases(Path(folder) / "made"), options)
     names = list(every)
     _place(options.keep / str(number), files_of(every[names[number % len(names)]], options.seed, number))
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The terrain in the scene is the surveyed one."""
 
+import re
 from pathlib import Path
 
 import bpy
@@ -59,6 +60,18 @@ def test_bad_terrain_is_reported_and_changes_nothing(part, tmp_path: Path) -> No
     (tmp_path / "empty.ply").write_bytes(b"")
     with pytest.raises(RuntimeError, match=r"empty\.ply"):
         bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "empty.ply"))
+    assert not bpy.context.scene.objects
+
+
+def test_a_bad_terrain_in_the_file_browser_is_reported_in_one_sentence(part, tmp_path: Path) -> None:
+    """The browser ends in an operator that calls another for the dialog: its error must not come out as a traceback."""
+    for name, data in (("empty.ply", b""), ("nested.glb", b"glTF" + bytes(16)), ("none.asc", None)):
+        if data is not None:
+            (tmp_path / name).write_bytes(data)
+        with pytest.raises(RuntimeError, match=re.escape(name)) as caught:
+            bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / name), browsing=True)
+        assert "Traceback" not in str(caught.value)
+        assert str(caught.value).strip().count("\n") == 0
     assert not bpy.context.scene.objects
 
 

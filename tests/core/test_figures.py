@@ -247,7 +247,7 @@ def test_the_live_page_calibrates_with_the_spin_and_the_radius_that_it_shows(imp
     [
         (["--model", "noel_2071"], "Did you mean noel_2017"),
         (["--port", "70000"], "65535"),
-        (["--parameters", "missing.toml"], "missing.toml: The parameters cannot be read"),
+        (["--parameters", "missing.toml"], "missing.toml: There is no such file"),
         (["--spin", "table"], "impacts.csv: No impact can be compared: "),
     ],
 )
@@ -278,7 +278,7 @@ def test_parameters_come_back_from_their_file(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("rn = ", "no TOML"),
+        ("rn = ", "not valid TOML"),
         ("seed = 1", "no parameters"),
         ("[models.noel_2017]\nrn_limit = 1000", "outside its range"),
         ("[models.noel_2017]\nrn_limits = 1", "Did you mean rn_limit"),

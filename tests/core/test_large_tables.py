@@ -68,7 +68,7 @@ MISTAKES = {
     "x,": "row 9, trajectory x: The cell of a is empty. Give a number.",
     "x": "row 9: The row has 1 cells, the header has 2. Give every row as many cells as the header; ",
     "x,1,2": "row 9: The row has 3 cells, the header has 2. ",
-    '"x,1': "row 9: The row cannot be read as comma-separated text ",
+    '"x,1': "row 9: The row cannot be read as separated text ",
 }
 
 

@@ -182,7 +182,7 @@ def test_bad_options_are_refused_and_leave_nothing(simulate, capsys, options, me
         ("line.csv", f"x_m,y_m\n{EAST + 5},{NORTH + 5}\n", "1 different point. A line needs at least 2"),
         ("line.csv", "x_m,y_m\n900,5\n900,9\n", "There is no terrain at 900.00, 5"),
         ("line.csv", f"x_m,y_m\n{EAST},north\n", "row 2: 'north'"),
-        ("line.geojson", "{", "This is no GeoJSON"),
+        ("line.geojson", "{", "The GeoJSON file cannot be read"),
         ("line.geojson", "[]", "no object"),
         ("line.geojson", '{"type": "FeatureCollection", "features": []}', "has no line"),
         ("line.geojson", '{"type": "Point", "coordinates": [1, 2]}', "is a Point, where lines are needed"),

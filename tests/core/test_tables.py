@@ -166,6 +166,25 @@ def test_a_million_metres_away_positions_are_exact(tmp_path):
     np.testing.assert_allclose(other.shift.to_survey(other.position), survey, atol=1e-9)
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("mark", [".", ","])
+def test_a_table_as_spreadsheets_in_europe_write_it_is_read(tmp_path, separator, mark):
+    rows = [
+        "trajectory,time_s,x_m,y_m,z_m,width_m,note",
+        "a,0,0.5,-1.25,1e-2,0.75,x",
+        "a,1.5,3.5,2.0,0.0,0.5,wet",
+        '"b",0,1,2,3,,',
+    ]
+    text = "\n".join(row.replace(",", separator).replace(".", mark) for row in rows) + "\n"
+    (tmp_path / "a.csv").write_text(text)
+    picks = read_picks(tmp_path / "a.csv")
+    np.testing.assert_array_equal(picks.time_s, [0.0, 1.5, 0.0])
+    np.testing.assert_array_equal(picks.position, [[0.5, -1.25, 0.01], [3.5, 2.0, 0.0], [1.0, 2.0, 3.0]])
+    assert picks.trajectory.tolist() == ["a", "a", "b"]
+    assert picks.extra["width_m"].tolist() == ["0.75", "0.5", ""]
+    assert picks.extra["note"].tolist() == ["x", "wet", ""]
+
+
 GOOD = "trajectory,time_s,x_m,y_m,z_m\na,0,0,0,0\na,1,3,0,0\n"
 BAD_PICKS = {
     "empty": ("", None, "empty"),
@@ -178,7 +197,12 @@ BAD_PICKS = {
     ),
     "near match": ("trajectory,time,x_m,y_m,z_m\na,0,0,0,0\n", 1, "Rename time to time_s"),
     "two missing": ("trajectory,time_s,x,y,z_m\na,0,0,0,0\n", 1, "columns x_m, y_m are missing"),
-    "semicolons": ("trajectory;time_s;x_m;y_m;z_m\na;0;0;0;0\n", 1, "semicolons"),
+    "another separator": ("trajectory|time_s|x_m|y_m|z_m\na|0|0|0|0\n", 1, "columns trajectory, time_s"),
+    "both decimal marks": (
+        "trajectory;time_s;x_m;y_m;z_m\na;0;0;0;0\na;1;3,5;2.5;0\n",
+        3,
+        "Write decimals with a point",
+    ),
     "column twice": ("trajectory,time_s,x_m,y_m,z_m,x_m\na,0,0,0,0,0\n", 1, "x_m is there 2 times"),
     "unnamed column": ("trajectory,time_s,x_m,y_m,z_m,\na,0,0,0,0,\na,1,0,0,0,hm\n", 3, "Column 6 has no name"),
     "non-number": (GOOD.replace("a,1,3", "a,1,3o"), 3, "'3o' in column x_m is not a number"),

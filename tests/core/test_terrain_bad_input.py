@@ -324,7 +324,6 @@ def test_truncated_las_also_at_the_end_of_a_record(tmp_path):
         ("1 2 3\n4 5\n7 8 9 1\n", "row 2: 2 values"),
         ("1 2\n3 4\n5 6\n", "2 columns"),
         ("x,y\n1,2\n", "names no x, y and z"),
-        ("1,5;2,5;3,5\n2,5;3,5;4,5\n", "decimal commas"),
         ("# only\n# comments\n", "no points"),
         ("1 2 3\n4 5 6\n", "2 points"),
         ("0 0 0\n1 2 5\n2 4 1\n3 6 0\n", "on a line"),

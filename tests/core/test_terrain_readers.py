@@ -520,3 +520,21 @@ def test_real_grid_of_tschamut():
     centred = surface.vertices - surface.vertices.mean(axis=0)
     slope = np.linalg.lstsq(centred[:, :2], centred[:, 2], rcond=None)[0]
     np.testing.assert_allclose(slope, [-0.2531, 0.4066], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,5;0;1,25\n4,5;0;2\n0,5;4;1\n",
+        "x;y;z\n0,5;0;1,25\n4,5;0;2\n0,5;4;1\n",
+        "0,5 0 1,25\n4,5 0 2\n0,5 4 1\n",
+        "0,5\t0\t1,25\n4,5\t0\t2\n0,5\t4\t1\n",
+        "0.5,0,1.25\n4.5,0,2\n0.5,4,1\n",
+        "0.5, 0, 1.25\n4.5, 0, 2\n0.5, 4, 1\n",
+    ],
+)
+def test_tables_with_decimal_commas_are_read(tmp_path, text):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    vertices = read_terrain(path).vertices
+    assert sorted(map(tuple, vertices.tolist())) == [(0.5, 0.0, 1.25), (0.5, 4.0, 1.0), (4.5, 0.0, 2.0)]

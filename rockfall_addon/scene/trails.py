@@ -140,7 +140,7 @@ def paint_observed(
     objects : None for all.
     plain : in the blocks' colour in any case.
     """
-    plain = plain or store.has_role(scene, store.MODEL_FLIGHTS_ROLE) or beside_models(scene)
+    plain = plain or are_plain(scene)
     for obj in store.with_role(scene, store.FLIGHTS_ROLE) if objects is None else objects:
         mesh = obj.data
         if materials.SPEED_COLOUR not in mesh.attributes or materials.SPEED_ATTRIBUTE not in mesh.attributes:
@@ -153,6 +153,11 @@ def paint_observed(
             if BELOW_ATTRIBUTE in mesh.attributes:
                 colours[_read(mesh, BELOW_ATTRIBUTE).astype(bool)] = BELOW_COLOUR
             paint(mesh, colours)
+
+
+def are_plain(scene: bpy.types.Scene) -> bool:
+    """Whether measured flights have the colour of their blocks, because there are those of models beside them."""
+    return store.has_role(scene, store.MODEL_FLIGHTS_ROLE) or beside_models(scene)
 
 
 def beside_models(scene: bpy.types.Scene) -> bool:

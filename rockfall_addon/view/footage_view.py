@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.camera.model import Camera, project
 from ...core.camera.path import rays_at
-from ...core.colours import scale_colours
+from ...core.colours import MEASURED_COLOUR, scale_colours
 from ...core.errors import RockfallError
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.flight import flight_states
@@ -58,6 +58,7 @@ class Path:
     joined : (n,) whether a point is joined with the next one.
     tick : (n,) points at the frames of the video.
     radius_m : of the block.
+    edged : with a dark edge, so that a white path shows on bright ground.
     """
 
     time_s: Array
@@ -66,6 +67,7 @@ class Path:
     joined: np.ndarray
     tick: np.ndarray
     radius_m: float
+    edged: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +146,7 @@ def path_of(scene: bpy.types.Scene, name: str, frames_s: Array | None = None) ->
     key = (
         fingerprints.remembered(scene).get(name), scene.get(store.GROUND, ""), how.reconstruction, how.block,
         scene.rockfall.speed_top_mps, scene.get(store.BLOCKS, ""),
-        None if frames_s is None else zlib.crc32(np.ascontiguousarray(frames_s)),
+        None if frames_s is None else zlib.crc32(np.ascontiguousarray(frames_s)), trails.are_plain(scene),
     )  # fmt: skip
     place = (scene.session_uid, name)
     if place not in _paths or _paths[place][0] != key:
@@ -159,9 +161,17 @@ def forget() -> None:
 
 
 def sample(
-    result: Reconstruction, frames_s: Array | None, speed_top_mps: float, surface: object | None = None
+    result: Reconstruction,
+    frames_s: Array | None,
+    speed_top_mps: float,
+    surface: object | None = None,
+    *,
+    plain: bool = False,
 ) -> Path | None:
-    """The path of the only trajectory of a reconstruction."""
+    """The path of the only trajectory of a reconstruction.
+
+    plain : in the colour of measured blocks, not by speed.
+    """
     flights = result.flights
     radius = next(iter(result.block.values())).radius_m if isinstance(result.block, dict) else result.block.radius_m
     pieces, which, ticks, joined = [], [], [], []
@@ -176,13 +186,13 @@ def sample(
         return None
     time, owner = np.concatenate(pieces), np.concatenate(which)
     position, velocity = flight_states(flights, owner, time)
-    colour = scale_colours(norm(velocity), 0.0, speed_top_mps)
+    colour = np.tile(MEASURED_COLOUR, (len(time), 1)) if plain else scale_colours(norm(velocity), 0.0, speed_top_mps)
     if surface is not None:
         under = radius if result.ends == "centres" else 0.0
         with np.errstate(invalid="ignore"):
             deep = heights_above(surface, position) - under < -trajectories.BELOW_RADII * radius
         colour[deep] = BELOW
-    return Path(time, position, colour, np.concatenate(joined), np.concatenate(ticks), radius)
+    return Path(time, position, colour, np.concatenate(joined), np.concatenate(ticks), radius, plain)
 
 
 def _path(scene: bpy.types.Scene, name: str, frames_s: Array | None) -> Path | None:
@@ -199,7 +209,7 @@ def _path(scene: bpy.types.Scene, name: str, frames_s: Array | None) -> Path | N
             )  # fmt: skip
         except RockfallError:
             continue  # the panel tells it
-        return sample(result, frames_s, scene.rockfall.speed_top_mps, surface)
+        return sample(result, frames_s, scene.rockfall.speed_top_mps, surface, plain=trails.are_plain(scene))
     return None
 
 
@@ -213,6 +223,8 @@ def _with_frames(even: Array, frames_s: Array | None) -> tuple[Array, np.ndarray
 
 
 def _add_path(found: Drawing, lens: Camera, path: Path) -> None:
+    if path.edged:
+        _add_polyline(found, lens, path.position, np.zeros_like(path.colour), path.joined, 4.5, 0.65)
     _add_polyline(found, lens, path.position, path.colour, path.joined)
     pixels = project(lens, path.position[path.tick])
     good = np.isfinite(pixels[:, 0])
@@ -220,12 +232,20 @@ def _add_path(found: Drawing, lens: Camera, path: Path) -> None:
     found.dots.append((pixels[good], colours[good], 4.0))
 
 
-def _add_polyline(found: Drawing, lens: Camera, position: Array, colour: Array, joined: np.ndarray) -> None:
+def _add_polyline(
+    found: Drawing,
+    lens: Camera,
+    position: Array,
+    colour: Array,
+    joined: np.ndarray,
+    width: float = 2.0,
+    opacity: float = 1.0,
+) -> None:
     pixels = project(lens, position)
     first = np.flatnonzero(joined[:-1] & np.isfinite(pixels[:-1, 0]) & np.isfinite(pixels[1:, 0]))
-    colours = np.column_stack([colour, np.ones(len(colour))])
+    colours = np.column_stack([colour, np.full(len(colour), opacity)])
     pairs = np.stack([first, first + 1], axis=1)
-    found.lines.append(Line(pixels[pairs], colours[pairs], 2.0))
+    found.lines.append(Line(pixels[pairs], colours[pairs], width))
 
 
 def _add_outline(found: Drawing, lens: Camera, path: Path, moment: float, step: float) -> None:

@@ -183,3 +183,16 @@ def test_a_full_disk_leaves_the_old_file(scene, tmp_path: Path, monkeypatch: pyt
         bpy.ops.rockfall.export_graphs(filepath=str(path), kind="IMPACTS")
     assert [file.name for file in tmp_path.iterdir() if file.name.startswith("graphs")] == [path.name]
     assert path.read_bytes() == b"old"
+
+
+def test_all_models_have_their_score_where_there_is_little_room(scene, part, tmp_path: Path) -> None:
+    one_graph(scene)
+    scene.rockfall_comparison.models = names = set(part("core.impact_models.registry").COMPARED)
+    compared = part("rockfall_addon.scene.comparison").comparison_of(scene)
+    rmse_of = part("rockfall_addon.scene.comparison_scores").rmse_of
+    wanted = {f"{rmse_of(compared, 'A', name, 'rn'):.2f}" for name in names}
+    path = tmp_path / "narrow.svg"
+    assert bpy.ops.rockfall.export_graphs(filepath=str(path), kind="IMPACTS", width=420, height=500) == {"FINISHED"}
+    texts = words(picture(path))
+    assert wanted <= {text.removeprefix("RMSE ") for text in texts}
+    assert sum(text.startswith("RMSE ") for text in texts) == 1

@@ -227,3 +227,16 @@ def test_the_models_colours_are_in_a_rendered_film(shown: bpy.types.Scene, part,
     find_model = part("core.impact_models.registry").find_model
     for colour in (part("core.colours").MEASURED_COLOUR, *(find_model(name).colour for name in MODELS)):
         assert (np.abs(pixels - colour).max(axis=2) < 0.15).sum() >= 2, colour
+
+
+def test_over_the_footage_measured_paths_are_white_beside_models(shown: bpy.types.Scene, part) -> None:
+    view, white = part("rockfall_addon.view.footage_view"), part("core.colours").MEASURED_COLOUR
+    path = view.path_of(shown, "A")
+    assert path.edged
+    above = ~np.all(path.colour == view.BELOW, axis=1)
+    assert above.any()
+    np.testing.assert_array_equal(path.colour[above], np.tile(white, (above.sum(), 1)))
+    assert bpy.ops.rockfall.remove_models() == {"FINISHED"}
+    path = view.path_of(shown, "A")
+    assert not path.edged
+    assert (np.ptp(path.colour, axis=0) > 0.05).any(), "by speed"

@@ -259,15 +259,29 @@ def _draw_scores(
     x, right = plot.left, plot.right
     if graph.beyond(seen.x, seen.y) and not any(one.curve is not None for one in graph.measured):
         right -= 0.5 * plot.width  # of the same line
-    for one in models:
-        texts = [""] if one.curve is None else _fit_texts(one, graph)
-        score = _score_text(one, graph, compared, kept)
-        texts = texts if len(models) == 1 else texts[2:] or texts
-        if score:
-            texts = [*(f"{text}, {score}" if text else score for text in texts), ""]
-        words = _fitting(texts, look, right - x)
-        if words:
-            x += drawing.text(x, plot.top + 0.45 * look.text, words, look.text, one.colour) + look.text
+    said = [_said(one, graph, compared, kept, alone=len(models) == 1, first=one is models[0]) for one in models]
+    for level in range(max(map(len, said), default=0)):  # all in the same way, the longest that has room
+        words = [texts[min(level, len(texts) - 1)] for texts in said]
+        if sum(look.measure(each) + look.text for each in words if each) <= right - x + look.text:
+            break
+    for one, each in zip(models, words, strict=True) if said else ():
+        if each and x + look.measure(each) <= right:
+            x += drawing.text(x, plot.top + 0.45 * look.text, each, look.text, one.colour) + look.text
+
+
+def _said(
+    one: Drawn, graph: ImpactGraph, compared: comparison.SceneComparison, kept: Mask, *, alone: bool, first: bool
+) -> list[str]:
+    """What can be said of a model, the longest first: its fit where there is one, and its score.
+
+    first : of the line, so that it says what the numbers of the others are.
+    """
+    fits = [""] if one.curve is None else _fit_texts(one, graph)[0 if alone else 2 :]
+    score = _score_text(one, graph, compared, kept)
+    if not score:
+        return fits
+    bare = score if first else score.removeprefix("RMSE ").removesuffix(" filtered")
+    return [*(f"{text}, {score}" if text else score for text in fits), bare]
 
 
 def _fit_texts(one: Drawn, graph: ImpactGraph) -> list[str]:

@@ -38,8 +38,8 @@ def draw(
     if compared.impacts is not None and not compared.models:
         entries.append(("no model: choose some in the sidebar (N)", look.faint, "", False))
     if compared.waiting:
-        names = ", ".join(MODELS[name].title for name in compared.waiting)
-        entries.append((f"preparing {names} …", look.faint, "", False))
+        which = MODELS[compared.waiting[0]].title if len(compared.waiting) == 1 else f"{len(compared.waiting)} models"
+        entries.append((f"preparing {which} …", look.faint, "", False))
     if links and not graph.linked:
         entries.append(("links: of selected impacts only", look.faint, "", False))
     if colours.colouring is not None:

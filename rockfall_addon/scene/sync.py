@@ -163,7 +163,8 @@ def sync(
         objects = picks.objects_of(scene, wanted)
     groups = fingerprints.by_trajectory(objects)
     prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
-    gone = [name for name in prints if name not in groups and (wanted is None or name in wanted)]
+    there = groups if wanted is None else {obj[store.TRAJECTORY] for obj in picks.objects_of(scene)}
+    gone = [name for name in prints if name not in there]
     for name in gone:
         _forget(scene, name)
         prints.pop(name), said.pop(name, None)

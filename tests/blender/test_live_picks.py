@@ -92,6 +92,16 @@ def test_a_trajectory_without_picks_is_gone(scene: bpy.types.Scene, part) -> Non
     check_shown(scene, part)
 
 
+def test_a_renamed_trajectory_leaves_nothing_under_its_old_name(scene: bpy.types.Scene, part) -> None:
+    for pick in picks_of(scene, "A"):
+        pick["rockfall_trajectory"] = "first run"
+        pick.update_tag()
+    update()
+    check_shown(scene, part)
+    assert set(json.loads(scene["rockfall_shown"])) == {"first run", "B"}
+    assert {obj.get("rockfall_trajectory") for obj in scene.objects} <= {"first run", "B", None}
+
+
 def test_a_copy_is_a_pick_of_its_own_at_the_present_moment(scene: bpy.types.Scene, part) -> None:
     pick = picks_of(scene, "A")[2]
     scene.frame_set(40)

@@ -13,8 +13,18 @@ from .motion_graphs import MotionCourse, Quantity, time_limits
 
 TITLE = 1.7
 """Room for a title above each graph, in heights of the text."""
+BELOW = 2 + 3 * GAP
+"""Room for numbers and label of the time axis, likewise."""
+LEAST = 3.0
+"""A graph that is lower shows nothing, in heights of the text."""
 DENSEST_PX = 1.0
 """Two moments of a line are not nearer than this along the axis, but where it jumps."""
+
+
+def fitting(count: int, height: float, text: float, above: float = 0.0) -> int:
+    """How many of so many graphs have room one above the other in a height [px]; at least one. For the rest see
+    `stacked`."""
+    return max(1, min(count, int((height - BELOW * text - above) // ((TITLE + LEAST) * text))))
 
 
 def stacked(
@@ -29,7 +39,7 @@ def stacked(
     above : room to be left above all [px].
     """
     gap, n = GAP * text, len(ys)
-    below = 2 * text + 3 * gap
+    below = BELOW * text
     whole = max((room.height - below - above) / max(n, 1), TITLE * text + 1.0)
     height = max(whole - TITLE * text, 1.0)
     y_ticks = [ticks(y, int(height / (1.8 * text))) for y in ys]

@@ -10,7 +10,7 @@ import numpy as np
 from ....core.analysis.axes import Axis, Limits, Ticks
 from ....core.analysis.graph_layout import Frame, Rectangle
 from ....core.analysis.motion_graphs import RESIDUAL, MotionCourse, Quantity, shown_quantities
-from ....core.analysis.stacked_graphs import quantity_axis, stacked, time_axis
+from ....core.analysis.stacked_graphs import fitting, quantity_axis, stacked, time_axis
 from ...scene import clocks, motion, motion_settings, next_step, picks, store, timing, videos
 from . import drawing, empty
 from .axes import draw_axes
@@ -20,6 +20,8 @@ from .motion_lines import REACH, Bundle, bundle, nearest_line
 
 CURSOR: Rgb = (0.96, 0.77, 0.16)
 ON_LIGHT: Rgb = (0.78, 0.45, 0.0)
+ABOVE = 1.7
+"""Room for the time of the cursor above all graphs, in heights of the text."""
 MARK_PX = 7.0
 """How near to an impact's time the mouse points at it, at interface scale 1."""
 MOST_MARKED = 40
@@ -86,11 +88,15 @@ def draw(context: bpy.types.Context, canvas: Canvas) -> None:
     limits = motion_settings.limits_of(scene)
     x = replace(shown.x, limits=limits.get(motion_settings.TIME, shown.x.limits))
     ys = [replace(y, limits=limits.get(q.name, y.limits)) for y, q in zip(shown.ys, quantities, strict=True)]
-    room = canvas.room.shrunk(0.4 * look.text)
-    for number, frame in enumerate(stacked(room, _numbered(scene, x), ys, look.text, look.measure, 1.7 * look.text)):
+    room, above = canvas.room.shrunk(0.4 * look.text), ABOVE * look.text
+    many = len(ys) if canvas.printed else fitting(len(ys), room.height, look.text, above)
+    frames = stacked(room, _numbered(scene, x), ys[:many], look.text, look.measure, above)
+    for number, frame in enumerate(frames):
         canvas.frames[number] = frame
         graph = _graph(kept, number, chosen, look)
-        _draw_graph(canvas, number, graph, quantities[number], last=number == len(quantities) - 1, some=bool(chosen))
+        _draw_graph(canvas, number, graph, quantities[number], last=number == many - 1, some=bool(chosen))
+    if many < len(ys):
+        _draw_lacking(canvas, quantities[many - 1], len(ys) - many)
     _draw_impacts(canvas, scene, courses, chosen)
     if not canvas.printed:
         _draw_cursor(canvas, scene)
@@ -243,6 +249,16 @@ def _draw_graph(canvas: Canvas, number: int, graph: _Graph, quantity: Quantity, 
                 owner = next((i for i, one in enumerate(each.courses) if one.trajectory == pointed), -1)
                 if owner >= 0:
                     drawing.Lines(each.ends[each.owner == owner]).draw(alpha(look.chosen), 2.2 * look.scale)
+
+
+def _draw_lacking(canvas: Canvas, lowest: Quantity, count: int) -> None:
+    """That some graphs have no room, beside the title of the lowest one."""
+    look, plot = canvas.look, canvas.frames[len(canvas.frames) - 1].plot
+    free = plot.width - look.measure(lowest.label) - look.text
+    for words in (f"{count} more in a higher view", f"{count} more", f"+{count}"):
+        if look.measure(words) <= free:
+            drawing.text(plot.right, plot.top + 0.45 * look.text, words, look.text, look.faint, (1.0, 0.0))
+            return
 
 
 def _whole_x(x: Axis, frame: Frame) -> Axis:

@@ -3,9 +3,11 @@
 
 Runs in the window of a real Blender, found as by interface_tests.py, with simulated events: a frame lasts from the
 mouse's event until Blender has drawn the window and asks for the next one. Without a graphics card the window is drawn
-by software, which takes most of the time: the same window with nothing in it is measured, too. "processor" is the time
-of all threads of Blender. Six models; those of the demo with their blocks in the 3-D view. The blocks of 10 000 impacts
-follow as soon as the slider rests; here they have none.
+by software, which takes most of the time: the same window with nothing in it is measured, too. "main thread" is the
+processor's time of the thread that computes and asks for drawings, "all threads" with those that draw.
+
+Six models; those of the demo have their blocks in the 3-D view. The blocks of 10 000 impacts follow as soon as the
+slider rests; here they have none.
 """
 
 import argparse
@@ -21,32 +23,33 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts" / "benchmarks"))
 
-MODEL, MODELS, IMPACTS = "noel_2017", 6, 10_000
+MODEL, PARAMETER, MODELS, IMPACTS = "noel_2017", "rt", 6, 10_000
 FRAMES = 90
 DATA, BLOCKS, EVALUATION, GRAPHS, REST = "data", "3-D blocks", "Blender's evaluation", "graphs", "the rest"
 PARTS = (DATA, BLOCKS, EVALUATION, GRAPHS, REST)
+KINDS = ("wall", "main thread", "all threads")
 ROW = "row: "
 HEADS = ("median", "95 %", *PARTS)
 WIDTHS = tuple(max(len(head) + 2, 8) for head in HEADS)
-HEADER = " " * 44 + "".join(f"{head:>{width}}" for head, width in zip(HEADS, WIDTHS, strict=True))
+HEADER = " " * 47 + "".join(f"{head:>{width}}" for head, width in zip(HEADS, WIDTHS, strict=True))
 
 
 class Parts:
-    """What the parts of a frame have taken [s], each without those that it calls: wall and processor time."""
+    """What the parts of a frame have taken [s], each without those that it calls: of each of `KINDS`."""
 
     def __init__(self) -> None:
-        self.taken = {part: [0.0, 0.0] for part in PARTS}
+        self.taken = {part: [0.0] * len(KINDS) for part in PARTS}
         self.stack: list[str] = []
         self.since = self.now()
 
     @staticmethod
-    def now() -> tuple[float, float]:
-        return time.perf_counter(), time.process_time()
+    def now() -> tuple[float, ...]:
+        return time.perf_counter(), time.thread_time(), time.process_time()
 
     def count(self) -> None:
         """Give the time since the last change to the part that runs."""
         now = self.now()
-        for i in range(2):
+        for i in range(len(KINDS)):
             self.taken[self.stack[-1] if self.stack else REST][i] += now[i] - self.since[i]
         self.since = now
 
@@ -70,7 +73,7 @@ class Parts:
     def frame(self) -> dict[str, list[float]]:
         """What has been taken since the last call."""
         self.count()
-        taken, self.taken = self.taken, {part: [0.0, 0.0] for part in PARTS}
+        taken, self.taken = self.taken, {part: [0.0] * len(KINDS) for part in PARTS}
         return taken
 
     def watch(self, owner: object, name: str, part: str) -> Callable[[], None]:
@@ -86,13 +89,13 @@ class Parts:
 
 
 def tell(what: str, frames: list[dict[str, list[float]]]) -> None:
-    """Two rows: wall and processor time."""
-    for i, kind in enumerate(("wall", "processor")):
+    """A row for each kind of time."""
+    for i, kind in enumerate(KINDS):
         whole = sorted(1e3 * sum(taken[i] for taken in frame.values()) for frame in frames)
         parts = [1e3 * statistics.median(frame[part][i] for frame in frames) for part in PARTS]
         cells = [statistics.median(whole), whole[len(whole) * 95 // 100], *parts]
         numbers = "".join(f"{cell:>{width}.1f}" for cell, width in zip(cells, WIDTHS, strict=True))
-        print(f"{ROW}{what if not i else '':<34}{kind:<10}{numbers}", flush=True)
+        print(f"{ROW}{what if not i else '':<34}{kind:<13}{numbers}", flush=True)
 
 
 def find_slider(window, name: str):
@@ -169,7 +172,6 @@ def case_slider(window):
     parts = Parts()
     tell("empty window, drawn again", (yield from redraw(window, parts)))
 
-    scene = bpy.context.scene
     with window.override():
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
     yield 2.0
@@ -177,11 +179,9 @@ def case_slider(window):
     comparison = window.part("rockfall_addon.scene.comparison")
     sheet = window.part("rockfall_addon.view.graphs.impact_sheet")
     names = window.part("rockfall_addon.scene.models").ORDER[:MODELS]
-    registry = window.part("core.impact_models.registry")
-    spec = next(one for one in registry.MODELS[MODEL].parameters if not one.choices)
     scene.rockfall_comparison.models = {MODEL}
     yield 1.0  # its parameters are unfolded now, and stay so with other models
-    scene.rockfall_comparison.models = {*names[:MODELS]} | {MODEL}
+    scene.rockfall_comparison.models = {MODEL, *names}
     assert len(scene.rockfall_comparison.models) == MODELS
     with window.override():
         assert bpy.ops.rockfall.show_models(models=set(scene.rockfall_comparison.models)) == {"FINISHED"}
@@ -190,7 +190,7 @@ def case_slider(window):
     group = scene.rockfall_parameters.noel_2017
 
     def value() -> float:
-        return float(getattr(group, spec.name))
+        return float(getattr(group, PARAMETER))
 
     for what, count in ((f"{len(comparison.measured_of(scene).impacts)} impacts", 0), (f"{IMPACTS} impacts", IMPACTS)):
         if count:
@@ -201,12 +201,12 @@ def case_slider(window):
             comparison.measured_key = lambda scene: IMPACTS
             window.redraw()
             yield 5.0
-        place = yield from find_slider(window, spec.name)
+        place = yield from find_slider(window, f"{MODEL}.{PARAMETER}")
         load = os.getloadavg()[0]
         dragged = yield from drag(window, parts, place, value)
         graph = sheet.drawn_graph(scene, 0)
         assert len(graph.drawn) == MODELS + 1
-        tell(f"{what} × {MODELS}, slider {spec.name}", dragged)
+        tell(f"{what} × {MODELS}, slider {PARAMETER}", dragged)
         tell(f"{what} × {MODELS}, drawn again", (yield from redraw(window, parts)))
         print(f"{ROW}load of the machine while it was dragged: {load:.1f}", flush=True)
         window.screenshot(what)

@@ -8,7 +8,7 @@ import numpy as np
 from ..vectors import Array, Indices
 from .curves import number
 from .graphs import Graph
-from .line_fits import CONFIDENCE
+from .scores import rmse_interval
 from .variables import find_variable
 
 
@@ -55,11 +55,6 @@ def graph_scores(graph: Graph, fall: Indices) -> tuple[GraphScore, ...]:
     Parameters
     ----------
     fall : (n,) number of the fall of each row of the table of impacts, from `fall_numbers`.
-
-    Notes
-    -----
-    Errors of one fall's impacts are alike, so falls count as wholes: the mean square is a ratio of two sums over falls,
-    its variance that of a ratio (Cochran 1977, § 2.11), and the interval Student's on its logarithm.
     """
     if not graph.model:
         return ()
@@ -75,7 +70,7 @@ def _score(variable: str, error: Array, fall: Indices) -> GraphScore:
     if not error.size:
         return GraphScore(variable, 0, 0, *[float("nan")] * 5)
     rmse = float(np.sqrt(np.mean(error**2)))
-    low, high, falls = _interval(error**2, fall)
+    low, high, falls = rmse_interval(error**2, fall)
     return GraphScore(
         variable,
         error.size,
@@ -86,19 +81,3 @@ def _score(variable: str, error: Array, fall: Indices) -> GraphScore:
         rmse * high,
         float(np.median(np.abs(error))),
     )
-
-
-def _interval(squared: Array, fall: Indices) -> tuple[float, float, int]:
-    """Ends of the interval of √mean, as parts of it, and the number of falls."""
-    from scipy.stats import t
-
-    counts = np.bincount(fall)
-    there = counts > 0
-    counts, sums = counts[there], np.bincount(fall, squared)[there]
-    mean = float(squared.mean())
-    if counts.size < 2 or mean == 0.0:
-        return float("nan"), float("nan"), counts.size
-    spread = np.sum((sums - mean * counts) ** 2) * counts.size / (counts.size - 1)
-    error = float(np.sqrt(spread)) / squared.size / mean
-    reach = float(t.ppf(0.5 + CONFIDENCE / 2, counts.size - 1)) * error / 2
-    return float(np.exp(-reach)), float(np.exp(reach)), counts.size

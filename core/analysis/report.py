@@ -136,7 +136,8 @@ def score_table(scores: Mapping[str, Sequence[Score]], title: str = "Scores") ->
             digits = 2 if part == "energy_distance" else DECIMALS.get(quantity, 2)
             text = "–" if value != value else f"{value:{'+' if part == 'bias' else ''}.{digits}f}".replace("-", "−")
             mark = " class=best" if len(rows) > 1 and abs(value) == best[quantity, part] else ""
-            cells.append(f"<td{mark}>{text}</td>")
+            interval = _interval(row[quantity]) if part == "rmse" else ""
+            cells.append(f"<td{mark}{interval}>{text}</td>")
         lines.append(f"<tr><td>{escape(label)}</td>{''.join(cells)}</tr>")
     return (
         f'<h2>{escape(title)}</h2><div class="scroll"><table>'
@@ -145,6 +146,13 @@ def score_table(scores: Mapping[str, Sequence[Score]], title: str = "Scores") ->
         '<p class="note">Bias and root mean square error of model − measured. Distance: energy distance between the '
         "two clouds of points in the plane of the graph, 0 for the same cloud; it counts the scatter too.</p>"
     )
+
+
+def _interval(score: Score) -> str:
+    """That of the root mean square error, shown under the pointer."""
+    if score.rmse_low != score.rmse_low:
+        return ""
+    return f' title="{score.rmse_low:.3g}–{score.rmse_high:.3g} (95 %, by falls)"'
 
 
 def by_model(scores: Sequence[Score]) -> dict[str, list[Score]]:

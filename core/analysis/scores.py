@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import Impacts, fall_numbers
 from ..vectors import Array, Indices, Mask
 from .comparison import Predictions
+from .line_fits import student
 
 ABSCISSA = {
     "vn2_mps": "vn1_mps",
@@ -34,6 +35,7 @@ class Score:
     n : impacts.
     bias, rmse : mean and root mean square of predicted − measured; predicted is the mean of the replicates, or the
         model's mean run when there are none.
+    rmse_low, rmse_high : 95 % interval of the latter, by falls; NaN with fewer than two.
     median_error : median of |predicted − measured|, which a few outliers do not move.
     coverage50, coverage90 : share of the measured values between the 25 and 75 %, the 5 and 95 % quantiles of their
         replicates; NaN without replicates. 0.5 and 0.9 would be right; a model without chance has 0.
@@ -47,6 +49,8 @@ class Score:
     n: int
     bias: float
     rmse: float
+    rmse_low: float
+    rmse_high: float
     median_error: float
     coverage50: float
     coverage90: float
@@ -66,9 +70,9 @@ def scores(
 
     distances : whether those between distributions and clouds are wanted, which take longest; NaN where they are not.
     """
-    row, quantities = predictions.row, tuple(quantities)
+    row, quantities, fall = predictions.row, tuple(quantities), fall_numbers(impacts)
     return tuple(
-        _score(model, i, quantity, impacts, predictions, kept, distances)
+        _score(model, i, quantity, impacts, predictions, kept, fall, distances)
         for i, model in enumerate(predictions.models)
         for quantity in quantities
         if row.size
@@ -89,14 +93,14 @@ def predicted(predictions: Predictions, model: int, name: str) -> Array:
 
 def rmse(impacts: Impacts, predictions: Predictions, model: int, quantity: str, kept: Mask | None = None) -> float:
     """That of a `Score` alone, at once; NaN where nothing is measured. `model` is its place in the predictions."""
-    y, runs, _, _ = _pairs(model, quantity, impacts, predictions, kept)
+    y, runs, _, _, _ = _pairs(model, quantity, impacts, predictions, kept)
     return float(np.sqrt(np.mean((_drawn(runs).mean(axis=0) - y) ** 2))) if y.size else np.nan
 
 
 def _pairs(
     i: int, quantity: str, impacts: Impacts, predictions: Predictions, kept: Mask | None
-) -> tuple[Array, Array, Array, Array]:
-    """Of the impacts where both are known: measured (n,), predicted (1 + R, n), and the same of the abscissa."""
+) -> tuple[Array, Array, Array, Array, Indices]:
+    """Of the impacts where both are known: measured (n,), predicted (1 + R, n), the same of the abscissa, and rows."""
     against = ABSCISSA[quantity]
     y, runs = measured(impacts, predictions.row, quantity), predicted(predictions, i, quantity)
     x = measured(impacts, predictions.row, against)
@@ -104,7 +108,32 @@ def _pairs(
     known = np.isfinite(y) & np.isfinite(x) & np.isfinite(runs).all(axis=0) & np.isfinite(x_runs).all(axis=0)
     if kept is not None:
         known &= kept[predictions.row]
-    return y[known], runs[:, known], x[known], x_runs[:, known]
+    return y[known], runs[:, known], x[known], x_runs[:, known], predictions.row[known]
+
+
+def rmse_interval(squared: Array, fall: Indices) -> tuple[float, float, int]:
+    """Ends of the 95 % interval of √mean as parts of it, and the number of falls; NaN with fewer than two of these.
+
+    Parameters
+    ----------
+    squared : (n,) squares of errors, n ≥ 1.
+    fall : (n,) number of the fall of each.
+
+    Notes
+    -----
+    Errors of one fall's impacts are alike, so falls count as wholes: the mean square is a ratio of two sums over falls,
+    its variance that of a ratio (Cochran 1977, § 2.11), and the interval Student's on its logarithm.
+    """
+    counts = np.bincount(fall)
+    there = counts > 0
+    counts, sums = counts[there], np.bincount(fall, squared)[there]
+    mean = float(squared.mean())
+    if counts.size < 2 or mean == 0.0:
+        return float("nan"), float("nan"), counts.size
+    spread = np.sum((sums - mean * counts) ** 2) * counts.size / (counts.size - 1)
+    error = float(np.sqrt(spread)) / squared.size / mean
+    reach = student(counts.size - 1) * error / 2
+    return float(np.exp(-reach)), float(np.exp(reach)), counts.size
 
 
 def _drawn(runs: Array) -> Array:
@@ -113,22 +142,33 @@ def _drawn(runs: Array) -> Array:
 
 
 def _score(
-    model: str, i: int, quantity: str, impacts: Impacts, predictions: Predictions, kept: Mask | None, distances: bool
+    model: str,
+    i: int,
+    quantity: str,
+    impacts: Impacts,
+    predictions: Predictions,
+    kept: Mask | None,
+    fall: Indices,
+    distances: bool,
 ) -> Score:
     from scipy.stats import wasserstein_distance
 
-    y, runs, x, x_runs = _pairs(i, quantity, impacts, predictions, kept)
+    y, runs, x, x_runs, row = _pairs(i, quantity, impacts, predictions, kept)
     n = y.size
     if not n:
-        return Score(model, quantity, 0, *[np.nan] * 7)
+        return Score(model, quantity, 0, *[np.nan] * 9)
     draws, x_draws = _drawn(runs), _drawn(x_runs)
     error = draws.mean(axis=0) - y
+    whole = float(np.sqrt(np.mean(error**2)))
+    low, high, _ = rmse_interval(error**2, fall[row])
     return Score(
         model,
         quantity,
         n,
         float(error.mean()),
-        float(np.sqrt(np.mean(error**2))),
+        whole,
+        whole * low,
+        whole * high,
         float(np.median(np.abs(error))),
         _coverage(y, draws, *HALF) if predictions.replicates else np.nan,
         _coverage(y, draws, *MOST) if predictions.replicates else np.nan,

@@ -30,8 +30,6 @@ OBJECTIVE = (
     "mean energy score of (v_N2, v_T2, deviation), each in units of its robust standard deviation over the impacts, "
     "with common random numbers; for a model without chance it is the mean distance"
 )
-UNUSABLE = ("departing", "into_ground", "below_terrain", "contact", "shattered", "discarded")
-"""Flags of impacts whose restituted velocity is not that of a block that left the ground."""
 MOST_POOLED = 2000
 WEISZFELD_STEPS = 50
 HOPELESS = 1e9
@@ -98,15 +96,14 @@ def measured_target(impacts: Impacts, courses: Courses) -> Target:
     """
     row = courses.row
     values = np.stack([impacts.vn2[row], impacts.vt2[row], impacts.theta_dev[row]], axis=1)
-    known = np.isfinite(values).all(axis=1)
-    flagged = np.any([impacts.flags[name][row] for name in UNUSABLE], axis=0)
-    if not (known & ~flagged).any():
+    known = np.asarray(np.isfinite(values).all(axis=1))
+    if not known.any():
         raise InputError(
-            f"None of the {len(impacts)} impacts can be used: {int(flagged.sum())} are flagged "
-            f"({', '.join(UNUSABLE)}), {int((~known & ~flagged).sum())} have no restituted velocity",
-            advice="Check the normals and the picks that the flags point to",
+            f"None of the {len(impacts)} impacts can be used: {len(courses.skipped)} cannot be compared, "
+            f"{row.size} have no restituted velocity",
+            advice="An impact needs both velocities and the normal: reconstruct more than two impacts of a trajectory",
         )
-    return make_target(courses, values[None], known & ~flagged)
+    return make_target(courses, values[None], known)
 
 
 def make_target(courses: Courses, values: Array, counted: Mask) -> Target:

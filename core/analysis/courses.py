@@ -10,7 +10,7 @@ import numpy as np
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..impact_models.machinery.base import Incident
-from ..reconstruction.impact import Impacts, fall_numbers
+from ..reconstruction.impact import REFUSED, Impacts, fall_numbers
 from ..vectors import Array, Indices, Mask, cross, dot, unit
 
 Spin = Literal["rolling", "zero", "table"]
@@ -20,7 +20,7 @@ REASONS = (
     "no incident velocity",
     "no terrain normal",
     "departing from the ground",
-    "the flag departing or discarded",
+    f"the flag {', '.join(REFUSED[:-1])} or {REFUSED[-1]}",
     "no measured angular velocity",
 )
 

@@ -9,12 +9,10 @@ from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel, Incident
 from ..impact_models.machinery.measured import FEWEST_NEAR, IQR_PER_SD, MeasuredRebounds
 from ..impact_models.machinery.parameters import Value
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import REFUSED, Impacts
 from ..vectors import Array, Mask, Names, cross, dot, norm, unit
 from .courses import Courses
 
-UNUSABLE = ("departing", "first", "last", "shattered", "discarded", "below_terrain", "gap", "doubtful")
-"""Flags of impacts that are not drawn, in the order in which they are counted."""
 INCOMPLETE = "without R_N and R_T"
 WEIGHED = ("rn", "rt", "theta_dev")
 """Whose standard deviations weigh an impact."""
@@ -36,7 +34,7 @@ def measured_rebounds(impacts: Impacts) -> MeasuredRebounds:
     error. An impact without σ among others with it has their median e; without any σ all weigh 1.
     """
     free, left_out = np.ones(len(impacts), dtype=np.bool_), {}
-    for flag in UNUSABLE:
+    for flag in REFUSED:
         left_out[flag] = int((impacts.flags[flag] & free).sum())
         free &= ~impacts.flags[flag]
     normal = unit(impacts.normal)

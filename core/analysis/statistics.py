@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..progress import Progress, silent
-from ..reconstruction.impact import Impacts, fall_numbers
+from ..reconstruction.impact import REFUSED, Impacts, fall_numbers
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask
 from .line_fits import (
@@ -38,7 +38,7 @@ CLASSES = 9
 """Classes of the incident angle, from 0 to 90°; the last holds 90°, too."""
 COUNTERS = ("time_s", "impact")
 """Variables whose spread says nothing."""
-DOUBTS = ("into_ground", "below_terrain", "contact", "shattered", "doubtful")
+DOUBTS = ("contact", "shattered", "doubtful")
 """Flags of impacts that enter and deserve a look, the gravest first."""
 
 Row = tuple[str, float, str, str]
@@ -94,7 +94,7 @@ class ImpactStatistics:
     Attributes
     ----------
     impacts : number of impacts.
-    used : how many of them have R_N, R_T, R, θ1 and θ_dev and are not discarded, and enter here.
+    used : how many of them have R_N, R_T, R, θ1 and θ_dev and are not refused, and enter here.
     trajectories : how many falls these are of.
     doubts : flag → how many of those that enter have it.
     rt : |v_T2| on |v_T1| through the origin: the slope is the table's R_T.
@@ -150,7 +150,7 @@ class ImpactStatistics:
         """The rows of statistics.csv."""
         rows: list[Row] = [
             ("impacts", self.impacts, "", "in the table"),
-            ("impacts_used", self.used, "", "with all coefficients defined, not discarded"),
+            ("impacts_used", self.used, "", f"with all coefficients, without {', '.join(REFUSED)}"),
             ("trajectories", self.trajectories, "", "that these are of"),
         ]
         rows += [(f"impacts_{flag}", number, "", "of those used") for flag, number in self.doubts.items()]
@@ -239,10 +239,9 @@ class ImpactStatistics:
 
 
 def usable(impacts: Impacts) -> Mask:
-    """(n,) impacts that enter: R_N, R_T, R, θ1 and θ_dev are defined, and they are not discarded.
+    """(n,) impacts that enter: R_N, R_T, R, θ1 and θ_dev are defined, and they have no flag of `REFUSED`.
 
-    First, last and departing impacts have no coefficients and drop out by themselves. Doubtful picks count like the
-    others.
+    First and last impacts have no coefficients and drop out by themselves. Doubtful picks count like the others.
     """
     known = impacts.complete & np.isfinite(impacts.theta1) & np.isfinite(impacts.theta_dev)
     return known & ~impacts.refused

@@ -31,8 +31,8 @@ EPILOG = """examples:
   rockfall statistics impacts.csv --group material --graph normal_spread_deg rn --out statistics
   rockfall statistics gully.csv quarry.csv --group site --where 'flags!=doubtful' --out statistics
 
-Impacts without all coefficients (first and last of a trajectory, departing), and discarded ones,
-do not enter, as in rockfall compare. Others that are flagged enter, and are counted."""
+Impacts without all coefficients (first and last of a trajectory), and those flagged departing,
+into_ground, below_terrain or discarded do not enter, as in compare and calibrate."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,9 +112,11 @@ def _are_numbers_apart(groups: "GroupStatistics") -> bool:
 
 
 def _nothing(impacts: "Impacts") -> InputError:
+    from ..reconstruction.impact import REFUSED
+
     refused = int(impacts.refused.sum())
     return InputError(
-        f"None of the {len(impacts)} impacts can be used: {refused} are departing or discarded, "
+        f"None of the {len(impacts)} impacts can be used: {refused} are flagged ({', '.join(REFUSED)}), "
         f"{len(impacts) - refused} have no R_N, R_T and R",
         advice="They need v1, v2 and the terrain normal: reconstruct with a terrain, and more than two impacts each",
     )

@@ -166,13 +166,14 @@ def codes(*columns: Array | Names | Indices) -> tuple[list[tuple[Hashable, ...]]
 
 
 def group_medians(impacts: Impacts, columns: Sequence[str]) -> list[dict[str, object]]:
-    """One row for each group: its values, how many impacts, and the medians of `MEDIANS` where defined."""
+    """One row for each group: its values, how many impacts, and the medians of `MEDIANS` of those that count."""
     keys, code = codes(*(column_of(impacts, name) for name in columns))
     table: list[dict[str, object]] = [dict(zip(columns, key, strict=True)) for key in keys]
     for row, count in zip(table, np.bincount(code, minlength=len(keys)).tolist(), strict=True):
         row["impacts"] = count
     for name in MEDIANS:
-        medians = _medians(np.asarray(column_of(impacts, name), dtype=np.float64), code, len(keys))
+        values = np.where(impacts.refused, np.nan, np.asarray(column_of(impacts, name), dtype=np.float64))
+        medians = _medians(values, code, len(keys))
         for row, value in zip(table, medians.tolist(), strict=True):
             row[f"median_{name}"] = value if value == value else ""
     return table

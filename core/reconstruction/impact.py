@@ -24,8 +24,10 @@ FLAGS = (
 )
 """In the order in which they are written. The last four say why a part is undefined, or repeat the pick's status."""
 
-REFUSED = ("departing", "discarded")
-"""Flags of impacts that neither comparisons nor statistics take: no impact at all, or none that counts."""
+REFUSED = ("departing", "into_ground", "below_terrain", "discarded")
+"""Flags of impacts that count nowhere, neither in comparisons, fits, statistics and medians nor as rebounds that are
+drawn: no impact at all, none that is to count, or one whose velocities a wrong pick or normal made. Where a part is
+undefined, as at the first and the last impact, there are no coefficients, and nothing to count."""
 
 DeviationForm = Literal["signed", "as_printed"]
 RUN = ("run", "source", "simulated_with", "seed")

@@ -131,8 +131,10 @@ def test_bad_questions_are_refused(impacts, tmp_path, capsys, case):
 def test_bad_tables_are_refused_with_their_name(impacts, tmp_path, capsys):
     lines = impacts.read_text(encoding="utf-8").splitlines()
     column = lines[0].split(",").index("flags")
-    flagged = [",".join([*row.split(",")[:column], "contact", *row.split(",")[column + 1 :]]) for row in lines[1:]]
-    for rows, message in ((lines[1:6], "too few to fit"), (flagged, "None of the 42 impacts can be used")):
+    flagged = [
+        ",".join([*row.split(",")[:column], "below_terrain", *row.split(",")[column + 1 :]]) for row in lines[1:]
+    ]
+    for rows, message in ((lines[1:6], "too few to fit"), (flagged, "No impact can be compared")):
         impacts.write_text("\n".join([lines[0], *rows]) + "\n", encoding="utf-8")
         argv = ["calibrate", str(impacts), "--model", "noel_2017", "--fit", "rt", "--out", str(tmp_path / "out")]
         assert main(argv) == 1

@@ -226,7 +226,7 @@ def test_the_same_seed_gives_the_same_result_whatever_the_order_of_rows():
     assert other.estimates[0].value == pytest.approx(one.estimates[0].value, abs=1e-3)
 
 
-def test_impacts_that_do_not_count_still_hand_on_their_spin():
+def test_an_impact_with_a_wrong_velocity_does_not_count():
     impacts = made_by(slope(8), "pfeiffer_bowen_1989", {"rn": 0.5})
     wild = impacts.vn2.copy()
     wild[3] = 1e6
@@ -298,9 +298,11 @@ def test_bad_impacts_are_refused():
     few = slope(1, 6)
     with pytest.raises(InputError, match=r"4 impacts can be used, which is too few to fit 2 .*at least 10"):
         calibrate(few, "stevens_1998", ["rn", "rt"])
-    flagged = replace(few, flags={**few.flags, "contact": np.ones(6, dtype=np.bool_)})
-    with pytest.raises(InputError, match="None of the 6 impacts can be used: 5 are flagged"):
+    flagged = replace(few, flags={**few.flags, "below_terrain": np.ones(6, dtype=np.bool_)})
+    with pytest.raises(InputError, match=r"No impact can be compared: .* with the flag departing, into_ground, below"):
         calibrate(flagged, "stevens_1998", ["rn"])
+    with pytest.raises(InputError, match=r"None of the 6 impacts can be used: .* have no restituted velocity"):
+        calibrate(replace(few, vn2=np.full(6, np.nan)), "stevens_1998", ["rn"])
     with pytest.raises(InputError, match="combinations of choices, too many to try"):
         calibrate(slope(5), "dorren_2015", ["soil_type", "block_shape", "deviation_axis"])
 

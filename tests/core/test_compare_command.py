@@ -102,7 +102,11 @@ BAD = {
     "no normals": ([row.replace(",0,0,1,", ",,,,") for row in ROWS], [], "2 with no terrain normal"),
     "zero normal": ([ROWS[0].replace(",0,0,1,", ",0,0,0,")], [], "trajectory a: The normal of impact 1 has the length"),
     "departing": ([row.replace(",0,0,1,", ",0,0,-1,") for row in ROWS], [], "2 with departing from the ground"),
-    "flagged": ([f"{row}departing" for row in ROWS], [], "2 with the flag departing or discarded"),
+    "flagged": (
+        [f"{row}departing" for row in ROWS],
+        [],
+        "with the flag departing, into_ground, below_terrain or discarded",
+    ),
     "nan": ([ROWS[0].replace(",8,", ",nan,")], [], "row 2, trajectory a: 'nan' in column v1x_mps is not finite"),
     "no radius": ([row.replace("0.35", "") for row in ROWS], [], "--radius"),
     "no spin": (ROWS, ["--spin", "table"], "no measured angular velocity"),

@@ -314,14 +314,12 @@ def test_what_depends_on_the_angle_is_learnt():
 
 def test_flags_are_left_out_and_counted():
     impacts = field(4, 8, seed=5)
-    for row, flag in enumerate(("first", "doubtful", "below_terrain", "gap", "departing")):
+    for row, flag in enumerate(("discarded", "doubtful", "below_terrain", "gap", "departing")):
         impacts.flags[flag][row] = True
     impacts.rt[20] = np.nan
     given = measured_rebounds(impacts)
-    assert len(given) == 32 - 6
-    assert given.left_out == {
-        "first": 1, "doubtful": 1, "below_terrain": 1, "gap": 1, "departing": 1, "without R_N and R_T": 1,
-    }  # fmt: skip
+    assert len(given) == 32 - 4
+    assert given.left_out == {"departing": 1, "below_terrain": 1, "discarded": 1, "without R_N and R_T": 1}
 
 
 def test_too_few_impacts_are_refused():

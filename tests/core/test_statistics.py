@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.stats
-from rockfall.core.analysis.comparison import compare
+from rockfall.core.analysis.clouds import measured_target
+from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.line_fits import (
     interval_by_cluster,
     line,
@@ -14,8 +15,10 @@ from rockfall.core.analysis.line_fits import (
     power_interval_by_cluster,
     power_law,
 )
+from rockfall.core.analysis.measured_rebounds import measured_rebounds
 from rockfall.core.analysis.robust_slope import theil_sen
 from rockfall.core.analysis.statistics import AngleClass, ImpactStatistics, impact_statistics
+from rockfall.core.exchange.selection import group_medians
 from rockfall.core.reconstruction.impact import Impacts
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -193,23 +196,28 @@ def test_classes_of_the_incident_angle_and_their_intervals() -> None:
     assert np.isnan(AngleClass(0, 10, 0, 0).interval).all()
 
 
-def test_discarded_and_departing_impacts_do_not_enter_as_in_a_comparison() -> None:
-    impacts = impacts_with(np.linspace(10, 40, 12), np.full(12, 0.8), np.full(12, 0.6), np.full(12, 9.0))
+def test_the_same_impacts_count_in_statistics_comparisons_fits_medians_and_draws() -> None:
+    """Discarded ones, and those with wrong velocities, nowhere; doubtful ones, and those beside a gap, everywhere."""
+    impacts = impacts_with(np.linspace(10, 40, 24), np.full(24, 0.8), np.full(24, 0.6), np.full(24, 9.0))
     marks = {name: mask.copy() for name, mask in impacts.flags.items()}
     row = np.flatnonzero(impacts.complete)
-    marks["discarded"][row[:3]], marks["doubtful"][row[2:5]], marks["into_ground"][row[6]] = True, True, True
-    marked = replace(impacts, flags=marks)
+    marks["discarded"][row[:3]], marks["doubtful"][row[2:5]], marks["gap"][row[5]] = True, True, True
+    marks["into_ground"][row[6]], marks["below_terrain"][row[7]] = True, True
+    marked, left = replace(impacts, flags=marks), np.delete(row, [0, 1, 2, 6, 7])
     found = impact_statistics(marked)
-    assert found.used == 9
-    assert found.doubts == {"into_ground": 1, "doubtful": 2}
-    compared = compare(marked, ["wyllie_2014"]).row
-    assert not set(row[:3]) & set(compared)
-    assert set(row[3:]) <= set(compared)
-    warning = found.remarks()[0]
-    assert (warning.severity, warning.text) == (
-        "warning",
-        "Flagged among the 9 impacts used: into_ground 1, doubtful 2.",
+    assert found.used == 19
+    assert found.doubts == {"doubtful": 2}
+    courses = find_courses(marked)
+    assert set(courses.row) & set(row) == set(left)
+    target = measured_target(marked, courses)
+    assert set(courses.row[target.counted]) == set(left)
+    np.testing.assert_allclose(np.sort(measured_rebounds(marked).rn), np.sort(impacts.rn[left]))
+    (group,) = group_medians(marked, ["site"])
+    assert group["median_theta1_deg"] == pytest.approx(
+        np.nanmedian(np.degrees(np.delete(impacts.theta1, row[[0, 1, 2, 6, 7]])))
     )
+    warning = found.remarks()[0]
+    assert (warning.severity, warning.text) == ("warning", "Flagged among the 19 impacts used: doubtful 2.")
 
 
 @pytest.mark.parametrize(

@@ -137,6 +137,15 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
         default=None,
         help="use the points that are classified as ground (default: when there are any)",
     )
+    points.add_argument(
+        "--ground-filter",
+        type=positive,
+        nargs="?",
+        const=1.0,
+        metavar="M",
+        help="take vegetation out of a cloud that nobody has classified: a cloth with cells of M metres (default 1) laid "
+        "on it from below",
+    )
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
 
 
@@ -155,7 +164,12 @@ def terrain_as_asked(arguments: argparse.Namespace, file: str, progress: "Progre
 
 def reading_as_asked(arguments: argparse.Namespace) -> dict[str, Any]:
     """What the options of `add_terrain_options` say of any file, for the readers."""
-    return {"up": arguments.up, "unit_m": arguments.unit, "ground_only": arguments.ground_only}
+    return {
+        "up": arguments.up,
+        "unit_m": arguments.unit,
+        "ground_only": arguments.ground_only,
+        "ground_filter_m": arguments.ground_filter,
+    }
 
 
 def add_incident_options(parser: argparse.ArgumentParser) -> None:

@@ -21,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read, mesh where needed, write a binary PLY in survey coordinates, and picture it where Blender is at hand."""
     from ..output import output_folder
+    from ..terrain.cloud import Cloud
     from ..terrain.writers import write_ply
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
@@ -28,6 +29,9 @@ def run(arguments: argparse.Namespace) -> int:
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")
         written = ["terrain.ply"]
+        if len(surface.left_out):
+            write_ply(Cloud(surface.left_out, surface.shift, surface.name), folder / "left_out.ply")
+            written.append("left_out.ply")
         no_picture = ""
         if not arguments.no_picture:
             progress("Shading terrain.png")

@@ -26,7 +26,8 @@ def moved[T: Surface | Cloud](terrain: T, shift: GlobalShift) -> T:
         return terrain if terrain.shift == shift else replace(terrain, shift=shift)
     if isinstance(terrain, Cloud):
         return replace(terrain, points=terrain.points + offset, shift=shift)
-    return replace(terrain, vertices=terrain.vertices + offset, shift=shift)
+    left_out = terrain.left_out + offset
+    return replace(terrain, vertices=terrain.vertices + offset, left_out=left_out, shift=shift)
 
 
 def join(surfaces: Sequence[Surface]) -> Surface:

@@ -17,6 +17,7 @@ from ..vectors import Array
 from . import advice, cleaning, clouds, geotiff, gltf, grids, meshes, ply, triangulation, winding
 from .cloud import Cloud
 from .crs import surely_different
+from .ground_filter import filter_ground
 from .source import Source
 from .surface import Surface
 
@@ -72,6 +73,7 @@ def read_terrain(
     unit_m: float = 1.0,
     max_edge_m: float | None = None,
     ground_only: bool | None = None,
+    ground_filter_m: float | None = None,
     progress: Progress = silent,
 ) -> Surface:
     """Read a mesh, grid or cloud; grids and clouds are meshed.
@@ -84,6 +86,8 @@ def read_terrain(
     unit_m : length of the file's unit [m], 0.001 for millimetres.
     max_edge_m : longest edge of a meshed cloud, in plan [m]; from the point spacing when None.
     ground_only : use the ground class of LAS and LAZ: None if there is one, True always, False never.
+    ground_filter_m : cell of a filter that takes vegetation out of a cloud, whatever its classes say [m]; none when
+        None. See `filter_ground`.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def read_terrain(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
-    return _surface(_opened(path, shift, up, unit_m, ground_only), max_edge_m, progress)
+    return _surface(_opened(path, shift, up, unit_m, ground_only, ground_filter_m), max_edge_m, progress)
 
 
 @reader("terrain")
@@ -102,6 +106,7 @@ def read_points(
     up: str = "auto",
     unit_m: float = 1.0,
     ground_only: bool | None = None,
+    ground_filter_m: float | None = None,
     progress: Progress = silent,
 ) -> Cloud:
     """Read a cloud as its points, without a surface between them; of a mesh its vertices, of a grid its heights.
@@ -110,7 +115,7 @@ def read_points(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 1)
-    return _cloud(_opened(path, shift, up, unit_m, ground_only))
+    return _cloud(_opened(path, shift, up, unit_m, ground_only, ground_filter_m))
 
 
 @reader("terrain")
@@ -121,6 +126,7 @@ def read_structure(
     up: str = "auto",
     unit_m: float = 1.0,
     ground_only: bool | None = None,
+    ground_filter_m: float | None = None,
     progress: Progress = silent,
 ) -> Surface | Cloud:
     """Read a mesh or a grid as a surface, a cloud as its points: a wall has no surface in plan.
@@ -129,7 +135,7 @@ def read_structure(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
-    opened = _opened(path, shift, up, unit_m, ground_only)
+    opened = _opened(path, shift, up, unit_m, ground_only, ground_filter_m)
     return _cloud(opened) if opened.source.kind == "cloud" else _surface(opened, None, progress)
 
 
@@ -142,12 +148,24 @@ class _Opened:
     shift: GlobalShift
     notes: tuple[str, ...]
     advice: tuple[str, ...]
+    left_out: Array
 
 
-def _opened(path: Path, shift: GlobalShift | None, up: str, unit_m: float, ground_only: bool | None) -> _Opened:
-    source = _read(path, ground_only)
+def _opened(
+    path: Path,
+    shift: GlobalShift | None,
+    up: str,
+    unit_m: float,
+    ground_only: bool | None,
+    ground_filter_m: float | None,
+) -> _Opened:
+    source = _read(path, ground_only if ground_filter_m is None else False)
     points = _placed(source, up, unit_m, path)
     notes = list(source.notes)
+    left_out = points[:0]
+    if ground_filter_m is not None:
+        points, left_out, said = _ground(source, points, ground_filter_m, path)
+        notes += said
     if source.faces is not None:
         notes.append(f"Mesh of {len(points):,} vertices and {len(source.faces):,} faces.")
     notes += _said_placement(source, up, unit_m)
@@ -163,7 +181,21 @@ def _opened(path: Path, shift: GlobalShift | None, up: str, unit_m: float, groun
     said.append(
         f"Coordinate reference system {shift.crs}." if shift.crs else "The coordinate reference system is unknown."
     )
-    return _Opened(path, replace(source, points=points - shift.vector), shift, tuple(notes), tuple(said))
+    left_out = left_out - shift.vector
+    return _Opened(path, replace(source, points=points - shift.vector), shift, tuple(notes), tuple(said), left_out)
+
+
+def _ground(source: Source, points: Array, cell_m: float, path: Path) -> tuple[Array, Array, tuple[str, ...]]:
+    """The points on the ground, those left out, and what to say of it."""
+    if source.kind != "cloud":
+        raise InputError(
+            f"This is a {source.kind}, and the ground filter works on clouds", file=path, advice="Read it without"
+        )
+    try:
+        found = filter_ground(points, cell_m)
+    except InputError as error:
+        raise InputError(error.problem, file=path, advice=error.advice) from error
+    return points[found.ground], points[~found.ground], found.notes
 
 
 def _cloud(opened: _Opened) -> Cloud:
@@ -175,7 +207,7 @@ def _cloud(opened: _Opened) -> Cloud:
 
 def _surface(opened: _Opened, max_edge_m: float | None, progress: Progress) -> Surface:
     source, path, shift = opened.source, opened.path, opened.shift
-    before, after = opened.notes, opened.advice
+    before, after, left_out = opened.notes, opened.advice, opened.left_out
     progress("Meshing" if source.kind != "mesh" else "Orienting faces", 1, 2)
     if source.grid_shape is not None:
         meshed = triangulation.mesh_grid(source.points, source.grid_shape)
@@ -186,7 +218,7 @@ def _surface(opened: _Opened, max_edge_m: float | None, progress: Progress) -> S
     kind = source.kind
     del source, opened  # their points are as large as what follows
     vertices, faces, done = _cleaned(meshed, kind)
-    return Surface(vertices, faces, shift, path.name, (*before, *meshed.notes, *done, *after))
+    return Surface(vertices, faces, shift, path.name, (*before, *meshed.notes, *done, *after), left_out)
 
 
 @reader("terrain")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The terrain: one triangle mesh in local coordinates, whatever it came from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ class Surface:
     shift : from local to survey coordinates.
     name : of the file, for people.
     summary : what the reader did, in sentences.
+    left_out : (k, 3) points of the cloud that the ground filter took for vegetation [m].
     """
 
     vertices: Array
@@ -33,6 +34,7 @@ class Surface:
     shift: GlobalShift
     name: str
     summary: tuple[str, ...] = ()
+    left_out: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     @cached_property
     def _cross(self) -> Array:

@@ -143,8 +143,8 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const=1.0,
         metavar="M",
-        help="take vegetation out of a cloud that nobody has classified: a cloth with cells of M metres (default 1) laid "
-        "on it from below",
+        help="take vegetation out of a cloud that nobody has classified: a cloth with cells of M metres (default 1) "
+        "laid on it from below",
     )
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
 

@@ -78,12 +78,13 @@ def filter_ground(points: Array, cell_m: float = CELL_M, distance_m: float = DIS
     ground = _distance(cloth, plan / cell_m + (MARGIN - 0.5), height, slope, cell_m) <= distance_m
     kept = int(ground.sum())
     notes = [
-        f"Ground filter (cloth of {cell_m:g} m): kept the {kept:,} of {len(points):,} points within {distance_m:g} m of "
-        f"it, left out {len(points) - kept:,}.",
+        f"Ground filter (cloth of {cell_m:g} m): kept the {kept:,} of {len(points):,} points within {distance_m:g} m "
+        f"of it, left out {len(points) - kept:,}.",
         "Look at what it left out: tops of boulders and steps of walls may be among it.",
     ]
     if false:
-        notes.append(f"Passed over {false:,} cells with returns more than {LOW_M:g} m under all around them.")
+        cells = "1 cell" if false == 1 else f"{false:,} cells"
+        notes.append(f"Passed over {cells} with returns more than {LOW_M:g} m under all around.")
     return GroundFilter(ground, tuple(notes))
 
 

@@ -164,8 +164,8 @@ def _opened(
     notes = list(source.notes)
     left_out = points[:0]
     if ground_filter_m is not None:
-        points, left_out, said = _ground(source, points, ground_filter_m, path)
-        notes += said
+        points, left_out, filtered = _ground(source, points, ground_filter_m, path)
+        notes += filtered
     if source.faces is not None:
         notes.append(f"Mesh of {len(points):,} vertices and {len(source.faces):,} faces.")
     notes += _said_placement(source, up, unit_m)

@@ -12,6 +12,7 @@ import bpy
 # of any object
 ROLE, ID = "rockfall_role", "rockfall_id"
 TERRAIN_ROLE, COARSE_VIEW_ROLE = "terrain", "terrain_view"
+LEFT_OUT_ROLE = "left_out"  # points of a cloud that the ground filter took for vegetation: for eyes only
 PICK_ROLE, BLOCK_ROLE, FLIGHTS_ROLE = "pick", "block", "flights"
 MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"

@@ -19,6 +19,7 @@ LEAST_THIN = 0.005
 
 _surfaces: dict[int, tuple[tuple, Surface]] = {}
 """By the tile's session_uid, what it was made of and the surface: the index of a million triangles takes a while."""
+MOST_LEFT_OUT = 200_000
 _joined: list[tuple[tuple[Surface, ...], Surface]] = []
 
 
@@ -41,9 +42,22 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     set_locked(obj, True)
     store.collection(scene, "Terrain").objects.link(obj)
     _surfaces[obj.session_uid] = _key(obj), surface
+    if len(surface.left_out):
+        _show_left_out(scene, surface)
     terrain_view.follow(scene)
     terrain_look.apply(scene)
     return obj
+
+
+def _show_left_out(scene: bpy.types.Scene, surface: Surface) -> None:
+    """Some of the points that the ground filter left out, beside the terrain: what it took for vegetation is seen."""
+    points = surface.left_out[:: max(1, -(-len(surface.left_out) // MOST_LEFT_OUT))]
+    mesh = bpy.data.meshes.new(f"{surface.name}, left out")
+    mesh.from_pydata(points.tolist(), [], [])
+    obj = bpy.data.objects.new(mesh.name, mesh)
+    obj[store.ROLE] = store.LEFT_OUT_ROLE
+    obj.hide_select = obj.hide_render = True
+    store.collection(scene, "Terrain").objects.link(obj)
 
 
 def tiles(scene: bpy.types.Scene) -> list[bpy.types.Object]:

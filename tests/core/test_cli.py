@@ -131,6 +131,8 @@ def test_how_a_terrain_is_read_is_a_matter_of_options(tmp_path, capsys):
     faces = len(read_terrain(tmp_path / "out" / "terrain.ply").faces)
     assert "the 400 points of the ground class" in said("cloud.las", "--ground-only")
     assert "all classes, as asked" in said("cloud.las", "--all-points")
+    assert not (tmp_path / "out" / "left_out.ply").exists()
+    assert "Ground filter (cloth of 2 m): kept the 600 of 600" in said("cloud.las", "--ground-filter", "2")
     said("cloud.las", "--max-edge", "4")
     cut = read_terrain(tmp_path / "out" / "terrain.ply")
     assert len(cut.faces) < faces

@@ -44,7 +44,13 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             ("AUTO", "Ground if classified", "The ground class when the file has one, else all points"),
             ("GROUND", "Ground only", "Only points of the class ground"),
             ("ALL", "All", "All points, vegetation and noise too"),
+            ("FILTER", "Ground filter", "What lies on a cloth laid from below, whatever its classes: no vegetation"),
         ],
+    )  # fmt: skip
+    filter_m: FloatProperty(
+        name="Cloth cell", description="Spacing of the ground filter's cloth: wider than the gaps without ground under "
+        "bushes and trees. Boulders and steps smaller than this may be left out",
+        default=1.0, min=0.05, soft_max=5.0, unit="LENGTH",
     )  # fmt: skip
     max_edge_m: FloatProperty(
         name="Longest edge", description="Longer edges of a meshed cloud are left out. 0: from the points' spacing",
@@ -92,7 +98,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         column.label(
             text="The project's shift, shared by all its files." if known else "Proposed: kept for the project."
         )
-        for name in ("up", "unit_m", "ground", "max_edge_m"):
+        for name in ("up", "unit_m", "ground", *(("filter_m",) if self.ground == "FILTER" else ()), "max_edge_m"):
             layout.prop(self, name)
         self.draw_offer(context, layout)
 
@@ -108,7 +114,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             up=self.up,
             unit_m=float(f"{self.unit_m:.7g}"),
             max_edge_m=self.max_edge_m or None,
-            ground_only={"AUTO": None, "GROUND": True, "ALL": False}[self.ground],
+            ground_only={"AUTO": None, "GROUND": True, "ALL": False, "FILTER": None}[self.ground],
+            ground_filter_m=self.filter_m if self.ground == "FILTER" else None,
         )
         terrain.add_terrain(context.scene, surface, shade(surface))
         sync.recompute(context.scene)
@@ -210,6 +217,25 @@ class ROCKFALL_OT_lock_terrain(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_toggle_left_out(bpy.types.Operator):
+    """Show or hide the points that the ground filter left out"""
+
+    bl_idname = "rockfall.toggle_left_out"
+    bl_label = "Show or Hide Points Left Out"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return possible(cls, store.has_role(context.scene, store.LEFT_OUT_ROLE), "The ground filter left nothing out")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        every = store.with_role(context.scene, store.LEFT_OUT_ROLE)
+        hidden = all(points.hide_get() for points in every)
+        for points in every:
+            points.hide_set(not hidden)
+        return {"FINISHED"}
+
+
 class ROCKFALL_OT_put_terrain_back(bpy.types.Operator):
     """Return the scan to where it was surveyed"""
 
@@ -267,6 +293,7 @@ CLASSES = (
     ROCKFALL_OT_reset_relief,
     ROCKFALL_OT_toggle_full_terrain,
     ROCKFALL_OT_lock_terrain,
+    ROCKFALL_OT_toggle_left_out,
     ROCKFALL_OT_put_terrain_back,
     ROCKFALL_FH_terrain,
 )

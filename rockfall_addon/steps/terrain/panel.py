@@ -46,6 +46,8 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("rockfall.show_relief", text="Show relief", icon="SHADING_SOLID")
         row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
+        if store.has_role(scene, store.LEFT_OUT_ROLE):
+            layout.operator("rockfall.toggle_left_out", text="Points left out", icon="HIDE_OFF")
         shift = georeference.read_shift(scene)
         rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
         facts(layout, [*rows, ("System", shift.crs or "unknown")])

@@ -27,7 +27,7 @@ CLOSED_PIPE = 141
 
 COMMANDS = {
     "demo": "the whole job on the bundled site: tables, statistics, a picture, the film",
-    "terrain": "any terrain file → terrain.ply, and what there is to know about it",
+    "terrain": "any terrain file, or several tiles → terrain.ply, and what there is to know about it",
     "inspect": "what a video file really contains, with advice",
     "align": "pairs of pixels and terrain points → the camera, camera.toml with residuals",
     "track": "follows the block through a video from one click → track.csv, proposed impacts",

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``rockfall terrain``: any terrain file → terrain.ply, a shaded picture, and what there is to know about it."""
+"""``rockfall terrain``: any terrain file, or several tiles → terrain.ply, a shaded picture, what there is to know."""
 
 import argparse
 from pathlib import Path
+
+import numpy as np
 
 from ..errors import DependencyError
 from .options import add_out, add_terrain_options, terrain_as_asked
@@ -12,33 +14,40 @@ from .progress import PrintedProgress
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     formats = "mesh (PLY, OBJ, STL, glTF), grid (ASC, TIF) or cloud (LAS, LAZ, XYZ)"
-    parser.add_argument("file", metavar="FILE", help=formats)
+    parser.add_argument("files", metavar="FILE", nargs="+", help=f"{formats}; several tiles become one surface")
     add_out(parser)
     add_terrain_options(parser)
     parser.add_argument("--no-picture", action="store_true", help="do not ask Blender for terrain.png")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, mesh where needed, write a binary PLY in survey coordinates, and picture it where Blender is at hand."""
+    """Read, mesh where needed, join tiles, write a binary PLY in survey coordinates, and picture it with Blender."""
     from ..output import output_folder
     from ..terrain.cloud import Cloud
+    from ..terrain.joining import join
     from ..terrain.writers import write_ply
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        surface = terrain_as_asked(arguments, arguments.file, progress)
+        tiles = [terrain_as_asked(arguments, file, progress) for file in arguments.files]
+        progress("Joining the tiles")
+        surface = join(tiles)
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")
         written = ["terrain.ply"]
-        if len(surface.left_out):
-            write_ply(Cloud(surface.left_out, surface.shift, surface.name), folder / "left_out.ply")
+        left_out = np.concatenate([tile.left_out + (tile.shift.vector - surface.shift.vector) for tile in tiles])
+        if len(left_out):
+            write_ply(Cloud(left_out, surface.shift, surface.name), folder / "left_out.ply")
             written.append("left_out.ply")
         no_picture = ""
         if not arguments.no_picture:
             progress("Shading terrain.png")
             no_picture = _picture(folder, surface.name)
             written += [] if no_picture else ["terrain.png"]
-    for sentence in surface.summary:
-        print(sentence)
+    for tile in tiles:
+        for sentence in tile.summary:
+            print(f"{tile.name}: {sentence}" if len(tiles) > 1 else sentence)
+    if len(tiles) > 1:
+        print(f"{len(tiles)} tiles are one surface of {len(surface.faces):,} faces.")
     if no_picture:
         print(f"No picture: {no_picture}")
     print(f"Written: {', '.join(written)} in {arguments.out}")

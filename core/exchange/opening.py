@@ -3,7 +3,7 @@
 
 from typing import cast
 
-from ..errors import RockfallError
+from ..errors import InputError
 from ..reconstruction.block import Block
 from ..reconstruction.choices import FlightEnds
 from ..reconstruction.drag import Drag
@@ -34,7 +34,7 @@ def read_project_picks(project: Project, surface: Surface | None) -> Picks:
     RockfallError : the project names none, the table is bad.
     """
     if project.picks is None:
-        raise RockfallError('The project names no table of picks: add [picks] file = "picks.csv" to it.')
+        raise InputError("The project names no table of picks", advice='Add [picks] file = "picks.csv" to it')
     return read_picks(project.picks, None if surface is None else surface.shift)
 
 

@@ -41,6 +41,13 @@ def refuse_degrees(source: Source, low: Array, high: Array, unit_m: float, path:
         )
 
 
+def faces_along_y(points: Array) -> bool:
+    """Whether points (n, 3) lie about a plane that faces along y much more than along z."""
+    scatter = points - points.mean(axis=0)
+    across = np.abs(np.linalg.eigh(scatter.T @ scatter)[1][:, 0])
+    return bool(across[1] > MUCH_MORE * across[2] and across[1] > across[0])
+
+
 def sentences(low: Array, high: Array, shift: GlobalShift) -> list[str]:
     """Advice on units and place, for the summary."""
     notes = []

@@ -174,6 +174,8 @@ def _opened(
     advice.refuse_degrees(source, low, high, unit_m, path)
     shift = _shift(shift, low, high, source.crs, path)
     said = [*advice.sentences(low, high, shift)]
+    if source.kind == "cloud" and advice.faces_along_y(points):
+        said.append(advice.Y_UP)
     if shift.vector.any():
         said.append(f"Shifted by ({shift.x:.0f}, {shift.y:.0f}, {shift.z:.0f}) m from survey to local coordinates.")
     if source.crs and source.crs != shift.crs:

@@ -104,6 +104,21 @@ def test_terrain_becomes_a_ply_that_reads_the_same(terrain, tmp_path, capsys):
     assert one == two
 
 
+def test_tiles_become_one_surface(tmp_path, capsys):
+    row = "1 2 3 4 5\n" * 3
+    for name, x in (("west", 2_600_000), ("east", 2_600_008)):
+        text = f"ncols 5\nnrows 3\nxllcenter {x}\nyllcenter 1200000\ncellsize 2\n"
+        (tmp_path / f"{name}.asc").write_text(text + (row if name == "west" else row.replace("1", "5", 1)))
+    tiles = [str(tmp_path / f"{name}.asc") for name in ("west", "east")]
+    assert main(["terrain", *tiles, "--no-picture", "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "west.asc: Grid of 5 × 3 heights" in said
+    assert "2 tiles are one surface of 32 faces." in said
+    surface = read_terrain(tmp_path / "out" / "terrain.ply")
+    survey = surface.shift.to_survey(surface.vertices)
+    np.testing.assert_allclose([survey[:, 0].min(), survey[:, 0].max()], [2_600_000, 2_600_016], atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("unit", "metres"), [("m", 1), ("mm", 1e-3), ("ft", 0.3048), ("us-ft", 1200 / 3937), ("0.5", 0.5)]
 )

@@ -241,7 +241,7 @@ def test_a_file_that_is_missing_or_no_text(folder: Path) -> None:
 
 
 def test_a_project_without_picks_is_not_reconstructed() -> None:
-    with pytest.raises(RockfallError, match=r"names no table of picks: add \[picks\]"):
+    with pytest.raises(RockfallError, match=r"names no table of picks. Add \[picks\]"):
         open_project(Project())
 
 

@@ -216,7 +216,7 @@ def test_a_full_disk_leaves_nothing(terrain: Path, releases: Path, tmp_path: Pat
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert status == 1
-    assert "The output cannot be written" in capsys.readouterr().err
+    assert "cannot be written (File too large). Make room" in capsys.readouterr().err
     assert not out.parent.exists()
 
 

@@ -538,3 +538,13 @@ def test_tables_with_decimal_commas_are_read(tmp_path, text):
     path.write_text(text)
     vertices = read_terrain(path).vertices
     assert sorted(map(tuple, vertices.tolist())) == [(0.5, 0.0, 1.25), (0.5, 4.0, 1.0), (4.5, 0.0, 2.0)]
+
+
+def test_a_cloud_in_which_y_points_up_is_noticed(tmp_path):
+    x, y = np.meshgrid(np.arange(20.0), np.arange(30.0))
+    z = 0.2 * x + np.sin(y)
+    path = tmp_path / "a.xyz"
+    for columns, noticed in (((x, y, z), False), ((x, z, -y), True)):
+        np.savetxt(path, np.stack([column.ravel() for column in columns], axis=1))
+        assert any("read it with Y up" in sentence for sentence in read_terrain(path).summary) == noticed
+    assert not any("read it with Y up" in sentence for sentence in read_terrain(path, up="y").summary)

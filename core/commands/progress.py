@@ -20,11 +20,11 @@ REDRAW_S = 0.1
 
 
 def progress_line(text: str, done: int, total: int, elapsed_s: float) -> str:
-    """ "Rendering: 120 of 375, 0:54 left"."""
+    """ "Rendering: 32 %, 120 of 375, 0:54 left"."""
     if not total or not done:
         return f"{text} …"
     left = round(elapsed_s / done * (total - done))
-    return f"{text}: {done} of {total}, {left // 60}:{left % 60:02d} left …"
+    return f"{text}: {100 * done // total} %, {done} of {total}, {left // 60}:{left % 60:02d} left …"
 
 
 class PrintedProgress:

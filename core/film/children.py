@@ -10,7 +10,9 @@ from typing import IO
 
 
 @contextmanager
-def child(command: Sequence[str], *, stdout: int | IO[str], stderr: int | IO[str]) -> Iterator[subprocess.Popen[str]]:
+def child(
+    command: Sequence[str], *, stdout: int | IO[str] | None, stderr: int | IO[str] | None
+) -> Iterator[subprocess.Popen[str]]:
     """A running process, which the end of the block ends.
 
     Raises

@@ -249,7 +249,7 @@ def test_whole_job_in_another_process(picks: Path, tmp_path: Path, part) -> None
         [*command, "--out", str(out), "--frames", "0-2"], capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
-    assert "Rendering: 3 of 3" in done.stderr
+    assert "Rendering: 100 %, 3 of 3" in done.stderr
     assert done.stdout.splitlines()[0] == "64×36, rendered with Cycles"
     clip = bpy.data.movieclips.load(str(out / "rockfall.mp4"))
     assert (clip.frame_duration, round(clip.fps, 5)) == (3, 59.94006)

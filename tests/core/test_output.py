@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
+from rockfall.core.cli import main
 from rockfall.core.errors import InputError
 from rockfall.core.interrupts import Interrupt
 from rockfall.core.output import LOCK, output_file, output_folder, output_stream, write_text
@@ -185,3 +186,45 @@ def test_devices_and_links_are_written_to(tmp_path):
     write_text(tmp_path / "link.toml", "new")
     assert (tmp_path / "true.toml").read_text() == "new"
     assert (tmp_path / "link.toml").is_symlink()
+
+
+@pytest.mark.parametrize("room", [0, 2000])
+def test_a_command_on_a_full_disk_says_which_file_and_keeps_the_old_output(tmp_path, room):
+    pytest.importorskip("resource")
+    picks, out = tmp_path / "picks.csv", tmp_path / "out"
+    rows = [f"a,{0.8 * i},{5 * i},0,{-3 * i},{'impact' if i else 'release'}" for i in range(30)]
+    picks.write_text("\n".join(["trajectory,time_s,x_m,y_m,z_m,kind", *rows, ""]))
+    assert main(["reconstruct", str(picks), "--out", str(out)]) == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert min(map(len, before.values())) > room
+    code = (
+        "import resource, sys; from rockfall.core.cli import main\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room})); sys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", code, "reconstruct", str(picks), "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"rockfall: {out / 'impacts.csv'}: The file cannot be written (File too large). Make")
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_command_that_is_asked_to_end_ends_as_after_an_interrupt(monkeypatch, capsys, name):
+    number = getattr(signal, name, None) or pytest.skip("not on this system")
+    before = signal.getsignal(number)
+    monkeypatch.setattr("rockfall.core.commands.models.run", lambda arguments: signal.raise_signal(number))
+    assert main(["models"]) == 128 + number
+    assert capsys.readouterr().err == "rockfall: interrupted, nothing was written.\n"
+    assert signal.getsignal(number) == before
+
+
+def test_a_child_ends_with_its_parent_however_that_ends():
+    child = "import time; from rockfall.core.film.children import end_with_parent; end_with_parent(); time.sleep(100)"
+    parent = (
+        "import sys, time; from rockfall.core.film.children import child\n"
+        "with child([sys.executable, '-c', sys.argv[1]], stdout=None, stderr=None): print(flush=True); time.sleep(100)"
+    )
+    with subprocess.Popen([sys.executable, "-c", parent, child], stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        process.kill()
+        assert process.stdout.read() == b""  # which ends when the child has, for it has this pipe, too

@@ -13,7 +13,7 @@ class Terminal(io.StringIO):
 
 
 def test_a_line() -> None:
-    assert progress_line("Rendering", 120, 375, 25.2) == "Rendering: 120 of 375, 0:54 left …"
+    assert progress_line("Rendering", 120, 375, 25.2) == "Rendering: 32 %, 120 of 375, 0:54 left …"
     assert progress_line("Rendering", 0, 375, 0.0) == "Rendering …"
     assert progress_line("Reading", 0, 0, 3.0) == "Reading …"
 
@@ -38,12 +38,12 @@ def loud(stream: io.StringIO) -> str:
 
 def test_a_log_has_a_line_for_each_piece_of_work() -> None:
     assert loud(io.StringIO()) == (
-        "Reading …\nRendering: 1 of 1000, 0:00 left …\nRendering: 1000 of 1000, 0:00 left …\nWriting …\n"
+        "Reading …\nRendering: 0 %, 1 of 1000, 0:00 left …\nRendering: 100 %, 1000 of 1000, 0:00 left …\nWriting …\n"
     )
 
 
 def test_a_terminal_has_one_line_written_over() -> None:
     said = loud(Terminal())
-    assert said.startswith("\rReading …\x1b[K\n\rRendering: 1 of 1000, 0:00 left …\x1b[K")
+    assert said.startswith("\rReading …\x1b[K\n\rRendering: 0 %, 1 of 1000, 0:00 left …\x1b[K")
     assert said.endswith("\n\rWriting …\x1b[K\n")
     assert said.count("\n") == 3

@@ -54,8 +54,7 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
             "The new flights are light blue in the free view; step 5 has the numbers.",
             ("rockfall.apply_refinement", "rockfall.discard_refinement"),
         )
-    refined = all(store.NORMAL in pick for pick in picks if pick.get(store.KIND) != "pass")
-    if camera is not None and not refined and not proposal.lacking(scene):
+    if camera is not None and not proposal.is_applied(scene) and not proposal.lacking(scene):
         sentence = "Look at each pick and correct it. Refine fits them all to the tracked pixels."
         return NextStep(sentence, (PICK_TOOL, "rockfall.refine"))
     sentence = "Play the fall; then models, simulation, film and tables: steps 6 to 10."

@@ -194,6 +194,12 @@ def apply(scene: bpy.types.Scene) -> int:
     return len(kept["ids"])
 
 
+def is_applied(scene: bpy.types.Scene) -> bool:
+    """Whether all picks but those in the air have the normals that a refinement gives them."""
+    grounded = [pick for pick in store.with_role(scene, store.PICK_ROLE) if pick.get(store.KIND) != "pass"]
+    return bool(grounded) and all(store.NORMAL in pick for pick in grounded)
+
+
 def discard(scene: bpy.types.Scene) -> None:
     """Forget the proposal."""
     for key in (store.PROPOSAL, store.PROPOSAL_PATH, store.PROPOSAL_ROWS, store.PROPOSAL_POSES):

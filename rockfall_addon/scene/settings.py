@@ -57,7 +57,7 @@ class SceneSettings(bpy.types.PropertyGroup):
         default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_changed,
     )  # fmt: skip
     density_kgpm3: FloatProperty(
-        name="Density", description="Density of the rock [kg/m³]; masses and energies come from it",
+        name="Density [kg/m³]", description="Of the rock; masses and energies come from it",
         default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_changed,
     )  # fmt: skip
     normal_radius_m: FloatProperty(
@@ -87,7 +87,7 @@ class SceneSettings(bpy.types.PropertyGroup):
         default="TOGETHER", update=_changed,
     )  # fmt: skip
     stagger_s: FloatProperty(
-        name="Delay", description="Delay between the starts of two blocks [s]",
+        name="Delay [s]", description="Between the starts of two blocks",
         default=0.5, min=0.0, soft_max=10.0, precision=2, update=_changed,
     )  # fmt: skip
     block_scale: FloatProperty(

@@ -10,10 +10,10 @@ import bpy
 from ...core.remarks import Remark
 from ..scene import store
 
-type State = Literal["TO_DO", "READY", "ATTENTION"]
-"""How a step stands."""
+type State = Literal["TO_DO", "READY", "ATTENTION", "ANY_TIME"]
+"""How a step stands; what has no end can be done at any time."""
 
-MARKS: dict[State, str] = {"TO_DO": "RADIOBUT_OFF", "READY": "CHECKMARK", "ATTENTION": "ERROR"}
+MARKS: dict[State, str] = {"TO_DO": "RADIOBUT_OFF", "READY": "CHECKMARK", "ATTENTION": "ERROR", "ANY_TIME": "DOT"}
 
 
 class RockfallPanel:
@@ -59,7 +59,7 @@ class Rows:
 
 
 def state_mark(layout: bpy.types.UILayout, state: State | None) -> None:
-    """The mark of a step: to do, ready, or needs attention."""
+    """The mark of a step: to do, done, needs attention, or for any time."""
     if state is not None:
         layout.label(text="", icon=MARKS[state])
 

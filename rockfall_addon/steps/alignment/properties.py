@@ -108,11 +108,11 @@ class AlignmentSettings(bpy.types.PropertyGroup):
     free_p1: BoolProperty(name="p1", description="Find the first tangential coefficient", default=False, update=_solve)
     free_p2: BoolProperty(name="p2", description="Find the second tangential coefficient", default=False, update=_solve)
     focal_px: FloatProperty(
-        name="Focal length", description="In pixels of the video", min=1.0, soft_max=20000.0, precision=1,
+        name="Focal length [px]", description="In pixels of the video", min=1.0, soft_max=20000.0, precision=1,
         get=_get_focal, set=_set_focal,
     )  # fmt: skip
     focal_mm: FloatProperty(
-        name="Equivalent", description="What the focal length is on a camera of full frame [mm], by the diagonal: "
+        name="Equivalent [mm]", description="What the focal length is on a camera of full frame, by the diagonal: "
         "26 for a phone, 14 for an action camera",
         min=1.0, soft_max=2000.0, precision=1, get=_get_focal_mm, set=_set_focal_mm,
     )  # fmt: skip

@@ -17,8 +17,8 @@ NUMBERS = (  # what is shown, key of the result, key of its standard deviation, 
     ("R_T", "rt", "sigma_rt", "", 2),
     ("Impact angle θ₁", "theta1_deg", "sigma_theta1_deg", "°", 1),
     ("Deviation θ_dev", "theta_dev_deg", "sigma_theta_dev_deg", "°", 1),
-    ("Energy before", "kinetic1_j", "sigma_kinetic1_j", " J", 0),
-    ("Energy after", "kinetic2_j", "sigma_kinetic2_j", " J", 0),
+    ("Energy before", "kinetic1_j", "sigma_kinetic1_j", " kJ", 2),
+    ("Energy after", "kinetic2_j", "sigma_kinetic2_j", " kJ", 2),
     ("Height of bounce", "bounce_height_m", "", " m", 2),
     ("Height over chord", "chord_height_m", "", " m", 2),
     ("Spread of normal", "normal_spread_deg", "", "°", 1),
@@ -71,6 +71,8 @@ def _fact(result: dict[str, object], label: str, key: str, sigma_key: str, unit:
         sigma = result[sigma_key][0]
     if math.isnan(value):
         return label, "not defined"
+    factor = 1e-3 if unit == " kJ" else 1.0
+    value, sigma = factor * value, factor * sigma
     return label, f"{value:.{digits}f}{'' if math.isnan(sigma) else f' ± {sigma:.{digits}f}'}{unit}"
 
 

@@ -15,7 +15,7 @@ class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
-        return "READY"
+        return "ANY_TIME"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.rockfall

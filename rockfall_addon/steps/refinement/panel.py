@@ -19,7 +19,9 @@ class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
     def step_state(context: bpy.types.Context) -> State:
         if proposal.lacking(context.scene):
             return "TO_DO"
-        return "ATTENTION" if proposal.is_there(context.scene) else "READY"  # it waits for a decision
+        if proposal.is_there(context.scene):
+            return "ATTENTION"  # it waits for a decision
+        return "READY" if proposal.is_applied(context.scene) else "TO_DO"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

@@ -18,7 +18,7 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
-        return "READY"
+        return "ANY_TIME"
 
     def draw(self, context: bpy.types.Context) -> None:
         advise(context, self.layout, True, "Tables in survey coordinates, with units.")

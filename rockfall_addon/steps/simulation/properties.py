@@ -65,7 +65,7 @@ class SimulationSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     pick: StringProperty(name="Pick", description="Id of the pick that blocks were last released from")
     steeper_than_deg: FloatProperty(
-        name="Steeper than", description="Blocks start on faces that are steeper than this [°]",
+        name="Steeper than [°]", description="Blocks start on faces that are steeper than this",
         default=60.0, min=0.0, max=179.0, precision=1,
     )  # fmt: skip
     number: IntProperty(
@@ -96,7 +96,7 @@ class SimulationSettings(bpy.types.PropertyGroup):
         size=3, default=(1.0, 1.0, 1.0), min=0.01, precision=2,
     )  # fmt: skip
     density_kgpm3: FloatProperty(
-        name="Density", description="Of the rock [kg/m³]",
+        name="Density [kg/m³]", description="Of the rock",
         default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0,
     )  # fmt: skip
     shape: EnumProperty(

@@ -72,21 +72,21 @@ class VideoProperties(bpy.types.PropertyGroup):
     """The clock of a camera's video."""
 
     capture_rate_hz: FloatProperty(
-        name="Capture rate", description="Pictures per second when filming, for slow motion: 240 for a file that plays "
-        "them at 30. 0: the file plays at the speed of the fall",
+        name="Capture rate [Hz]", description="Pictures per second when filming, for slow motion: 240 for a file that "
+        "plays them at 30. 0: the file plays at the speed of the fall",
         min=0.0, soft_max=2000.0, max=100_000.0, precision=2, get=_get_capture, set=_set_capture,
     )  # fmt: skip
     offset_s: FloatProperty(
-        name="Offset", description="Common time of the video's beginning, or of its events once it is synchronised [s]",
+        name="Offset [s]", description="Common time of the video's beginning, or of its events once it is synchronised",
         precision=4, step=1, **_clock("offset_s"),
     )  # fmt: skip
     drift_ppm: FloatProperty(
-        name="Drift", description="How much faster the common clock runs than the video's, in millionths: 10 are "
+        name="Drift [ppm]", description="How much faster the common clock runs than the video's, in millionths: 10 are "
         "36 ms in an hour",
         precision=1, min=-900_000.0, soft_min=-1000.0, soft_max=1000.0, **_clock("drift", MICRO),
     )  # fmt: skip
     row_time_us: FloatProperty(
-        name="Row time", description="Time between the readout of two rows of the picture [µs]: rolling shutter. "
+        name="Row time [µs]", description="Time between the readout of two rows of the picture [µs]: rolling shutter. "
         "0 for a global shutter, or when it is not known",
         min=0.0, soft_max=50.0, precision=2, get=_get_row_time, set=_set_row_time,
     )  # fmt: skip

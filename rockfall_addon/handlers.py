@@ -68,6 +68,7 @@ def _loaded(_path: str, _unused: object = None) -> None:
 @problems.guarded
 def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     """At once: Blender stores a step before the edit is absorbed, and its animation would take the edit back."""
+    strip.forget()
     terrain_mesh.mistrust()
     _keep_rate(scene)
     footage.follow(scene)

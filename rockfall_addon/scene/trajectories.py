@@ -17,7 +17,7 @@ from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.raycast import heights_above
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array, norm
-from . import block_keys, impact_rows, keyframes, materials, picks, store, timing, trails
+from . import block_keys, impact_marks, impact_rows, keyframes, materials, picks, store, timing, trails
 
 BELOW_RADII = 0.2
 """A point of a flight that is deeper under the terrain than this part of the block's radius is shown as below it."""
@@ -272,6 +272,7 @@ def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -
         columns["sigma_kinetic1_j"] = impacts.mass_kg * norm(impacts.v1) * columns["sigma_speed1"]
         columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
     rows = {name: [np.atleast_1d(value).tolist() for value in values] for name, values in columns.items()}
+    impact_marks.results_written(set(result.picks.trajectory.tolist()))
     i = 0
     for obj, kind in zip(objects, result.picks.kind.tolist(), strict=True):
         if kind != "impact":

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Names of array types, and row-wise vector algebra on arrays whose last axis is x, y, z."""
 
+from collections.abc import Hashable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,3 +57,11 @@ def across(direction: Array) -> Array:
 def distance_to_ray(points: Array, origins: Array, directions: Array) -> Array:
     """Distance of points from the straight lines through origins along unit directions, (..., 3) → (...)."""
     return norm(cross(points - origins, directions))
+
+
+def numbered(*columns: Names | Indices) -> tuple[list[tuple[Hashable, ...]], Indices]:
+    """The different rows of some columns (n,), in the order of their first appearance, and (n,) which each row is."""
+    keys: dict[tuple[Hashable, ...], int] = {}
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    number = np.array([keys.setdefault(row, len(keys)) for row in rows], dtype=np.intp)
+    return list(keys), number

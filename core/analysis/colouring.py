@@ -9,7 +9,7 @@ import numpy as np
 
 from ..colours import scale_colours
 from ..impact_models.registry import COMPARED, MODELS
-from ..vectors import Array, Names
+from ..vectors import Array
 from .columns import Column
 
 Rgb = tuple[float, float, float]
@@ -52,7 +52,7 @@ def colour_by(columns: Sequence[Column], dark: bool) -> Colouring:
         low, high = np.quantile(values, [OUTER, 1 - OUTER]).tolist() if values.size else (0.0, 1.0)
         colours = tuple(scale_colours(c.numbers, low, high) for c in columns if c.numbers is not None)
         return Colouring(columns[0].title, colours, ends=(low, high))
-    texts = [_texts(column) for column in columns]
+    texts = [column.labels for column in columns]
     groups = dict.fromkeys(text for some in texts for text in some.tolist())
     hues = {text: group_colour(i, dark) for i, text in enumerate(groups)}
     colours = tuple(np.array([hues[text] for text in some.tolist()]).reshape(-1, 3) for some in texts)
@@ -80,11 +80,3 @@ def model_shape(model: str) -> str:
     """The shape of a model's points, the same in all graphs."""
     order = [*COMPARED, *(name for name in MODELS if name not in COMPARED)]
     return MODEL_SHAPES[order.index(model) % len(MODEL_SHAPES)]
-
-
-def _texts(column: Column) -> Names:
-    """A column as texts, where another table has texts in it."""
-    if column.texts is not None:
-        return column.texts
-    numbers = np.empty(0) if column.numbers is None else column.numbers
-    return np.array([f"{value:g}" for value in numbers.tolist()], dtype=np.str_)

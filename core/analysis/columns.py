@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..impact_models.machinery.parameters import suggestion
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import FLAGS, Impacts
 from ..vectors import Array, Mask, Names
 from .variables import VARIABLES, measured_values
 
@@ -34,6 +34,14 @@ class Column:
     texts: Names | None = None
 
     @property
+    def labels(self) -> Names:
+        """(n,) its texts, or its numbers as the shortest texts; empty where undefined."""
+        if self.texts is not None:
+            return self.texts
+        numbers = np.empty(0) if self.numbers is None else self.numbers
+        return np.array([f"{value:.15g}" if value == value else "" for value in numbers.tolist()], dtype=np.str_)
+
+    @property
     def groups(self) -> tuple[str, ...]:
         """The different texts in the order of their first appearance; none for numbers."""
         return () if self.texts is None else tuple(dict.fromkeys(self.texts.tolist()))
@@ -55,8 +63,13 @@ def column_titles(tables: Sequence[Impacts]) -> dict[str, str]:
     return {**TEXT_COLUMNS, **{name: one.label for name, one in VARIABLES.items()}, **further}
 
 
+def has_column(impacts: Impacts, name: str) -> bool:
+    """Whether `find_column` finds a column."""
+    return name in FLAGS or name in column_titles([impacts])
+
+
 def find_column(impacts: Impacts, name: str) -> Column:
-    """A column of a table.
+    """A column of a table: a variable, a text, a further column, or a flag ("yes" and "no").
 
     Raises
     ------
@@ -69,6 +82,8 @@ def find_column(impacts: Impacts, name: str) -> Column:
         return Column(name, titles[name], texts=getattr(impacts, name).astype(str))
     if name == "flags":
         return Column(name, titles[name], texts=np.array(impacts.flag_text(), dtype=np.str_))
+    if name in FLAGS:
+        return Column(name, name, texts=np.where(impacts.flags[name], "yes", "no"))
     if name in impacts.extra:
         return _further(name, impacts.extra[name])
     raise InputError(f"There is no column {name!r}", advice=suggestion(name, titles))
@@ -78,7 +93,7 @@ def passing(impacts: Impacts, filters: Sequence[Filter]) -> Mask:
     """(n,) the impacts that have what all filters ask for; one whose column is empty, or lacking, has it not."""
     found = np.ones(len(impacts), dtype=np.bool_)
     for one in filters:
-        if one.column not in column_titles([impacts]):
+        if not has_column(impacts, one.column):
             found[:] = False
             continue
         column = find_column(impacts, one.column)
@@ -91,12 +106,13 @@ def passing(impacts: Impacts, filters: Sequence[Filter]) -> Mask:
 
 def _further(name: str, texts: Names) -> Column:
     """A column of a table that was read: numbers if all its texts are, and they are many."""
-    filled = np.char.strip(texts.astype(str)) != ""
+    texts = np.char.strip(texts.astype(str))
+    filled = texts != ""
     try:
         values = np.full(texts.size, np.nan)
         values[filled] = texts[filled].astype(np.float64)
     except ValueError:
-        return Column(name, name, texts=texts.astype(str))
+        return Column(name, name, texts=texts)
     if np.unique(values[filled]).size < FEWEST_NUMBERS:
-        return Column(name, name, texts=texts.astype(str))
+        return Column(name, name, texts=texts)
     return Column(name, name, values)

@@ -15,9 +15,9 @@ import numpy as np
 from ..errors import InputError
 from ..output import write_text
 from ..reading import reader, reading
+from ..vectors import numbered
 from .database import SOURCE, Database, Source, Span, digest
 from .impact_fields import field_of
-from .selection import codes
 from .tables import read_impacts, write_impacts
 
 DESCRIPTOR, TABLE = "datapackage.json", "impacts.csv"
@@ -97,7 +97,7 @@ def read_package(path: str | Path) -> Database:
         )
     cells = impacts.extra.get(SOURCE, np.zeros(len(impacts), dtype="U1"))
     named = {str(i): i - 1 for i in range(1, len(sources) + 1)}
-    values, code = codes(cells)
+    values, code = numbered(cells)
     unknown = [str(value) for (value,) in values if value not in named]
     if unknown:
         raise InputError(
@@ -111,7 +111,7 @@ def read_package(path: str | Path) -> Database:
 def _primary_key(database: Database) -> dict[str, list[str]]:
     impacts = database.impacts
     key = ("site", "trajectory", *impacts.runs, "impact")
-    unique = len(codes(*impacts.falls, impacts.impact)[0]) == len(database)
+    unique = len(numbered(*impacts.falls, impacts.impact)[0]) == len(database)
     return {"primaryKey": list(key)} if unique else {}
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..reconstruction.impact import Impacts
-from ..vectors import Indices, Mask
-from .selection import codes
+from ..vectors import Indices, Mask, numbered
 
 SAME_TIME_S, SAME_PLACE_M = 1e-3, 0.01
 """Impacts of one trajectory that are nearer in time and place are one."""
@@ -42,7 +41,7 @@ def find_duplicates(impacts: Impacts) -> Duplicates:
     Two impacts are the same when site, trajectory, time and place agree (`SAME_TIME_S`, `SAME_PLACE_M`); or, under any
     names, when both velocities and the normal do, to `EXACT`. Those of different runs of a simulation never are.
     """
-    _, code = codes(*impacts.falls)
+    _, code = numbered(*impacts.falls)
     first = np.arange(len(impacts), dtype=np.intp)
     for found in (_same_values(impacts), _same_place(impacts, code)):
         first = np.minimum(first, found)
@@ -63,7 +62,7 @@ def _same_values(impacts: Impacts) -> Indices:
     known = np.flatnonzero(np.isfinite(values).all(axis=1))
     whole = np.round(values[known] / EXACT).astype(np.int64)
     if impacts.runs:
-        _, run = codes(*impacts.runs.values())
+        _, run = numbered(*impacts.runs.values())
         whole = np.column_stack([whole, run[known]])
     order = np.argsort(_hashed(whole), kind="stable")
     near = (np.diff(whole[order], axis=0) == 0).all(axis=1)

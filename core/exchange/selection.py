@@ -2,20 +2,21 @@
 """Rows of a table of impacts: taken, filtered by conditions, grouped by a column, joined."""
 
 import re
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any
 
 import numpy as np
 
+from ..analysis.columns import Column, find_column, has_column
 from ..analysis.group_statistics import Grouping, group_by_number, group_by_text
-from ..analysis.variables import VARIABLES, known_variables, measured_values
+from ..analysis.variables import known_variables, measured_values
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.impact import FLAGS, Impacts
-from ..vectors import Array, Indices, Mask, Names
+from ..vectors import Array, Indices, Mask, Names, numbered
 from .tables import impact_column, impact_columns
 
 COMPARISONS: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -78,7 +79,7 @@ def matching(impacts: Impacts, conditions: Iterable[str]) -> Mask:
 
     Parameters
     ----------
-    conditions : texts such as ``theta1_deg<20``, ``site=Gully``, ``flags!=doubtful``, on columns as in impacts.csv.
+    conditions : texts such as ``theta1_deg<20``, ``site=Gully``, ``flags!=doubtful``, on columns as of `column_of`.
 
     Raises
     ------
@@ -94,35 +95,29 @@ def matching(impacts: Impacts, conditions: Iterable[str]) -> Mask:
             result &= _flagged(impacts, sign, value, condition)
             continue
         column = column_of(impacts, name)
-        if column.dtype.kind != "U":
-            result &= np.isfinite(column) & COMPARISONS[sign](column, _number(value, condition))
+        if column.numbers is not None:
+            result &= np.isfinite(column.numbers) & COMPARISONS[sign](column.numbers, _number(value, condition))
         elif sign in ("=", "==", "!="):
-            result &= COMPARISONS[sign](column, value)
+            result &= COMPARISONS[sign](column.labels, value)
         else:
             raise InputError(f"{condition!r} compares texts by size", advice="Use = or !=")
     return result
 
 
-def column_of(impacts: Impacts, name: str) -> Array | Names | Indices:
-    """(n,) a column by its name in impacts.csv, with the unit of that name.
+def column_of(impacts: Impacts, name: str) -> Column:
+    """A column by its name: of the graphs (`find_column`), or else as in impacts.csv, with the unit of that name.
 
     Raises
     ------
     InputError : there is none; the nearest is suggested.
     """
-    column = impact_column(impacts, name)
-    if column is None:
-        raise InputError(f"There is no column {name!r}", advice=suggestion(name, impact_columns(impacts)))
-    return column
-
-
-def grouped(impacts: Impacts, *columns: str) -> dict[tuple[Hashable, ...], Indices]:
-    """Values of some columns → rows that have them, in the order of first appearance."""
-    values = [column_of(impacts, name) for name in columns]
-    keys, code = codes(*values)
-    order = np.argsort(code, kind="stable")
-    ends = np.cumsum(np.bincount(code, minlength=len(keys)))
-    return dict(zip(keys, np.split(order, ends[:-1]), strict=True))
+    if has_column(impacts, name):
+        return find_column(impacts, name)
+    values = impact_column(impacts, name)
+    if values is None:
+        known = dict.fromkeys((*impact_columns(impacts), *known_variables(impacts), *FLAGS))
+        raise InputError(f"There is no column {name!r}", advice=suggestion(name, known))
+    return Column(name, name, np.asarray(values, dtype=np.float64))
 
 
 def grouping_of(impacts: Impacts, name: str, classes: int = 0) -> Grouping:
@@ -137,42 +132,26 @@ def grouping_of(impacts: Impacts, name: str, classes: int = 0) -> Grouping:
     ------
     InputError : there is no such column; the nearest is suggested. Classes of a column of texts.
     """
-    if name in FLAGS:
-        return group_by_text(name, np.where(impacts.flags[name], "yes", "no"))
-    column = impact_column(impacts, name)
-    if column is None and name in VARIABLES:
-        column = measured_values(impacts, np.arange(len(impacts)), name)
-    if column is None:
-        known = dict.fromkeys((*impact_columns(impacts), *known_variables(impacts), *FLAGS))
-        raise InputError(f"There is no column {name!r} to group by", advice=suggestion(name, known))
-    if column.dtype.kind != "U":
-        return group_by_number(name, np.asarray(column, dtype=np.float64), classes)
-    texts = [cell.strip() for cell in column.astype(np.str_).tolist()]
+    column = column_of(impacts, name)
+    if column.numbers is not None:
+        return group_by_number(name, column.numbers, classes)
     if not classes:
-        return group_by_text(name, np.array(texts, dtype=np.str_))
+        return group_by_text(name, column.labels)
     try:
-        numbers = [float(text) if text else np.nan for text in texts]
+        numbers = [float(text) if text else np.nan for text in column.labels.tolist()]
     except ValueError:
         raise InputError(f"The column {name!r} holds texts, which have no classes", advice="Drop the classes") from None
     return group_by_number(name, np.array(numbers), classes)
 
 
-def codes(*columns: Array | Names | Indices) -> tuple[list[tuple[Hashable, ...]], Indices]:
-    """The different rows of some columns, and (n,) which of them each row is."""
-    seen: dict[tuple[Hashable, ...], int] = {}
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    code = np.array([seen.setdefault(row, len(seen)) for row in rows], dtype=np.intp)
-    return list(seen), code
-
-
 def group_medians(impacts: Impacts, columns: Sequence[str]) -> list[dict[str, object]]:
     """One row for each group: its values, how many impacts, and the medians of `MEDIANS` of those that count."""
-    keys, code = codes(*(column_of(impacts, name) for name in columns))
+    keys, code = numbered(*(column_of(impacts, name).labels for name in columns))
     table: list[dict[str, object]] = [dict(zip(columns, key, strict=True)) for key in keys]
     for row, count in zip(table, np.bincount(code, minlength=len(keys)).tolist(), strict=True):
         row["impacts"] = count
     for name in MEDIANS:
-        values = np.where(impacts.refused, np.nan, np.asarray(column_of(impacts, name), dtype=np.float64))
+        values = np.where(impacts.refused, np.nan, measured_values(impacts, np.arange(len(impacts)), name))
         medians = _medians(values, code, len(keys))
         for row, value in zip(table, medians.tolist(), strict=True):
             row[f"median_{name}"] = value if value == value else ""

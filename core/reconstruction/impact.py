@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..georeference import GlobalShift
-from ..vectors import Array, Indices, Mask, Names, cross, dot, norm
+from ..vectors import Array, Indices, Mask, Names, cross, dot, norm, numbered
 
 FLAGS = (
     "first",
@@ -203,9 +203,7 @@ class Impacts:
 
 def fall_numbers(impacts: Impacts) -> Indices:
     """(n,) number of the fall that each impact belongs to."""
-    keys: dict[tuple[str, ...], int] = {}
-    names = zip(*(column.tolist() for column in impacts.falls), strict=True)
-    return np.array([keys.setdefault(name, len(keys)) for name in names], dtype=np.intp)
+    return numbered(*impacts.falls)[1]
 
 
 JUDGED = ("rn", "rt", "r", "theta1", "theta_dev")

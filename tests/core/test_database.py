@@ -14,7 +14,7 @@ from rockfall.core.exchange.database import digest, merge, read_source
 from rockfall.core.exchange.datapackage import read_package, write_package
 from rockfall.core.exchange.duplicates import find_duplicates
 from rockfall.core.exchange.impact_fields import FIELDS
-from rockfall.core.exchange.selection import group_medians, grouped, joined, matching, rows_of
+from rockfall.core.exchange.selection import group_medians, joined, matching, rows_of
 from rockfall.core.exchange.tables import IMPACTS_COLUMNS, impact_columns, read_impacts, write_impacts
 from rockfall.core.exchange.unit_checks import check_units
 from rockfall.core.reconstruction.impact import Impacts
@@ -184,15 +184,31 @@ def test_conditions_and_groups():
     )
     assert matching(impacts, ["flags=first"]).sum() == 4
     assert matching(impacts, ["flags!=first", "impact<=3"]).sum() == 8
-    groups = grouped(impacts, "site", "trajectory")
-    assert list(groups) == [("gully", "a"), ("gully", "b"), ("quarry", "c"), ("quarry", "d")]
-    assert groups["quarry", "c"].tolist() == list(range(14, 21))
-    for row, rows in zip(group_medians(impacts, ["site", "trajectory"]), groups.values(), strict=True):
-        assert row["impacts"] == 7
+    groups = [("gully", "a"), ("gully", "b"), ("quarry", "c"), ("quarry", "d")]
+    for row, (site, trajectory) in zip(group_medians(impacts, ["site", "trajectory"]), groups, strict=True):
+        assert (row["site"], row["trajectory"], row["impacts"]) == (site, trajectory, 7)
+        rows = (impacts.site == site) & (impacts.trajectory == trajectory)
         for name in ("rn", "r"):
             assert row[f"median_{name}"] == pytest.approx(np.nanmedian(getattr(impacts, name)[rows]), rel=1e-12)
     (first,) = group_medians(rows_of(impacts, [0]), ["site"])
     assert (first["impacts"], first["median_rn"]) == (1, "")
+
+
+def test_conditions_and_groups_know_the_columns_of_the_graphs():
+    """Further columns of numbers, variables, and undefined cells, as where points are coloured and filtered."""
+    impacts = bounces()
+    hardness = np.round(np.linspace(0.1, 0.9, len(impacts)), 3)
+    cells = np.array([*map(str, hardness[:-1]), " "])
+    impacts = replace(impacts, extra={"hardness": cells, "ground": np.array(["rock ", "scree"] * 7)})
+    known = np.arange(len(impacts)) < len(impacts) - 1
+    assert matching(impacts, ["hardness<0.5"]).tolist() == ((hardness < 0.5) & known).tolist()
+    assert matching(impacts, ["ground=rock"]).sum() == 7
+    slope = np.degrees(np.arccos(impacts.normal[:, 2] / np.linalg.norm(impacts.normal, axis=1)))
+    assert matching(impacts, ["slope_deg>=0"]).all()
+    assert matching(impacts, [f"slope_deg<{slope.max() + 1}", "doubtful=no", "x_m<1e9"]).all()
+    (one, other) = group_medians(impacts, ["ground"])
+    assert (one["ground"], one["impacts"], other["ground"]) == ("rock", 7, "scree")
+    assert [row["hardness"] for row in group_medians(impacts, ["hardness"])] == [*map(str, hardness[:-1]), ""]
 
 
 @pytest.mark.parametrize(

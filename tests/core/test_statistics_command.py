@@ -188,7 +188,10 @@ def test_all_discarded_is_no_result(demo, tmp_path, capsys) -> None:
     write_impacts(replace(demo, flags=every), tmp_path / "impacts.csv")
     assert main(["statistics", str(tmp_path / "impacts.csv"), "--out", str(tmp_path / "out")]) == 1
     error = capsys.readouterr().err
-    assert "impacts.csv: None of the 104 impacts can be used: 104 are departing or discarded, 0 have no R_N" in error
+    assert (
+        "impacts.csv: None of the 104 impacts can be used: 104 are flagged (departing, into_ground, below_terrain, "
+        "discarded), 0 have no R_N" in error
+    )
     assert not (tmp_path / "out").exists()
 
 

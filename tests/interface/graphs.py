@@ -68,6 +68,11 @@ def case_statistics_beside_the_graphs(window):
     window.screenshot("dark")
     (_, found), *_ = kept.values()
     assert [one.used for one in found.groups.values()] == [30, 29, 24]
+    with window.override("NODE_EDITOR"):
+        bpy.ops.rockfall.test_groups("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: next(iter(kept.values()))[1].tests is not None, 30.0, "the groups are tested")
+    yield 1.0
+    window.screenshot("tested")
     theme("Light")
     yield 1.0
     window.screenshot("light")

@@ -119,8 +119,8 @@ def case_simulate_beside_the_real_blocks(window):
         bpy.ops.ed.undo_push(message="demo")
     yield 1.0
     sidebar = window.region("UI")
-    yield from open_panel(window, 733)
-    for y in (733, 509):  # closed again: all are; then this step's
+    yield from open_panel(window, 707)
+    for y in (876, 652):  # closed again: all are; then this step's
         yield from window.click(sidebar.x + 90, y)
         yield 0.7
     settings().number = 5

@@ -103,12 +103,13 @@ def _batch(lines: simulated_paths.Lines, colours: np.ndarray) -> gpu.types.GPUBa
 
 
 def _draw_selected(points: np.ndarray, scale: float) -> None:
-    """In white on black, also where the terrain hides it, then fainter."""
+    """In the colour of what is active, on black, also where the terrain hides it, then fainter."""
+    active = tuple(bpy.context.preferences.themes[0].view_3d.object_active[:3])
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     batch = batch_for_shader(shader, "LINE_STRIP", {"pos": np.ascontiguousarray(points, dtype=np.float32)})
     for test, opacity in (("NONE", 0.35), ("LESS_EQUAL", 1.0)):
         gpu.state.depth_test_set(test)
-        for width, colour in ((SELECTED_PX + 2.5, (0.0, 0.0, 0.0)), (SELECTED_PX, (1.0, 1.0, 1.0))):
+        for width, colour in ((SELECTED_PX + 2.5, (0.0, 0.0, 0.0)), (SELECTED_PX, active)):
             shader.uniform_float("lineWidth", width * scale)
             shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
             shader.uniform_float("color", (*colour, opacity))
@@ -153,9 +154,10 @@ def _draw_legend() -> None:
     if settings.colour_by == "MODEL" or not settings.show_paths:
         models = [(MODELS[simulation.model_of(obj)], len(obj.data.curves)) for obj in objects]
         rows = [(f"{model.title}: {count}", model.colour) for model, count in models]
-        if store.has_role(scene, store.BLOCK_ROLE):
+        measured = store.has_role(scene, store.BLOCK_ROLE)
+        if measured:
             rows.insert(0, ("measured", MEASURED_COLOUR))
-        legend.swatches(left, scale, rows, "Simulated blocks")
+        legend.swatches(left, scale, rows, f"{'Measured and simulated' if measured else 'Simulated'} blocks")
     elif settings.colour_by == "SPEED":
         legend.bar(left, scale, speed_top, "Simulated: speed [m/s]")
     else:

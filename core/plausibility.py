@@ -30,15 +30,15 @@ BETWEEN: Mapping[str, tuple[float, float]] = {
     **dict.fromkeys(("position", "target", "shift"), (0.0, GREATEST_M)),
 }
 """Name → the least amount, of either sign, that can be if it is not zero, and the greatest."""
-UNDEFINED = ("sigma_", "weight_")
-"""Beginnings of names that may be anything: a standard deviation of 1e20 says that nothing is known."""
+SIGMA, GREATEST_SIGMA = "sigma_", 1e50
+"""A standard deviation of 1e20 says that nothing is known; squares stay finite."""
 
 
 def limits(name: str) -> tuple[float, float]:
     """The least and the greatest amount of a number of this name; signs and zeros are for its reader to judge."""
     if name in BETWEEN:
         return BETWEEN[name]
-    return 0.0, inf if name.startswith(UNDEFINED) else OF_UNIT.get(name.rpartition("_")[2], inf)
+    return 0.0, GREATEST_SIGMA if name.startswith(SIGMA) else OF_UNIT.get(name.rpartition("_")[2], inf)
 
 
 def implausible(name: str, value: float) -> str:

@@ -31,7 +31,8 @@ import numpy as np
 from cases import Case, cases
 from damage import damaged
 
-LIMIT_S, MEMORY_BYTES = 20.0, 3_000_000_000
+LIMIT_S, NO_ANSWER_S, MEMORY_BYTES = 20.0, 100.0, 3_000_000_000
+"""Of processor time for a case; until its process is ended; of memory."""
 MOST_LETTERS = 400
 UNFORESEEN = "in Rockfall itself"
 """What `main` says of an error that no reader has put into words."""
@@ -134,7 +135,7 @@ def _work(connection: Connection, options: argparse.Namespace) -> None:
             problem = judge(case, root / "case")
             if problem[0]:
                 connection.send(("whole", problem))
-    signal.signal(signal.SIGALRM, _ring)
+    signal.signal(signal.SIGPROF, _ring)
     connection.send(list(every))
     resource.setrlimit(resource.RLIMIT_AS, (_used_bytes() + MEMORY_BYTES,) * 2)
     names = list(every)
@@ -142,15 +143,15 @@ def _work(connection: Connection, options: argparse.Namespace) -> None:
         while (number := connection.recv()) is not None:
             case = every[names[number % len(names)]]
             _place(root / "case", files_of(case, options.seed, number))
-            began = time.perf_counter()
-            signal.setitimer(signal.ITIMER_REAL, LIMIT_S)
+            began = time.process_time()
+            signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
             try:
                 problem, said = judge(case, root / "case")
             except TooLongError:
                 problem, said = "too long", ""
             finally:
-                signal.setitimer(signal.ITIMER_REAL, 0.0)
-            took = time.perf_counter() - began
+                signal.setitimer(signal.ITIMER_PROF, 0.0)
+            took = time.process_time() - began
             if took > LIMIT_S / 2 and not problem:
                 problem = "slow"
             connection.send((problem, said, took))
@@ -203,7 +204,7 @@ class Worker:
         """The result of a case, where the process may end or not answer."""
         self.connection.send(number)
         try:
-            if self.connection.poll(2 * LIMIT_S):
+            if self.connection.poll(NO_ANSWER_S):
                 return self.connection.recv()
             problem = "too long, and nothing stops it"
         except EOFError:
@@ -211,7 +212,7 @@ class Worker:
             problem = f"the process ended with {self.process.exitcode}"
         self.process.kill()
         self.process.join()
-        return problem, "", 2 * LIMIT_S
+        return problem, "", NO_ANSWER_S
 
 
 def main() -> int:

@@ -6,7 +6,7 @@ The same for any number of threads, batches and orders; one more run, or one mor
 
 import numpy as np
 
-from ..compiled import kernel
+from ..compiled import borrowing, kernel
 
 ROUNDS = 10
 MULTIPLY_0, MULTIPLY_1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
@@ -21,7 +21,7 @@ BLOCK, ATTITUDE, PLACE = 0xFFFF0000, 0xFFFF0001, 0xFFFF1000
 attitude, and of its place at the first, second, … attempt."""
 
 
-@kernel
+@borrowing
 def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
     """Four words of 32 bits from a counter of four and a key of two, all held in uint64."""
     for _ in range(ROUNDS):
@@ -31,7 +31,7 @@ def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
     return c0, c1, c2, c3
 
 
-@kernel
+@borrowing
 def fill_uniform(seed, run, impact, values):  # type: ignore[no-untyped-def]
     """Fill `values` with uniform numbers of 53 bits, 0 ≤ u < 1: those of one impact of one run."""
     key, number = np.uint64(seed), np.uint64(run)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiled import kernel
+from ..compiled import borrowing as kernel
 
 GENTLE = 0.2679
 """tan(θ/2) of the bends that a block is taken over at once, 30°: beyond, an edge is a corner or a crest."""

@@ -57,7 +57,12 @@ DRAG_CHANGE = 0.005
 HELD, MOST_HELD = 1e-4, 100
 """A block that moves less than this part of its radius in so many steps is held where it is."""
 LINGERS = 0.3
-"""So is one that rocks: that in so many short steps gets no further than this part of its radius."""
+"""So is one that rocks: that in so many short steps gets no further than this part of its radius.
+
+From 0.05 to 1, with 600 blocks and two models each: on the demo site's triangles no run depends on it; on two scanned
+clouds at most 15 runs, by 0.7 m below 0.3 and by 1.5 m above, and mean run-outs by 0.005 m. Up to 0.1 some blocks, 9 at
+most, rock on to the limit of time, from 0.2 on none: the value is among those, and far from either end.
+"""
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

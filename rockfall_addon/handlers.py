@@ -41,10 +41,11 @@ def _frame_shown(_scene: bpy.types.Scene, _depsgraph: bpy.types.Depsgraph | None
 @persistent
 @problems.guarded
 def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    _keep_rate(scene)
-    footage.follow(scene)
-    sync.notice(scene, depsgraph)
-    _selected_otherwise()
+    with store.looking(scene):
+        _keep_rate(scene)
+        footage.follow(scene)
+        sync.notice(scene, depsgraph)
+        _selected_otherwise()
 
 
 @persistent

@@ -32,7 +32,7 @@ def make(scene: bpy.types.Scene, kind: str, points: Sequence[Array], name: str =
     obj = bpy.data.objects.new(name or NAMES[kind], mesh)
     obj[store.ROLE] = store.RELEASE_ROLE
     obj.hide_render = True
-    store.collection(scene, "Releases").objects.link(obj)
+    store.link(store.collection(scene, "Releases"), obj)
     return obj
 
 

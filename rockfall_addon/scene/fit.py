@@ -19,7 +19,7 @@ from ...core.analysis.estimation import FitOptions, FittedModel
 from ...core.errors import RockfallError
 from ...core.exchange.selection import joined
 from ...core.impact_models.machinery.parameters import Value
-from ...core.impact_models.registry import MODELS
+from ...core.impact_models.registry import MODELS, find_model
 from ...core.reconstruction.impact import Impacts
 from ...core.remarks import Remark, from_plain, to_plain
 from . import comparison, databases, model_parameters, models, store
@@ -90,7 +90,8 @@ def fitted_names(scene: bpy.types.Scene, model: str) -> tuple[str, ...]:
     """The parameters of a model that are to be fitted, in the order of its table."""
     words = scene.rockfall_comparison.fitted_names.split()
     chosen = [word.partition(".")[2] for word in words if word.partition(".")[0] == model]
-    return tuple(spec.name for spec in MODELS[model].parameters if spec.name in chosen) or usual_names(MODELS[model])
+    known = find_model(model)
+    return tuple(spec.name for spec in known.parameters if spec.name in chosen) or usual_names(known)
 
 
 def toggle(scene: bpy.types.Scene, model: str, name: str) -> None:

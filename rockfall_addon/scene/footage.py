@@ -102,6 +102,7 @@ def remove(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     identifier, data = camera[store.ID], camera.data
     camera_paths.unsolve(camera)
     bpy.data.objects.remove(camera)
+    store.look_again()
     if not data.users:
         _remove_data(data)
     forget(scene, identifier)

@@ -17,6 +17,8 @@ from ...core.vectors import Array
 
 DRAG_KEY_STEP_S = 0.1  # with drag the cubic is an approximation: Hermite's error at this step is below 0.1 mm
 JUMP_FRAMES = 1e-3
+MANY_ACTIONS = 100
+"""More new actions than this are copies of one, and named like it."""
 CONSTANT, BEZIER = 0, 2  # as the interpolation of keys is numbered
 
 
@@ -69,10 +71,18 @@ def motion_keys(flights: Flights, which: Array, offset: Array | float = 0.0) -> 
     )
 
 
-def write_location_keys(obj: bpy.types.Object, keys: Keys, rate: float, *, in_place: bool = False) -> bool:
+def write_location_keys(
+    obj: bpy.types.Object,
+    keys: Keys,
+    rate: float,
+    *,
+    in_place: bool = False,
+    like: bpy.types.Action | None = None,
+) -> bool:
     """Replace an object's location curves by these keys, at frame = time × rate.
 
     in_place : write only when the number of keys stays the same, so that no key is freed while a person drags keys.
+    like : an action that is copied where there is none; among thousands Blender takes long for a new one.
 
     Returns
     -------
@@ -95,7 +105,7 @@ def write_location_keys(obj: bpy.types.Object, keys: Keys, rate: float, *, in_pl
     co, left, right = (values.astype(np.float32).reshape(3, -1) for values in (co, left, right))  # as Blender has them
     free = np.zeros(count, dtype=np.int32)
     interpolation = np.where(keys.held, CONSTANT, BEZIER).astype(np.int32)
-    bag = _channelbag(obj)
+    bag = _channelbag(obj, like)
     for axis in range(3):
         curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
         points = curve.keyframe_points
@@ -129,9 +139,12 @@ def write_visibility_keys(obj: bpy.types.Object, spans_s: Sequence[tuple[float, 
         curve.update()
 
 
-def key_location_once(obj: bpy.types.Object, frame: float) -> None:
-    """One key at a (sub-)frame: the place and the time of a pick."""
-    bag = _channelbag(obj)
+def key_location_once(obj: bpy.types.Object, frame: float, like: bpy.types.Action | None = None) -> None:
+    """One key at a (sub-)frame: the place and the time of a pick.
+
+    like : see `write_location_keys`.
+    """
+    bag = _channelbag(obj, like)
     for axis in range(3):
         curve = bag.fcurves.find("location", index=axis) or bag.fcurves.new("location", index=axis)
         points = curve.keyframe_points
@@ -158,9 +171,11 @@ def location_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:
     return [curve for curve in found if curve is not None]
 
 
-def _channelbag(obj: bpy.types.Object) -> bpy.types.ActionChannelbag:
+def _channelbag(obj: bpy.types.Object, like: bpy.types.Action | None = None) -> bpy.types.ActionChannelbag:
     animation = obj.animation_data or obj.animation_data_create()
-    if animation.action is None:
+    if animation.action is None and like is not None:
+        animation.action = like.copy()
+    elif animation.action is None:
         action = bpy.data.actions.new(obj.name)
         animation.action = action
         animation.action_slot = action.slots.new(id_type="OBJECT", name=obj.name)

@@ -169,4 +169,4 @@ def _lanes(begin_s: Array, duration_s: Array) -> list[list[int]]:
 
 
 def _link(scene: bpy.types.Scene, obj: bpy.types.Object, model: str) -> None:
-    store.collection(scene, COLLECTION, find_model(model).title).objects.link(obj)
+    store.link(store.collection(scene, COLLECTION, find_model(model).title), obj)

@@ -14,7 +14,7 @@ from ...core.impact_models.machinery.base import ImpactModel
 from ...core.impact_models.machinery.parameters import ParameterSpec, Value
 from ...core.impact_models.machinery.sliders import slider_range
 from ...core.impact_models.presets import Preset
-from ...core.impact_models.registry import MODELS
+from ...core.impact_models.registry import MODELS, find_model
 from . import comparison, models, store, sync
 
 LARGEST = 1e30  # of a single-precision property
@@ -42,7 +42,7 @@ def keep(scene: bpy.types.Scene, model: str, values: Mapping[str, Value | None],
     own = parameters.setdefault(model, {})
     for name, value in values.items():
         own.pop(name, None)
-        spec = MODELS[model].parameter(name)
+        spec = find_model(model).parameter(name)
         if value is not None and (value != spec.default or spec.follows is not None):
             own[name] = value
     keep_all(scene, parameters, which, [model])

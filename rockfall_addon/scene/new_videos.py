@@ -47,7 +47,7 @@ def add_camera(scene: bpy.types.Scene, video: Video) -> bpy.types.Object:
     data.clip_start, data.clip_end, data.passepartout_alpha = NEAR_M, FAR_M, 0.7
     data.show_background_images = True
     camera = bpy.data.objects.new(name, data)
-    store.collection(scene, videos.COLLECTION).objects.link(camera)
+    store.link(store.collection(scene, videos.COLLECTION), camera)
     camera[store.ROLE], camera[store.ID] = store.CAMERA_ROLE, uuid.uuid4().hex
     camera[store.CLOCK], camera[store.CAPTURE_RATE], camera[store.ROW_TIME] = [0.0, 0.0, 0.0, 1.0], 0.0, 0.0
     camera[store.SOLVED] = False

@@ -7,6 +7,7 @@ makes it the pick's state.
 """
 
 import uuid
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -42,15 +43,12 @@ UNCHANGED = Change()
 
 def objects_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
     """The objects of the picks, all or those of some trajectories, in no order."""
-    names = None if trajectories is None else set(trajectories)
+    names = (None,) if trajectories is None else set(trajectories)
     return [
         obj
-        for obj in scene.objects
-        if obj.get(store.ROLE) == store.PICK_ROLE
-        and store.TRAJECTORY in obj
-        and store.TIME in obj
-        and store.POSITION in obj
-        and (names is None or obj[store.TRAJECTORY] in names)
+        for name in names
+        for obj in store.of_role(scene, store.PICK_ROLE, name)
+        if store.TRAJECTORY in obj and store.TIME in obj and store.POSITION in obj
     ]
 
 
@@ -71,14 +69,17 @@ def show_picks(
     -------
     The object of each pick.
     """
-    rate, version, shown = timing.keyed_rate(scene), next_version(scene), []
+    written = (*store.of_role(scene, store.PICK_ROLE), *store.of_role(scene, store.BLOCK_ROLE))
+    rate, version, shown = timing.keyed_rate(scene), next_version(written), []
     there = {(o[store.TRAJECTORY], time_of(o, rate)): o for o in objects_of(scene)}
+    folders = store.collections(scene, "Trajectories", dict.fromkeys(picks.trajectory.tolist()))
+    numbers, like = Counter[str](), None
     for i in range(len(picks.time_s)):
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
+        numbers[trajectory] += 1
         obj = there.pop((trajectory, time), None)
         if obj is None:
-            number = int(np.count_nonzero(picks.trajectory[: i + 1] == picks.trajectory[i]))
-            obj = _new(scene, trajectory, kind, number)
+            obj = _new(folders[trajectory], trajectory, kind, numbers[trajectory])
         obj[store.TRAJECTORY], obj[store.TIME] = trajectory, time
         obj[store.POSITION] = picks.position[i].tolist()
         obj[store.KIND], obj[store.STATUS] = kind, str(picks.status[i])
@@ -97,7 +98,9 @@ def show_picks(
         if store.EXTRA not in obj or obj[store.EXTRA].to_dict() != extra:
             obj[store.EXTRA] = extra
         obj[store.PICK_SHIFT] = picks.shift.vector.tolist()
-        pose(obj, normals[i], (time - offsets[trajectory]) * rate, radius_m, version)
+        pose(obj, normals[i], (time - offsets[trajectory]) * rate, radius_m, version, like)
+        if len(folders) > keyframes.MANY_ACTIONS:
+            like = like or keyframes.action_of(obj)
         shown.append(obj)
     store.remove_objects(list(there.values()))
     scene[store.PICKS_SOURCE] = picks.source
@@ -116,7 +119,7 @@ def add_pick(
 ) -> bpy.types.Object:
     """A new pick at a local place; `live.sync` then makes the trajectory follow."""
     number = len(objects_of(scene, [trajectory])) + 1
-    obj = _new(scene, trajectory, kind, number)
+    obj = _new(store.collection(scene, "Trajectories", trajectory), trajectory, kind, number)
     obj[store.TRAJECTORY], obj[store.TIME], obj[store.ROW] = trajectory, float(time_s), 0
     obj[store.POSITION] = _writable(scene, position_m)
     obj[store.KIND], obj[store.STATUS] = kind, status
@@ -128,10 +131,9 @@ def add_pick(
     return obj
 
 
-def next_version(scene: bpy.types.Scene) -> int:
-    """A number above all with which something of picks and blocks was written."""
-    ours = (obj for obj in scene.objects if obj.get(store.ROLE) in (store.PICK_ROLE, store.BLOCK_ROLE))
-    return 1 + max((max(versions(obj)) for obj in ours), default=0)
+def next_version(objects: Iterable[bpy.types.Object]) -> int:
+    """A number above all with which something of these picks and blocks was written."""
+    return 1 + max((max(versions(obj)) for obj in objects), default=0)
 
 
 def versions(obj: bpy.types.Object) -> tuple[int, int]:
@@ -144,8 +146,18 @@ def versions(obj: bpy.types.Object) -> tuple[int, int]:
     return own, own if action is None else int(action.get(store.WRITTEN, 0))
 
 
-def pose(obj: bpy.types.Object, normal: Array, frame: float, radius_m: float, version: int) -> None:
-    """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay."""
+def pose(
+    obj: bpy.types.Object,
+    normal: Array,
+    frame: float,
+    radius_m: float,
+    version: int,
+    like: bpy.types.Action | None = None,
+) -> None:
+    """Put a pick's object where its state says: marker, direction, size, place, one key. Unchanged values stay.
+
+    like : see `keyframes.key_location_once`.
+    """
     marker = _marker(obj[store.KIND])
     if obj.data is not marker:
         obj.data = marker
@@ -157,11 +169,16 @@ def pose(obj: bpy.types.Object, normal: Array, frame: float, radius_m: float, ve
         obj.rotation_quaternion = turn
     if (obj.scale - Vector((radius_m,) * 3)).length > 1e-6 * radius_m:
         obj.scale = (radius_m,) * 3
+    key(obj, frame, version, like)
+
+
+def key(obj: bpy.types.Object, frame: float, version: int, like: bpy.types.Action | None = None) -> None:
+    """Put a pick's object, and its one key, where its state says."""
     place = list(obj[store.POSITION])
     if not _same_place(obj.location, place):
         obj.location = place
     if not _keyed_at(obj, frame):
-        keyframes.key_location_once(obj, frame)
+        keyframes.key_location_once(obj, frame, like)
     obj[store.KEY_FRAME] = float(np.float32(frame))
     obj[store.WRITTEN] = keyframes.action_of(obj)[store.WRITTEN] = version
 
@@ -227,6 +244,18 @@ def read(
     )
 
 
+def home_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Scene | None:
+    """Another scene that shows this pick, too, and whose origin is the pick's; None where this scene may move it.
+
+    Without this the pick would go from one origin to the other at every look at one of the scenes.
+    """
+    own = list(obj.get(store.PICK_SHIFT, ()))
+    if obj.users == 1 or own == georeference.read_shift(scene).vector.tolist():
+        return None
+    others = (each for each in obj.users_scene if each != scene)
+    return next((each for each in others if georeference.read_shift(each).vector.tolist() == own), None)
+
+
 def moved(obj: bpy.types.Object, held: Held = NOTHING_HELD) -> bool:
     """Whether the object, or the key of its block, is elsewhere than the pick."""
     return not _same_place(obj.location, obj[store.POSITION]) or any(_held(obj, held).way)
@@ -285,7 +314,7 @@ def take_edits(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], edit
             for key in (store.KEY_FRAME, store.SEEN):
                 copy.pop(key, None)
             for collection in of[identifier].users_collection:
-                collection.objects.link(copy)
+                store.link(collection, copy)
     for identifier, change in edits.changes.items():
         obj = of.get(identifier)
         if obj is None:
@@ -363,10 +392,10 @@ def extra_of(obj: bpy.types.Object, name: str) -> str:
     return str(obj[store.EXTRA].get(name, "")) if store.EXTRA in obj else ""
 
 
-def _new(scene: bpy.types.Scene, trajectory: str, kind: str, number: int) -> bpy.types.Object:
+def _new(folder: bpy.types.Collection, trajectory: str, kind: str, number: int) -> bpy.types.Object:
     obj = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
     obj[store.ROLE], obj[store.ID] = store.PICK_ROLE, uuid.uuid4().hex
-    store.collection(scene, "Trajectories", trajectory).objects.link(obj)
+    store.link(folder, obj)
     return obj
 
 

@@ -62,8 +62,8 @@ def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[
 def first_instant(scene: bpy.types.Scene) -> float | None:
     """Common time of the first picture, or the time origin when the scene plays as filmed; None when neither is set."""
     starts = []
-    for obj in scene.objects:
-        if obj.get(store.ROLE) == CAMERA_ROLE and store.VIDEO_TIMES in obj and store.CLOCK in obj:
+    for obj in store.of_role(scene, CAMERA_ROLE):
+        if store.VIDEO_TIMES in obj and store.CLOCK in obj:
             times = obj[store.VIDEO_TIMES]
             offset, drift, origin, rate = obj[store.CLOCK]
             if len(times):
@@ -129,6 +129,13 @@ def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
             "shows are not those of the slope: set Scene Properties > Units > Unit Scale to 1."
         )
         said.append(Remark(text, "warning", "units"))
+    homes = {home.name for obj in picks.objects_of(scene) if (home := picks.home_of(obj, scene)) is not None}
+    if homes:
+        text = (
+            f"Some picks are shared with the scene {min(homes)}, which has another origin, and stay where that scene "
+            "has them. Work on them there, or make them this scene's own: Object > Relations > Make Single User."
+        )
+        said.append(Remark(text, "problem", "origin"))
     if scene.get(store.GROUND) and not fingerprints.ground(scene):
         text = (
             "The terrain is gone. What was computed stays; edited trajectories have no terrain normals and heights. "

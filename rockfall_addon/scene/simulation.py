@@ -130,8 +130,8 @@ def show_prepared(
         for obj in (blocks, paths):
             obj[store.MODEL] = each.model
             obj[store.RELEASES] = json.dumps([[name, origin.trajectory, origin.time_s] for name, origin in begins])
-            place.objects.link(obj)
-        place.objects.link(_pattern(blocks, each.model))
+            store.link(place, obj)
+        store.link(place, _pattern(blocks, each.model))
         shown.append(blocks)
     follow(scene)
     look(scene)

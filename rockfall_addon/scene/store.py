@@ -5,7 +5,8 @@ All of it is stored in ID properties: they hold doubles, are saved in the file a
 right is what saved files contain and never changes; `migration` says what is done when the meaning does.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 
 import bpy
 
@@ -112,9 +113,60 @@ def double(value: float) -> float:
     return float(f"{value:.7g}")
 
 
+_Table = dict[tuple[str, str | None], list[bpy.types.Object]]
+_tables: dict[int, _Table | None] = {}  # session_uid of a scene → what `looking` has found, None before
+
+
+@contextmanager
+def looking(scene: bpy.types.Scene) -> Iterator[None]:
+    """Inside, the objects of a scene are gone through once, and again only after some of ours came or went."""
+    if scene.session_uid in _tables:
+        yield
+        return
+    _tables[scene.session_uid] = None
+    try:
+        yield
+    finally:
+        del _tables[scene.session_uid]
+
+
+def look_again() -> None:
+    """Objects of ours came or went."""
+    _tables.update(dict.fromkeys(_tables))
+
+
+def of_role(scene: bpy.types.Scene, role: str, trajectory: str | None = None) -> list[bpy.types.Object]:
+    """The scene's objects of one role, all or those of a trajectory, in no order."""
+    key = scene.session_uid
+    if key not in _tables:
+        found = (o for o in scene.objects if o.get(ROLE) == role)
+        return [o for o in found if trajectory is None or o.get(TRAJECTORY) == trajectory]
+    if _tables[key] is None:
+        _tables[key] = _table(scene)
+    return list(_tables[key].get((role, trajectory), ()))
+
+
+def _table(scene: bpy.types.Scene) -> _Table:
+    table: _Table = {}
+    for obj in scene.objects:
+        role = obj.get(ROLE)
+        if role is not None:
+            table.setdefault((role, None), []).append(obj)
+            name = obj.get(TRAJECTORY)
+            if name is not None:
+                table.setdefault((role, name), []).append(obj)
+    return table
+
+
 def with_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
     """The scene's objects of one role, by name."""
-    return sorted((o for o in scene.objects if o.get(ROLE) == role), key=lambda o: o.name)
+    return sorted(of_role(scene, role), key=lambda o: o.name)
+
+
+def link(folder: bpy.types.Collection, obj: bpy.types.Object) -> None:
+    """Put a new object of ours into a collection."""
+    folder.objects.link(obj)
+    look_again()
 
 
 def has_role(scene: bpy.types.Scene, role: str) -> bool:
@@ -137,12 +189,22 @@ def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
     parent = scene.collection
     for name in ("Rockfall", *path):
         child = next((c for c in parent.children if c.get(COLLECTION_NAME) == name), None)
-        if child is None:
-            child = bpy.data.collections.new(name)
-            child[COLLECTION_NAME] = name
-            parent.children.link(child)
-        parent = child
+        parent = _new_collection(parent, name) if child is None else child
     return parent
+
+
+def collections(scene: bpy.types.Scene, folder: str, names: Iterable[str]) -> dict[str, bpy.types.Collection]:
+    """Many collections of one folder below "Rockfall" by name, created where they are missing."""
+    parent = collection(scene, folder)
+    there = {child.get(COLLECTION_NAME): child for child in reversed(parent.children)}
+    return {name: there.get(name) or _new_collection(parent, name) for name in names}
+
+
+def _new_collection(parent: bpy.types.Collection, name: str) -> bpy.types.Collection:
+    child = bpy.data.collections.new(name)
+    child[COLLECTION_NAME] = name
+    parent.children.link(child)
+    return child
 
 
 def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = ()) -> None:
@@ -161,6 +223,7 @@ def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = 
 
 def remove_objects(objects: list[bpy.types.Object]) -> None:
     """Remove objects with the data and actions that nothing else uses."""
+    look_again()
     for obj in objects:
         data, action = obj.data, obj.animation_data.action if obj.animation_data else None
         bpy.data.objects.remove(obj)

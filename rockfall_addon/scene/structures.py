@@ -93,7 +93,7 @@ def make(scene: bpy.types.Scene, name: str, structure: Surface | Cloud) -> bpy.t
     mesh.attributes.active_color_name = mesh.attributes.default_color_name = COLOUR
     mesh.materials.append(materials.shaded_material("Rockfall structure", COLOUR))
     obj = bpy.data.objects.new(name, mesh)
-    store.collection(scene, "Structures").objects.link(obj)
+    store.link(store.collection(scene, "Structures"), obj)
     mark([obj])
     return obj
 

@@ -49,6 +49,9 @@ POLL_S = 0.015
 _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajectories to look at, None for all
 
 
+_recomputing: set[int] = set()  # session_uid of scenes
+
+
 @dataclass
 class Done:
     """What a `sync` has done: trajectories that were computed again, or could not be; whether picks came or went."""
@@ -70,15 +73,17 @@ def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
 
 
 def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """From Blender's list of updates, find what to look at."""
+    """From Blender's list of updates, find what to look at.
+
+    Nothing is asked of an update's `original`: after a scene was deleted it may be no more, and Blender crashes.
+    """
     names: set[str] = set()
+    actions: set[str] = set()
     anywhere = False
     for update in depsgraph.updates:  # a scene is in it at every selection; then nothing of it is updated
         obj = update.id
         if isinstance(obj, bpy.types.Action):  # a key that was inserted or deleted moves no object at this frame
-            for user in (user for slot in obj.original.slots for user in slot.users()):
-                if user.get(store.ROLE) == store.BLOCK_ROLE and store.TRAJECTORY in user:
-                    names.add(user[store.TRAJECTORY])
+            actions.add(obj.name)
         elif isinstance(obj, bpy.types.Object):
             role = obj.get(store.ROLE)
             if role in (store.PICK_ROLE, store.BLOCK_ROLE) and store.TRAJECTORY in obj:
@@ -86,15 +91,26 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             elif role == store.TERRAIN_ROLE:
                 anywhere = True
                 if update.is_updated_geometry:
-                    terrain_mesh.mistrust(obj.original.data)
+                    terrain_mesh.mistrust()
             elif role == store.STRUCTURE_ROLE and update.is_updated_geometry:
-                terrain_mesh.mistrust(obj.original.data)
+                terrain_mesh.mistrust()
         elif isinstance(obj, bpy.types.Collection) or (
             isinstance(obj, bpy.types.Scene) and (update.is_updated_transform or update.is_updated_geometry)
         ):
             anywhere = True
+    names |= _moved_by(scene, actions) if actions else set()
     if names or (anywhere and migration.version(scene) is not None):
         touch(scene, None if anywhere else names)
+
+
+def _moved_by(scene: bpy.types.Scene, actions: set[str]) -> set[str]:
+    """The trajectories whose block has one of these actions."""
+    blocks = ((obj, keyframes.action_of(obj)) for obj in store.of_role(scene, store.BLOCK_ROLE))
+    return {
+        obj[store.TRAJECTORY]
+        for obj, action in blocks
+        if action is not None and action.name in actions and store.TRAJECTORY in obj
+    }
 
 
 @problems.guarded
@@ -140,9 +156,14 @@ def sync(
     undone : an undo or redo has just brought something back: no objects come or go.
     again : compute them even where nothing has changed.
     """
-    done = Done([], [])
     if migration.is_newer(scene):
-        return done
+        return Done([], [])
+    with store.looking(scene):
+        return _sync(scene, names, dragging, again, undone)
+
+
+def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, again: bool, undone: bool) -> Done:
+    done = Done([], [])
     timing.follow_frame_rate(scene)  # what is waiting may be done before Blender says that the rate has changed
     if not dragging:
         terrain_view.follow_edits(scene)
@@ -180,7 +201,7 @@ def sync(
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:
-        _finish(scene)
+        _finish(scene, done.rebuilt)
     problems.update(scene)
     return done
 
@@ -210,12 +231,15 @@ def recompute(scene: bpy.types.Scene) -> None:
 
     When one trajectory has a problem, the others still follow.
     """
-    if migration.is_newer(scene):
+    if migration.is_newer(scene) or scene.session_uid in _recomputing:
         return
+    _recomputing.add(scene.session_uid)  # showing what has no flights yet sets sizes, which are settings
     try:
         reconstruction.refresh(scene)
     except RockfallError:
         sync(scene, again=True)
+    finally:
+        _recomputing.discard(scene.session_uid)
     simulation.follow(scene)
 
 
@@ -288,7 +312,9 @@ def _has_changed(
     held: picks.Held,
 ) -> bool:
     """Whether the picks differ from what is shown, hold an edit to be absorbed, or what is shown is damaged."""
-    if not dragging and any(picks.moved(one) or picks.frames_moved(one) for one in members):
+    if not dragging and any(
+        picks.moved(one) or picks.frames_moved(one) or keyframes.action_of(one) is None for one in members
+    ):
         return True
     now = fingerprints.fingerprint(members, rate, held)
     if before.endswith(fingerprints.COMPLETE):
@@ -320,6 +346,8 @@ def _try_rebuild(
         said = _rebuild(scene, name, members, parts, dragging, held)
     except RockfallError as error:
         _grey(scene, name, parts)
+        if not dragging:
+            _keep_keys(scene, name, members)
         done.failed.append(name)
         return fingerprints.fingerprint(members, timing.keyed_rate(scene), held), [Remark(str(error), "problem", name)]
     done.rebuilt.append(name)
@@ -350,18 +378,35 @@ def _rebuild(
     offset = timing.offset_of(scene, name, float(result.picks.time_s[0]))
     trajectories.store_results(members, result)
     if not dragging:
-        _pose(scene, members, result, offset)
-    trajectories.show_trajectory(scene, name, result, members, offset, surface, parts, held=dragging)
+        _pose(scene, members, result, offset, parts.get((store.BLOCK_ROLE, name)))
+    trail = trajectories.show_trajectory(scene, name, result, members, offset, surface, parts, held=dragging)
+    if trail is not None:
+        trails.paint_observed(scene, [trail])
     impact_rows.fill(scene, name)
     return problems.of_result(scene, result)[name]
 
 
-def _pose(scene: bpy.types.Scene, members: list[bpy.types.Object], result: object, offset: float) -> None:
-    rate, radius, version = timing.keyed_rate(scene), scene.rockfall.marker_radius_m, picks.next_version(scene)
+def _pose(
+    scene: bpy.types.Scene,
+    members: list[bpy.types.Object],
+    result: object,
+    offset: float,
+    block: bpy.types.Object | None,
+) -> None:
+    rate, radius = timing.keyed_rate(scene), scene.rockfall.marker_radius_m
+    version = picks.next_version(members if block is None else [*members, block])
     scene[store.KEYED_RATE] = rate
     for obj, normal in zip(members, trajectories.normals_of(result), strict=True):
         frame = (float(obj[store.TIME]) - offset) * rate
         picks.pose(obj, normal, frame, radius, version)
+
+
+def _keep_keys(scene: bpy.types.Scene, name: str, members: list[bpy.types.Object]) -> None:
+    """An edit with which the trajectory cannot be computed stays an edit: at the next frame the key would undo it."""
+    rate = timing.keyed_rate(scene)
+    offset = timing.offset_of(scene, name, min(float(obj[store.TIME]) for obj in members))
+    for obj in members:
+        picks.key(obj, (float(obj[store.TIME]) - offset) * rate, int(obj.get(store.WRITTEN, 0)))
 
 
 def _grey(scene: bpy.types.Scene, name: str, parts: trajectories.Parts) -> None:
@@ -381,10 +426,10 @@ def _forget(scene: bpy.types.Scene, name: str) -> None:
     impact_rows.fill(scene, name)
 
 
-def _finish(scene: bpy.types.Scene) -> None:
+def _finish(scene: bpy.types.Scene, rebuilt: list[str]) -> None:
     """What concerns all trajectories, once nothing moves: the ends of the colour scales, the twins of the models."""
     scene[store.SCHEMA] = migration.SCHEMA
-    last = max((float(obj.get(store.KEY_FRAME, 0.0)) for obj in picks.objects_of(scene)), default=0.0)
+    last = max((float(obj.get(store.KEY_FRAME, 0.0)) for obj in picks.objects_of(scene, rebuilt)), default=0.0)
     if last > scene.frame_end:
         scene.frame_end = int(np.ceil(last + timing.frame_rate(scene)))
     if trails.set_tops(scene):
@@ -433,7 +478,7 @@ def _heal(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
         own = obj.get(store.PICK_SHIFT)
         if own is None:
             obj[store.PICK_SHIFT] = shift.tolist()
-        elif list(own) != shift.tolist():
+        elif list(own) != shift.tolist() and picks.home_of(obj, scene) is None:
             place = np.array(obj[store.POSITION]) + np.array(own) - shift
             obj[store.POSITION], obj[store.PICK_SHIFT] = place.tolist(), shift.tolist()
             obj.location = place

@@ -40,7 +40,7 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     obj[store.THIN_SHARE] = float(np.mean(shading.thin))
     obj[store.REACH] = float(np.abs(surface.bounds).max())
     set_locked(obj, True)
-    store.collection(scene, "Terrain").objects.link(obj)
+    store.link(store.collection(scene, "Terrain"), obj)
     _surfaces[obj.session_uid] = _key(obj), surface
     if len(surface.left_out):
         _show_left_out(scene, surface)
@@ -57,7 +57,7 @@ def _show_left_out(scene: bpy.types.Scene, surface: Surface) -> None:
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj[store.ROLE] = store.LEFT_OUT_ROLE
     obj.hide_select = obj.hide_render = True
-    store.collection(scene, "Terrain").objects.link(obj)
+    store.link(store.collection(scene, "Terrain"), obj)
 
 
 def tiles(scene: bpy.types.Scene) -> list[bpy.types.Object]:

@@ -12,6 +12,8 @@ from ...core.vectors import Array
 from . import materials, store
 
 SAMPLE_STEP_S = 0.02
+MANY_FLIGHTS, COARSE_STEP_S = 2000, 0.1
+"""Of so many flights the memory is spared: between ticks they differ from their parabola by a centimetre."""
 SAME_MOMENT_S = 1e-4
 BELOW_COLOUR = (1.0, 0.0, 0.0)
 STALE_COLOUR = (0.45, 0.45, 0.45)
@@ -47,9 +49,9 @@ class Marks:
     tick: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
-def moments(start_s: float, end_s: float) -> Array:
+def moments(start_s: float, end_s: float, step_s: float = SAMPLE_STEP_S) -> Array:
     """Times at which a flight is sampled, its ends among them."""
-    return np.linspace(start_s, end_s, max(2, int(np.ceil((end_s - start_s) / SAMPLE_STEP_S)) + 1))
+    return np.linspace(start_s, end_s, max(2, int(np.ceil((end_s - start_s) / step_s)) + 1))
 
 
 def parts(duration_s: Array, step_s: Array | float) -> tuple[Array, Array]:
@@ -62,9 +64,11 @@ def parts(duration_s: Array, step_s: Array | float) -> tuple[Array, Array]:
     return count, number * np.repeat(duration_s / (count - 1), count)
 
 
-def moments_with_ticks(start_s: float, end_s: float, offset_s: float, rate: float) -> tuple[Array, Array]:
+def moments_with_ticks(
+    start_s: float, end_s: float, offset_s: float, rate: float, step_s: float = SAMPLE_STEP_S
+) -> tuple[Array, Array]:
     """`moments` and those of the scene's frames, which are ticks: (m,) [s] on the clock, (m,) bool."""
-    even = moments(start_s, end_s)
+    even = moments(start_s, end_s, step_s)
     first, last = np.ceil((start_s - offset_s) * rate), np.floor((end_s - offset_s) * rate)
     frames = offset_s + np.arange(first, last + 1) / rate
     frames = frames[(frames > start_s + SAME_MOMENT_S) & (frames < end_s - SAME_MOMENT_S)]

@@ -5,7 +5,8 @@ Of each trajectory: its picks, one polyline of its flights with colours, its blo
 numbers of its impacts. What is there already is brought in line, not made anew.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -16,7 +17,7 @@ from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.raycast import heights_above
 from ...core.terrain.surface import Surface
-from ...core.vectors import Array, norm
+from ...core.vectors import Array, Indices, Names, norm
 from . import block_keys, impact_marks, impact_rows, keyframes, materials, picks, store, timing, trails
 
 BELOW_RADII = 0.2
@@ -28,6 +29,31 @@ SAME_TIME_S = 1e-9
 """A key of the block is that of the pick at this time; with drag there are keys between them."""
 
 Parts = Mapping[tuple[str, str], bpy.types.Object]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Where a trajectory is.
+
+    Attributes
+    ----------
+    flights, picks : (k,) rows in the reconstruction.
+    folder : the collection of what is shown of it.
+    like : an action that a new block copies, see `keyframes.write_location_keys`.
+    """
+
+    flights: Indices
+    picks: Indices
+    folder: bpy.types.Collection
+    like: bpy.types.Action | None = None
+
+
+def rows_of(names: Names) -> dict[str, Indices]:
+    """Name → its rows in (n,) names, in the order of first appearance."""
+    found: dict[str, list[int]] = {}
+    for row, name in enumerate(names.tolist()):
+        found.setdefault(name, []).append(row)
+    return {name: np.array(rows) for name, rows in found.items()}
 
 
 def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface: Surface | None = None) -> None:
@@ -45,14 +71,18 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     objects = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
     timing.keep_offsets(scene, offsets)
     store_results(objects, result)
-    parts = parts_of(scene)
-    names = [name for name in offsets if (result.flights.trajectory == name).any()]
-    store.remove_objects([obj for (_, name), obj in parts.items() if name not in names])
-    last = 1.0
-    for name in names:
-        show_trajectory(scene, name, result, objects, offsets[name], surface, parts)
-        end = result.flights.end_time_s[result.flights.trajectory == name].max()
-        last = max(last, float(end) - offsets[name])
+    parts, flown = parts_of(scene), rows_of(result.flights.trajectory)
+    picked, folders = rows_of(result.picks.trajectory), store.collections(scene, "Trajectories", flown)
+    store.remove_objects([obj for (_, name), obj in parts.items() if name not in flown])
+    last, like = 1.0, None
+    for name in (name for name in offsets if name in flown):
+        rows = Rows(flown[name], picked[name], folders[name], like)
+        show_trajectory(scene, name, result, objects, offsets[name], surface, parts, rows=rows)
+        last = max(last, float(result.flights.end_time_s[rows.flights].max()) - offsets[name])
+        if len(flown) > keyframes.MANY_ACTIONS and like is None:
+            like = next(
+                keyframes.action_of(obj) for obj in folders[name].objects if obj.get(store.ROLE) == store.BLOCK_ROLE
+            )
     trails.set_tops(scene)
     trails.paint_observed(scene)
     impact_rows.fill(scene)
@@ -70,19 +100,24 @@ def parts_of(scene: bpy.types.Scene, trajectories: Collection[str] | None = None
     trajectories : None for all.
     """
     found: dict[tuple[str, str], bpy.types.Object] = {}
-    for obj in scene.objects:
-        role = obj.get(store.ROLE)
-        if role not in (store.FLIGHTS_ROLE, store.BLOCK_ROLE):
-            continue
+    for role, obj in _shown(scene, trajectories):
         name = obj.get(store.TRAJECTORY)
-        if name is None or (trajectories is not None and name not in trajectories):
+        if name is None:
             continue
         other = found.setdefault((role, name), obj)
         if other != obj:
             older, newer = sorted((other, obj), key=lambda each: each.session_uid)
             found[role, name] = older
             del newer[store.ROLE]
+            store.look_again()
     return found
+
+
+def _shown(scene: bpy.types.Scene, trajectories: Collection[str] | None) -> Iterator[tuple[str, bpy.types.Object]]:
+    names = (None,) if trajectories is None else trajectories
+    for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE):
+        for name in names:
+            yield from ((role, obj) for obj in store.of_role(scene, role, name))
 
 
 def show_trajectory(
@@ -94,21 +129,28 @@ def show_trajectory(
     surface: Surface | None,
     parts: Parts,
     *,
+    rows: Rows | None = None,
     held: bool = False,
-) -> None:
+) -> bpy.types.Object | None:
     """Bring the flights and the block of one trajectory in line; without a flight there are none.
 
     objects : the object of each of the reconstruction's picks.
+    rows : where the trajectory is in the reconstruction and the scene; looked up without.
     held : a person holds picks or keys; keys of the block that the person holds are left alone.
+
+    Returns
+    -------
+    The object of the flights, which is still to be painted.
     """
-    which = np.flatnonzero(result.flights.trajectory == name)
+    if rows is None:
+        which, mine = (np.flatnonzero(each == name) for each in (result.flights.trajectory, result.picks.trajectory))
+        rows = Rows(which, mine, store.collection(scene, "Trajectories", name))
     trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
-    if not which.size:
+    if not rows.flights.size:
         store.remove_objects([obj for obj in (trail, block) if obj is not None])
-        return
-    trail = _show_flights(scene, name, result, which, offset, surface, trail)
-    _show_block(scene, name, result, objects, which, offset, block, held)
-    trails.paint_observed(scene, [trail])
+        return None
+    _show_block(scene, name, result, objects, rows, offset, block, held)
+    return _show_flights(scene, name, result, rows, offset, surface, trail)
 
 
 def flights_of(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
@@ -134,14 +176,15 @@ def _show_flights(
     scene: bpy.types.Scene,
     name: str,
     result: Reconstruction,
-    which: np.ndarray,
+    rows: Rows,
     offset: float,
     surface: Surface | None,
     obj: bpy.types.Object | None,
 ) -> bpy.types.Object:
-    flights, rate = result.flights, timing.frame_rate(scene)
+    flights, which, rate = result.flights, rows.flights, timing.frame_rate(scene)
+    step_s = trails.COARSE_STEP_S if len(flights.start_time_s) > trails.MANY_FLIGHTS else trails.SAMPLE_STEP_S
     sampled = [
-        trails.moments_with_ticks(float(flights.start_time_s[i]), float(flights.end_time_s[i]), offset, rate)
+        trails.moments_with_ticks(float(flights.start_time_s[i]), float(flights.end_time_s[i]), offset, rate, step_s)
         for i in which
     ]
     counts = np.array([len(clock) for clock, _ in sampled])
@@ -162,7 +205,7 @@ def _show_flights(
     obj[store.TOP_SPEED] = float(norm(ends).max(initial=0.0))
     obj.pop(store.STALE, None)
     if new:
-        store.collection(scene, "Trajectories", name).objects.link(obj)
+        store.link(rows.folder, obj)
     if bare:
         trails.set_trail(scene.rockfall, obj)
     return obj
@@ -211,7 +254,7 @@ def _show_block(
     name: str,
     result: Reconstruction,
     objects: Sequence[bpy.types.Object],
-    which: np.ndarray,
+    rows: Rows,
     offset: float,
     block: bpy.types.Object | None,
     held: bool,
@@ -220,20 +263,19 @@ def _show_block(
     if block is None:
         block = bpy.data.objects.new(f"{name} block", block_mesh())
         block[store.ROLE], block[store.TRAJECTORY] = store.BLOCK_ROLE, name
-        store.collection(scene, "Trajectories", name).objects.link(block)
+        store.link(rows.folder, block)
     block.scale = np.array([solid.d1, solid.d2, solid.d3]) * scale / 2
     block.delta_location.z = (scale - 1) * solid.radius_m  # an enlarged block must not sink into the slope
     if held and block_keys.edits_of(block):
         return
-    keys = keyframes.motion_keys(result.flights, which)
-    mine = np.flatnonzero(result.picks.trajectory == name)
+    keys, mine = keyframes.motion_keys(result.flights, rows.flights), rows.picks
     away = np.abs(keys.time_s[:, None] - result.picks.time_s[mine])
     of = [objects[mine[i]] if gap < SAME_TIME_S else None for i, gap in zip(away.argmin(1), away.min(1), strict=True)]
     keys.time_s[:] -= offset
-    if keyframes.write_location_keys(block, keys, timing.keyed_rate(scene), in_place=held):
+    if keyframes.write_location_keys(block, keys, timing.keyed_rate(scene), in_place=held, like=rows.like):
         block_keys.remember(block, of)
         if not held:
-            keyframes.action_of(block)[store.WRITTEN] = max(int(obj.get(store.WRITTEN, 0)) for obj in objects)
+            keyframes.action_of(block)[store.WRITTEN] = max(int(objects[i].get(store.WRITTEN, 0)) for i in mine)
 
 
 def normals_of(result: Reconstruction) -> np.ndarray:

@@ -4,8 +4,9 @@
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
+from ...core.errors import RockfallError
 from ...core.impact_models.presets import Preset, presets_of
-from ...core.impact_models.registry import MODELS
+from ...core.impact_models.registry import MODELS, find_model
 from ..scene import model_parameters, models
 from .reporting import reported
 
@@ -43,7 +44,7 @@ class ROCKFALL_OT_reset_parameter(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        names = [self.parameter] if self.parameter else [spec.name for spec in MODELS[self.model].parameters]
+        names = [self.parameter] if self.parameter else [spec.name for spec in find_model(self.model).parameters]
         model_parameters.keep(context.scene, self.model, dict.fromkeys(names), self.which)
         return {"FINISHED"}
 
@@ -75,6 +76,8 @@ class ROCKFALL_OT_use_ground(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self.ground:
+            raise RockfallError("There are no values for a ground of this model.")
         preset = presets_of(self.model)[int(self.ground)]
         model_parameters.use_preset(context.scene, preset, self.which)
         self.report({"INFO"}, f"{preset.ground}: {_values(preset)} ({preset.source}).")

@@ -6,7 +6,7 @@ from bpy.props import EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ....core.exchange.parameters import write_parameters
-from ....core.impact_models.registry import MODELS
+from ....core.impact_models.registry import MODELS, find_model
 from ...scene import model_parameters, models, store
 from ...view.parameters import OfModel
 from ...view.reporting import possible, reported
@@ -22,7 +22,7 @@ class ROCKFALL_OT_compare_model(OfModel, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.rockfall_comparison
-        settings.models = set(settings.models) ^ {self.model}
+        settings.models = set(settings.models) ^ {find_model(self.model).name}
         return {"FINISHED"}
 
 

@@ -29,11 +29,12 @@ def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | 
     following = (np.arange(CORNERS) + 1) % CORNERS
     band = np.column_stack([np.arange(CORNERS), following, CORNERS + following, CORNERS + np.arange(CORNERS)])
     faces = np.vstack([band + 2 * CORNERS * number for number in range(len(BANDS))])
-    rate = timing.frame_rate(scene)
+    offsets = timing.kept_offsets(scene)
     corners, times = [], []
     for obj in objects:
         corners.append(ring @ np.array(obj.rotation_quaternion.to_matrix()).T + np.array(obj.location))
-        times.append(np.full(len(ring), obj.animation_data.action.frame_range[0] / rate))
+        begin_s = float(obj[store.TIME]) - offsets.get(obj[store.TRAJECTORY], 0.0)
+        times.append(np.full(len(ring), begin_s))
     mesh = bpy.data.meshes.new("Film impacts")
     steps = len(ring) * np.arange(len(objects))
     mesh.from_pydata(np.vstack(corners).tolist(), [], (faces[None] + steps[:, None, None]).reshape(-1, 4).tolist())

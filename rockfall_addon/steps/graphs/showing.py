@@ -5,6 +5,7 @@ import bpy
 from bpy.props import IntProperty, StringProperty
 
 from ....core.analysis.columns import column_titles, find_column
+from ....core.errors import RockfallError
 from ...scene import comparison
 from ...view.reporting import reported
 
@@ -57,7 +58,10 @@ class ROCKFALL_OT_filter_graph_text(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        row = context.scene.rockfall_graphs.filters[self.number]
+        filters = context.scene.rockfall_graphs.filters
+        if not 0 <= self.number < len(filters):
+            raise RockfallError(f"There is no filter {self.number + 1}.")
+        row = filters[self.number]
         chosen = texts_of(row)
         others = [one for one in chosen if one != self.text]
         row.texts = ", ".join(others if self.text in chosen else [*chosen, self.text])

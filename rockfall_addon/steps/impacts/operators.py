@@ -4,6 +4,7 @@
 import bpy
 from bpy.props import FloatProperty, StringProperty
 
+from ....core.errors import RockfallError
 from ...scene import impact_rows, store, sync
 from ...view.reporting import possible, reported
 
@@ -20,8 +21,11 @@ class ROCKFALL_OT_sort_impacts(bpy.types.Operator):
 
     column: StringProperty()
 
+    @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.rockfall
+        if self.column not in settings.bl_rna.properties["table_sort"].enum_items:
+            raise RockfallError(f"The impact table has no column {self.column!r}.")
         settings.table_descending = settings.table_sort == self.column and not settings.table_descending
         settings.table_sort = self.column
         return {"FINISHED"}
@@ -70,10 +74,10 @@ class ROCKFALL_OT_show_impact(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_pick(context) and context.object.animation_data is not None
+        return _has_pick(context) and store.KEY_FRAME in context.object
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        frame = context.object.animation_data.action.frame_range[0]
+        frame = float(context.object[store.KEY_FRAME])
         context.scene.frame_set(int(frame // 1), subframe=float(frame % 1))
         return {"FINISHED"}
 

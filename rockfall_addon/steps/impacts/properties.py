@@ -122,6 +122,7 @@ class ImpactRow(bpy.types.PropertyGroup):
 
     pick: StringProperty()
     trajectory: StringProperty()
+    trajectory_number: IntProperty(description="Stands for the name, 0 where a file has none")
     number: IntProperty()
     time_s: FloatProperty()
     speed1_mps: FloatProperty()

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ....core.impact_models.registry import find_model
 from ....core.progress import Progress
 from ...scene import simulated_sources, simulation, simulation_setup, store
 from ...view import job
@@ -67,7 +68,7 @@ class ROCKFALL_OT_choose_simulated_model(OfModel, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.rockfall_simulation
-        settings.models = set(settings.models) ^ {self.model}
+        settings.models = set(settings.models) ^ {find_model(self.model).name}
         return {"FINISHED"}
 
 

@@ -29,11 +29,10 @@ class ROCKFALL_OT_fit_footage(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(
-            cls,
-            context.screen is not None and any(workspace.camera_views(context.screen)),
-            "Look through a camera first",
-        )
+        if bpy.app.background or context.window is None:
+            cls.poll_message_set("There is no window")
+            return False
+        return possible(cls, any(workspace.camera_views(context.screen)), "Look through a camera first")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         workspace.fit_footage(context.scene, context.screen)

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A random walk over all that can be done to a scene loses no pick, and nothing goes wrong."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+STEPS = 333
+
+
+def _walk() -> type:
+    spec = importlib.util.spec_from_file_location("random_walk", Path(__file__).with_name("random_walk.py"))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.Walk
+
+
+@pytest.mark.parametrize("seed", [3, 15])
+def test_a_random_walk(part, tmp_path: Path, seed: int) -> None:
+    walk = _walk()(seed, tmp_path, part)
+    walk.begin()
+    for _ in range(STEPS):
+        walk.step()
+        walk.check()
+    assert len({name.split()[0].split("(")[0] for name in walk.done}) > 50

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..impact_models.registry import find_model
 from ..output import output_file
+from ..progress import Progress, silent
 from .curves import Curve, number
 from .extras import FIGURES, demand
 from .graphs import Graph
@@ -114,7 +115,10 @@ def sheet_figure(sheet: Sequence[Sequence[Graph]]) -> "Figure":
 
 
 def save_figures(
-    sheet: Sequence[Sequence[Graph]], folder: str | Path, formats: Sequence[str] = FORMATS[:1]
+    sheet: Sequence[Sequence[Graph]],
+    folder: str | Path,
+    formats: Sequence[str] = FORMATS[:1],
+    progress: Progress = silent,
 ) -> tuple[Path, ...]:
     """Write the sheet (all_models) and one figure per model into a folder; returns the files.
 
@@ -129,20 +133,25 @@ def save_figures(
         for graphs in sheet:
             yield graphs[0].model, model_figure(graphs)
 
-    return save_named(figures(), folder, formats)
+    return save_named(figures(), folder, formats, progress, 1 + len(sheet))
 
 
 def save_named(
-    figures: "Iterable[tuple[str, Figure]]", folder: str | Path, formats: Sequence[str] = FORMATS[:1]
+    figures: "Iterable[tuple[str, Figure]]",
+    folder: str | Path,
+    formats: Sequence[str] = FORMATS[:1],
+    progress: Progress = silent,
+    total: int = 0,
 ) -> tuple[Path, ...]:
-    """Write (name, figure) pairs into a folder, each in all formats; returns the files."""
+    """Write (name, figure) pairs into a folder, each in all formats; returns the files. `total`: how many there are."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for name, figure in figures:
+    for done, (name, figure) in enumerate(figures, start=1):
         for kind in formats:
             written.append(folder / f"{name}.{kind}")
             save_figure(figure, written[-1])
+        progress("Drawing the figures", done, total)
     return tuple(written)
 
 

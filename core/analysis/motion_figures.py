@@ -6,6 +6,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
+from ..progress import Progress, silent
 from .extras import FIGURES, demand
 from .figures import FORMATS, LINK, MEASURED, MUTED, PAGE_IN, STYLE, save_named
 from .motion_graphs import (
@@ -38,6 +39,7 @@ def save_motion_figures(
     scale: FrameScale | None = None,
     quantities: Sequence[Quantity] = QUANTITIES,
     formats: Sequence[str] = FORMATS[:1],
+    progress: Progress = silent,
 ) -> tuple[Path, ...]:
     """Write one figure of each trajectory that flies, and one of all from their starts on; returns the files.
 
@@ -50,7 +52,8 @@ def save_motion_figures(
     DependencyError : Matplotlib is not installed.
     """
     demand(FIGURES)
-    return save_named(_figures(courses, scale, quantities), folder, formats)
+    number = sum(bool(course.time_s.size) for course in courses)
+    return save_named(_figures(courses, scale, quantities), folder, formats, progress, number + (len(courses) > 1))
 
 
 def motion_figure(

@@ -145,7 +145,7 @@ def _draw(
     notes = []
     if is_there(FIGURES):
         progress("Drawing the figures")
-        save_figures(make_sheet(impacts, predictions), folder / "figures", figure_formats(arguments))
+        save_figures(make_sheet(impacts, predictions), folder / "figures", figure_formats(arguments), progress)
     else:
         notes.append(f"No figures without Matplotlib. Install it: {install_command(FIGURES)}")
     if is_there(PAGES):

@@ -64,7 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
         notes = [] if footage is None else list(footage.notes)
         if not arguments.tables_only and is_there(FIGURES):
             progress("Drawing the figures")
-            save_motion_figures(courses, folder / "figures", scale, formats=figure_formats(arguments))
+            save_motion_figures(
+                courses, folder / "figures", scale, formats=figure_formats(arguments), progress=progress
+            )
             written.append("figures")
         elif not arguments.tables_only:
             notes.append(f"No figures without Matplotlib. Install it: {install_command(FIGURES)}")

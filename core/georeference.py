@@ -24,12 +24,21 @@ class GlobalShift:
     ----------
     x, y, z : the survey coordinates of the local origin [m].
     crs : coordinate reference system as the source states it ("EPSG:2056"), empty when unknown.
+
+    Raises
+    ------
+    RockfallError : it is not finite: nothing could be brought back from it.
     """
 
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
     crs: str = ""
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.vector).all():
+            said = f"The global shift ({self.x}, {self.y}, {self.z}) m is not finite."
+            raise RockfallError(f"{said} Write metres, like 2600000.0.")
 
     @property
     def vector(self) -> Array:

@@ -337,6 +337,14 @@ def test_every_operator_refuses_a_newer_file_in_the_same_words(scene: bpy.types.
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
 
 
+def test_a_shift_that_is_not_finite_changes_nothing(scene: bpy.types.Scene, part) -> None:
+    before = everything(scene, part)
+    georeference = part("rockfall_addon.scene.georeference")
+    with pytest.raises(part("core.errors").RockfallError, match="not finite"):
+        georeference.write_shift(scene, part("core.georeference").GlobalShift(float("nan"), 0.0, 0.0))
+    assert everything(scene, part) == before
+
+
 def test_a_scene_without_anything_of_ours_stays_so(part) -> None:
     scene = bpy.context.scene
     scene.collection.objects.link(bpy.data.objects.new("empty", None))

@@ -58,8 +58,9 @@ def write_report(
     linked = link_graphs(impacts, predictions, run, [first], other_run=0 if run else None)
     document = Document()
     document.title = title or f"Rockfall: {origin or 'impact models'}"
-    for root in (*linked.graphs.values(), linked.selection):
-        document.add_root(root)
+    with document.models.freeze():  # what belongs to the page is looked up once, not with each root
+        for root in (*linked.graphs.values(), linked.selection):
+            document.add_root(root)
     document.template_variables.update(
         heading=title or "Impact models against measured impacts",
         summary=summary(total, len(impacts), origin) + fewer_sentence(total, predictions),

@@ -178,7 +178,7 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     if not header:
         raise InputError("The file is empty", file=path, advice=f"Its first row must name {', '.join(required)}")
     if not numbers:
-        raise InputError("The table has a header but no rows", file=path, advice="Add a row for each pick")
+        raise InputError("The table has a header but no rows", file=path, advice="Add rows below it")
     _add_block(blocks, rows)
     columns = {name: texts for name, texts in zip(header, blocks, strict=True) if name}
     table = TextTable(path, columns, numbers, converted, _decimal(data, separator))

@@ -20,7 +20,7 @@ def test_measured_rebounds_are_shown_beside_the_real_blocks(demo: bpy.types.Scen
     shown = part("rockfall_addon.scene.models").find_predictions(demo, result, ("observed",))
     compared = part("core.analysis.comparison").compare(result.impacts, ["observed"])
     assert compared.measured is not None
-    assert len(compared.measured) == 82
+    assert len(compared.measured) == 83
     assert shown.model.size == np.isfinite(compared.v2[0, 0]).all(axis=1).sum()
 
 

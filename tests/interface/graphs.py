@@ -53,18 +53,9 @@ def case_statistics_beside_the_graphs(window):
     with window.override():
         bpy.ops.rockfall.colour_graphs(column="theta1_deg")
     yield 1.0
-    x, top = sidebar.x + 60, sidebar.y + sidebar.height - 15
-    yield from window.click(x, top, ctrl=True)  # folds the other panels
-    yield from window.click(x, top)
-    panels = [
-        cls.__name__
-        for cls in window.part("rockfall_addon.steps").classes()
-        if issubclass(cls, bpy.types.Panel) and cls.bl_space_type == "NODE_EDITOR" and cls.bl_region_type == "UI"
-    ]
     kept = window.part("rockfall_addon.scene.statistics")._kept
     assert not kept, "a folded panel computes nothing"
-    yield from window.click(x, top - 28 * panels.index("ROCKFALL_PT_graph_statistics"))
-    yield 1.0
+    yield from window.open_panel("ROCKFALL_PT_graph_statistics", "NODE_EDITOR")
     window.screenshot("dark")
     (_, found), *_ = kept.values()
     assert [one.used for one in found.groups.values()] == [30, 29, 24]

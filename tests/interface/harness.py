@@ -41,6 +41,8 @@ ROOT = Path(__file__).resolve().parents[2]
 EXTENSION = "bl_ext.user_default.rockfall"
 BEGINS = "harness: "
 FIRST_DRAW_S = 1.0
+HEADER_PX = 28
+"""Height of a folded panel at scale 1."""
 BETWEEN_EVENTS_S = 0.2
 
 Steps = Generator[float]
@@ -79,6 +81,33 @@ class Window:
         sidebar.tag_redraw()
         yield 0.5
         assert sidebar.active_panel_category == tab, f"the sidebar has no tab {tab}"
+
+    def open_panel(self, name: str, area: str = "VIEW_3D") -> Steps:
+        """Unfold one of our panels in a sidebar that shows them, and fold the others, by clicks on their headers."""
+        sidebar = self.region("UI", area)
+        x, top = sidebar.x + 90, sidebar.y + sidebar.height - HEADER_PX // 2
+        yield from self.click(x, top, ctrl=True)  # folds all but the first, however high they were
+        yield 0.5
+        yield from self.click(x, top)
+        with self.override(area):
+            panels = [
+                panel
+                for panel in self.part("rockfall_addon.steps").classes()
+                if issubclass(panel, bpy.types.Panel)
+                and (panel.bl_space_type, panel.bl_region_type) == (area, "UI")
+                and not getattr(panel, "bl_parent_id", "")
+                and (not hasattr(panel, "poll") or panel.poll(bpy.context))
+            ]
+        names = [panel.__name__ for panel in panels]
+        panel, drawn = panels[names.index(name)], []
+        draw = panel.draw
+        panel.draw = lambda self, context: (drawn.append(name), draw(self, context))[-1]
+        try:
+            yield from self.click(x, top - HEADER_PX * names.index(name))
+            yield 1.0
+        finally:
+            panel.draw = draw
+        assert drawn, f"{name} is not open"
 
     def move(self, x: float, y: float) -> Steps:
         """Move the mouse to a pixel of the window, counted from the bottom left."""

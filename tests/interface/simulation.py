@@ -19,13 +19,6 @@ def shown(role="simulated_blocks"):
     return [obj for obj in bpy.context.scene.objects if obj.get("rockfall_role") == role]
 
 
-def open_panel(window, y):
-    """Open the panel whose header is at a height of the window, and close the others."""
-    sidebar = window.region("UI")
-    yield from window.click(sidebar.x + 90, y, ctrl=True)
-    yield 1.0
-
-
 def on_window(window, place):
     """Pixel of the window at which a place of the scene is seen."""
     region = window.region()
@@ -46,7 +39,7 @@ def case_simulate_from_a_line_on_a_bare_scan(window):
         bpy.ops.rockfall.show_relief(frame_all=True)
         bpy.ops.ed.undo_push(message="terrain")
     yield 2.0
-    yield from open_panel(window, 181)
+    yield from window.open_panel("ROCKFALL_PT_simulation")
     window.screenshot("1-scan")
     terrain = shown("terrain")[0]
     steep = np.array([face.center for face in terrain.data.polygons if face.normal.z < 0.8])
@@ -118,11 +111,7 @@ def case_simulate_beside_the_real_blocks(window):
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="demo")
     yield 1.0
-    sidebar = window.region("UI")
-    yield from open_panel(window, 707)
-    for y in (876, 652):  # closed again: all are; then this step's
-        yield from window.click(sidebar.x + 90, y)
-        yield 0.7
+    yield from window.open_panel("ROCKFALL_PT_simulation")
     settings().number = 5
     settings().models = {"noel_2017", "observed"}
     with window.override():

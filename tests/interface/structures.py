@@ -26,9 +26,7 @@ def case_wall_across_the_slope(window):
         assert bpy.ops.rockfall.use_as_structure() == {"FINISHED"}
     settings = bpy.context.scene.rockfall_simulation
     settings.source, settings.steeper_than_deg, settings.number = "STEEP", 20.0, 20
-    sidebar = window.region("UI")
-    yield from window.click(sidebar.x + 90, 181, ctrl=True)
-    yield 1.0
+    yield from window.open_panel("ROCKFALL_PT_simulation")
     window.screenshot("1-marked")
     with window.override():
         bpy.ops.rockfall.simulate("INVOKE_DEFAULT")

@@ -213,7 +213,9 @@ def main() -> int:
     if why_not:
         print(f"{why_not}: the extension and its interface are not tested.")
     board = Board(tuple(step for step in STEPS if not (why_not and step.in_blender)))
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A machine may start this with signals ignored, as nohup does, and tests that send them would inherit that.
+    for name in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(name, signal.default_int_handler)
     workers = [threading.Thread(target=board.take, daemon=True) for _ in range(AT_ONCE)]
     try:
         for worker in workers:

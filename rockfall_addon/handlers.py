@@ -45,6 +45,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         _keep_rate(scene)
         footage.follow(scene)
         sync.notice(scene, depsgraph)
+        trail_lines.notice(depsgraph)
         _selected_otherwise()
 
 
@@ -70,6 +71,7 @@ def _loaded(_path: str, _unused: object = None) -> None:
 def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     """At once: Blender stores a step before the edit is absorbed, and its animation would take the edit back."""
     strip.forget()
+    trail_lines.forget()
     terrain_mesh.mistrust()
     _keep_rate(scene)
     footage.follow(scene)
@@ -118,7 +120,6 @@ def _selected_otherwise() -> None:
     selection.notice()
     graph_settings.redraw()
     strip.redraw()
-    trail_lines.forget()
 
 
 def _keep_rate(scene: bpy.types.Scene) -> None:

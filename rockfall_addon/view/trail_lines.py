@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The flights in the 3-D view as lines of the same width on the screen at every distance, faint where they are hidden.
 
-The tubes of geometry, which renders show, are thinner than a pixel from afar. Batches are kept until something changes.
+The tubes of geometry, which renders show, are thinner than a pixel from afar. What was read of a mesh is kept until
+Blender says that it has changed, batches until any of the lines has.
 """
 
 from dataclasses import dataclass, field
@@ -22,9 +23,21 @@ NEARER = 2e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Trails:
-    """The points of all flights (n, 3), their sRGB colours (n, 4), display times (n,) [s], and segments (k, 2)."""
+class Trail:
+    """Of the flights in a mesh: points (n, 3), their sRGB colours (n, 4), display times (n,) [s], segments (k, 2)."""
 
+    mesh: str
+    position: Array
+    colour: Array
+    time_s: Array
+    segment: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Trails:
+    """All flights of a scene that are seen, as one trail."""
+
+    parts: tuple[Trail, ...]
     position: Array
     colour: Array
     time_s: Array
@@ -48,13 +61,32 @@ class Trails:
         return self.batches[now_s]
 
 
+_read: dict[str, Trail] = {}
+"""By the object's name, while neither it nor its mesh changes."""
 _kept: dict[int, Trails] = {}
+_looked: set[int] = set()
+"""Scenes in which nothing at all has happened since."""
 _handles: list[object] = []
 
 
 def forget() -> None:
-    """Something may have changed: flights are read again when they are drawn next."""
+    """Anything may have changed: flights are read again when they are drawn next."""
+    _read.clear()
     _kept.clear()
+    _looked.clear()
+
+
+def notice(depsgraph: bpy.types.Depsgraph) -> None:
+    """From Blender's list of updates, find which flights are to be read again."""
+    changed = {
+        update.id.name
+        for update in depsgraph.updates
+        if isinstance(update.id, bpy.types.Mesh)
+        or (isinstance(update.id, bpy.types.Object) and update.is_updated_geometry)
+    }
+    for name in [name for name, trail in _read.items() if name in changed or trail.mesh in changed]:
+        del _read[name]
+    _looked.clear()
 
 
 def register() -> None:
@@ -74,9 +106,7 @@ def _draw() -> None:
     scene, space = context.scene, context.space_data
     if not space.overlay.show_overlays or pointing.solved_camera_of(context) is not None:
         return  # over footage they are drawn in its pixels
-    if scene.session_uid not in _kept:
-        _kept[scene.session_uid] = _read(scene)
-    trails = _kept[scene.session_uid]
+    trails = trails_of(scene)
     if not len(trails.segment):
         return
     now_s = np.inf
@@ -99,26 +129,48 @@ def _draw() -> None:
     gpu.state.blend_set("NONE")
 
 
-def _read(scene: bpy.types.Scene) -> Trails:
+def trails_of(scene: bpy.types.Scene) -> Trails:
     """What is shown of the flights of blocks and of models."""
-    parts, count = [], 0
-    needed = {materials.SPEED_COLOUR, materials.TIME_ATTRIBUTE}
+    key = scene.session_uid
+    if key in _looked:
+        return _kept[key]
     roles = (store.FLIGHTS_ROLE, store.MODEL_FLIGHTS_ROLE)
-    for obj in (obj for role in roles for obj in store.with_role(scene, role)):
-        mesh = obj.data
-        if not obj.visible_get() or not needed <= set(mesh.attributes.keys()):
-            continue
-        points, edges = len(mesh.vertices), len(mesh.edges)
-        position, colour = np.empty(3 * points, dtype=np.float32), np.empty(4 * points, dtype=np.float32)
-        time, segment = np.empty(points, dtype=np.float32), np.empty(2 * edges, dtype=np.int32)
-        mesh.vertices.foreach_get("co", position)
-        mesh.attributes[materials.SPEED_COLOUR].data.foreach_get("color_srgb", colour)
-        mesh.attributes[materials.TIME_ATTRIBUTE].data.foreach_get("value", time)
-        mesh.edges.foreach_get("vertices", segment)
-        parts.append((position.reshape(-1, 3), colour.reshape(-1, 4), time, segment.reshape(-1, 2) + count))
-        count += points
+    shown = [obj for role in roles for obj in store.with_role(scene, role) if obj.visible_get()]
+    parts = tuple(trail for obj in shown if (trail := _trail(obj)) is not None)
+    if key not in _kept or _kept[key].parts != parts:
+        _kept[key] = _joined(parts)
+    _looked.add(key)
+    return _kept[key]
+
+
+def _trail(obj: bpy.types.Object) -> Trail | None:
+    """The flights in an object's mesh; None when they have no times or colours yet."""
+    mesh = obj.data
+    if not {materials.SPEED_COLOUR, materials.TIME_ATTRIBUTE} <= set(mesh.attributes.keys()):
+        return None
+    kept = _read.get(obj.name)
+    if kept is not None and kept.mesh == mesh.name:
+        return kept
+    points, edges = len(mesh.vertices), len(mesh.edges)
+    position, colour = np.empty(3 * points, dtype=np.float32), np.empty(4 * points, dtype=np.float32)
+    time, segment = np.empty(points, dtype=np.float32), np.empty(2 * edges, dtype=np.int32)
+    mesh.vertices.foreach_get("co", position)
+    mesh.attributes[materials.SPEED_COLOUR].data.foreach_get("color_srgb", colour)
+    mesh.attributes[materials.TIME_ATTRIBUTE].data.foreach_get("value", time)
+    mesh.edges.foreach_get("vertices", segment)
+    _read[obj.name] = Trail(mesh.name, position.reshape(-1, 3), colour.reshape(-1, 4), time, segment.reshape(-1, 2))
+    return _read[obj.name]
+
+
+def _joined(parts: tuple[Trail, ...]) -> Trails:
     if not parts:
         nothing = np.zeros((0, 4), dtype=np.float32)
-        return Trails(nothing[:, :3], nothing, nothing[:, 0], np.zeros((0, 2), dtype=np.int32))
-    position, colour, time, segment = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return Trails(position, colour, time, np.ascontiguousarray(segment, dtype=np.int32))
+        return Trails((), nothing[:, :3], nothing, nothing[:, 0], np.zeros((0, 2), dtype=np.int32))
+    starts = np.cumsum([0, *(len(part.time_s) for part in parts)])
+    return Trails(
+        parts,
+        np.concatenate([part.position for part in parts]),
+        np.concatenate([part.colour for part in parts]),
+        np.concatenate([part.time_s for part in parts]),
+        np.concatenate([part.segment + start for part, start in zip(parts, starts, strict=False)]).astype(np.int32),
+    )

@@ -15,7 +15,7 @@ from ..reconstruction.picks import Picks, take
 from ..reconstruction.refinement.refine import refine
 from ..reconstruction.refinement.result import Refinement
 from ..reconstruction.refinement.views import PixelObservations
-from ..remarks import Remark
+from ..remarks import Remark, gravest_first
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, norm
 from .sightings import SeenVideo, Sightings, joined, some
@@ -35,7 +35,7 @@ class Refined:
     seen, frame : the m pixels that were used, and their frames, −1 where not given.
     moved_m, later_s : (n,) by how much the picks moved.
     pose_covariance : of the v views, as in `View`; None for those whose pose was held.
-    remarks : those of the fit, after one on pixels that were left out.
+    remarks : one on pixels that were left out and those of the fit, the gravest first.
     """
 
     before: Picks
@@ -127,7 +127,7 @@ def refine_picks(
         moved_m=norm(fit.picks.position - before.position),
         later_s=fit.picks.time_s - before.time_s,
         pose_covariance=tuple(view.pose_covariance if "camera" in free else None for view in fit.views),
-        remarks=(*((Remark(text, "note", "pixels"),) if lost else ()), *fit.remarks),
+        remarks=tuple(gravest_first([*((Remark(text, "note", "pixels"),) if lost else ()), *fit.remarks])),
     )
 
 

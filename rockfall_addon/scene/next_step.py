@@ -1,11 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What to do next, from what the scene holds: a sentence, and the operators or tools for it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import bpy
 
-from . import alignment, camera_paths, migration, places, proposal, sightings, store, terrain, videos
+from ...core.remarks import Remark
+from ...core.workflow.noticed import tracks_off_the_motion
+from . import (
+    alignment,
+    camera_paths,
+    migration,
+    motion,
+    places,
+    problems,
+    proposal,
+    sightings,
+    store,
+    terrain,
+    video_times,
+    videos,
+)
 
 PICK_TOOL = "rockfall.pick_tool"
 
@@ -41,6 +57,18 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         hint = alignment.hint(scene, camera)
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
         return NextStep(sentence, ("rockfall.align_views",))
+    unset = None if proposal.is_applied(scene) else video_times.never_synchronised(scene)
+    if unset is not None and all(map(camera_paths.is_solved, videos.cameras(scene))):
+        sentence = (
+            f"{unset.name} is not synchronised: both videos begin together until it is. Mark the same event in "
+            "each (step 2), and synchronise."
+        )
+        return NextStep(sentence, ("rockfall.mark_event", "rockfall.synchronise_videos"))
+    return _with_cameras(scene, camera, picks)
+
+
+def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks: list[bpy.types.Object]) -> NextStep:
+    """Once the cameras stand: pick, refine, look at it."""
     if not picks:
         if len(sightings.seen_in(camera, places.trajectory(scene))):
             sentence = "The block is tracked. Propose its impacts, or click the block at each (step with ← →)."
@@ -49,13 +77,40 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         return NextStep(sentence, (PICK_TOOL,))
     found = proposal.read(scene)
     if found is not None:
-        return NextStep(
-            f"Refined: {found.before_px:.2f} px from the tracked pixels before, {found.after_px:.2f} px after. "
-            "The new flights are light blue in the free view; step 5 has the numbers.",
-            ("rockfall.apply_refinement", "rockfall.discard_refinement"),
-        )
-    if camera is not None and not proposal.is_applied(scene) and not proposal.lacking(scene):
+        return _on_proposal(found)
+    lacking = camera is None or proposal.lacking(scene)
+    refined = proposal.is_applied(scene)
+    worries = [*_grave(problems.remarks(scene)), *(() if lacking else _grave(tracks_off(scene)))]
+    if worries:
+        return NextStep(worries[0], (PICK_TOOL,) if lacking or refined else (PICK_TOOL, "rockfall.refine"))
+    if not lacking and not refined:
         sentence = "Look at each pick and correct it. Refine fits them all to the tracked pixels."
         return NextStep(sentence, (PICK_TOOL, "rockfall.refine"))
     sentence = "Play the fall; then models, simulation, film and tables: steps 6 to 10."
     return NextStep(sentence, ("screen.animation_play", "rockfall.export_tables"))
+
+
+def _on_proposal(found: proposal.Proposal) -> NextStep:
+    """What speaks against it comes before the numbers, and it is not offered first then."""
+    if found.stale:
+        sentence = "The picks were changed since they were refined: refine again."
+        return NextStep(sentence, ("rockfall.refine", "rockfall.discard_refinement"))
+    numbers = (
+        f"{found.before_px:.2f} px from the tracked pixels before, {found.after_px:.2f} px after. "
+        "The new flights are light blue in the free view; step 5 has the numbers."
+    )
+    decide = ("rockfall.apply_refinement", "rockfall.discard_refinement")
+    worries = _grave(found.remarks)
+    if worries:
+        return NextStep(f"{worries[0]} Otherwise: {numbers}", (PICK_TOOL, "rockfall.discard_refinement", decide[0]))
+    return NextStep(f"Refined: {numbers}", decide)
+
+
+def _grave(remarks: Iterable[Remark]) -> list[str]:
+    return [remark.text for remark in remarks if remark.severity in ("warning", "problem")]
+
+
+def tracks_off(scene: bpy.types.Scene) -> tuple[Remark, ...]:
+    """Where the block was tracked away from the motion of its picks."""
+    seen = proposal.seen_names(scene)
+    return tracks_off_the_motion(one for one in motion.motion_of(scene).courses if one.trajectory in seen)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, from_plain, from_text, gravest_first, to_plain, to_text
+from ...core.workflow.noticed import impossible_sizes
 from . import fingerprints, migration, picks, store, timing
 
 MOST = 6
@@ -36,7 +37,7 @@ def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[
     """Trajectory → what deserves a look in its reconstruction."""
     names = list(dict.fromkeys(result.picks.trajectory.tolist()))
     said: dict[str, list[Remark]] = {name: [] for name in names}
-    for remark in result.remarks:
+    for remark in (*result.remarks, *impossible_sizes(result)):
         said[remark.about].append(remark)
     impacts = result.impacts
     for i in np.flatnonzero(impacts.normal[:, 2] < BACKSIDE):

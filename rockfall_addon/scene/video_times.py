@@ -123,6 +123,19 @@ def reference_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return next((c for c in (videos.by_id(scene, one) for one in order) if c is not None), None)
 
 
+def never_synchronised(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """A video whose clock nobody has set: it begins with the reference, to the picture; None when there is none."""
+    reference = reference_camera(scene)
+    if reference is None:
+        return None
+    begin = clocks.clock_of(reference).to_common(float(videos.times_of(reference)[0]))
+    for camera in videos.cameras(scene):
+        own = clocks.clock_of(camera).to_common(float(videos.times_of(camera)[0]))
+        if camera != reference and store.SYNCHRONISED not in camera and own == begin:
+            return camera
+    return None
+
+
 def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[Remark]:
     """Set the clocks of all cameras that share events with the reference camera; returns remarks about the fit.
 

@@ -585,3 +585,25 @@ def test_derivative_of_a_turn_is_that_of_differences(turn: list[float]) -> None:
         ahead, behind = rotation_from_vector(w + delta), rotation_from_vector(w - delta)
         expected = vector_from_rotation(ahead @ behind.T) / (2 * step)
         np.testing.assert_allclose(_left_jacobian(w)[:, axis], expected, atol=1e-8)
+
+
+def test_a_missing_impact_is_said_before_everything_else():
+    views = [view()]
+    pixels = observe(views)
+    picks = marked()
+    without = make_picks(["a"] * 4, np.delete(picks.time_s, 2), np.delete(picks.position, 2, axis=0))
+    result = run(views, pixels, without)
+    first = result.remarks[0]
+    assert first.severity == "warning"
+    used = int(np.isfinite(result.residual_px[:, 0]).sum())
+    assert f"{result.outlier.sum()} of the {used} pixels of trajectory a" in first.text
+    assert "is an impact missing there?" in first.text
+    assert not any("do not fit" in remark.text for remark in run(views, pixels).remarks)
+
+
+def test_a_gravity_that_is_none_tells_by_how_much_lengths_are_off():
+    views = [view(50.0), view(-20.0)]
+    result = run(views, observe(views, gravity=9.81 / 2), free=("gravity",))  # as if all lengths were halved
+    (said,) = (remark.text for remark in result.remarks if remark.about == "gravity")
+    assert "2 times as large" in said
+    assert not any(r.about == "gravity" for r in run(views, observe(views, gravity=9.7), free=("gravity",)).remarks)

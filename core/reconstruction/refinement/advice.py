@@ -6,28 +6,41 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...constants import GRAVITY_MPS2
 from ...least_squares import inverse
 from ...remarks import Remark
-from ...vectors import Array, dot, norm, unit
+from ...vectors import Array, Mask, dot, norm, unit
 from ..triangulation import GRAZING_DEG
 from .deviations import Fit
 from .problem import CLOCK_COLUMN, NODE
 from .setup import Ground, Setup
 from .solver import normal_equations
-from .views import PixelObservations
+from .views import PixelObservations, View
 
 PULLED = 3.0
 """A time that moves by more standard deviations than this contradicts its pick."""
 HELD = 0.7
 """A time whose standard deviation stays above this part of the marked one rests on the mark for the most part."""
 CLOCK_SIGNIFICANCE = 6.0
+MANY = 0.1
+"""Outliers above this part of the pixels are more than slips of a tracker."""
+IN_A_ROW = 5
+"""Outliers one after the other: the motion between two picks is another one, as when an impact is missing."""
+MOST_TIMES = 3
+GRAVITY_OFF, GRAVITY_SIGNIFICANCE = 0.1, 5.0
+"""Fitted gravity that is off by more than this part, and by more than so many standard deviations, is no gravity."""
 
 
 def remarks_on(
-    ground: Ground, observations: PixelObservations, residual: Array, fits: Sequence[Fit]
+    ground: Ground,
+    views: Sequence[View],
+    observations: PixelObservations,
+    residual: Array,
+    outlier: Mask,
+    fits: Sequence[Fit],
 ) -> tuple[Remark, ...]:
-    """Remarks on solved problems; residual (m, 2) is NaN for pixels that were not used."""
-    remarks: list[Remark] = []
+    """Remarks on solved problems, what does not fit first; residual (m, 2) is NaN for pixels that were not used."""
+    remarks = [*_outliers(views, observations, residual, outlier), *_on_gravity(fits[0])]
     seen = set(observations.trajectory.tolist())
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
         if name not in seen:
@@ -50,6 +63,49 @@ def remarks_on(
             *_late_views(fit),
         ]
     return tuple(remarks)
+
+
+def _outliers(
+    views: Sequence[View], observations: PixelObservations, residual: Array, outlier: Mask
+) -> Iterator[Remark]:
+    """Trajectories of which many pixels do not fit, or several in a row."""
+    used = np.isfinite(residual[:, 0])
+    for name in dict.fromkeys(observations.trajectory.tolist()):
+        own = used & (observations.trajectory == name)
+        count = int((own & outlier).sum())
+        runs = []
+        for i, view in enumerate(views):
+            rows = np.flatnonzero(own & (observations.view == i))
+            rows = rows[np.argsort(observations.time_s[rows], kind="stable")]
+            edges = np.flatnonzero(np.diff(np.r_[False, outlier[rows], False].astype(np.int8)))
+            for begin, end in edges.reshape(-1, 2):
+                if end - begin >= IN_A_ROW:
+                    runs.append(np.sort(view.clock.to_common(observations.time_s[rows[[begin, end - 1]]])))
+        if not runs and count <= MANY * own.sum():
+            continue
+        text = f"{count} of the {int(own.sum())} pixels of trajectory {name} do not fit its motion"
+        if runs:
+            times = [f"{first:.2f} to {last:.2f} s" for first, last in sorted(map(tuple, runs))[:MOST_TIMES]]
+            text += f", all of those from {' and '.join(times)}: is an impact missing there? Pick it and refine again."
+        else:
+            text += ": look at the track and at the picks."
+        yield Remark(text, "warning", name)
+
+
+def _on_gravity(fit: Fit) -> Iterator[Remark]:
+    """A gravity that was fitted, and is none."""
+    column = fit.setup.problem.columns.law[1]
+    if column < 0:
+        return
+    found, sigma = fit.solution.state.gravity, float(np.sqrt(fit.covariance[column, column]))
+    off = abs(found - GRAVITY_MPS2)
+    if found > 0 and off > GRAVITY_OFF * GRAVITY_MPS2 and off > GRAVITY_SIGNIFICANCE * sigma:
+        text = (
+            f"The flights have a gravity of {found:.3g} ± {sigma:.1g} m/s² instead of {GRAVITY_MPS2:g}: lengths should "
+            f"be {GRAVITY_MPS2 / found:.3g} times as large (check the unit of the terrain), or times "
+            f"{np.sqrt(found / GRAVITY_MPS2):.3g} times as long (check the capture rate of the video)."
+        )
+        yield Remark(text, "warning", "gravity")
 
 
 def _on_the_search(fit: Fit) -> Iterator[Remark]:

@@ -122,7 +122,7 @@ def summarise(
         unknowns=_unknowns(views, fits[0]),
         iterations=max(fit.solution.iterations for fit in fits),
         converged=all(fit.solution.settled for fit in fits),
-        remarks=remarks_on(ground, observations, residual, fits),
+        remarks=remarks_on(ground, views, observations, residual, outlier, fits),
     )
 
 

@@ -32,7 +32,9 @@ class ROCKFALL_OT_refine(bpy.types.Operator):
             names = [places.trajectory(scene) if obj is None else obj[store.TRAJECTORY]]
         fitting.propose(scene, names, sorted(settings.free))
         found = proposal.read(scene)
-        self.report({"INFO"}, f"{found.before_px:.2f} px before, {found.after_px:.2f} px after.")
+        worries = [remark.text for remark in found.remarks if remark.severity in ("warning", "problem")]
+        numbers = f"{found.before_px:.2f} px before, {found.after_px:.2f} px after."
+        self.report({"WARNING" if worries else "INFO"}, " ".join([*worries[:1], numbers]))
         return {"FINISHED"}
 
 
@@ -51,6 +53,12 @@ class ROCKFALL_OT_apply_refinement(_OfProposal, bpy.types.Operator):
 
     bl_idname = "rockfall.apply_refinement"
     bl_label = "Apply Refinement"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        found = proposal.read(context.scene)
+        said = "Refine first" if found is None else "The picks were changed since: refine again"
+        return possible(cls, found is not None and not found.stale, said)
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -47,6 +47,8 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
     box = layout.box()
     if found.stale:
         paragraph(context, box, "The picks were changed since: refine again.", "ERROR")
+    grave = [remark for remark in found.remarks if remark.severity in ("warning", "problem")]
+    show_remarks(context, box, grave)
     for texts in (("", "Before", "After"), ("Residual", f"{found.before_px:.2f} px", f"{found.after_px:.2f} px")):
         row = box.row()
         for text in texts:
@@ -67,7 +69,7 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
         row.label(text=f"{change.later_ms:+.0f} ± {change.sigma_ms:.0f}")
     if len(found.changes) > MOST_ROWS:
         column.label(text=f"… and {len(found.changes) - MOST_ROWS} more")
-    show_remarks(context, box, found.remarks)
+    show_remarks(context, box, [remark for remark in found.remarks if remark not in grave])
     paragraph(context, box, "The proposed flights are drawn in light blue.")
     row = box.row(align=True)
     row.operator("rockfall.apply_refinement", text="Apply", icon="CHECKMARK")

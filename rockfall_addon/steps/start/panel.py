@@ -15,6 +15,8 @@ LOOKS = {
     "rockfall.open_project": ("", "FILE_FOLDER"),
     "rockfall.add_video": ("", "FILE_MOVIE"),
     "rockfall.import_picks": ("", "IMPORT"),
+    "rockfall.mark_event": ("", "MARKER"),
+    "rockfall.synchronise_videos": ("", "UV_SYNC_SELECT"),
     "rockfall.align_views": ("", "SPLIT_VERTICAL"),
     "rockfall.propose_impacts": ("", "OUTLINER_OB_LIGHTPROBE"),
     "rockfall.apply_refinement": ("Apply", "CHECKMARK"),

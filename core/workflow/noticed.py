@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What somebody who looks over one's shoulder would notice: tracks off the motion, sizes that cannot be."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from ..analysis.motion_graphs import MotionCourse, VideoResiduals
+from ..constants import GRAVITY_MPS2
+from ..reconstruction.block import per_pick
+from ..reconstruction.trajectory import Reconstruction
+from ..remarks import Remark
+from ..vectors import norm
+
+OFF_PX = 10.0
+"""A track further than this from the motion is not explained by the click of a pick."""
+IN_A_ROW = 4
+"""Pictures one after the other: fewer may be a slip of the tracker."""
+LARGEST_GAIN = 3.0
+"""Times the energy of a fall from the first pick: beyond it not even badly timed picks explain the speed."""
+FASTEST_MPS = 150.0
+"""No rockfall is this fast: that of a fall of 1 100 m in a vacuum."""
+FEWEST_FLIGHTS = 3
+
+
+def tracks_off_the_motion(courses: Iterable[MotionCourse]) -> tuple[Remark, ...]:
+    """A warning for each track that leaves the computed motion for several pictures, about its trajectory."""
+    return tuple(
+        remark for course in courses for residuals in course.residuals for remark in _off(course.trajectory, residuals)
+    )
+
+
+def impossible_sizes(reconstruction: Reconstruction) -> tuple[Remark, ...]:
+    """A warning for each trajectory whose lengths, times and block cannot belong together.
+
+    Notes
+    -----
+    A fall of the height h gives 2 g h to the square of a speed, and no more. The block is held against the distances
+    between impacts.
+    """
+    flights, picks = reconstruction.flights, reconstruction.picks
+    diameter = per_pick(picks, reconstruction.block, lambda one: one.diameter_m)
+    remarks = []
+    for name in dict.fromkeys(flights.trajectory.tolist()):
+        own = np.flatnonzero((flights.trajectory == name) & (flights.kind == "flight"))
+        if own.size < FEWEST_FLIGHTS:
+            continue
+        hop = float(np.median(norm(flights.end_position[own] - flights.start_position[own])))
+        size = float(diameter[flights.first_pick[own[0]]])
+        if size > hop:
+            text = (
+                f"Trajectory {name}: its block ({size:.3g} m) is larger than the usual distance between its impacts "
+                f"({hop:.3g} m). Check the block's diameter and the unit of the terrain."
+            )
+            remarks.append(Remark(text, "warning", name))
+            continue
+        first, later = own[0], norm(flights.end_velocity[own[1:]])
+        drop = flights.start_position[first, 2] - flights.end_position[own[1:], 2]
+        most = norm(flights.start_velocity[first]) ** 2 + 2 * GRAVITY_MPS2 * np.maximum(drop, 0.0)
+        gain, speed = float(np.median(later**2 / np.maximum(most, 1e-12))), float(np.median(later))
+        if gain > LARGEST_GAIN or speed > FASTEST_MPS:
+            why = f"{gain:.0f} times the energy of a fall from its first pick" if gain > LARGEST_GAIN else "no rockfall"
+            text = (
+                f"Trajectory {name}: its speeds (typically {speed:.3g} m/s) are those of {why}. "
+                "Check the unit of the terrain, and the capture rate of the video."
+            )
+            remarks.append(Remark(text, "warning", name))
+    return tuple(remarks)
+
+
+def _off(name: str, residuals: VideoResiduals) -> Iterator[Remark]:
+    distance = residuals.distance_px
+    known = np.flatnonzero(np.isfinite(distance))
+    off = distance[known] > OFF_PX
+    edges = np.flatnonzero(np.diff(np.r_[False, off, False].astype(np.int8)))
+    runs = [known[begin:end] for begin, end in edges.reshape(-1, 2) if end - begin >= IN_A_ROW]
+    if not runs:
+        return
+    worst = max(runs, key=lambda run: float(distance[run].max()))
+    at = worst[int(np.argmax(distance[worst]))]
+    text = (
+        f"{name}: the track in {residuals.video} lies up to {distance[at]:.0f} px off the flights, at "
+        f"{residuals.time_s[at]:.2f} s. Pick the impact that is missing there, or correct the picks beside it."
+    )
+    yield Remark(text, "warning", name)

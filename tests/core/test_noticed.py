@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is noticed without being asked: a track off the motion, sizes that cannot be."""
+
+import numpy as np
+import pytest
+from rockfall.core.analysis.motion_graphs import MotionCourse, VideoResiduals
+from rockfall.core.reconstruction.block import Block
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.workflow.noticed import impossible_sizes, tracks_off_the_motion
+
+
+def course(offset_px):
+    time = np.arange(len(offset_px)) / 30
+    offset = np.c_[np.asarray(offset_px, float), np.zeros(len(offset_px))]
+    nothing = np.empty(0)
+    residuals = VideoResiduals("left", time, time + 2, offset, offset)
+    return MotionCourse("a", nothing, nothing, {}, nothing, nothing, nothing, (residuals,))
+
+
+def test_a_flight_through_two_is_off_where_the_impact_is_missing():
+    # two parabolas of 0.5 s, 1.63 m high each, seen at 30 px/m, and the one flight through their ends
+    time = np.arange(30) / 30
+    true = 0.5 * 9.81 * (time % 0.5) * (0.5 - time % 0.5)
+    single = 0.5 * 9.81 * time * (1 - time)
+    (remark,) = tracks_off_the_motion([course(30 * (true - single))])
+    assert "37 px off the flights, at 2.50 s" in remark.text  # ½ g 0.5² · 30 px/m, where both halves meet
+    assert remark.severity == "warning"
+
+
+@pytest.mark.parametrize("offset", [[9.0] * 20, [0, 0, 60, 60, 0, 0, 0, 60], [np.nan] * 10])
+def test_noise_slips_and_unknown_places_are_not_told(offset):
+    assert tracks_off_the_motion([course(offset)]) == ()
+
+
+def fall(scale=1.0, slower=1.0):
+    """A block that gains 5 m/s in each second on its way down a slope of 45°, picked every half second."""
+    time = 0.5 * np.arange(9)
+    down = 0.5 * 5.0 * time**2 / np.sqrt(2)
+    return make_picks(["a"] * 9, slower * time, scale * np.c_[down, np.zeros(9), -down])
+
+
+def test_a_real_fall_has_nothing_to_be_noticed():
+    assert impossible_sizes(reconstruct(fall(), block=Block(0.5, 0.5, 0.5))) == ()
+
+
+@pytest.mark.parametrize("wrong", [{"scale": 100.0}, {"slower": 0.2}, {"scale": 20.0, "slower": 1.0}])
+def test_a_wrong_unit_and_a_wrong_rate_give_speeds_that_cannot_be(wrong):
+    (remark,) = impossible_sizes(reconstruct(fall(**wrong), block=Block(0.5, 0.5, 0.5)))
+    assert "Check the unit of the terrain, and the capture rate" in remark.text
+
+
+def test_speeds_of_no_rockfall_are_told_when_the_first_flight_has_them_too():
+    time = 0.2 * np.arange(5)
+    picks = make_picks(["a"] * 5, time, np.c_[600 * time, np.zeros(5), -600 * time])
+    (remark,) = impossible_sizes(reconstruct(picks, block=Block(0.5, 0.5, 0.5)))
+    assert "no rockfall" in remark.text
+
+
+def test_a_block_larger_than_its_flights_is_told():
+    (remark,) = impossible_sizes(reconstruct(fall(), block=Block(50.0, 50.0, 50.0)))
+    assert "block (50 m) is larger" in remark.text

@@ -6,11 +6,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ..analysis.motion_graphs import MotionCourse, VideoResiduals
+from ..camera.model import Camera
 from ..constants import GRAVITY_MPS2
+from ..footage.background import BackgroundMotion, stabilise
 from ..reconstruction.block import per_pick
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
-from ..vectors import norm
+from ..vectors import Array, norm
 
 OFF_PX = 10.0
 """A track further than this from the motion is not explained by the click of a pick."""
@@ -21,6 +23,8 @@ LARGEST_GAIN = 3.0
 FASTEST_MPS = 150.0
 """No rockfall is this fast: that of a fall of 1 100 m in a vacuum."""
 FEWEST_FLIGHTS = 3
+TREMBLE_PX = 2.0
+"""A background that moves further than this is not that of a tripod in the wind."""
 
 
 def tracks_off_the_motion(courses: Iterable[MotionCourse]) -> tuple[Remark, ...]:
@@ -28,6 +32,23 @@ def tracks_off_the_motion(courses: Iterable[MotionCourse]) -> tuple[Remark, ...]
     return tuple(
         remark for course in courses for residuals in course.residuals for remark in _off(course.trajectory, residuals)
     )
+
+
+def turn_deg(motion: BackgroundMotion, camera: Camera) -> float:
+    """Largest angle by which the middle of the picture turns away from that of the reference frame [°]."""
+    shift = _shift(motion, camera)
+    return float(np.degrees(np.arctan(norm(shift / (camera.fx, camera.fy)).max())))
+
+
+def no_tripod(motion: BackgroundMotion, camera: Camera, video: str) -> tuple[Remark, ...]:
+    """A warning on a camera that is taken for a tripod, and whose background moves."""
+    if motion.still or norm(_shift(motion, camera)).max() <= TREMBLE_PX:
+        return ()
+    text = (
+        f"The background of {video} moves by {turn_deg(motion, camera):.1f}°, but its camera counts as a tripod: "
+        "choose Hand-held in step 3 and follow the background."
+    )
+    return (Remark(text, "warning", "background"),)
 
 
 def impossible_sizes(reconstruction: Reconstruction) -> tuple[Remark, ...]:
@@ -66,6 +87,12 @@ def impossible_sizes(reconstruction: Reconstruction) -> tuple[Remark, ...]:
             )
             remarks.append(Remark(text, "warning", name))
     return tuple(remarks)
+
+
+def _shift(motion: BackgroundMotion, camera: Camera) -> Array:
+    """(f, 2) of the middle of the picture from its place in the reference frame [px]."""
+    middle = np.tile([camera.width / 2, camera.height / 2], (len(motion.frames), 1))
+    return stabilise(motion, motion.frames, middle) - middle
 
 
 def _off(name: str, residuals: VideoResiduals) -> Iterator[Remark]:

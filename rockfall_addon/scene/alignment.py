@@ -10,9 +10,11 @@ import numpy as np
 
 from ...core.camera.model import full_frame_mm, pinhole
 from ...core.camera.resection.problem import needed_pairs
-from ...core.remarks import Remark, from_plain, to_plain
+from ...core.footage.background import BackgroundMotion
+from ...core.remarks import Remark, from_plain, from_text, to_plain, to_text
 from ...core.vectors import Array
 from ...core.workflow.alignment import counting_pairs, reference_frame
+from ...core.workflow.noticed import no_tripod
 from . import camera_paths, georeference, store, terrain, videos
 from .pairs import POINT, complete_of, open_pair, pairs_of, table
 
@@ -74,6 +76,17 @@ def placement(camera: bpy.types.Object) -> str:
 def moves(camera: bpy.types.Object) -> bool:
     """Whether the camera has a pose for each frame, or is to get one."""
     return camera.rockfall_alignment.motion != "FIXED"
+
+
+def keep_background(camera: bpy.types.Object, motion: BackgroundMotion) -> None:
+    """Remember whether the background of a video says that its camera is no tripod."""
+    camera[store.BACKGROUND] = to_text(no_tripod(motion, camera_paths.camera_path(camera).reference, camera.name))
+
+
+def background_remarks(camera: bpy.types.Object) -> tuple[Remark, ...]:
+    """What the background says against the camera that was chosen, as far as the video was looked through."""
+    said = () if moves(camera) else from_text(str(camera.get(store.BACKGROUND, "")), "warning")
+    return said if said and camera_paths.camera_path(camera).is_fixed else ()
 
 
 def free_of(camera: bpy.types.Object) -> tuple[str, ...]:

@@ -64,6 +64,9 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
             "each (step 2), and synchronise."
         )
         return NextStep(sentence, ("rockfall.mark_event", "rockfall.synchronise_videos"))
+    for one in videos.cameras(scene):
+        for remark in alignment.background_remarks(one):
+            return NextStep(remark.text, ("rockfall.align_views",))
     return _with_cameras(scene, camera, picks)
 
 

@@ -397,3 +397,13 @@ def test_the_block_is_tracked(site, part) -> None:
     assert np.median(off) < 2.5, "its sunny side is 1 to 2 px from its centre"
     assert seen.frame.min() >= 45
     assert seen.frame.max() <= 75
+    alignment, paths = (part(f"rockfall_addon.scene.{name}") for name in ("alignment", "camera_paths"))
+    assert alignment.background_remarks(camera) == (), "the camera is known to move"
+    held, truth = part("core.camera.path"), paths.camera_path(camera)
+    camera.rockfall_alignment.motion = "FIXED"
+    paths.set_camera_path(site, camera, held.fixed(truth.reference), rmse_px=1.0)
+    (said,) = alignment.background_remarks(camera)
+    relative = truth.rotation[(truth.time_s > 44.5 / 30) & (truth.time_s < 75.5 / 30)]
+    turned = np.degrees(np.arccos((np.einsum("nij,ij->n", relative, relative[0]) - 1) / 2)).max()
+    assert float(said.text.split(" by ")[1].split("°")[0]) == pytest.approx(turned, abs=0.5), "as the demo was filmed"
+    assert part("rockfall_addon.scene.next_step").next_step(site).sentence == said.text

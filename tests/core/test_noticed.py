@@ -4,10 +4,12 @@
 import numpy as np
 import pytest
 from rockfall.core.analysis.motion_graphs import MotionCourse, VideoResiduals
+from rockfall.core.camera.model import Camera
+from rockfall.core.footage.background import BackgroundMotion, no_motion
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
-from rockfall.core.workflow.noticed import impossible_sizes, tracks_off_the_motion
+from rockfall.core.workflow.noticed import impossible_sizes, no_tripod, tracks_off_the_motion, turn_deg
 
 
 def course(offset_px):
@@ -60,3 +62,19 @@ def test_speeds_of_no_rockfall_are_told_when_the_first_flight_has_them_too():
 def test_a_block_larger_than_its_flights_is_told():
     (remark,) = impossible_sizes(reconstruct(fall(), block=Block(50.0, 50.0, 50.0)))
     assert "block (50 m) is larger" in remark.text
+
+
+@pytest.mark.parametrize(("turn", "told"), [(13.6, True), (0.01, False)])
+def test_a_background_that_turns_is_no_tripod(turn, told):
+    camera = Camera(1920, 1080, 1600.0, 1600.0, 960.0, 540.0)
+    matrix = np.array([[1600.0, 0, 960], [0, 1600, 540], [0, 0, 1]])
+    a = np.radians([0.0, turn / 2, turn])
+    turned = np.array([[[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]] for b in a])
+    motion = BackgroundMotion(
+        np.arange(3), matrix @ turned @ np.linalg.inv(matrix), np.full(3, 50), np.zeros(3), still=False
+    )
+    assert turn_deg(motion, camera) == pytest.approx(turn)
+    said = no_tripod(motion, camera, "left")
+    assert len(said) == told
+    assert all("moves by 13.6°" in remark.text for remark in said)
+    assert no_tripod(no_motion(0, 2), camera, "left") == ()

@@ -171,6 +171,7 @@ class ROCKFALL_PT_alignment_motion(RockfallPanel, bpy.types.Panel):
         layout.row(align=True).prop(settings, "motion", expand=True)
         if settings.motion == "FIXED":
             paragraph(context, layout, "One pose for all frames. If the picture moves, choose Hand-held.", "INFO")
+            show_remarks(context, layout, alignment.background_remarks(camera))
             return
         known = following.followed(camera)
         if known is None:

@@ -4,9 +4,10 @@
 import bpy
 
 from ....core.errors import RockfallError
+from ....core.footage.background import BackgroundMotion, background_motion
 from ....core.footage.tracking import BlockTrack, track_block
 from ....core.progress import Progress
-from ...scene import clocks, places, sightings, store, video_files, videos
+from ...scene import alignment, camera_paths, clocks, places, sightings, store, video_files, videos
 from ...scene.trajectories import flights_of
 from ...view import job, look
 from ...view.of_video import has_video
@@ -42,14 +43,19 @@ class ROCKFALL_OT_track_block(job.InBackground, bpy.types.Operator):
                 raise RockfallError("No click or pick is within these pictures. Go to one, or follow the whole video.")
         frame, u, v = clicks[0]
 
-        def compute(progress: Progress) -> BlockTrack:
-            return track_block(video, frame, (u, v), clicks=clicks[1:], first=first, last=last, progress=progress)
+        def compute(progress: Progress) -> tuple[BlockTrack, BackgroundMotion]:
+            motion, _ = background_motion(video, first=first, last=last, progress=progress)
+            more = {"clicks": clicks[1:], "background": motion, "first": first, "last": last}
+            return track_block(video, frame, (u, v), **more, progress=progress), motion
 
-        def keep(scene: bpy.types.Scene, track: BlockTrack) -> str:
+        def keep(scene: bpy.types.Scene, found: tuple[BlockTrack, BackgroundMotion]) -> str:
+            track, motion = found
             there = videos.by_id(scene, identifier)
             if there is None:
                 raise RockfallError("The camera was deleted while its video was tracked: the track is not kept.")
             sightings.keep_track(there, name, track)
+            if camera_paths.is_solved(there):
+                alignment.keep_background(there, motion)
             frames = f"{track.frame.size} pictures, {track.frame[0]} to {track.frame[-1]}"
             return f"{name} is followed through {frames}. After: {track.stopped[1]}."
 

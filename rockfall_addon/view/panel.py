@@ -83,6 +83,25 @@ def show_remarks(context: bpy.types.Context, layout: bpy.types.UILayout, remarks
         paragraph(context, layout, remark.text, "ERROR" if remark.severity in ("warning", "problem") else "INFO")
 
 
+def fields(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, names: Iterable[str]) -> None:
+    """Properties below one another, half of the width for each name: Blender's own split cuts the longer ones off."""
+    for name in names:
+        of = owner.bl_rna.properties[name]
+        if of.type == "BOOLEAN":
+            field(layout, "").prop(owner, name)
+        else:
+            field(layout, of.name).prop(owner, name, text="")
+
+
+def field(layout: bpy.types.UILayout, name: str) -> bpy.types.UILayout:
+    """A row for what belongs to a name, which is to the left of it."""
+    row = layout.split(factor=0.45)
+    before = row.row()
+    before.alignment = "RIGHT"
+    before.label(text=name)
+    return row.row(align=True)
+
+
 def facts(layout: bpy.types.UILayout, rows: list[tuple[str, str]]) -> None:
     """A small table: names to the left, values to the right."""
     column = layout.column(align=True)

@@ -7,7 +7,7 @@ import bpy
 
 from ...scene import store
 from ...view import impact_words
-from ...view.panel import RockfallPanel, facts, paragraph
+from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 
 NUMBERS = (  # what is shown, key of the result, key of its standard deviation, unit, digits
     ("Incident speed", "incident_mps", "sigma_speed1", " m/s", 2),
@@ -56,11 +56,9 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
 
 def _draw_editable(layout: bpy.types.UILayout, editable: bpy.types.PropertyGroup) -> None:
     column = layout.column(align=True)
-    column.use_property_split, column.use_property_decorate = True, False
-    for name in ("kind", "status", "confidence", "note"):
-        column.prop(editable, name)
-    row = column.row(align=True)
-    row.prop(editable, "time_s")
+    fields(column, editable, ("kind", "status", "confidence", "note"))
+    row = field(column, editable.bl_rna.properties["time_s"].name)
+    row.prop(editable, "time_s", text="")
     for frames, icon in ((-0.1, "TRIA_LEFT"), (0.1, "TRIA_RIGHT")):
         row.operator("rockfall.nudge_pick_time", text="", icon=icon).frames = frames
 

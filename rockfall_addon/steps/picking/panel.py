@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import camera_paths, places, problems, sightings, store, videos
 from ...view import job, pointing
-from ...view.panel import RockfallPanel, State, advise, paragraph, show_remarks
+from ...view.panel import RockfallPanel, State, advise, fields, paragraph, show_remarks
 from . import editing
 
 
@@ -32,11 +32,8 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
         show_remarks(context, layout, problems.remarks(scene))
         runs = "trajectory" if len(flights) == 1 else "trajectories"
         advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
-        layout.use_property_split = True
-        settings = scene.rockfall
-        column = layout.column(align=True)
-        for name in ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag", "flights_join"):
-            column.prop(settings, name)
+        names = ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag", "flights_join")
+        fields(layout.column(align=True), scene.rockfall, names)
         layout.operator("rockfall.reconstruct", icon="FILE_REFRESH")
 
 
@@ -50,11 +47,7 @@ class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
         settings, camera = scene.rockfall_picking, videos.active_camera(scene)
         layout.operator("wm.tool_set_by_id", text="Pick Impacts", icon="CURSOR").name = "rockfall.pick_tool"
         advise(context, layout, *_advice(scene, camera))
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
-        column.prop(settings, "trajectory", icon="OUTLINER_OB_CURVE")
-        for name in ("kind", "aim", "sigma_px"):
-            column.prop(settings, name)
+        fields(layout.column(), settings, ("trajectory", "kind", "aim", "sigma_px"))
         pick = pointing.active_pick(context)
         if pick is not None:
             warning = editing.grazing_warning(pick)

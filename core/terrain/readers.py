@@ -18,6 +18,7 @@ from . import advice, cleaning, clouds, geotiff, gltf, grids, meshes, ply, trian
 from .cloud import Cloud
 from .crs import surely_different
 from .ground_filter import filter_ground
+from .overhangs import find_overhangs
 from .source import Source
 from .surface import Surface
 
@@ -215,6 +216,8 @@ def _surface(opened: _Opened, max_edge_m: float | None, progress: Progress) -> S
         meshed = triangulation.mesh_grid(source.points, source.grid_shape)
     elif source.faces is None:
         meshed = triangulation.mesh_cloud(source.points, max_edge_m)
+        overhangs = find_overhangs(source.points)
+        before = before if overhangs is None else (overhangs.sentence(shift), *before)
     else:
         meshed = triangulation.Meshed(source.points, source.faces, ())
     kind = source.kind

@@ -61,7 +61,7 @@ def measure_spin(
 
     Raises
     ------
-    InputError : fewer than two marks, two at one time, or a standard deviation that is not one.
+    InputError : fewer than two marks, all at one time, or a standard deviation that is not one.
 
     Notes
     -----
@@ -70,7 +70,7 @@ def measure_spin(
     time, turn = np.asarray(time_s, dtype=np.float64).reshape(-1), np.asarray(turns, dtype=np.float64).reshape(-1)
     if time.size < 2 or turn.size != time.size:
         raise InputError("Spin needs two marks or more of the same side", advice="Mark the side when it shows again")
-    if not (np.isfinite(time).all() and np.isfinite(turn).all() and np.unique(time).size == time.size):
+    if not (np.isfinite(time).all() and np.isfinite(turn).all() and np.ptp(time) > 0):
         raise InputError("The marks of the spin are at one time, or not numbers", advice="Mark each in its own frame")
     sigma_t = np.broadcast_to(np.asarray(sigma_time_s, dtype=np.float64), time.shape)
     sigma_n = np.broadcast_to(np.asarray(sigma_turns, dtype=np.float64), time.shape)

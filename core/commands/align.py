@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..vectors import Array, Mask, norm
 from .options import (
     add_out,
+    add_terrain_files,
     add_terrain_options,
     known_names,
     naming,
@@ -62,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     moving.add_argument(
         "--frames", type=whole, nargs=2, metavar=("FIRST", "LAST"), help="of the video to follow (default all)"
     )
-    moving.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; the points are checked against it")
+    add_terrain_files(moving, "mesh, grid or cloud; the points are checked against it")
     errors = parser.add_argument_group("errors of the pairs")
     errors.add_argument(
         "--sigma-px",

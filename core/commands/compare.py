@@ -14,6 +14,7 @@ from .options import (
     add_observed_option,
     add_out,
     add_parameter_options,
+    add_terrain_files,
     add_terrain_options,
     figure_formats,
     measured_as_asked,
@@ -52,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
         "predicted flights: the blocks that leave each impact as a model says, and where they land"
     )
-    group.add_argument("--terrain", metavar="FILE", help="the terrain on which they land → predicted_flights.csv")
+    add_terrain_files(group, "the terrain on which they land → predicted_flights.csv")
     group.add_argument(
         "--gravity", type=not_negative, default=GRAVITY_MPS2, metavar="G", help="[m/s²] (default %(default)s)"
     )

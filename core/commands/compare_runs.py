@@ -15,12 +15,14 @@ from .options import (
     add_motion_options,
     add_out,
     add_parameter_options,
+    add_terrain_files,
     add_terrain_options,
     figure_formats,
     model_parameters,
     models_as_asked,
     positive,
     terrain_as_asked,
+    terrain_inputs,
     whole,
 )
 from .progress import PrintedProgress, stopped_by_interrupt
@@ -48,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stops", metavar="FILE", help="where blocks stopped, without footage: release, x_m, y_m (z_m)"
     )
-    parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; a project names its own")
+    add_terrain_files(parser, "mesh, grid or cloud; a project names its own")
     add_model_option(parser, "models to simulate with (default: the project's, else the six of Noël et al. 2018)")
     add_parameter_options(parser)
     parser.add_argument(
@@ -138,7 +140,7 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
     from ..workflow.simulation import ground_of
 
     for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density", "--zone-attribute"):
-        if getattr(arguments, option.strip("-").replace("-", "_")) is not None:
+        if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, []):
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
     file = Path(arguments.table)
     project = read_project(file)
@@ -203,7 +205,7 @@ def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case
         seed=arguments.seed or 0,
         **given,
     )
-    inputs = {"observed": Path(arguments.table), "terrain": Path(arguments.terrain), **zone_files}
+    inputs = {"observed": Path(arguments.table), **terrain_inputs(arguments.terrain), **zone_files}
     drawing = [model.name for model in models if model.draws_from_impacts]
     ground = ground_of(scenario)
     if arguments.stops:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..exchange.database import Database
     from ..impact_models.machinery.measured import MeasuredRebounds
     from ..progress import Progress
+    from ..terrain.opening import HowToRead
     from ..terrain.surface import Surface
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
@@ -112,6 +113,23 @@ def add_motion_options(group: "argparse._ArgumentGroup") -> None:
     group.add_argument("--friction", type=not_negative, metavar="MU", help="of either (default 0.5)")
 
 
+def add_terrain_files(group: "argparse._ActionsContainer", text: str) -> None:
+    """``--terrain FILE …``: several files after one another, or the option again."""
+    group.add_argument(
+        "--terrain",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help=f"{text}; several tiles become one terrain",
+    )
+
+
+def terrain_inputs(files: Sequence[str]) -> dict[str, Path]:
+    """The files of a terrain by the names that they have in a summary: numbered when they are several."""
+    return {f"terrain {i}" if len(files) > 1 else "terrain": Path(file) for i, file in enumerate(files, start=1)}
+
+
 def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     """How to read a terrain file."""
     group = parser.add_argument_group("reading the terrain")
@@ -149,27 +167,23 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
 
 
-def terrain_as_asked(arguments: argparse.Namespace, file: str, progress: "Progress") -> "Surface":
-    """Read a terrain with the options of `add_terrain_options`.
+def terrain_as_asked(arguments: argparse.Namespace, files: Sequence[str], progress: "Progress") -> "Surface":
+    """Read a terrain, of one file or several, with the options of `add_terrain_options`.
 
     Raises
     ------
-    InputError : see `read_terrain`.
+    InputError : see `read_tiles`.
     """
-    from ..terrain.readers import read_terrain
+    from ..terrain.readers import read_tiles
 
-    progress(f"Reading {file}", 0, 0)
-    return read_terrain(file, max_edge_m=arguments.max_edge, progress=progress, **reading_as_asked(arguments))
+    return read_tiles(files, reading_as_asked(arguments), max_edge_m=arguments.max_edge, progress=progress)
 
 
-def reading_as_asked(arguments: argparse.Namespace) -> dict[str, Any]:
+def reading_as_asked(arguments: argparse.Namespace) -> "HowToRead":
     """What the options of `add_terrain_options` say of any file, for the readers."""
-    return {
-        "up": arguments.up,
-        "unit_m": arguments.unit,
-        "ground_only": arguments.ground_only,
-        "ground_filter_m": arguments.ground_filter,
-    }
+    from ..terrain.opening import HowToRead
+
+    return HowToRead(arguments.up, arguments.unit, arguments.ground_only, arguments.ground_filter)
 
 
 def add_incident_options(parser: argparse.ArgumentParser) -> None:

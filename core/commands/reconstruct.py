@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..reconstruction.sampling import STEP_S
-from .options import add_out, add_terrain_options, naming, not_negative, positive, terrain_as_asked
+from .options import add_out, add_terrain_files, add_terrain_options, naming, not_negative, positive, terrain_as_asked
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("picks", metavar="PICKS", help="picks.csv")
     add_out(parser)
-    parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; not needed with nx, ny, nz")
+    add_terrain_files(parser, "mesh, grid or cloud; not needed with nx, ny, nz")
     parser.add_argument(
         "--normal-radius",
         type=positive,

@@ -108,8 +108,11 @@ def releases_as_asked(arguments: argparse.Namespace) -> "tuple[ReleaseSource, di
 
     given = sources_given(arguments)
     if not given:
+        several = len(arguments.terrain) > 1
         raise InputError(
-            "Nothing says where blocks start", advice=f"Give a table of releases, or {', '.join(SOURCES[1:])}"
+            "Nothing says where blocks start",
+            advice=("Write the table of releases before --terrain" if several else "Give a table of releases")
+            + f", or give {', '.join(SOURCES[1:])}",
         )
     if len(given) > 1 and given != ["--from-polygon", "--steeper-than"]:
         raise InputError(f"{' and '.join(given)} both say where blocks start", advice="Give one of them")
@@ -162,7 +165,7 @@ def zones_as_asked(
         return None, {}
     zones = open_zones(
         arguments.zones, arguments.zone_attribute or "", terrain, models,
-        terrain_file=arguments.terrain or "", up=arguments.up, unit_m=arguments.unit,
+        terrain_files=arguments.terrain, up=arguments.up, unit_m=arguments.unit,
     )  # fmt: skip
     return zones, {"zones": Path(arguments.zones)}
 

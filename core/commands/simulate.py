@@ -2,7 +2,7 @@
 """``rockfall simulate``: blocks that fall down the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv."""
 
 import argparse
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,6 +14,7 @@ from .options import (
     add_observed_option,
     add_out,
     add_parameter_options,
+    add_terrain_files,
     add_terrain_options,
     known_names,
     measured_as_asked,
@@ -22,6 +23,7 @@ from .options import (
     positive,
     reading_as_asked,
     terrain_as_asked,
+    terrain_inputs,
     whole,
     whole_range,
 )
@@ -52,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "one of the sources below",
     )
     add_out(parser)
-    parser.add_argument("--terrain", metavar="FILE", help="mesh, grid or cloud; a project names its own")
+    add_terrain_files(parser, "mesh, grid or cloud; a project names its own")
     add_model_option(parser, "impact models, each of which gets the same blocks")
     add_parameter_options(parser)
     add_observed_option(parser, "needed by that model; a project can give its own")
@@ -138,7 +140,7 @@ class _Asked(NamedTuple):
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
     """What the options say."""
     from ..reconstruction.drag import Drag
-    from ..terrain.readers import read_points, read_structure
+    from ..terrain.readers import read_structure, read_tile_points
     from ..workflow.simulation import Scenario
 
     for option in ("terrain", "model"):
@@ -160,7 +162,7 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
     if arguments.contact == "points":
         if arguments.max_edge is not None:
             raise InputError("--max-edge is of a mesh, and --contact points makes none", advice="Leave out one of them")
-        terrain: Surface | Cloud = read_points(arguments.terrain, progress=progress, **reading)
+        terrain: Surface | Cloud = read_tile_points(arguments.terrain, reading, progress=progress)
     else:
         terrain = terrain_as_asked(arguments, arguments.terrain, progress)
     zones, zone_files = zones_as_asked(arguments, terrain, models)
@@ -169,12 +171,12 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
         source,
         {name: parameters.get(name, {}) for name in models},
         measured,
-        structures={name: read_structure(file, progress=progress, **reading) for name, file in files.items()},
+        structures={name: read_structure(file, progress=progress, **asdict(reading)) for name, file in files.items()},
         zones=zones,
         drag=Drag() if arguments.drag else None,
         **given,
     )
-    inputs = {**release_files, **zone_files, "terrain": Path(arguments.terrain)}
+    inputs = {**release_files, **zone_files, **terrain_inputs(arguments.terrain)}
     if measured is not None:
         inputs["observed"] = Path(arguments.observed)
     return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()})

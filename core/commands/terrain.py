@@ -4,8 +4,6 @@
 import argparse
 from pathlib import Path
 
-import numpy as np
-
 from ..errors import DependencyError
 from .options import add_out, add_terrain_options, terrain_as_asked
 from .progress import PrintedProgress
@@ -24,30 +22,23 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, mesh where needed, join tiles, write a binary PLY in survey coordinates, and picture it with Blender."""
     from ..output import output_folder
     from ..terrain.cloud import Cloud
-    from ..terrain.joining import join
     from ..terrain.writers import write_ply
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        tiles = [terrain_as_asked(arguments, file, progress) for file in arguments.files]
-        progress("Joining the tiles")
-        surface = join(tiles)
+        surface = terrain_as_asked(arguments, arguments.files, progress)
         progress("Writing terrain.ply")
         write_ply(surface, folder / "terrain.ply")
         written = ["terrain.ply"]
-        left_out = np.concatenate([tile.left_out + (tile.shift.vector - surface.shift.vector) for tile in tiles])
-        if len(left_out):
-            write_ply(Cloud(left_out, surface.shift, surface.name), folder / "left_out.ply")
+        if len(surface.left_out):
+            write_ply(Cloud(surface.left_out, surface.shift, surface.name), folder / "left_out.ply")
             written.append("left_out.ply")
         no_picture = ""
         if not arguments.no_picture:
             progress("Shading terrain.png")
             no_picture = _picture(folder, surface.name)
             written += [] if no_picture else ["terrain.png"]
-    for tile in tiles:
-        for sentence in tile.summary:
-            print(f"{tile.name}: {sentence}" if len(tiles) > 1 else sentence)
-    if len(tiles) > 1:
-        print(f"{len(tiles)} tiles are one surface of {len(surface.faces):,} faces.")
+    for sentence in surface.summary:
+        print(sentence)
     if no_picture:
         print(f"No picture: {no_picture}")
     print(f"Written: {', '.join(written)} in {arguments.out}")

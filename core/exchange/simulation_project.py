@@ -85,7 +85,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         inputs["zones"] = entry.zones.file
         zones = open_zones(
             entry.zones.file, entry.zones.attribute, met, models,
-            terrain_file=source.file, up=source.up, unit_m=source.unit_m,
+            terrain_files=[source.file], up=source.up, unit_m=source.unit_m,
         )  # fmt: skip
     scenario = Scenario(
         met,

@@ -21,7 +21,7 @@ from ..remarks import Remark
 from ..simulation.ground import element_places
 from ..simulation.zones import ZoneCover, face_values, nearest_values, zones_of_values, zones_within
 from ..terrain.cloud import Cloud
-from ..terrain.ply_attributes import PlyAttribute, read_ply_attribute
+from ..terrain.ply_attributes import PlyAttribute, read_ply_attributes
 from ..terrain.surface import Surface
 from ..vectors import Array
 from ..workflow.simulation import Zones
@@ -149,7 +149,7 @@ def open_zones(
     terrain: Surface | Cloud,
     models: Sequence[str],
     *,
-    terrain_file: str | Path,
+    terrain_files: Sequence[str | Path],
     up: str,
     unit_m: float,
 ) -> Zones:
@@ -157,15 +157,15 @@ def open_zones(
 
     Parameters
     ----------
-    terrain_file, up, unit_m : what the terrain was read from, and how.
+    terrain_files, up, unit_m : what the terrain was read from, and how.
 
     Raises
     ------
-    InputError : see `read_zones`, `read_ply_attribute` and `read_attribute_zones`.
+    InputError : see `read_zones`, `read_ply_attributes` and `read_attribute_zones`.
     """
     if not attribute:
         return read_zones(path, terrain, models)
-    values = read_ply_attribute(terrain_file, attribute)
+    values = read_ply_attributes(terrain_files, attribute)
     places = terrain.shift.to_local(values.in_metres(up, unit_m))
     return read_attribute_zones(path, terrain, values, places, models)
 

@@ -50,7 +50,10 @@ def join(surfaces: Sequence[Surface]) -> Surface:
     faces = np.concatenate([tile.faces + np.int32(start) for tile, start in zip(tiles, starts[:-1], strict=True)])
     same = _same_points(tiles, starts)
     vertices, faces = _merged(vertices, faces, same)
-    return Surface(vertices, faces, tiles[0].shift, ", ".join(tile.name for tile in tiles))
+    said = [f"{tile.name}: {sentence}" for tile in tiles for sentence in tile.summary]
+    said.append(f"{len(tiles)} tiles are one surface of {len(faces):,} faces.")
+    name, left_out = ", ".join(tile.name for tile in tiles), np.concatenate([tile.left_out for tile in tiles])
+    return Surface(vertices, faces, tiles[0].shift, name, tuple(said), left_out)
 
 
 def _same_points(tiles: Sequence[Surface], starts: NDArray[np.int64]) -> NDArray[np.int64]:

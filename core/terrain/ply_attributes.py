@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Numbers that a PLY file has beside its coordinates, of vertices or of faces: zones, classes, soil types."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -34,6 +35,26 @@ class PlyAttribute:
         """(k, 3) the places as `read_terrain` puts them, with its arguments, in survey coordinates."""
         places = self.places * unit_m
         return np.stack([places[:, 0], -places[:, 2], places[:, 1]], axis=1) if up == "y" else places
+
+
+def read_ply_attributes(paths: Sequence[str | Path], name: str) -> PlyAttribute:
+    """The attribute of a name in several files as one.
+
+    Raises
+    ------
+    InputError : see `read_ply_attribute`; one file has it of its faces, another of its vertices.
+    """
+    parts = [read_ply_attribute(path, name) for path in paths]
+    for path, part in zip(paths, parts, strict=True):
+        if part.of_faces != parts[0].of_faces:
+            of, other = ("faces", "vertices") if part.of_faces else ("vertices", "faces")
+            raise InputError(
+                f"The attribute {name!r} is of {of} here, of {other} in {paths[0]}",
+                file=path,
+                advice="Export the tiles in the same way",
+            )
+    places, values = (np.concatenate([getattr(part, what) for part in parts]) for what in ("places", "values"))
+    return PlyAttribute(places, values, parts[0].of_faces)
 
 
 @reader("terrain")

@@ -182,7 +182,7 @@ def _zones(project: Project, surface: Surface | None) -> Zones | None:
         return None
     return open_zones(
         entry.zones.file, entry.zones.attribute, surface, entry.models or COMPARED,
-        terrain_file=source.file, up=source.up, unit_m=source.unit_m,
+        terrain_files=[source.file], up=source.up, unit_m=source.unit_m,
     )  # fmt: skip
 
 

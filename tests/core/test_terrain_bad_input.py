@@ -10,7 +10,8 @@ import pytest
 import tifffile
 import trimesh
 from rockfall.core.errors import InputError
-from rockfall.core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
+from rockfall.core.terrain.opening import EXTENSIONS
+from rockfall.core.terrain.readers import inspect_terrain, read_terrain
 
 DATA = Path(__file__).parents[1] / "data"
 HEADER = "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"

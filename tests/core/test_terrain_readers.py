@@ -14,7 +14,8 @@ from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
 from rockfall.core.terrain.meshes import read_obj
-from rockfall.core.terrain.readers import READERS, inspect_terrain, read_terrain
+from rockfall.core.terrain.opening import READERS
+from rockfall.core.terrain.readers import inspect_terrain, read_terrain
 from rockfall.core.terrain.writers import write_ply
 
 DATA = Path(__file__).parents[1] / "data"

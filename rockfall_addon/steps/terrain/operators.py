@@ -9,7 +9,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from ....core.errors import RockfallError
 from ....core.georeference import GlobalShift
 from ....core.terrain.advice import sentences
-from ....core.terrain.readers import EXTENSIONS, inspect_terrain, read_terrain
+from ....core.terrain.opening import EXTENSIONS
+from ....core.terrain.readers import inspect_terrain, read_terrain
 from ....core.terrain.shading import shade
 from ...scene import georeference, materials, start_up, store, sync, terrain, terrain_look
 from ...view import look

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Any terrain file → what it holds, in local coordinates with z up; several clouds → one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..georeference import GlobalShift
+from ..plausibility import GREATEST_M
+from ..reading import reader
+from ..vectors import Array
+from . import advice, clouds, geotiff, gltf, grids, meshes, ply
+from .crs import surely_different
+from .ground_filter import filter_ground
+from .source import Source
+
+READERS: dict[str, Callable[[Path], Source]] = {
+    ".ply": ply.read_ply,
+    ".obj": meshes.read_obj,
+    ".stl": meshes.read_stl,
+    ".gltf": gltf.read_gltf,
+    ".glb": gltf.read_gltf,
+    ".asc": grids.read_ascii_grid,
+    ".tif": geotiff.read_geotiff,
+    ".tiff": geotiff.read_geotiff,
+    ".xyz": clouds.read_xyz,
+    ".txt": clouds.read_xyz,
+    ".csv": clouds.read_xyz,
+}
+LAS_EXTENSIONS = (".las", ".laz")
+EXTENSIONS = (*READERS, *LAS_EXTENSIONS)
+UP_AXES = ("auto", "z", "y")
+
+
+@dataclass(frozen=True)
+class HowToRead:
+    """What a user says of a file.
+
+    Attributes
+    ----------
+    up : axis that points up in the file: "z", "y", or "auto" (y in glTF, as its standard says, else z).
+    unit_m : length of the file's unit [m], 0.001 for millimetres.
+    ground_only : use the ground class of LAS and LAZ: None if there is one, True always, False never.
+    ground_filter_m : cell of a filter that takes vegetation out of a cloud, whatever its classes say [m]; none when
+        None. See `filter_ground`.
+    """
+
+    up: str = "auto"
+    unit_m: float = 1.0
+    ground_only: bool | None = None
+    ground_filter_m: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What is in a file, or in several clouds, in local coordinates; and what there is to say of it.
+
+    Attributes
+    ----------
+    name : of the file, for people.
+    source : its contents; of a grid without data NaN heights.
+    shift : from local to survey coordinates.
+    notes : sentences on what was done.
+    advice : sentences that come after those on the meshing.
+    left_out : (k, 3) points that the ground filter left out.
+    """
+
+    name: str
+    source: Source
+    shift: GlobalShift
+    notes: tuple[str, ...]
+    advice: tuple[str, ...]
+    left_out: Array
+
+
+def open_terrain_file(path: Path, how: HowToRead, shift: GlobalShift | None) -> Opened:
+    """Read a file and put it into local coordinates; a shift is proposed from the data when None.
+
+    Raises
+    ------
+    InputError : anything wrong with the file, with what to do about it.
+    """
+    return _localised(read_placed(path, how), path, path.name, how, shift)
+
+
+def open_terrain_files(paths: Sequence[Path], how: HowToRead, shift: GlobalShift | None) -> tuple[Opened, ...]:
+    """The same of several files, in one shift; all clouds among them become one, as if they had been one file.
+
+    So the ground filter and the meshing reach across the borders of tiles, where no gap is left.
+
+    Raises
+    ------
+    InputError : anything wrong with a file; the files are in different systems.
+    """
+    sources = [_read_one(path, how) for path in paths]
+    cloudy = [i for i, source in enumerate(sources) if source.kind == "cloud"]
+    parts = [(paths[i], paths[i].name, sources[i]) for i in range(len(paths)) if len(cloudy) < 2 or i not in cloudy]
+    if len(cloudy) > 1:
+        parts.insert(0, _one_cloud([paths[i] for i in cloudy], [sources[i] for i in cloudy]))
+    del sources
+    opened: list[Opened] = []
+    while parts:
+        path, name, source = parts.pop(0)
+        opened.append(_localised(source, path, name, how, opened[0].shift if opened else shift))
+    return tuple(opened)
+
+
+@reader("terrain")
+def _read_one(path: Path, how: HowToRead) -> Source:
+    return read_placed(path, how)
+
+
+def _one_cloud(paths: Sequence[Path], sources: Sequence[Source]) -> tuple[Path, str, Source]:
+    crs = ""
+    for path, source in zip(paths, sources, strict=True):
+        if surely_different(source.crs, crs):
+            raise _two_systems(source.crs, f"the files before it in {crs}", path)
+        crs = crs or source.crs
+    notes = [f"{path.name}: {note}" for path, source in zip(paths, sources, strict=True) for note in source.notes]
+    notes.append(f"The {len(paths)} clouds are read as one.")
+    points = np.concatenate([source.points for source in sources])
+    geographic = any(source.geographic for source in sources)
+    name = ", ".join(path.name for path in paths)
+    return paths[0], name, Source(points, crs=crs, geographic=geographic, notes=tuple(notes))
+
+
+def _localised(source: Source, path: Path, name: str, how: HowToRead, shift: GlobalShift | None) -> Opened:
+    """A placed source in local coordinates; errors name the path."""
+    points, notes = source.points, list(source.notes)
+    left_out = points[:0]
+    if how.ground_filter_m is not None:
+        points, left_out, filtered = _ground(source, points, how.ground_filter_m, path)
+        notes += filtered
+    heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
+    low, high = box_of(points[heights], path)
+    advice.refuse_degrees(source, low, high, how.unit_m, path)
+    shift = _shift(shift, low, high, source.crs, path)
+    said = [*advice.sentences(low, high, shift)]
+    if source.kind == "cloud" and advice.faces_along_y(points):
+        said.append(advice.Y_UP)
+    if shift.vector.any():
+        said.append(f"Shifted by ({shift.x:.0f}, {shift.y:.0f}, {shift.z:.0f}) m from survey to local coordinates.")
+    if source.crs and source.crs != shift.crs:
+        said.append(f"The file names its system {source.crs}: check that this is the same as the project's.")
+    said.append(
+        f"Coordinate reference system {shift.crs}." if shift.crs else "The coordinate reference system is unknown."
+    )
+    left_out = left_out - shift.vector
+    return Opened(name, replace(source, points=points - shift.vector), shift, tuple(notes), tuple(said), left_out)
+
+
+def _ground(source: Source, points: Array, cell_m: float, path: Path) -> tuple[Array, Array, tuple[str, ...]]:
+    """The points on the ground, those left out, and what to say of it."""
+    if source.kind != "cloud":
+        raise InputError(
+            f"This is a {source.kind}, and the ground filter works on clouds", file=path, advice="Read it without"
+        )
+    try:
+        found = filter_ground(points, cell_m)
+    except InputError as error:
+        raise InputError(error.problem, file=path, advice=error.advice) from error
+    return points[found.ground], points[~found.ground], found.notes
+
+
+def check_path(path: Path) -> None:
+    """Refuse what is no file of a known format.
+
+    Raises
+    ------
+    InputError : a folder, no such file, an extension that is no terrain format.
+    """
+    if path.is_dir():
+        raise InputError("This is a folder", file=path, advice="Choose a terrain file in it")
+    if not path.is_file():
+        raise InputError("There is no such file", file=path, advice="Check the path")
+    if path.suffix.lower() not in EXTENSIONS:
+        raise InputError(
+            f'"{path.suffix}" is no terrain format', file=path, advice=f"Supported are {', '.join(EXTENSIONS)}"
+        )
+
+
+def read_placed(path: Path, how: HowToRead) -> Source:
+    """Read a file; its points in metres with z up, and finite, in survey coordinates.
+
+    Raises
+    ------
+    InputError : anything wrong with the file, with what to do about it.
+    """
+    check_path(path)
+    extension, ground_only = path.suffix.lower(), how.ground_only if how.ground_filter_m is None else False
+    if extension in LAS_EXTENSIONS:
+        return placed(clouds.read_las(path, ground_only), how, path)
+    if ground_only:
+        raise InputError("Only LAS and LAZ files have a ground class", file=path, advice="Read it without ground_only")
+    return placed(READERS[extension](path), how, path)
+
+
+def placed(source: Source, how: HowToRead, path: Path) -> Source:
+    """The contents of a file in metres with z up, checked to be finite, and what to say of that.
+
+    Raises
+    ------
+    InputError : an axis or a unit that there is not, a coordinate that cannot be.
+    """
+    up, unit_m = how.up, how.unit_m
+    if up not in UP_AXES:
+        raise InputError(f'The up axis "{up}" is unknown', file=path, advice=f"Choose one of {', '.join(UP_AXES)}")
+    if not (np.isfinite(unit_m) and unit_m > 0):
+        raise InputError(f"The unit of {unit_m} m is no length", file=path, advice="Give 0.001 for millimetres")
+    points = source.points
+    finite = np.isfinite(points)
+    if source.kind == "grid":
+        finite = finite[:, :2]
+        if np.isinf(points[:, 2]).any():
+            points = np.where(np.isinf(points), np.nan, points)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=1))[0])
+        what, plural = ("vertex", "vertices") if source.kind == "mesh" else ("point", "points")
+        raise InputError(
+            f"The {what} {row} (counted from 0) is not finite: {points[row].tolist()}",
+            file=path,
+            advice=f"Remove {plural} with NaN or infinite coordinates and export again",
+        )
+    if unit_m != 1.0:
+        points = points * unit_m
+    reach = float(np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0))
+    if reach >= GREATEST_M:
+        raise InputError(
+            f"A coordinate of {reach:g} m is beyond every survey (1e9 m)",
+            file=path,
+            advice="The file is damaged or in another unit: export it again, or give the length of its unit",
+        )
+    notes = list(source.notes)
+    if source.faces is not None:
+        notes.append(f"Mesh of {len(points):,} vertices and {len(source.faces):,} faces.")
+    if up == "y" or (up == "auto" and source.up == "y"):
+        points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
+        notes.append(
+            "Turned from Y up to Z up" + (", as the format's standard says." if up == "auto" else ", as asked.")
+        )
+    if unit_m != 1.0:
+        notes.append(f"Multiplied by {unit_m:g} to metres, as asked.")
+    return replace(source, points=np.ascontiguousarray(points), up="z", notes=tuple(notes))
+
+
+def box_of(points: Array, path: Path, count: int | None = None) -> tuple[Array, Array]:
+    """Lowest and highest coordinates, (3,) each.
+
+    Raises
+    ------
+    InputError : fewer points than a surface needs.
+    """
+    count = len(points) if count is None or not len(points) else count
+    if count < 3:
+        raise InputError(
+            f"The file has {count} points, where a surface needs 3", file=path, advice="Check that it is complete"
+        )
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _shift(given: GlobalShift | None, low: Array, high: Array, crs: str, path: Path) -> GlobalShift:
+    if given is None:
+        return GlobalShift.proposed(low, high, crs)
+    if surely_different(crs, given.crs):
+        raise _two_systems(crs, f"the project in {given.crs}", path)
+    return given if given.crs or not crs else GlobalShift(given.x, given.y, given.z, crs)
+
+
+def _two_systems(crs: str, other: str, path: Path) -> InputError:
+    return InputError(f"The file is in {crs}, {other}", file=path, advice="Transform one into the other's system")

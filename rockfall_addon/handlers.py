@@ -6,11 +6,14 @@ from bpy.app.handlers import persistent
 
 from .scene import (
     comparison,
+    fingerprints,
     footage,
     graph_settings,
     impact_rows,
     migration,
     motion,
+    pick_names,
+    picks,
     problems,
     store,
     sync,
@@ -112,6 +115,9 @@ def _catch_up() -> None:
     """Files of older versions, and picks that were changed while nobody watched."""
     for scene in bpy.data.scenes:
         migration.migrate(scene)
+        if not migration.is_newer(scene):
+            for members in fingerprints.by_trajectory(picks.objects_of(scene)).values():
+                pick_names.follow(members)  # before Blender takes its first undo step
         sync.touch(scene)
 
 

@@ -72,7 +72,7 @@ def _where(impacts: Impacts, flag: str) -> list[str]:
     rows = np.flatnonzero(impacts.flags[flag])
     if not rows.size:
         return []
-    named = [f"{impacts.trajectory[i]} #{impacts.impact[i]}" for i in rows[:8]]
+    named = [f"{impacts.trajectory[i]} impact {impacts.impact[i]}" for i in rows[:8]]
     return [f"{MEANINGS[flag][:1].upper()}{MEANINGS[flag][1:]}: {', '.join(named)}{', …' if rows.size > 8 else ''}."]
 
 

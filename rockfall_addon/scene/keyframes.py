@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.reconstruction.flight import Flights, flight_states
 from ...core.vectors import Array
+from . import store
 
 DRAG_KEY_STEP_S = 0.1  # with drag the cubic is an approximation: Hermite's error at this step is below 0.1 mm
 JUMP_FRAMES = 1e-3
@@ -176,9 +177,10 @@ def _channelbag(obj: bpy.types.Object, like: bpy.types.Action | None = None) -> 
     if animation.action is None and like is not None:
         animation.action = like.copy()
     elif animation.action is None:
-        action = bpy.data.actions.new(obj.name)
+        name = f"{obj[store.TRAJECTORY]} pick" if obj.get(store.ROLE) == store.PICK_ROLE else obj.name  # no number
+        action = bpy.data.actions.new(name)
         animation.action = action
-        animation.action_slot = action.slots.new(id_type="OBJECT", name=obj.name)
+        animation.action_slot = action.slots.new(id_type="OBJECT", name=name)
     elif animation.action.users - animation.action.use_fake_user > 1:  # of a linked duplicate
         animation.action = animation.action.copy()
     action, slot = animation.action, animation.action_slot

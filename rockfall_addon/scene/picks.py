@@ -19,7 +19,7 @@ from ...core.reconstruction.picks import Picks, make_picks
 from ...core.terrain.raycast import closest_points
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
-from . import block_keys, georeference, keyframes, materials, store, timing
+from . import block_keys, georeference, keyframes, materials, pick_names, store, timing
 from .block_keys import Change
 
 CONFIDENCE_SIGMA_M = {1: 0.50, 2: 0.20, 3: 0.05}
@@ -73,13 +73,13 @@ def show_picks(
     rate, version, shown = timing.keyed_rate(scene), next_version(written), []
     there = {(o[store.TRAJECTORY], time_of(o, rate)): o for o in objects_of(scene)}
     folders = store.collections(scene, "Trajectories", dict.fromkeys(picks.trajectory.tolist()))
-    numbers, like = Counter[str](), None
+    numbers, like = Counter[tuple[str, str]](), None
     for i in range(len(picks.time_s)):
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
-        numbers[trajectory] += 1
+        numbers[trajectory, kind] += 1
         obj = there.pop((trajectory, time), None)
         if obj is None:
-            obj = _new(folders[trajectory], trajectory, kind, numbers[trajectory])
+            obj = _new(folders[trajectory], trajectory, kind, numbers[trajectory, kind])
         obj[store.TRAJECTORY], obj[store.TIME] = trajectory, time
         obj[store.POSITION] = picks.position[i].tolist()
         obj[store.KIND], obj[store.STATUS] = kind, str(picks.status[i])
@@ -103,6 +103,11 @@ def show_picks(
             like = like or keyframes.action_of(obj)
         shown.append(obj)
     store.remove_objects(list(there.values()))
+    of: dict[str, list[bpy.types.Object]] = {}
+    for obj in shown:
+        of.setdefault(obj[store.TRAJECTORY], []).append(obj)
+    for members in of.values():
+        pick_names.follow(members)
     scene[store.PICKS_SOURCE] = picks.source
     return shown
 
@@ -118,7 +123,7 @@ def add_pick(
     extra: Mapping[str, str] | None = None,
 ) -> bpy.types.Object:
     """A new pick at a local place; `live.sync` then makes the trajectory follow."""
-    number = len(objects_of(scene, [trajectory])) + 1
+    number = 1 + sum(other[store.KIND] == kind for other in objects_of(scene, [trajectory]))
     obj = _new(store.collection(scene, "Trajectories", trajectory), trajectory, kind, number)
     obj[store.TRAJECTORY], obj[store.TIME], obj[store.ROW] = trajectory, float(time_s), 0
     obj[store.POSITION] = _writable(scene, position_m)
@@ -393,7 +398,7 @@ def extra_of(obj: bpy.types.Object, name: str) -> str:
 
 
 def _new(folder: bpy.types.Collection, trajectory: str, kind: str, number: int) -> bpy.types.Object:
-    obj = bpy.data.objects.new(f"{trajectory} {number:02d} {kind}", _marker(kind))
+    obj = bpy.data.objects.new(pick_names.name_of(trajectory, kind, number), _marker(kind))
     obj[store.ROLE], obj[store.ID] = store.PICK_ROLE, uuid.uuid4().hex
     store.link(folder, obj)
     return obj

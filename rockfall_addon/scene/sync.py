@@ -26,6 +26,7 @@ from . import (
     keyframes,
     migration,
     models,
+    pick_names,
     picks,
     problems,
     reconstruction,
@@ -54,7 +55,7 @@ _recomputing: set[int] = set()  # session_uid of scenes
 
 @dataclass
 class Done:
-    """What a `sync` has done: trajectories that were computed again, or could not be; whether picks came or went."""
+    """What a `sync` has done: trajectories it computed again or could not; whether picks came, went, were renamed."""
 
     rebuilt: list[str]
     failed: list[str]
@@ -198,6 +199,9 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
             prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, held, done)
             if edited.get(name):
                 said[name].append(Remark(edited[name], "warning", name))
+    if not dragging:
+        renamed = [pick_names.follow(members) for members in groups.values()]
+        done.picks_changed = done.picks_changed or any(renamed)
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:

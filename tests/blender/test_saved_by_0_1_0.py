@@ -132,6 +132,16 @@ def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
     assert len(old["cameras"]["Bridge"]["pairs"]) == 14
 
 
+def named_by_0_1_0(obj: bpy.types.Object) -> str:
+    """A pick was numbered among all picks of its trajectory, where impacts are counted now."""
+    run = obj.get("rockfall_trajectory")
+    if obj.get("rockfall_role") != "pick":
+        return obj.name
+    times = [o["rockfall_time_s"] for o in bpy.context.scene.objects if o.get("rockfall_role") == "pick"
+             and o["rockfall_trajectory"] == run]  # fmt: skip
+    return f"{run} {1 + sorted(times).index(obj['rockfall_time_s']):02d} {obj['rockfall_kind']}"
+
+
 def test_settings_models_and_film_are_as_they_were(opened, part, old) -> None:
     for settings, before in ((opened.rockfall, old["settings"]), (opened.rockfall_picking, old["picking"])):
         for name, value in before.items():
@@ -145,7 +155,10 @@ def test_settings_models_and_film_are_as_they_were(opened, part, old) -> None:
     assert [[len(tile.data.vertices), len(tile.data.polygons)] for tile in tiles] == old["terrain"]
     assert list(part("rockfall_addon.scene.models").shown_models(opened)) == old["models"]
     assert part("rockfall_addon.steps.film.remembered").is_set_up(opened) is old["film"] is True
-    named = [[o.name, str(o.get("rockfall_role", "")), str(o.get("rockfall_trajectory", ""))] for o in opened.objects]
+    named = [
+        [named_by_0_1_0(o), str(o.get("rockfall_role", "")), str(o.get("rockfall_trajectory", ""))]
+        for o in opened.objects
+    ]
     assert sorted(named) == old["objects"]
     for name in ("rockfall_problem", "rockfall_trajectory_problems", "rockfall_offsets_s", "rockfall_blocks"):
         assert opened[name] == old["scene"][name], name

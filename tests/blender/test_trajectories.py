@@ -86,7 +86,7 @@ def test_picks_come_back_exactly_after_save_and_load(scene: bpy.types.Scene, par
 
 
 def test_a_moved_pick_moves_the_trajectory(scene: bpy.types.Scene, part) -> None:
-    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    pick = scene.objects["A impact 1"]
     pick.animation_data_clear()
     pick.location.x += 0.5
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
@@ -97,7 +97,7 @@ def test_a_moved_pick_moves_the_trajectory(scene: bpy.types.Scene, part) -> None
 
 
 def test_picks_keep_their_objects_and_selection(scene: bpy.types.Scene) -> None:
-    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    pick = scene.objects["A impact 1"]
     before = {o.name: o["rockfall_id"] for o in scene.objects if o.get("rockfall_role") == "pick"}
     pick.select_set(True)
     bpy.context.view_layer.objects.active = pick
@@ -112,7 +112,7 @@ def test_picks_keep_their_objects_and_selection(scene: bpy.types.Scene) -> None:
 def test_imported_again_a_pick_is_what_the_table_says(scene: bpy.types.Scene, table: Path) -> None:
     text = table.read_text(encoding="utf-8").replace(",impact,ok,0.5,0.0,0.8660254037844386,", ",pass,ok,,,,", 1)
     table.write_text(text, encoding="utf-8")
-    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    pick = scene.objects["A impact 1"]
     assert {"rockfall_normal", "rockfall_result"} <= set(pick.keys())
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     assert pick["rockfall_kind"] == "pass"
@@ -121,11 +121,11 @@ def test_imported_again_a_pick_is_what_the_table_says(scene: bpy.types.Scene, ta
 
 
 def test_a_deleted_pick_is_gone(scene: bpy.types.Scene, part) -> None:
-    bpy.data.objects.remove(next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 03 " in o.name))
+    bpy.data.objects.remove(scene.objects["A impact 2"])
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
     assert len(part("rockfall_addon.scene.picks").picks_of(scene)) == 7
     direct = (PLACES[3] - PLACES[1]) / (TIMES[3] - TIMES[1]) + [0, 0, GRAVITY * (TIMES[3] - TIMES[1]) / 2]
-    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 02 " in o.name)
+    pick = scene.objects["A impact 1"]
     np.testing.assert_allclose(pick["rockfall_result"]["restituted_mps"], direct, atol=1e-9)
 
 
@@ -148,7 +148,7 @@ def test_flight_curve_lies_on_the_parabola_and_ends_now(scene: bpy.types.Scene) 
 
 
 def test_impact_object_keeps_the_impacts_numbers(scene: bpy.types.Scene) -> None:
-    pick = next(o for o in scene.objects if o.get("rockfall_trajectory") == "A" and " 03 " in o.name)
+    pick = scene.objects["A impact 2"]
     d1, d2 = np.diff(TIMES)[1:3]
     v1 = np.diff(PLACES, axis=0)[1] / d1 - [0, 0, GRAVITY * d1 / 2]
     v2 = np.diff(PLACES, axis=0)[2] / d2 + [0, 0, GRAVITY * d2 / 2]

@@ -24,7 +24,7 @@ def case_load_demo_and_play(window):
     window.screenshot("playing")
     fallen = [before - block.matrix_world.translation.z for before, block in zip(heights, blocks, strict=True)]
     assert max(fallen) > 3.0
-    pick = next(o for o in scene.objects if " 03 impact" in o.name)
+    pick = next(o for o in scene.objects if o.name.endswith(" impact 3"))
     bpy.context.view_layer.objects.active = pick
     pick.select_set(True)
     yield 3.0

@@ -13,7 +13,7 @@ def case_instrumented_impacts_without_terrain(window):
     with window.override():
         assert bpy.ops.rockfall.import_picks(filepath=str(PICKS)) == {"FINISHED"}
     scene = bpy.context.scene
-    pick = next(o for o in scene.objects if " 02 impact" in o.name)
+    pick = next(o for o in scene.objects if o.name.endswith(" impact 2"))
     bpy.context.view_layer.objects.active = pick
     yield 3.0
     window.screenshot("chant-sura")

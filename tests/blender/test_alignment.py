@@ -310,6 +310,26 @@ def test_pairs_and_camera_go_through_files(part, scene, aligned, pairs, camera, 
         bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "small.toml"))
 
 
+def test_a_camera_and_its_pairs_are_written_together(part, scene, camera, tmp_path, monkeypatch) -> None:
+    """Neither of the two files is of another camera than the other, also when one of them cannot be written."""
+    from errno import ENOSPC
+
+    bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
+    for name in ("camera.toml", "left bank.toml"):
+        assert bpy.ops.rockfall.export_camera(filepath=str(tmp_path / name)) == {"FINISHED"}
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    assert sorted(before) == ["camera.toml", "left bank.toml", "left bank_pairs_residuals.csv", "pairs_residuals.csv"]
+
+    def full(*_: object) -> None:
+        raise OSError(ENOSPC, "No space left on device")
+
+    assert bpy.ops.rockfall.delete_pair() == {"FINISHED"}
+    monkeypatch.setattr(part("rockfall_addon.steps.alignment.files"), "write_pair_residuals", full)
+    with pytest.raises(RuntimeError, match="No space left on device"):
+        bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml"))
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
 def test_a_marked_pair_can_be_taken_back(part, scene, aligned, marking, pairs, solving, camera, table) -> None:
     """Pairs, solution, lens and place of the camera are as before, whether it was solved or not."""
     camera_paths = part("rockfall_addon.scene.camera_paths")

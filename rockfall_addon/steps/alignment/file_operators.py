@@ -90,7 +90,7 @@ class ROCKFALL_OT_import_camera(OfVideo, FromFile, bpy.types.Operator):
 
 
 class ROCKFALL_OT_export_camera(_IntoFile, bpy.types.Operator):
-    """Write the camera as camera.toml and what is left of its pairs as pairs_residuals.csv"""
+    """Write the camera as camera.toml, and beside it what is left of its pairs as pairs_residuals.csv"""
 
     bl_idname = "rockfall.export_camera"
     bl_label = "Export Camera"

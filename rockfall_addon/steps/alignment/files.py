@@ -11,8 +11,12 @@ from ....core.camera.pairs import pair_residuals
 from ....core.errors import InputError
 from ....core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
+from ....core.output import output_folder
 from ...scene import alignment, camera_paths, clocks, georeference, pairs, store, videos
 from . import solving
+
+RESIDUALS = "pairs_residuals.csv"
+"""Beside a camera: what is left of its pairs."""
 
 
 def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:
@@ -100,19 +104,26 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
 
 
 def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, file: str | Path) -> list[str]:
-    """Write camera.toml and, when there are pairs, pairs_residuals.csv beside it. Returns the names of the files."""
-    file, solution, path = Path(file), alignment.solution_of(camera), camera_paths.camera_path(camera)
-    covariance = camera_paths.pose_covariance(camera)
-    write_camera(file, path, rmse_px=solution.rmse_px, sigma=solution.sigma, pose_covariance=covariance)
-    complete = pairs.complete_of(camera)
-    if not complete:
-        return [file.name]
-    table = pairs.table(complete, georeference.read_shift(scene))
-    left, away = pair_residuals(path, table, pairs.times_of(camera, table.frame))
-    used = np.array([pair.enabled and pair.id not in solution.wrong for pair in complete])
-    beside = file.with_name("pairs_residuals.csv")
-    write_pair_residuals(beside, table, left, away, used)
-    return [file.name, beside.name]
+    """Write a camera and, when there are pairs, what is left of them beside it: both files, or neither.
+
+    Returns the names of the files: NAME.toml and NAME_pairs_residuals.csv; beside camera.toml pairs_residuals.csv, as
+    `rockfall align` writes it.
+
+    Raises
+    ------
+    RockfallError : one of them cannot be written; older ones are as they were.
+    """
+    file, solution, path = Path(file).absolute(), alignment.solution_of(camera), camera_paths.camera_path(camera)
+    covariance, complete = camera_paths.pose_covariance(camera), pairs.complete_of(camera)
+    beside = RESIDUALS if file.stem == "camera" else f"{file.stem}_{RESIDUALS}"
+    with output_folder(file.parent) as folder:
+        write_camera(folder / file.name, path, rmse_px=solution.rmse_px, sigma=solution.sigma, pose_covariance=covariance)
+        if complete:
+            table = pairs.table(complete, georeference.read_shift(scene))
+            left, away = pair_residuals(path, table, pairs.times_of(camera, table.frame))
+            used = np.array([pair.enabled and pair.id not in solution.wrong for pair in complete])
+            write_pair_residuals(folder / beside, table, left, away, used)
+    return [file.name, beside] if complete else [file.name]
 
 
 def _number(value: float | None) -> float:

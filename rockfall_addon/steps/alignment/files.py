@@ -117,7 +117,8 @@ def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, file: str | 
     covariance, complete = camera_paths.pose_covariance(camera), pairs.complete_of(camera)
     beside = RESIDUALS if file.stem == "camera" else f"{file.stem}_{RESIDUALS}"
     with output_folder(file.parent) as folder:
-        write_camera(folder / file.name, path, rmse_px=solution.rmse_px, sigma=solution.sigma, pose_covariance=covariance)
+        known = {"rmse_px": solution.rmse_px, "sigma": solution.sigma, "pose_covariance": covariance}
+        write_camera(folder / file.name, path, **known)
         if complete:
             table = pairs.table(complete, georeference.read_shift(scene))
             left, away = pair_residuals(path, table, pairs.times_of(camera, table.frame))

@@ -33,6 +33,7 @@ COMMANDS = {
     "track": "follows the block through a video from one click → track.csv, proposed impacts",
     "refine": "fits picks and times to the pixels of the footage → picks, impacts with standard deviations",
     "reconstruct": "timed picks → impacts.csv and trajectories.csv",
+    "spin": "one point of the block marked in two pictures or more → spin.csv, impacts with their angular velocity",
     "motion": "the motion of a project over time → speeds, heights, energies, residuals of tracks: motion.csv, figures",
     "statistics": "measured impacts alone, and groups of them → statistics.csv, groups.csv, figures",
     "compare": "impact models on measured impacts → predictions.csv, scores.csv, figures and a page",

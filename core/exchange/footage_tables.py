@@ -94,7 +94,7 @@ def read_clicks(path: str | Path) -> Clicks:
     table = read_table(path, ("frame", *PIXEL), CLICKS_KNOWN)
     return Clicks(
         trajectory=_names(table, "trajectory"),
-        frame=_frames(table, required=True),
+        frame=frames_of(table, required=True),
         pixel=table.vectors(PIXEL, required=True),
         row=np.asarray(table.row, dtype=np.intp),
         extra=table.rest(CLICKS_KNOWN),
@@ -112,10 +112,10 @@ def read_track(path: str | Path) -> Track:
     table = read_table(path, TRACK_REQUIRED, TRACK_KNOWN)
     track = Track(
         trajectory=_names(table, "trajectory"),
-        frame=_frames(table),
+        frame=frames_of(table),
         time_s=table.numbers("time_s", required=True),
         pixel=table.vectors(PIXEL, required=True),
-        sigma_px=_positive(table, "sigma_px"),
+        sigma_px=positive_of(table, "sigma_px"),
         score=table.numbers("score"),
         row=np.asarray(table.row, dtype=np.intp),
         extra=table.rest(TRACK_KNOWN),
@@ -133,7 +133,7 @@ def read_track(path: str | Path) -> Track:
 
 def write_track(track: Track, path: str | Path) -> None:
     """Write track.csv, unknown columns at the end."""
-    columns: Columns = {"trajectory": track.trajectory, "frame": _whole(track.frame), "time_s": track.time_s}
+    columns: Columns = {"trajectory": track.trajectory, "frame": whole_numbers(track.frame), "time_s": track.time_s}
     columns |= vector_columns(PIXEL, track.pixel) | {"sigma_px": track.sigma_px}
     if np.isfinite(track.score).any():
         columns["score"] = track.score
@@ -155,10 +155,10 @@ def read_events(path: str | Path) -> EventTable:
             raise table.error(i, f"Unknown kind '{kind}'", f"Use one of {', '.join(EVENT_KINDS)}")
     return EventTable(
         trajectory=_names(table, "trajectory"),
-        frame=_frames(table),
+        frame=frames_of(table),
         time_s=table.numbers("time_s", required=True),
         pixel=table.vectors(PIXEL, required=True),
-        sigma_time_s=_positive(table, "sigma_time_s", zero_allowed=True),
+        sigma_time_s=positive_of(table, "sigma_time_s", zero_allowed=True),
         kind=np.array(kinds, dtype=np.str_),
         row=np.asarray(table.row, dtype=np.intp),
         extra=table.rest(EVENTS_KNOWN),
@@ -168,7 +168,7 @@ def read_events(path: str | Path) -> EventTable:
 
 def write_events(events: EventTable, path: str | Path) -> None:
     """Write events.csv, unknown columns at the end."""
-    columns: Columns = {"trajectory": events.trajectory, "frame": _whole(events.frame), "time_s": events.time_s}
+    columns: Columns = {"trajectory": events.trajectory, "frame": whole_numbers(events.frame), "time_s": events.time_s}
     columns |= vector_columns(PIXEL, events.pixel) | {"sigma_time_s": events.sigma_time_s, "kind": events.kind}
     write_columns(path, columns | dict(events.extra))
 
@@ -194,7 +194,7 @@ def write_refinement_residuals(
     """
     columns: Columns = {"trajectory": trajectory, "video": video}
     if (frame >= 0).any():
-        columns["frame"] = _whole(frame)
+        columns["frame"] = whole_numbers(frame)
     columns |= {"time_s": time_s} | vector_columns(PIXEL, pixel)
     columns |= vector_columns(("residual_u_px", "residual_v_px"), residual_px)
     write_columns(path, columns | {"outlier": ["1" if one else "0" for one in outlier.tolist()]})
@@ -204,18 +204,31 @@ def _names(table: TextTable, name: str) -> Names:
     return np.array(table.text(name), dtype=np.str_)
 
 
-def _whole(values: Indices) -> list[str]:
+def whole_numbers(values: Indices) -> list[str]:
+    """(n,) as they are written, empty where they are not given."""
     return [str(value) if value >= 0 else "" for value in values.tolist()]
 
 
-def _frames(table: TextTable, *, required: bool = False) -> Indices:
+def frames_of(table: TextTable, *, required: bool = False) -> Indices:
+    """(n,) the column frame, −1 where it is not given.
+
+    Raises
+    ------
+    InputError : no whole number of zero or more, with the row.
+    """
     frames = table.numbers("frame", required=required)
     for i in np.flatnonzero(~np.isnan(frames) & ((frames < 0) | (frames % 1 != 0))):
         raise table.error(int(i), f"The frame {frames[i]:g} is no whole number of zero or more", "Frames count from 0")
     return np.where(np.isnan(frames), -1, frames).astype(np.intp)
 
 
-def _positive(table: TextTable, name: str, *, zero_allowed: bool = False) -> Array:
+def positive_of(table: TextTable, name: str, *, zero_allowed: bool = False) -> Array:
+    """(n,) a column of numbers above zero, NaN where they are not given.
+
+    Raises
+    ------
+    InputError : another number, with the row.
+    """
     values = table.numbers(name)
     for i in np.flatnonzero((values < 0) if zero_allowed else (values <= 0)):
         limit = "of zero or more" if zero_allowed else "above zero"

@@ -105,6 +105,7 @@ class VideoEntry:
     camera : camera.toml, the solved view.
     track : track.csv, the block in the frames.
     events : events.csv, the impacts seen in the frames; first picks are made from it where the project has none.
+    spin_marks : spin_marks.csv, one point of the block in two frames or more of a flight, for its spin.
     offset_s, drift, origin_s : of the `Clock`: common time = offset + (1 + drift) · rate · (video time − origin).
     capture_rate_hz : pictures per second when filming; None when the file plays at the speed of the fall.
     row_time_s : readout time of one row of the image [s]: rolling shutter.
@@ -115,6 +116,7 @@ class VideoEntry:
     camera: Path | None = None
     track: Path | None = None
     events: Path | None = None
+    spin_marks: Path | None = None
     offset_s: float = 0.0
     drift: float = 0.0
     origin_s: float = 0.0
@@ -368,6 +370,7 @@ def _video(table: TomlTable) -> VideoEntry:
         camera=table.path("camera") if table.has("camera") else None,
         track=table.path("track") if table.has("track") else None,
         events=table.path("events") if table.has("events") else None,
+        spin_marks=table.path("spin_marks") if table.has("spin_marks") else None,
         offset_s=table.signed("offset_s", 0.0),
         drift=table.signed("drift", 0.0),
         origin_s=table.signed("origin_s", 0.0),

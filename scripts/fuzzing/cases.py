@@ -82,7 +82,7 @@ def _terrains(files: dict[str, bytes]) -> dict[str, Case]:
 
 def _tables() -> dict[str, Case]:
     from rockfall.core.analysis.truth import read_truth
-    from rockfall.core.exchange import block_sizes, cameras, footage_tables, map_shapes, parameters, tables
+    from rockfall.core.exchange import block_sizes, cameras, footage_tables, map_shapes, parameters, spin_tables, tables
     from rockfall.core.workflow.alignment import AlignmentOptions, align
 
     pairs, moving = (FOOTAGE / "pairs.csv").read_bytes(), head_of(FOOTAGE / "camera.toml", 9000, b"[[frame]]")
@@ -96,6 +96,7 @@ def _tables() -> dict[str, Case]:
         "moving camera": ("camera.toml", moving, cameras.read_camera),
         "track": ("track.csv", head_of(FOOTAGE / "track.csv", 4000), footage_tables.read_track),
         "events": ("events.csv", (FOOTAGE / "events.csv").read_bytes(), footage_tables.read_events),
+        "spin marks": ("spin_marks.csv", examples.SPIN_MARKS, spin_tables.read_spin_marks),
         "clicks": ("clicks.csv", (FOOTAGE / "clicks.csv").read_bytes(), footage_tables.read_clicks),
         "sizes": ("sizes.csv", sizes, block_sizes.read_sizes),
         "parameters": ("p.toml", examples.PARAMETERS, parameters.read_parameters),

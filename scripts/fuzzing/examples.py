@@ -109,6 +109,10 @@ release,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,diameter_m,density_kgpm3,number
 one,988403,6375606,,1,0,0,0.5,2600,2
 two,988404,6375608,1540,1,0,0,0.4,,1
 """
+SPIN_MARKS = (
+    b"trajectory,frame,time_s,u_px,v_px,sigma_px,axis,counted_turns_per_s\n"
+    b"A,12,0.48,640.5,360.25,1,rolling,\nA,13,0.52,652.5,355.75,1,rolling,4.5\n"
+)
 POLYGON = b"name,x_m,y_m,friction\nscree,988402,6375604,0.4\nscree,988416,6375604,0.4\nscree,988416,6375616,0.4\n"
 GEOJSON = json.dumps(
     {"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::2154"}},

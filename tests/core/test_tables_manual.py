@@ -18,14 +18,18 @@ from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.predicted_flight_tables import write_predicted_flights
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.simulated_motion import write_simulated_impacts, write_simulated_trajectories
+from rockfall.core.exchange.spin_tables import MARKS_KNOWN, write_spins
 from rockfall.core.exchange.tables import PICKS_KNOWN, impact_columns, write_impacts, write_trajectories
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.impact import FLAGS
+from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.sampling import sample_trajectories
+from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.spins import MeasuredSpins
 
 MANUAL = Path(__file__).parents[2] / "docs" / "manual" / "tables.md"
 SIMULATED = MANUAL.with_name("simulation_tables.md")
@@ -54,6 +58,17 @@ def opened():
 def header(path: Path) -> set[str]:
     with path.open(encoding="utf-8", newline="") as stream:
         return {name for name in next(csv.reader(stream)) if not name.startswith("sigma_")}
+
+
+def test_spins(sections, tmp_path) -> None:
+    write_spins(
+        MeasuredSpins((), ()),
+        reconstruct(make_picks([], [], [])).impacts,
+        make_picks([], [], []),
+        tmp_path / "spin.csv",
+    )
+    assert header(tmp_path / "spin.csv") <= sections["spin.csv"]
+    assert set(MARKS_KNOWN) <= sections["spin_marks.csv"]
 
 
 def test_picks_and_impacts(sections, opened, tmp_path) -> None:

@@ -76,7 +76,7 @@ def open_terrain(project: Project) -> Surface | None:
 def block_of(project: Project, trajectory: str) -> Block:
     """The block of a trajectory."""
     entry = project.block_of(trajectory)
-    return Block(entry.d1_m, entry.d2_m, entry.d3_m, entry.density_kgpm3)
+    return Block(entry.d1_m, entry.d2_m, entry.d3_m, entry.density_kgpm3, entry.shape)
 
 
 def blocks_of(project: Project, picks: Picks) -> dict[str, Block]:

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..georeference import GlobalShift
 from ..output import final_path, write_text
 from ..reading import reader
+from ..reconstruction.block import SHAPES
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
 from .toml_text import TomlTable, Vector3, read_toml
@@ -63,13 +64,14 @@ class TerrainSource:
 
 @dataclass(frozen=True)
 class BlockEntry:
-    """One block: principal diameters [m] and density [kg/m³]; ``name`` is its trajectory in the table of picks."""
+    """One block: principal diameters [m], density [kg/m³] and shape; ``name`` is that of its trajectory."""
 
     name: str = ""
     d1_m: float = 0.35
     d2_m: float = 0.35
     d3_m: float = 0.35
     density_kgpm3: float = ROCK_DENSITY_KGPM3
+    shape: str = SHAPES[0]
     extra: Extra = field(default_factory=dict)
 
 
@@ -346,6 +348,7 @@ def _block(table: TomlTable, default: BlockEntry, named: bool) -> BlockEntry:
         d2_m=table.number("d2_m", default.d2_m),
         d3_m=table.number("d3_m", default.d3_m),
         density_kgpm3=table.number("density_kgpm3", default.density_kgpm3),
+        shape=table.choice("shape", SHAPES, default.shape),
         extra=table.rest(),
     )
 

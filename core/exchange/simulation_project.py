@@ -13,7 +13,7 @@ from ..progress import Progress, silent
 from ..reconstruction.drag import Drag
 from ..reconstruction.picks import take
 from ..reconstruction.trajectory import Reconstruction
-from ..simulation.block_shapes import ROUND
+from ..simulation.block_shapes import ROUND, Shape
 from ..simulation.blocks import Blocks
 from ..simulation.distributions import Distribution
 from ..simulation.ground import Ground
@@ -184,7 +184,9 @@ def _from_table(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int) 
 def _blocks(entry: ReleaseEntry, block: BlockEntry) -> Blocks:
     """The law of the blocks: what is not given is as in the project's block."""
     three = (block.d1_m, block.d2_m, block.d3_m)
-    shape = entry.shape or ("sphere" if len(set(three)) == 1 else "ellipsoid")
+    even: Shape = "cube" if block.shape == "box" else "sphere"
+    uneven: Shape = "box" if block.shape == "box" else "ellipsoid"
+    shape = entry.shape or (even if len(set(three)) == 1 else uneven)
     own = (1.0, 1.0, 1.0) if shape in ROUND else three
     return Blocks(
         shape,

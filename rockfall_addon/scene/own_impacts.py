@@ -54,6 +54,7 @@ def settings_key(scene: bpy.types.Scene) -> tuple[object, ...]:
         *(tuple(scene.get(key, ())) for key in arrays),
         settings.block_diameter_m,
         settings.density_kgpm3,
+        settings.block_shape,
         settings.normal_radius_m,
         settings.use_drag,
         settings.flights_join,

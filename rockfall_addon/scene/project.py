@@ -87,7 +87,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     shift = result.picks.shift if result is not None else known or next(iter(cameras), None)
     if shift is not None:
         georeference.write_shift(scene, shift)
-    reconstruction.keep_settings(scene, project, sorted(set(names)))
+    reconstruction.keep_settings(scene, project)
     scene[store.SITE_DESCRIPTION] = project.site.description
     scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in project.render])
     fit.forget(scene)

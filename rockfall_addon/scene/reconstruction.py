@@ -7,13 +7,14 @@ import bpy
 import numpy as np
 
 from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
+from ...core.exchange.opening import block_of
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.terrain.surface import Surface
-from . import fingerprints, migration, models, problems, simulation, store, terrain, trajectories
+from . import fingerprints, migration, models, own_blocks, problems, simulation, store, terrain, trajectories
 from . import picks as pick_objects
 
 
@@ -83,18 +84,20 @@ def refresh(scene: bpy.types.Scene) -> Reconstruction | None:
     return result
 
 
-def keep_settings(scene: bpy.types.Scene, project: Project, names: list[str]) -> None:
+def keep_settings(scene: bpy.types.Scene, project: Project) -> None:
     """Store a project's settings in the scene: doubles where they matter, the others where the panels show them."""
     settings, how = scene.rockfall, project.reconstruction
     scene[store.SITE], scene[store.GRAVITY] = project.site.name, how.gravity_mps2
     scene[store.DRAG] = [how.air_density_kgpm3, how.drag_coefficient]
-    blocks = {name: project.block_of(name) for name in names}
-    scene[store.BLOCKS] = json.dumps({n: [b.d1_m, b.d2_m, b.d3_m, b.density_kgpm3] for n, b in blocks.items()})
+    scene[store.BLOCKS] = "{}"
+    for entry in project.blocks:
+        own_blocks.give(scene, entry.name, block_of(project, entry.name))
     default = project.block
     scene[store.DEFAULT_BLOCK] = [default.d1_m, default.d2_m, default.d3_m, default.density_kgpm3]
     scene[store.NORMAL_RADIUS] = how.normal_radius_m or 0.0
     settings.block_diameter_m = (project.block.d1_m + project.block.d2_m + project.block.d3_m) / 3
     settings.density_kgpm3 = project.block.density_kgpm3
+    settings.block_shape = project.block.shape
     settings.normal_radius_m = how.normal_radius_m or 0.0
     settings.use_drag = how.drag
     settings.flights_join = how.flights
@@ -125,12 +128,12 @@ def _exact(scene: bpy.types.Scene, key: str, typed: float) -> float:
     return store.double(typed) if kept is None or np.float32(kept) != np.float32(typed) else float(kept)
 
 
-def _default_block(scene: bpy.types.Scene) -> list[float]:
-    """d1, d2, d3 [m] and density [kg/m³] of the blocks that have none of their own."""
+def _default_block(scene: bpy.types.Scene) -> tuple[float, float, float, float, str]:
+    """d1, d2, d3 [m], density [kg/m³] and shape of the blocks that have none of their own."""
     settings = scene.rockfall
     d1, d2, d3, density = scene.get(store.DEFAULT_BLOCK, (0.0, 0.0, 0.0, 0.0))
     if np.float32((d1 + d2 + d3) / 3) != np.float32(settings.block_diameter_m):
         d1 = d2 = d3 = store.double(settings.block_diameter_m)
     if np.float32(density) != np.float32(settings.density_kgpm3):
         density = store.double(settings.density_kgpm3)
-    return [d1, d2, d3, density]
+    return d1, d2, d3, density, settings.block_shape

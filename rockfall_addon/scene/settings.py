@@ -6,6 +6,11 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...core.constants import ROCK_DENSITY_KGPM3
 
+BLOCK_SHAPES = (
+    ("ellipsoid", "Ellipsoid", "Volume π/6·d₁·d₂·d₃: a rounded block"),
+    ("box", "Box", "Volume d₁·d₂·d₃: a slab or a cube"),
+)
+
 
 def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     from . import sync
@@ -60,6 +65,10 @@ class SceneSettings(bpy.types.PropertyGroup):
         name="Density [kg/m³]", description="Of the rock; masses and energies come from it",
         default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_changed,
     )  # fmt: skip
+    block_shape: EnumProperty(
+        name="Block shape", description="Of blocks without one of their own; volume, mass and inertia come from it",
+        items=BLOCK_SHAPES, update=_changed,
+    )  # fmt: skip
     normal_radius_m: FloatProperty(
         name="Normal radius",
         description="Radius within which the terrain normal of an impact is fitted. "
@@ -91,7 +100,7 @@ class SceneSettings(bpy.types.PropertyGroup):
         default=0.5, min=0.0, soft_max=10.0, precision=2, update=_changed,
     )  # fmt: skip
     block_scale: FloatProperty(
-        name="Block size", description="Blocks are drawn this many times their size, so that they are seen from afar",
+        name="Block size [×]", description="Blocks are drawn so many times their size, to be seen from afar",
         default=1.0, min=0.1, soft_max=10.0, precision=1, update=_changed,
     )  # fmt: skip
     marker_radius_m: FloatProperty(
@@ -120,11 +129,11 @@ class SceneSettings(bpy.types.PropertyGroup):
         default="SPEED", update=_colours_changed,
     )  # fmt: skip
     speed_top_mps: FloatProperty(
-        name="Top of the scale", description="Speed at the upper end of the colour scale [m/s]",
+        name="Top of the scale [m/s]", description="Speed at the upper end of the colour scale",
         default=20.0, min=0.1, precision=1,
     )  # fmt: skip
     energy_top_kj: FloatProperty(
-        name="Top of the scale", description="Kinetic energy at the upper end of the colour scale [kJ]",
+        name="Top of the scale [kJ]", description="Kinetic energy at the upper end of the colour scale",
         default=10.0, min=0.001, precision=2,
     )  # fmt: skip
     impact_index: IntProperty(name="Impact", description="Row of the impact table", update=_row_chosen)

@@ -35,7 +35,7 @@ WORKSPACE, GRAPHS_WORKSPACE = "rockfall_workspace", "rockfall_graphs_workspace" 
 # of the scene: how trajectories are computed
 GRAVITY, NORMAL_RADIUS = "rockfall_gravity_mps2", "rockfall_normal_radius_m"
 DEFAULT_BLOCK = "rockfall_default_block"  # d1, d2, d3, density
-BLOCKS = "rockfall_blocks"  # d1, d2, d3, density by trajectory, as text
+BLOCKS = "rockfall_blocks"  # d1, d2, d3, density and, unless it is an ellipsoid, shape by trajectory, as text
 DRAG = "rockfall_drag"  # density of air, drag coefficient
 TIME_ORIGIN, OFFSETS = "rockfall_time_origin_s", "rockfall_offsets_s"
 KEYED_RATE, TICK_RATE = "rockfall_keyed_rate_hz", "rockfall_tick_rate_hz"
@@ -54,6 +54,7 @@ MOTION_LIMITS = "rockfall_motion_limits"  # of the axes of motion graphs, as tex
 SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
 BACKGROUND = "rockfall_background"  # of a camera: what was noticed of its video's background, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights
+BLOCK_SHOWN = "rockfall_block_shown"  # of flights: the block that they were computed with, as text
 
 # of simulated blocks and paths
 ENDS = "rockfall_ends"  # of paths: the ways to end, as text

@@ -190,10 +190,11 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
     for name in gone:
         _forget(scene, name)
         prints.pop(name), said.pop(name, None)
-    altered = again or bool(gone)
+    altered, blocks = again or bool(gone), {} if dragging else _blocks_of(scene, groups)
     for name, members in groups.items():
         held = _held(name, parts) if dragging else picks.NOTHING_HELD
         changed = _has_changed(name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging, held)
+        changed = changed or (name in blocks and _has_other_block(parts.get((store.FLIGHTS_ROLE, name)), blocks[name]))
         if changed or again or resample or name in edited:
             altered = altered or changed or name in edited
             prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, held, done)
@@ -328,6 +329,19 @@ def _has_changed(
         if not dragging and not (fingerprints.is_marked(trail, block, now) and _of_one_version(members, block)):
             return True
     return before.rstrip(fingerprints.COMPLETE) != now
+
+
+def _blocks_of(scene: bpy.types.Scene, names: Iterable[str]) -> dict[str, Block]:
+    """The block of each trajectory; none where one of them cannot be: its trajectory says so."""
+    try:
+        return reconstruction.blocks_of(scene, set(names))
+    except RockfallError:
+        return {}
+
+
+def _has_other_block(trail: bpy.types.Object | None, block: Block) -> bool:
+    """Whether what is shown was computed with another block: it was edited, or an undo has brought one back."""
+    return trail is not None and trail.get(store.BLOCK_SHOWN, repr(block)) != repr(block)
 
 
 def _of_one_version(members: list[bpy.types.Object], block: bpy.types.Object) -> bool:

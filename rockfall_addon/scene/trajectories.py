@@ -200,7 +200,8 @@ def _show_flights(
     bare = new or "Trail" not in obj.modifiers or obj.modifiers["Trail"].node_group is None
     obj = trails.trail(f"{name} flights", store.FLIGHTS_ROLE, lines, marks, obj)
     obj[store.TRAJECTORY] = name
-    obj[store.MASS] = _block_of(result, name).mass_kg
+    solid = _block_of(result, name)
+    obj[store.MASS], obj[store.BLOCK_SHOWN] = solid.mass_kg, repr(solid)
     ends = np.vstack([flights.start_velocity[which], flights.end_velocity[which]])
     obj[store.TOP_SPEED] = float(norm(ends).max(initial=0.0))
     obj.pop(store.STALE, None)

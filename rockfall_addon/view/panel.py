@@ -102,6 +102,11 @@ def field(layout: bpy.types.UILayout, name: str) -> bpy.types.UILayout:
     return row.row(align=True)
 
 
+def kilograms(mass_kg: float) -> str:
+    """A mass to three digits."""
+    return f"{mass_kg:,.0f} kg".replace(",", "\N{NO-BREAK SPACE}") if mass_kg >= 100 else f"{mass_kg:.3g} kg"
+
+
 def facts(layout: bpy.types.UILayout, rows: list[tuple[str, str]]) -> None:
     """A small table: names to the left, values to the right."""
     column = layout.column(align=True)

@@ -129,10 +129,7 @@ def test_it_follows_a_moved_pick_and_a_setting(scene, part, comparison_of) -> No
 
 
 def test_a_trajectory_with_a_problem_leaves_the_others(scene, part, comparison_of) -> None:
-    pick = next(obj for obj in picks(scene) if obj["rockfall_trajectory"] == "B" and "02" in obj.name)
-    pick["rockfall_time_s"] = next(
-        obj["rockfall_time_s"] for obj in picks(scene) if obj["rockfall_trajectory"] == "B" and "03" in obj.name
-    )
+    scene.objects["B impact 1"]["rockfall_time_s"] = scene.objects["B impact 2"]["rockfall_time_s"]
     part("rockfall_addon.scene.sync").sync(scene)
     found = comparison_of(scene)
     assert set(found.impacts.trajectory.tolist()) == {"A"}

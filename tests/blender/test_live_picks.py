@@ -205,3 +205,11 @@ def test_a_key_beyond_the_end_moves_the_end(scene: bpy.types.Scene) -> None:
     end = scene.frame_end
     move_key(picks_of(scene, "B")[-1], 200.0)
     assert scene.frame_end > end
+
+
+def test_a_time_shown_in_short_keeps_its_digits(scene: bpy.types.Scene) -> None:
+    pick = picks_of(scene, "A")[2]
+    pick.rockfall_pick.time_s = "11.812345678901234"
+    assert pick.rockfall_pick.time_s == "11.8123"
+    pick.rockfall_pick.time_s = "11.8123"  # Enter in the field, with nothing typed
+    assert pick["rockfall_time_s"] == 11.812345678901234

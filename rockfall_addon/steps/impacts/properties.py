@@ -67,17 +67,19 @@ def _set_note(self: bpy.types.PropertyGroup, value: str) -> None:
 
 
 def _get_time(self: bpy.types.PropertyGroup) -> str:
-    return repr(float(self.id_data.get(store.TIME, 0.0)))
+    """To 0.1 ms, which the field has room for; an exact time that looks like this one is not changed to it."""
+    return f"{float(self.id_data.get(store.TIME, 0.0)):.4f}"
 
 
 def _set_time(self: bpy.types.PropertyGroup, value: str) -> None:
     from ...scene import sync
 
-    sync.retime(self.id_data, value)
+    if value.strip() != _get_time(self):
+        sync.retime(self.id_data, value)
 
 
 class PickProperties(bpy.types.PropertyGroup):
-    """The selected pick, to be edited; the time is text because numbers here are single precision."""
+    """The selected pick, to be edited; the time is text, as Blender's numbers are single precision."""
 
     kind: EnumProperty(
         name="Kind",
@@ -113,7 +115,10 @@ class PickProperties(bpy.types.PropertyGroup):
     )  # fmt: skip
     note: StringProperty(name="Note", get=_get_note, set=_set_note)
     time_s: StringProperty(
-        name="Time [s]", description="On the common clock, with all its digits", get=_get_time, set=_set_time
+        name="Time [s]",
+        description="On the common clock, shown to 0.1 ms; all digits that are typed are kept",
+        get=_get_time,
+        set=_set_time,
     )
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 4: picks in the footage and on the terrain, the track of the block, and the trajectories between picks."""
 
-from . import operators, overlay, panel, properties, table_operators, tracking
+from . import block, operators, overlay, panel, properties, table_operators, tracking
 
-PARTS = (properties, table_operators, operators, tracking, overlay, panel)
+PARTS = (properties, table_operators, operators, tracking, overlay, panel, block)

@@ -32,7 +32,7 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
         show_remarks(context, layout, problems.remarks(scene))
         runs = "trajectory" if len(flights) == 1 else "trajectories"
         advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
-        names = ("block_diameter_m", "density_kgpm3", "normal_radius_m", "use_drag", "flights_join")
+        names = ("block_diameter_m", "density_kgpm3", "block_shape", "normal_radius_m", "use_drag", "flights_join")
         fields(layout.column(align=True), scene.rockfall, names)
         layout.operator("rockfall.reconstruct", icon="FILE_REFRESH")
 

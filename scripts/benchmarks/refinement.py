@@ -87,6 +87,8 @@ class Case:
     distance_m: float
     views: int
     pairs: Pairs = Pairs()
+    azimuth_deg: tuple[float, float] = (45.0, 60.0)
+    """Of the first camera, from the fall line."""
 
 
 CASES = (
@@ -97,6 +99,7 @@ CASES = (
     Case("4K, 30 Hz, 150 m, one view, 12 pairs of 1.5 px and 3 cm", 3840, 2160, 30.0, 150.0, 1, Pairs(12, 1.5, 0.03)),
     Case("1080p, 60 Hz, 300 m, one view", 1920, 1080, 60.0, 300.0, 1),
     Case("1080p, 60 Hz, 300 m, three views", 1920, 1080, 60.0, 300.0, 3),
+    Case("4K, 30 Hz, 150 m, one view along the slope", 3840, 2160, 30.0, 150.0, 1, azimuth_deg=(80.0, 100.0)),
 )
 
 
@@ -232,7 +235,7 @@ class Footage:
 def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) -> Footage:
     """Film a fall."""
     middle = (truth.centre.min(axis=0) + truth.centre.max(axis=0)) / 2
-    first = rng.uniform(45, 60)
+    first = rng.uniform(*case.azimuth_deg)
     azimuths = np.radians([first, first - rng.uniform(60, 90), first - rng.uniform(30, 45)])[: case.views]
     true_views, views, rows = [], [], []
     for number, azimuth in enumerate(azimuths):
@@ -289,18 +292,24 @@ def marked(surface: Surface, truth: Fall, true: View, solved: View, rng: np.rand
     """Picks in the first view: rays through pixels onto the terrain, at whole frames."""
     path = true.path
     frame = np.abs(np.asarray(true.clock.to_common(path.time_s))[:, None] - truth.time_s).argmin(axis=0)
+    exact = project(path.reference, truth.contact, position=path.position[frame], rotation=path.rotation[frame])
+    place, open_rows = np.full(truth.contact.shape, np.nan), np.arange(len(frame))
     for _ in range(50):
-        pixel = project(path.reference, truth.contact, position=path.position[frame], rotation=path.rotation[frame])
-        pixel = pixel + SIGMA_PICK * rng.normal(size=pixel.shape)
         origin, direction = rays(
-            solved.path.reference, pixel, position=solved.path.position[frame], rotation=solved.path.rotation[frame]
+            solved.path.reference,
+            exact[open_rows] + SIGMA_PICK * rng.normal(size=(open_rows.size, 2)),
+            position=solved.path.position[frame[open_rows]],
+            rotation=solved.path.rotation[frame[open_rows]],
         )
-        hit = cast_rays(surface, origin, direction)
-        if np.isfinite(hit.distance).all() and (np.linalg.norm(hit.point - truth.contact, axis=1) < 10).all():
-            break
+        point = cast_rays(surface, origin, direction).point
+        found = np.linalg.norm(point - truth.contact[open_rows], axis=1) < 10
+        place[open_rows[found]] = point[found]
+        open_rows = open_rows[~found]
+    if open_rows.size:  # the sky behind: the nearest ground
+        place[open_rows] = closest_points(surface, truth.contact[open_rows] + 0.3 * rng.normal(size=3)).point
     times = np.asarray(solved.clock.to_common(path.time_s[frame]))
     sigma = np.full(len(frame), float(np.diff(path.time_s).mean()) / np.sqrt(12))
-    return make_picks(["a"] * len(frame), times, hit.point, sigma_time_s=sigma)
+    return make_picks(["a"] * len(frame), times, place, sigma_time_s=sigma)
 
 
 def bound(surface: Surface, footage: Footage, free: tuple[str, ...]) -> tuple[np.ndarray, ...]:

@@ -12,7 +12,7 @@ from ...remarks import Remark
 from ...vectors import Array, Mask, dot, norm, unit
 from ..triangulation import GRAZING_DEG
 from .deviations import Fit
-from .problem import CLOCK_COLUMN, NODE
+from .problem import CLOCK_COLUMN, NODE, solve_segments
 from .setup import Ground, Setup
 from .solver import normal_equations
 from .views import PixelObservations, View
@@ -27,6 +27,8 @@ MANY = 0.1
 IN_A_ROW = 5
 """Outliers one after the other: the motion between two picks is another one, as when an impact is missing."""
 MOST_TIMES = 3
+UNLIKELY = 0.05
+"""Chance below which another solution is not spoken of."""
 GRAVITY_OFF, GRAVITY_SIGNIFICANCE = 0.1, 5.0
 """Fitted gravity that is off by more than this part, and by more than so many standard deviations, is no gravity."""
 
@@ -54,6 +56,7 @@ def remarks_on(
         remarks.append(Remark(text, "advice", "pixels"))
     for fit in fits:
         remarks += [
+            *_second_solutions(fit),
             *_on_the_search(fit),
             *_without_pixels(fit),
             *_pulled(fit),
@@ -106,6 +109,31 @@ def _on_gravity(fit: Fit) -> Iterator[Remark]:
             f"{np.sqrt(found / GRAVITY_MPS2):.3g} times as long (check the capture rate of the video)."
         )
         yield Remark(text, "warning", "gravity")
+
+
+def _second_solutions(fit: Fit) -> Iterator[Remark]:
+    """Trajectories whose likeliest motion is not the only one that the pixels and the terrain allow."""
+    problem, state = fit.setup.problem, fit.solution.state
+    for name in dict.fromkeys(rival.trajectory for rival in fit.rivals):
+        own = [i for i, rival in enumerate(fit.rivals) if rival.trajectory == name and fit.chance[i] > UNLIKELY]
+        if not own:
+            continue
+        rival = fit.rivals[max(own, key=lambda i: float(fit.chance[i]))]
+        centre, time_s = state.centre.copy(), state.time_s.copy()
+        centre[rival.nodes], time_s[rival.nodes] = rival.centre, rival.time_s
+        other = solve_segments(problem, replace(state, centre=centre, time_s=time_s))
+        faster = np.abs(norm(other.start_velocity) - norm(fit.solution.evaluation.motion.start_velocity))
+        of_trajectory = problem.group == fit.setup.names.index(name)
+        away = norm(centre - state.centre)
+        node = int(np.argmax(away))
+        count = "another solution" if len(own) == 1 else f"{len(own)} other solutions"
+        text = (
+            f"The pixels and the terrain allow {count} for trajectory {name} (chance "
+            f"{100 * float(fit.chance[own].sum()):.0f} %): its {_kind_and_time(fit, node)} lies {away[node]:.1f} m off there, "
+            f"and speeds are others by up to {faster[of_trajectory].max():.1f} m/s. The standard deviations contain "
+            "it. Film from a second side, or give the place of a mark that is sure a standard deviation."
+        )
+        yield Remark(text, "warning", name)
 
 
 def _on_the_search(fit: Fit) -> Iterator[Remark]:
@@ -220,6 +248,8 @@ def _trajectory(setup: Setup, node: int) -> str:
 
 def _pick(fit: Fit, node: int) -> str:
     """A node's pick in words."""
-    setup = fit.setup
-    kind, time = setup.picks.kind[setup.nodes[node]], fit.solution.state.time_s[node]
-    return f"{kind} at {time:.3f} s of trajectory {_trajectory(setup, node)}"
+    return f"{_kind_and_time(fit, node)} of trajectory {_trajectory(fit.setup, node)}"
+
+
+def _kind_and_time(fit: Fit, node: int) -> str:
+    return f"{fit.setup.picks.kind[fit.setup.nodes[node]]} at {fit.solution.state.time_s[node]:.3f} s"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Standard deviations: of a refinement's unknowns, and of the impacts that follow from them."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import chi2
@@ -11,6 +12,7 @@ from ...vectors import Array, Indices, dot, perpendicular
 from ..impact import Impacts, apparent
 from ..node_motion import NodeMotion
 from .problem import NODE, Problem
+from .search import Rival
 from .setup import Setup
 from .solver import UNEXPLAINED, Solution
 
@@ -23,17 +25,21 @@ class Fit:
 
     Attributes
     ----------
+    covariance : of this solution, and of its rivals about it as much as they are likely.
     scale : factor on the stated standard deviations, which the covariance contains.
+    rivals : other solutions within the noise; chance (r,) of each, this one's being the rest of its trajectory's.
     """
 
     setup: Setup
     solution: Solution
     covariance: Array
     scale: float
+    rivals: tuple[Rival, ...] = ()
+    chance: Array = field(default_factory=lambda: np.zeros(0))
 
 
-def with_covariance(setup: Setup, solution: Solution) -> Fit:
-    """The covariance, enlarged when the residuals are larger than the stated noise allows."""
+def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = ()) -> Fit:
+    """The covariance, enlarged when the residuals are larger than the stated noise allows, and by the rivals."""
     used = solution.weight > 0
     pixels = solution.evaluation.pixels.residual[used]
     squares = float((solution.weight[used, None] * pixels**2).sum())
@@ -45,7 +51,17 @@ def with_covariance(setup: Setup, solution: Solution) -> Fit:
     scale = 1.0
     if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
         scale = float(np.sqrt(squares / spare))
-    return Fit(setup, solution, scale**2 * inverse(solution.information, partly=True), scale)
+    covariance = scale**2 * inverse(solution.information, partly=True)
+    odds = np.array([np.exp(-rival.worse / scale**2) for rival in rivals])
+    of = np.array([rival.trajectory for rival in rivals])
+    chance = np.array([one / (1 + odds[of == name].sum()) for one, name in zip(odds, of, strict=True)])
+    for rival, weight in zip(rivals, chance, strict=True):
+        away = np.empty((rival.nodes.size, NODE))
+        away[:, :3] = rival.centre - solution.state.centre[rival.nodes]
+        away[:, 3] = rival.time_s - solution.state.time_s[rival.nodes]
+        place = (NODE * rival.nodes[:, None] + np.arange(NODE)).ravel()
+        covariance[place[:, None], place] += weight * np.outer(away, away)
+    return Fit(setup, solution, covariance, scale, tuple(rivals), chance)
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Refinement: whole trajectories fitted to the block's pixels in every frame."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,9 +15,10 @@ from ..choices import FREE, LOSSES, SIGMA_AIM, Loss
 from ..drag import Drag
 from ..picks import Picks
 from ..placement import check_placement
+from .deviations import Fit, with_covariance
 from .result import Refinement, summarise
+from .search import Rival, search, search_one_by_one, solve_with_noise
 from .setup import Setup, prepare, set_up
-from .solver import Solution, pixel_noise, solve
 from .starts import check_start, find_clocks
 from .views import PixelObservations, View, check_observations
 
@@ -101,23 +102,36 @@ def refine(
     names = [name for name in dict.fromkeys(picks.trajectory.tolist()) if name in set(observations.trajectory.tolist())]
     groups = [names] if free_set else [[name] for name in names]
     setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set, sigma_aim) for group in groups]
-    solved = [_solve(setup, loss, free_set, _part(progress, i, len(setups))) for i, setup in enumerate(setups)]
+    clock = free_set & {"clock", "clock_drift"}
+
+    def alone(name: str) -> Setup:
+        return set_up(ground, moved_views, observations, [name], gravity_mps2, clock, sigma_aim)
+
+    fits = [_solve(setup, alone, loss, free_set, _part(progress, i, len(setups))) for i, setup in enumerate(setups)]
     return summarise(
-        ground, moved_views, observations, [pair[0] for pair in solved], [pair[1] for pair in solved],
+        ground, moved_views, observations, fits,
         block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, site=site,
     )  # fmt: skip
 
 
-def _solve(setup: Setup, loss: Loss, free: frozenset[str], progress: Progress) -> tuple[Setup, Solution]:
-    """Solve, once more with larger standard deviations of the pixels if these scatter more than stated."""
+def _solve(setup: Setup, alone: Callable[[str], Setup], loss: Loss, free: frozenset[str], progress: Progress) -> Fit:
+    """Solve a problem; several trajectories, from where each of them is likeliest by itself.
+
+    Parameters
+    ----------
+    alone : makes the problem of one of the trajectories, with the poses held.
+    """
     check_start(setup)
-    problem = setup.problem
-    solution = solve(problem, find_clocks(problem, setup.state) if "clock" in free else setup.state, loss, progress)
-    noise = pixel_noise(problem, solution)
-    if noise > 1:
-        problem = replace(problem, sigma_px=noise * problem.sigma_px)
-        solution = solve(problem, solution.state, loss, progress)
-    return replace(setup, problem=problem, noise=noise), solution
+    state, rivals = setup.state, list[Rival]()
+    several = len(setup.names) > 1
+    if several:
+        state, rivals = search_one_by_one(setup, [alone(name) for name in setup.names], loss, progress)
+    if "clock" in free:
+        state = find_clocks(setup.problem, state)
+    found = solve_with_noise(setup.problem, state, loss, progress) if several else search(setup, state, loss, progress)
+    return with_covariance(
+        replace(setup, problem=found.problem, noise=found.noise), found.solution, [*rivals, *found.rivals]
+    )
 
 
 def _check_parameters(

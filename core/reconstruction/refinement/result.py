@@ -18,10 +18,9 @@ from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
 from ..trajectory import Reconstruction, reconstruct
 from .advice import remarks_on
-from .deviations import Fit, impact_sigmas, velocity_rows, with_covariance
+from .deviations import Fit, impact_sigmas, velocity_rows
 from .problem import NODE, evaluate
-from .setup import Ground, Setup
-from .solver import Solution
+from .setup import Ground
 from .views import PixelObservations, View
 
 
@@ -73,8 +72,7 @@ def summarise(
     ground: Ground,
     views: tuple[View, ...],
     observations: PixelObservations,
-    setups: Sequence[Setup],
-    solutions: Sequence[Solution],
+    fits: Sequence[Fit],
     *,
     block: Block | Mapping[str, Block],
     drag: Drag | None,
@@ -83,7 +81,6 @@ def summarise(
     site: str,
 ) -> Refinement:
     """Make the result of the solved problems."""
-    fits = [with_covariance(setup, solution) for setup, solution in zip(setups, solutions, strict=True)]
     picks, normals = _refined_picks(ground, fits, normal_radius_m)
     columns, state = fits[0].setup.problem.columns, fits[0].solution.state
     if columns.law[0] >= 0 and drag is not None:

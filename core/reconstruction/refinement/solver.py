@@ -31,6 +31,8 @@ SETTLED = 1e-7
 """A last step of this part of a standard deviation ends the search,"""
 NO_GAIN = 1e-10
 """and so does a step that takes less than this part off the cost."""
+ROUGHLY_SETTLED, ROUGHLY_NO_GAIN = 0.02, 0.02
+"""Enough to tell solutions apart: a last step in standard deviations, and what it takes off half the squares."""
 UNEXPLAINED = 0.999
 """A sum of squares that chance exceeds only in one of a thousand cases is not explained by the stated noise."""
 MEDIAN_LENGTH = float(np.sqrt(2 * np.log(2)))
@@ -61,9 +63,18 @@ class Solution:
     settled: bool
 
 
-def solve(problem: Problem, state: Unknowns, loss: Loss, progress: Progress = silent) -> Solution:
-    """Search from a first state; once more without outliers, and as long as pixels join or leave the ends of chains."""
-    found = _search(problem, state, chains_at(problem, state), loss, progress, reject=False)
+def solve(
+    problem: Problem, state: Unknowns, loss: Loss, progress: Progress = silent, *, roughly: bool = False
+) -> Solution:
+    """Search from a first state; once more without outliers, and as long as pixels join or leave the ends of chains.
+
+    Parameters
+    ----------
+    roughly : one search, as far as it takes to compare its end with others'.
+    """
+    found = _search(problem, state, chains_at(problem, state), loss, progress, reject=False, roughly=roughly)
+    if roughly:
+        return found
     iterations = found.iterations
     for _ in range(MOST_ROUNDS):
         reject = loss != "linear" and bool(found.outlier.any())
@@ -77,9 +88,17 @@ def solve(problem: Problem, state: Unknowns, loss: Loss, progress: Progress = si
 
 
 def _search(
-    problem: Problem, state: Unknowns, chain: Indices, loss: Loss, progress: Progress, *, reject: bool
+    problem: Problem,
+    state: Unknowns,
+    chain: Indices,
+    loss: Loss,
+    progress: Progress,
+    *,
+    reject: bool,
+    roughly: bool = False,
 ) -> Solution:
-    damping, settled, iteration = 1e-4, False, 0
+    damping, settled, iteration = 1e-6, False, 0
+    last_step = ROUGHLY_SETTLED if roughly else SETTLED
     here = evaluate(problem, state, chain)
     weight, outlier = _weights(here, loss, reject)
     information, gradient = normal_equations(problem, here, weight)
@@ -89,7 +108,7 @@ def _search(
         improved = False
         while not improved and damping < HEAVIEST:
             step = -damped_step(information, gradient, damping)
-            settled = float(step @ information @ step) < SETTLED**2
+            settled = float(step @ information @ step) < last_step**2
             trial_state = moved(problem, state, step)
             trial = evaluate(problem, trial_state, chain)
             before = _cost(here, weight)
@@ -98,7 +117,7 @@ def _search(
             if settled:
                 break
             damping *= 0.1 if improved else 10
-        settled = settled or not improved or before - after < NO_GAIN * before
+        settled = settled or not improved or before - after < (ROUGHLY_NO_GAIN if roughly else NO_GAIN * before)
         if improved:
             state, here, damping = trial_state, trial, max(damping, 1e-12)
             weight, outlier = _weights(here, loss, reject)
@@ -111,6 +130,21 @@ def pixel_noise(problem: Problem, solution: Solution) -> float:
     squares = float(solution.weight @ (solution.evaluation.pixels.residual**2).sum(axis=1))
     spare = 2 * int((solution.weight > 0).sum()) - problem.columns.size
     return float(np.sqrt(squares / spare)) if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare) else 1.0
+
+
+def objective(solution: Solution, loss: Loss) -> float:
+    """Half the squares that the search makes small, with the loss in place of weights: comparable between solutions."""
+    evaluation = solution.evaluation
+    length = _lengths(evaluation)[evaluation.segment >= 0]
+    if loss != "linear":
+        length = np.minimum(length, REJECTED)
+    if loss == "huber":
+        pixels = np.where(length < HUBER, length**2, HUBER * (2 * length - HUBER))
+    elif loss == "cauchy":
+        pixels = CAUCHY**2 * np.log1p((length / CAUCHY) ** 2)
+    else:
+        pixels = length**2
+    return 0.5 * (float(pixels.sum()) + sum(float((rows.residual**2).sum()) for rows in evaluation.others))
 
 
 def _lengths(evaluation: Evaluation) -> Array:

@@ -129,9 +129,9 @@ def _second_solutions(fit: Fit) -> Iterator[Remark]:
         count = "another solution" if len(own) == 1 else f"{len(own)} other solutions"
         text = (
             f"The pixels and the terrain allow {count} for trajectory {name} (chance "
-            f"{100 * float(fit.chance[own].sum()):.0f} %): its {_kind_and_time(fit, node)} lies {away[node]:.1f} m off there, "
-            f"and speeds are others by up to {faster[of_trajectory].max():.1f} m/s. The standard deviations contain "
-            "it. Film from a second side, or give the place of a mark that is sure a standard deviation."
+            f"{100 * float(fit.chance[own].sum()):.0f} %): its {_kind_and_time(fit, node)} lies {away[node]:.1f} m off "
+            f"there, and speeds are others by up to {faster[of_trajectory].max():.1f} m/s. The standard deviations "
+            "contain it. Film from a second side, or give the place of a mark that is sure a standard deviation."
         )
         yield Remark(text, "warning", name)
 

@@ -15,6 +15,7 @@ from .scene import (
     pick_names,
     picks,
     problems,
+    set_aside,
     store,
     sync,
     terrain_mesh,
@@ -116,6 +117,7 @@ def _catch_up() -> None:
     for scene in bpy.data.scenes:
         migration.migrate(scene)
         if not migration.is_newer(scene):
+            set_aside.look(scene)  # before anything reads it
             for members in fingerprints.by_trajectory(picks.objects_of(scene)).values():
                 pick_names.follow(members)  # before Blender takes its first undo step
         sync.touch(scene)

@@ -35,7 +35,8 @@ STEPS = (
         ("rockfall.nudge_pick_time", "A Tenth of a Frame Later", {"frames": 0.1}),
         ("rockfall.show_impact", "Go to the Pick's Moment", {}), "rockfall.use_triangulated", None,
         "rockfall.track_block", "rockfall.propose_impacts", "rockfall.clear_track", None,
-        "rockfall.import_picks", "rockfall.reconstruct", "rockfall.impact_table",
+        "rockfall.import_picks", "rockfall.reconstruct", "rockfall.impact_table", None,
+        "rockfall.recover_picks", "rockfall.select_set_aside", "rockfall.remove_set_aside",
     )),
     ("refinement", "5  Refinement", (
         "rockfall.refine", "rockfall.apply_refinement", "rockfall.discard_refinement",

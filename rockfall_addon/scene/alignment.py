@@ -55,7 +55,7 @@ class Solution:
 
 def solution_of(camera: bpy.types.Object) -> Solution:
     """What came out last."""
-    values = json.loads(camera.get(store.SOLUTION, "{}"))
+    values = store.read_json(camera, store.SOLUTION, {})
     for name in ("wrong", "keys"):
         values[name] = tuple(values.get(name, ()))
     remarks = from_plain(values.pop("remarks", values.pop("advice", ())))  # "advice" in files of version 0.1.0

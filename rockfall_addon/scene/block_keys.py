@@ -21,6 +21,11 @@ STATE = (store.TIME, store.POSITION, store.NORMAL)
 """What of a pick follows from a key of its block."""
 GONE = "The keys of {block} were put back. To delete the run, delete its picks."
 SINGLE = "The keys of {block} were put back: of one axis alone they cannot be deleted or copied."
+MERGED = (
+    "The keys of {block} were put back: one was moved to the time of another, which Blender then deletes. Two picks of "
+    "a run are never at one time."
+)
+NOWHERE = "The keys of {block} were put back: one had no finite time or place."
 BETWEEN = (
     "The keys of {block} were put back: only those at its picks can be edited. For a new pick, duplicate a key, or use "
     "the tool Pick Impacts."
@@ -105,7 +110,7 @@ def stretch(block: bpy.types.Object, factor: float) -> None:
     """The keys were moved to another frame rate."""
     action = keyframes.action_of(block)
     if action is not None and store.BLOCK_KEYS in action:
-        rows = json.loads(action[store.BLOCK_KEYS])
+        rows = store.read_json(action, store.BLOCK_KEYS, [])
         action[store.BLOCK_KEYS] = json.dumps([[row[0] * factor, *row[1:]] for row in rows])
 
 
@@ -125,6 +130,8 @@ def edits_of(block: bpy.types.Object) -> Edits:
     now = _read(block, len(kept.frame))
     if now is None:
         return Edits(put_back=SINGLE.format(block=block.name))
+    if not (np.isfinite(now.frame).all() and np.isfinite(now.place).all()):
+        return Edits(put_back=NOWHERE.format(block=block.name))
     of = _matched(kept, now)
     return _edits(block.name, kept, now, of)
 
@@ -146,6 +153,8 @@ def _edits(name: str, kept: _Rows, now: _Rows, of: list[int]) -> Edits:
             idle = True
     there = {kept.identifiers[k] for k in of if k >= 0}
     deleted = tuple(dict.fromkeys(one for one in kept.identifiers if one and one not in there))
+    if _merged(kept, now, of, deleted):
+        return Edits(put_back=MERGED.format(block=name))
     lost = [k for k in range(len(kept.frame)) if k not in of and kept.identifiers[k] not in deleted]
     copied = []
     for i in (i for i, k in enumerate(of) if k < 0):
@@ -158,6 +167,13 @@ def _edits(name: str, kept: _Rows, now: _Rows, of: list[int]) -> Edits:
     put_back = BETWEEN.format(block=name) if (idle or lost) and not means else ""
     identifiers = tuple(kept.identifiers[k] if k >= 0 else "" for k in of)
     return Edits(changes, deleted, tuple(copied), put_back, identifiers)
+
+
+def _merged(kept: _Rows, now: _Rows, of: list[int], deleted: tuple[str, ...]) -> bool:
+    """Whether a key that was moved in time is now where one was that is gone: nobody has deleted that one."""
+    gone = [kept.frame[k] for k, one in enumerate(kept.identifiers) if one in deleted]
+    moved = [now.frame[i] for i, k in enumerate(of) if k >= 0 and not same_frame(now.frame[i], kept.frame[k])]
+    return any(same_frame(frame, other) for frame in moved for other in gone)
 
 
 def _matched(kept: _Rows, now: _Rows) -> list[int]:
@@ -214,7 +230,7 @@ def _read(block: bpy.types.Object, count: int = -1) -> _Rows | None:
 def _kept(block: bpy.types.Object) -> _Rows | None:
     """What was written last; None where that is not known."""
     action = keyframes.action_of(block)
-    rows = json.loads(action.get(store.BLOCK_KEYS, "[]")) if action is not None else []
+    rows = store.read_json(action, store.BLOCK_KEYS, []) if action is not None else []
     if not rows:
         return None
     numbers = np.array([row[:4] for row in rows], dtype=np.float64)

@@ -54,7 +54,7 @@ def fingerprint(objects: Sequence[bpy.types.Object], rate: float, held: picks.He
 
 def remembered(scene: bpy.types.Scene) -> dict[str, str]:
     """Trajectory → fingerprint of what is shown of it."""
-    return json.loads(scene.get(store.SHOWN, "{}"))
+    return store.read_json(scene, store.SHOWN, {})
 
 
 def remember(scene: bpy.types.Scene, prints: dict[str, str]) -> None:

@@ -167,7 +167,7 @@ def proposal_of(scene: bpy.types.Scene) -> Proposal | None:
     """What is proposed; None without."""
     if store.FIT not in scene:
         return None
-    kept = json.loads(scene[store.FIT])
+    kept = store.read_json(scene, store.FIT, {})
     stale = ""
     if kept["print"] != _print(scene, kept["model"], kept["imitated"], kept["names"]):
         stale = "Impacts or other parameters have changed since: it may not be right any more. Fit again."
@@ -188,7 +188,7 @@ def proposal_of(scene: bpy.types.Scene) -> Proposal | None:
 
 def apply(scene: bpy.types.Scene) -> None:
     """Make the proposed values those of the scene; the second set is again what it was before."""
-    kept = json.loads(scene[store.FIT])
+    kept = store.read_json(scene, store.FIT, {})
     _restore(scene, kept)
     model_parameters.keep(scene, kept["model"], kept["values"])
 
@@ -196,12 +196,12 @@ def apply(scene: bpy.types.Scene) -> None:
 def discard(scene: bpy.types.Scene) -> None:
     """Forget the proposal, if there is one; the second set is again what it was before."""
     if store.FIT in scene:
-        _restore(scene, json.loads(scene[store.FIT]))
+        _restore(scene, store.read_json(scene, store.FIT, {}))
 
 
 def second_set(scene: bpy.types.Scene) -> dict[str, dict[str, Value]]:
     """The second set of parameters, without what is merely proposed."""
-    return json.loads(scene[store.FIT])["set_b"] if store.FIT in scene else models.parameters_of(scene, "B")
+    return store.read_json(scene, store.FIT, {})["set_b"] if store.FIT in scene else models.parameters_of(scene, "B")
 
 
 def forget(scene: bpy.types.Scene) -> None:

@@ -235,7 +235,7 @@ def filters_of(scene: bpy.types.Scene) -> tuple[Filter, ...]:
 def chosen_elsewhere(scene: bpy.types.Scene) -> frozenset[tuple[str, int]]:
     """The selected impacts of other sites: file and row."""
     return frozenset(
-        (path, row) for path, rows in json.loads(scene.get(store.GRAPH_CHOSEN, "{}")).items() for row in rows
+        (path, row) for path, rows in store.read_json(scene, store.GRAPH_CHOSEN, {}).items() for row in rows
     )
 
 

@@ -7,27 +7,28 @@ import uuid
 import bpy
 
 from ...core.errors import RockfallError
-from . import georeference, keyframes, materials, picks, store, timing, trajectories
+from . import georeference, keyframes, materials, picks, set_aside, store, timing, trajectories
 
 SCHEMA = 1
 
 
 def version(scene: bpy.types.Scene) -> int | None:
     """The schema of what is in a scene: 0 before there were numbers, None when nothing of ours is there."""
-    if store.SCHEMA in scene:
-        return int(scene[store.SCHEMA])
-    return 0 if any(store.ROLE in obj for obj in scene.objects) else None
+    kept = scene.get(store.SCHEMA)
+    if isinstance(kept, (int, float)) and kept >= 0:
+        return int(kept)
+    return 0 if kept is not None or any(store.ROLE in obj for obj in scene.objects) else None
 
 
 def is_newer(scene: bpy.types.Scene) -> bool:
     """Whether the scene was saved by a Rockfall that this one does not understand."""
-    return store.SCHEMA in scene and int(scene[store.SCHEMA]) > SCHEMA
+    return store.SCHEMA in scene and (version(scene) or 0) > SCHEMA
 
 
 def warning(scene: bpy.types.Scene) -> str:
     """What to say about a newer scene."""
     return (
-        f"This scene was saved by a newer Rockfall (schema {int(scene[store.SCHEMA])}, this one knows {SCHEMA}). "
+        f"This scene was saved by a newer Rockfall (schema {version(scene)}, this one knows {SCHEMA}). "
         "Update the extension. Until then nothing is computed or changed here."
     )
 
@@ -46,9 +47,10 @@ def migrate(scene: bpy.types.Scene) -> bool:
 def _from_0(scene: bpy.types.Scene) -> None:
     """Picks got ids, the frame of their key and their shift; blocks are text, which has no limit for names."""
     blocks = scene.get(store.BLOCKS)
-    if blocks is not None and not isinstance(blocks, str):
-        scene[store.BLOCKS] = json.dumps({name: list(values) for name, values in blocks.items()})
-    objects = [obj for obj in picks.objects_of(scene) if store.TIME in obj and store.POSITION in obj]
+    if hasattr(blocks, "to_dict"):
+        scene[store.BLOCKS] = json.dumps(blocks.to_dict(), default=str)
+    set_aside.look_at_scene(scene)
+    objects = store.of_role(scene, store.PICK_ROLE)
     shift = georeference.read_shift(scene).vector.tolist()
     for obj in objects:
         for key, value in (
@@ -64,6 +66,8 @@ def _from_0(scene: bpy.types.Scene) -> None:
         curves = keyframes.location_curves(obj)
         if store.KEY_FRAME not in obj and curves and len(curves[0].keyframe_points):
             obj[store.KEY_FRAME] = float(curves[0].keyframe_points[0].co[0])
+    set_aside.look(scene)
+    objects = picks.objects_of(scene)
     if objects and store.OFFSETS not in scene:
         try:
             timing.keep_offsets(scene, timing.offsets_of(scene, picks.picks_of(scene)))

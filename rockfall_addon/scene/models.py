@@ -37,7 +37,7 @@ def parameters_of(scene: bpy.types.Scene, which: str = "A") -> dict[str, dict[st
 
     which : "A", the scene's parameters, or "B", the second set that graphs can show.
     """
-    return json.loads(scene.get(PARAMETER_SETS[which], "{}"))
+    return store.read_json(scene, PARAMETER_SETS[which], {})
 
 
 def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]], which: str = "A") -> None:

@@ -72,7 +72,7 @@ def asked(scene: bpy.types.Scene) -> tuple[Quantity, ...]:
 
 def limits_of(scene: bpy.types.Scene) -> dict[str, Limits]:
     """Time, or name of a quantity → the limits of its axis, where a person has chosen them."""
-    kept = json.loads(scene.get(store.MOTION_LIMITS, "{}"))
+    kept = store.read_json(scene, store.MOTION_LIMITS, {})
     return {name: (low, high) for name, (low, high) in kept.items()}
 
 

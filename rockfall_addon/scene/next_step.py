@@ -16,6 +16,7 @@ from . import (
     places,
     problems,
     proposal,
+    set_aside,
     sightings,
     store,
     terrain,
@@ -47,6 +48,10 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if terrain.displaced(scene):
         sentence = "The scan was moved, so nothing on it fits any more. Put it back; panel Terrain says how far it is."
         return NextStep(sentence, ("rockfall.put_terrain_back",))
+    apart = [each for each in problems.remarks(scene) if each.about == set_aside.ABOUT and each.severity == "problem"]
+    if apart:
+        actions = ("rockfall.recover_picks", "rockfall.select_set_aside", "rockfall.remove_set_aside")
+        return NextStep(apart[0].text, actions)
     if camera is None and not picks:
         if store.has_role(scene, store.SIMULATED_BLOCKS_ROLE):
             sentence = "Play the simulated fall; step 7 has the numbers of each run."

@@ -26,7 +26,7 @@ def take(scene: bpy.types.Scene, name: str) -> None:
 
 
 def _kept(scene: bpy.types.Scene) -> dict[str, list[float | str]]:
-    return json.loads(scene.get(store.BLOCKS, "{}"))
+    return store.read_json(scene, store.BLOCKS, {})
 
 
 def _keep(scene: bpy.types.Scene, blocks: dict[str, list[float | str]]) -> None:

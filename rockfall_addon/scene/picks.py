@@ -273,7 +273,7 @@ def frames_moved(obj: bpy.types.Object) -> float:
         return 0.0
     for curve in keyframes.location_curves(obj):
         frames = [point.co[0] for point in curve.keyframe_points]
-        if frames:
+        if frames and np.isfinite(frames).all():
             nearest = min((frame - kept for frame in frames), key=abs)
             if not block_keys.same_frame(nearest + kept, kept):
                 return nearest

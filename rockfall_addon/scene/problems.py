@@ -11,7 +11,7 @@ import numpy as np
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, from_plain, from_text, gravest_first, to_plain, to_text
 from ...core.workflow.noticed import impossible_sizes
-from . import fingerprints, migration, picks, store, timing
+from . import fingerprints, migration, picks, set_aside, store, timing
 
 MOST = 6
 BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon
@@ -29,7 +29,7 @@ def keep_trajectories(scene: bpy.types.Scene, remarks: dict[str, list[Remark]]) 
 
 def of_trajectories(scene: bpy.types.Scene) -> dict[str, list[Remark]]:
     """Trajectory → remarks."""
-    kept = json.loads(scene.get(store.TRAJECTORY_PROBLEMS, "{}"))
+    kept = store.read_json(scene, store.TRAJECTORY_PROBLEMS, {})
     return {name: list(from_plain(values, "warning")) for name, values in kept.items()}
 
 
@@ -122,7 +122,9 @@ def forget() -> None:
 
 
 def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
-    said = []
+    said = set_aside.remarks(scene)
+    if not said and store.HAS_SET_ASIDE in scene:
+        del scene[store.HAS_SET_ASIDE]
     scale = scene.unit_settings.scale_length
     if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6 and picks.objects_of(scene):
         text = (

@@ -40,6 +40,7 @@ from . import (
     picks,
     project_videos,
     reconstruction,
+    set_aside,
     simulated_sources,
     simulated_zones,
     simulation_setup,
@@ -109,17 +110,23 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     return result
 
 
-def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
+def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
     """Write project.toml, picks.csv and, when there are, terrain and structures; `load_project` reads them again.
 
-    Several tiles are written as one terrain. Returns the path of project.toml.
+    Several tiles are written as one terrain.
+
+    Returns
+    -------
+    The path of project.toml; and which trajectories are left out, and why.
 
     Raises
     ------
-    RockfallError : there are neither picks nor terrain, two picks are at one time, or the folder cannot be written.
+    RockfallError : there are neither picks nor terrain, no trajectory can be used, or the folder cannot be written.
     """
     surface, shift = reconstruction.ground(scene), georeference.read_shift(scene)
-    table = picks.picks_of(scene) if picks.objects_of(scene) else None
+    table, left_out = None, tuple(set_aside.grave(scene))
+    if picks.objects_of(scene):
+        table, left_out = reconstruction.good_picks(scene)
     if table is None and surface is None:
         raise RockfallError("There is nothing to export: import a terrain or picks first, or load the demo.")
     settings = reconstruction.project_settings(scene, [] if table is None else table.trajectory.tolist())
@@ -150,12 +157,12 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> Path:
             blocks=settings.blocks,
             reconstruction=settings.reconstruction,
             videos=project_videos.write_videos(scene, place),
-            render=tuple(_preset(values) for values in json.loads(scene.get(store.RENDER_PRESETS, "[]"))),
+            render=tuple(_preset(values) for values in store.read_json(scene, store.RENDER_PRESETS, [])),
             simulation=stated,
             extra={MODEL_TABLES[which]: values for which, values in parameters.items() if values},
         )
         write_project(project, place / "project.toml")
-    return folder / "project.toml"
+    return folder / "project.toml", left_out
 
 
 def _structures(project: Project, surface: Surface | None) -> tuple[dict[str, Surface | Cloud], list[str]]:

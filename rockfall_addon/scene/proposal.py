@@ -196,7 +196,7 @@ def apply(scene: bpy.types.Scene) -> int:
 
 def is_applied(scene: bpy.types.Scene) -> bool:
     """Whether all picks but those in the air have the normals that a refinement gives them."""
-    grounded = [pick for pick in store.with_role(scene, store.PICK_ROLE) if pick.get(store.KIND) != "pass"]
+    grounded = [pick for pick in store.of_role(scene, store.PICK_ROLE) if pick.get(store.KIND) != "pass"]
     return bool(grounded) and all(store.NORMAL in pick for pick in grounded)
 
 
@@ -208,7 +208,7 @@ def discard(scene: bpy.types.Scene) -> None:
 
 
 def _kept(scene: bpy.types.Scene) -> dict[str, Any] | None:
-    return json.loads(scene[store.PROPOSAL]) if store.PROPOSAL in scene else None
+    return store.read_json(scene, store.PROPOSAL, None)
 
 
 def _is_stale(scene: bpy.types.Scene, kept: dict[str, Any]) -> bool:

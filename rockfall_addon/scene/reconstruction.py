@@ -2,20 +2,24 @@
 """The scene's picks and settings → the core's reconstruction → the scene."""
 
 import json
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
 from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
+from ...core.errors import RockfallError
 from ...core.exchange.opening import block_of
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
+from ...core.remarks import Remark
 from ...core.terrain.surface import Surface
-from . import fingerprints, migration, models, own_blocks, problems, simulation, store, terrain, trajectories
+from . import fingerprints, migration, models, own_blocks, problems, set_aside, simulation, store, terrain, trajectories
 from . import picks as pick_objects
+from .stored_values import block_problem
 
 
 def reconstruct_scene(
@@ -41,6 +45,47 @@ def reconstruct_scene(
     )
 
 
+def reconstruct_good(scene: bpy.types.Scene) -> tuple[Reconstruction, tuple[Remark, ...]]:
+    """The trajectories that can be reconstructed; and what is missing, and why.
+
+    Raises
+    ------
+    RockfallError : none can be.
+    """
+    _, result, said = _good(scene)
+    return result, said
+
+
+def good_picks(scene: bpy.types.Scene) -> tuple[Picks, tuple[Remark, ...]]:
+    """The picks of these trajectories, as they stand in the scene; what is missing, and errors, as there."""
+    picks, _, said = _good(scene)
+    return picks, said
+
+
+def _good(scene: bpy.types.Scene) -> tuple[Picks, Reconstruction, tuple[Remark, ...]]:
+    objects = pick_objects.ordered(scene, pick_objects.objects_of(scene))
+    surface, said = ground(scene), tuple(set_aside.grave(scene))
+
+    def together(members: Sequence[bpy.types.Object]) -> tuple[Picks, Reconstruction]:
+        picks = pick_objects.read(scene, members)
+        return picks, reconstruct_scene(scene, picks, surface)
+
+    try:
+        return *together(objects), said
+    except RockfallError as error:
+        first = error
+    good, bad = [], []
+    for name, members in fingerprints.by_trajectory(objects).items():
+        try:
+            together(members)
+            good += members
+        except RockfallError as error:
+            bad.append(Remark(str(error), "problem", name))
+    if not good:
+        raise first
+    return *together(good), (*bad, *said)
+
+
 def forces_of(scene: bpy.types.Scene) -> tuple[float, Drag | None]:
     """Gravity [m/s²], and the drag of the air where it is wanted."""
     drag = Drag(*list(scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))))
@@ -55,8 +100,15 @@ def ground(scene: bpy.types.Scene) -> Surface | None:
 def blocks_of(scene: bpy.types.Scene, names: set[str]) -> dict[str, Block]:
     """The block of each trajectory: its own, or that of the settings."""
     default = Block(*_default_block(scene))
-    own = json.loads(scene.get(store.BLOCKS, "{}"))
-    return {name: Block(*own[name]) if name in own else default for name in names}
+    own = store.read_json(scene, store.BLOCKS, {})
+    return {name: _own_block(name, own[name]) if name in own else default for name in names}
+
+
+def _own_block(name: str, values: list[float]) -> Block:
+    problem = block_problem(values)
+    if problem:
+        raise RockfallError(f"Trajectory {name} has a block that cannot be: {problem} Give it another one.")
+    return Block(*values)
 
 
 def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
@@ -106,7 +158,7 @@ def keep_settings(scene: bpy.types.Scene, project: Project) -> None:
 def project_settings(scene: bpy.types.Scene, names: list[str]) -> Project:
     """The settings as a project keeps them; blocks for the trajectories that have their own."""
     settings = scene.rockfall
-    own = json.loads(scene.get(store.BLOCKS, "{}"))
+    own = store.read_json(scene, store.BLOCKS, {})
     density, coefficient = scene.get(store.DRAG, (AIR_DENSITY_KGPM3, DRAG_COEFFICIENT))
     return Project(
         block=BlockEntry("", *_default_block(scene)),

@@ -90,7 +90,7 @@ def seen_video(camera: bpy.types.Object, names: Collection[str]) -> SeenVideo:
 
 def _tables(camera: bpy.types.Object) -> dict[str, Array]:
     """Name → (m, 6) rows: frame, video time, u, v, sigma, by hand."""
-    names = json.loads(camera.get(store.TRACK_NAMES, "[]"))
+    names = store.read_json(camera, store.TRACK_NAMES, [])
     rows = np.array(camera.get(store.TRACK_ROWS, ()), dtype=np.float64).reshape(-1, COLUMNS)
     return {name: rows[rows[:, 0] == i, 1:] for i, name in enumerate(names)}
 

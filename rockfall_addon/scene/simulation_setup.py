@@ -211,7 +211,7 @@ def forget(scene: bpy.types.Scene) -> None:
 
 def remarks(scene: bpy.types.Scene) -> list[Remark]:
     """What there is to say about the shown simulation, bad news first."""
-    kept = json.loads(scene.get(store.SIMULATION, "{}"))
+    kept = store.read_json(scene, store.SIMULATION, {})
     said = list(from_plain(kept.get("remarks", []), "note"))
     if simulation.blocks_of(scene) and kept.get("print") != fingerprint(scene):
         text = "Terrain, structures, releases, models or settings were changed since: simulate again."

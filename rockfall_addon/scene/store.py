@@ -5,22 +5,29 @@ All of it is stored in ID properties: they hold doubles, are saved in the file a
 right is what saved files contain and never changes; `migration` says what is done when the meaning does.
 """
 
+import json
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
+
+from ...core.errors import InputError
 
 # of any object
 ROLE, ID = "rockfall_role", "rockfall_id"
 TERRAIN_ROLE, COARSE_VIEW_ROLE = "terrain", "terrain_view"
 LEFT_OUT_ROLE = "left_out"  # points of a cloud that the ground filter took for vegetation: for eyes only
 PICK_ROLE, BLOCK_ROLE, FLIGHTS_ROLE = "pick", "block", "flights"
+SET_ASIDE_ROLE = "pick_set_aside"  # a pick that cannot be used, until it is corrected
 MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"
 SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
 RELEASE_ROLE = "release"  # a drawn line, area or points
 STRUCTURE_ROLE = "structure"  # a mesh that blocks meet beside the terrain
 CAMERA_ROLE = "camera"
+SET_ASIDE = "rockfall_set_aside"  # of scenes, picks and actions: values that cannot be used, by their keys
+HAS_SET_ASIDE = "rockfall_has_set_aside"  # of the scene: whether picks or values are
 COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
 
 # of the scene: the project
@@ -115,6 +122,23 @@ def double(value: float) -> float:
     return float(f"{value:.7g}")
 
 
+def read_json(holder: bpy.types.ID, key: str, empty: Any) -> Any:
+    """What is kept as text; `empty` where there is none.
+
+    Raises
+    ------
+    RockfallError : it cannot be read. `set_aside` puts such a text aside when a file is opened.
+    """
+    text = holder.get(key)
+    if text is None:
+        return empty
+    try:
+        return json.loads(text)
+    except (TypeError, ValueError) as error:
+        problem = f"{key} of {holder.name} cannot be read: it was changed from outside"
+        raise InputError(problem, advice="Save the file and open it again: it is set aside then") from error
+
+
 _Table = dict[tuple[str, str | None], list[bpy.types.Object]]
 _tables: dict[int, _Table | None] = {}  # session_uid of a scene → what `looking` has found, None before
 
@@ -155,7 +179,7 @@ def _table(scene: bpy.types.Scene) -> _Table:
         if role is not None:
             table.setdefault((role, None), []).append(obj)
             name = obj.get(TRAJECTORY)
-            if name is not None:
+            if isinstance(name, str):
                 table.setdefault((role, name), []).append(obj)
     return table
 

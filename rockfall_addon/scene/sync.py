@@ -30,6 +30,7 @@ from . import (
     picks,
     problems,
     reconstruction,
+    set_aside,
     simulation,
     store,
     terrain_mesh,
@@ -87,8 +88,11 @@ def notice(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             actions.add(obj.name)
         elif isinstance(obj, bpy.types.Object):
             role = obj.get(store.ROLE)
-            if role in (store.PICK_ROLE, store.BLOCK_ROLE) and store.TRAJECTORY in obj:
-                names.add(obj[store.TRAJECTORY])
+            name = obj.get(store.TRAJECTORY)
+            if role in (store.PICK_ROLE, store.BLOCK_ROLE) and isinstance(name, str):
+                names.add(name)
+            elif role in (store.PICK_ROLE, store.SET_ASIDE_ROLE):
+                anywhere = True  # what it belongs to is known once it was looked at
             elif role == store.TERRAIN_ROLE:
                 anywhere = True
                 if update.is_updated_geometry:
@@ -165,12 +169,17 @@ def sync(
 
 def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, again: bool, undone: bool) -> Done:
     done = Done([], [])
+    wanted = None if names is None else set(names)
+    if not dragging:
+        came = set_aside.look(scene, wanted)
+        wanted = None if wanted is None else wanted | came
     timing.follow_frame_rate(scene)  # what is waiting may be done before Blender says that the rate has changed
     if not dragging:
         terrain_view.follow_edits(scene)
-    wanted = None if names is None else set(names)
     objects = picks.objects_of(scene, wanted)
     if not objects and store.SHOWN not in scene:
+        if not dragging:
+            problems.update(scene)
         return done
     parts = trajectories.parts_of(scene, wanted)
     edited: dict[str, str] = {}
@@ -187,8 +196,12 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
     prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
     there = groups if wanted is None else {obj[store.TRAJECTORY] for obj in picks.objects_of(scene)}
     gone = [name for name in prints if name not in there]
+    apart = {set_aside.trajectory_of(obj) for obj in set_aside.of_picks(scene)}
     for name in gone:
-        _forget(scene, name)
+        if name in apart:  # its last flights wait for its picks
+            _grey(scene, name, trajectories.parts_of(scene, [name]))
+        else:
+            _forget(scene, name)
         prints.pop(name), said.pop(name, None)
     altered, blocks = again or bool(gone), {} if dragging else _blocks_of(scene, groups)
     for name, members in groups.items():

@@ -55,7 +55,7 @@ def shown_offsets(scene: bpy.types.Scene, picks: Picks) -> dict[str, float]:
 
 def kept_offsets(scene: bpy.types.Scene) -> dict[str, float]:
     """The offsets with which the scene's keys were written."""
-    return json.loads(scene.get(store.OFFSETS, "{}"))
+    return store.read_json(scene, store.OFFSETS, {})
 
 
 def keep_offsets(scene: bpy.types.Scene, offsets: dict[str, float]) -> None:

@@ -97,7 +97,7 @@ def use_rate_of(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 def events_of(camera: bpy.types.Object) -> dict[int, float]:
     """Number of an event → video time at which this camera saw it [s]."""
-    return {int(number): float(time) for number, time in json.loads(camera.get(store.EVENTS, "{}")).items()}
+    return {int(number): float(time) for number, time in store.read_json(camera, store.EVENTS, {}).items()}
 
 
 def mark_event(scene: bpy.types.Scene, camera: bpy.types.Object, number: int) -> float:
@@ -119,7 +119,7 @@ def reference_camera(scene: bpy.types.Scene) -> bpy.types.Object | None:
     chosen = videos.by_id(scene, str(scene.get(store.REFERENCE_CAMERA, "")))
     if chosen is not None:
         return chosen
-    order = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
+    order = store.read_json(scene, store.KNOWN_VIDEOS, {})
     return next((c for c in (videos.by_id(scene, one) for one in order) if c is not None), None)
 
 

@@ -49,7 +49,7 @@ def summary(camera: bpy.types.Object) -> str:
 
 def facts_of(camera: bpy.types.Object) -> dict:
     """What the file says about itself: codec, container, rotation_deg, header_rate_hz, rate_hz, remarks …"""
-    return json.loads(camera.get(store.VIDEO_FACTS, "{}"))
+    return store.read_json(camera, store.VIDEO_FACTS, {})
 
 
 def size_of(camera: bpy.types.Object) -> tuple[int, int]:
@@ -81,7 +81,7 @@ def row_time_of(camera: bpy.types.Object) -> float:
 
 def remember(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
     """Remember which cameras there are, beside those that are gone."""
-    known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
+    known = store.read_json(scene, store.KNOWN_VIDEOS, {})
     known |= {obj[store.ID]: Path(str(obj[store.VIDEO_FILE])).name for obj in objects}
     text = json.dumps(known)
     if scene.get(store.KNOWN_VIDEOS) != text:
@@ -90,7 +90,7 @@ def remember(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
 
 def forget_id(scene: bpy.types.Scene, identifier: str) -> None:
     """A camera that is gone is not missed any more."""
-    known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
+    known = store.read_json(scene, store.KNOWN_VIDEOS, {})
     known.pop(identifier, None)
     scene[store.KNOWN_VIDEOS] = json.dumps(known)
 
@@ -98,5 +98,5 @@ def forget_id(scene: bpy.types.Scene, identifier: str) -> None:
 def deleted(scene: bpy.types.Scene) -> dict[str, str]:
     """Id → name of the video, of cameras that someone deleted."""
     there = {obj[store.ID] for obj in cameras(scene)}
-    known = json.loads(scene.get(store.KNOWN_VIDEOS, "{}"))
+    known = store.read_json(scene, store.KNOWN_VIDEOS, {})
     return {identifier: name for identifier, name in known.items() if identifier not in there}

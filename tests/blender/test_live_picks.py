@@ -194,7 +194,12 @@ def test_a_pick_that_lost_a_property(scene: bpy.types.Scene, part, key: str) -> 
     update()
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("other", None))
     update()
-    assert part("rockfall_addon.scene.problems").remarks(scene) == []
+    said = [remark.text for remark in part("rockfall_addon.scene.problems").remarks(scene)]
+    if key in ("rockfall_time_s", "rockfall_position_m"):
+        (text,) = said
+        assert "of the pick A 03 impact is missing. Trajectory A goes without it" in text
+    else:
+        assert said == []
     check_shown(scene, part)
     assert len([row for row in scene.rockfall_impacts if row.trajectory == "A"]) == (
         2 if key in ("rockfall_time_s", "rockfall_position_m") else 3

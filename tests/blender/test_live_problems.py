@@ -150,7 +150,8 @@ def test_an_unknown_kind_is_told(scene: bpy.types.Scene, part) -> None:
     pick["rockfall_kind"] = "impakt"
     pick.location.y += 0.2
     update()
-    assert "trajectory A: Unknown kind 'impakt'. Did you mean impact?" in scene["rockfall_problem"]
+    assert "The kind of the pick A 03 impact ('impakt') is none of impact" in scene["rockfall_problem"]
+    assert "(did you mean impact?). Trajectory A goes without it" in scene["rockfall_problem"]
     pick.rockfall_pick.kind = "impact"
     assert scene["rockfall_problem"] == ""
     check_shown(scene, part)

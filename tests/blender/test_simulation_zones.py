@@ -96,7 +96,7 @@ def test_a_project_keeps_the_zones(scan: bpy.types.Scene, part, tmp_path) -> Non
         tile.vertex_groups[settings.zones[-1].name].add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
     part("rockfall_addon.scene.terrain_mesh").mistrust(tile.data)
     before = plan(part, scan).scenario
-    path = project.save_project(scan, tmp_path / "project")
+    path, _ = project.save_project(scan, tmp_path / "project")
 
     core = part("core.exchange.simulation_project")
     stated = core.open_simulation(part("core.exchange.project").read_project(path), path)[0]

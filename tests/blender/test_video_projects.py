@@ -65,7 +65,7 @@ def test_project_goes_out_as_it_came_in(part: Part, tmp_path: Path, moved: bool)
     projects.load_project(scene(), path)
     (camera,) = videos.cameras(scene())
     assert part("rockfall_addon.steps.videos.wording").is_missing(camera) == moved
-    out = projects.save_project(scene(), tmp_path / "out")
+    out, _ = projects.save_project(scene(), tmp_path / "out")
     (before,), (after,) = (project.read_project(each).videos for each in (path, out))
     for name in ("name", "offset_s", "drift", "origin_s", "capture_rate_hz", "row_time_s"):
         assert getattr(after, name) == getattr(before, name)

@@ -68,7 +68,8 @@ def _set_note(self: bpy.types.PropertyGroup, value: str) -> None:
 
 def _get_time(self: bpy.types.PropertyGroup) -> str:
     """To 0.1 ms, which the field has room for; an exact time that looks like this one is not changed to it."""
-    return f"{float(self.id_data.get(store.TIME, 0.0)):.4f}"
+    time = self.id_data.get(store.TIME, 0.0)
+    return f"{time:.4f}" if isinstance(time, (int, float)) else repr(time)
 
 
 def _set_time(self: bpy.types.PropertyGroup, value: str) -> None:

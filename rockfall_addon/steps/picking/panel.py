@@ -6,7 +6,7 @@ import bpy
 from ...scene import camera_paths, places, problems, sightings, store, videos
 from ...view import job, pointing
 from ...view.panel import RockfallPanel, State, advise, fields, paragraph, show_remarks
-from . import editing
+from . import editing, set_aside
 
 
 class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
@@ -24,12 +24,15 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
         picks = store.with_role(scene, store.PICK_ROLE)
         flights = store.with_role(scene, store.FLIGHTS_ROLE)
         if not picks:
+            show_remarks(context, layout, problems.remarks(scene))
+            set_aside.draw(layout, scene)
             with_video = store.has_role(scene, store.CAMERA_ROLE)
             way = "Click the block at its impacts in the footage, or import" if with_video else "Import"
             advise(context, layout, False, f"{way} a table of timed picks (picks.csv).")
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
         show_remarks(context, layout, problems.remarks(scene))
+        set_aside.draw(layout, scene)
         runs = "trajectory" if len(flights) == 1 else "trajectories"
         advise(context, layout, True, f"{len(picks)} picks, {len(flights)} {runs}.")
         names = ("block_diameter_m", "density_kgpm3", "block_shape", "normal_radius_m", "use_drag", "flights_join")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Export what was reconstructed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -10,6 +11,7 @@ from ....core.exchange.tables import write_impacts, write_picks, write_trajector
 from ....core.output import output_folder
 from ....core.progress import Progress
 from ....core.reconstruction.sampling import sample_trajectories
+from ....core.remarks import Remark
 from ...scene import project, reconstruction, simulation, simulation_setup, store, terrain, trails
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
@@ -45,13 +47,13 @@ class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        result = reconstruction.reconstruct_scene(scene)
+        result, left_out = reconstruction.reconstruct_good(scene)
         samples = sample_trajectories(result, trails.SAMPLE_STEP_S, surface=terrain.surface_of_scene(scene))
         with output_folder(Path(bpy.path.abspath(self.directory))) as folder:
             write_picks(result.picks, folder / "picks.csv")
             write_impacts(result.impacts, folder / "impacts.csv")
             write_trajectories(samples, folder / "trajectories.csv")
-        self.report({"INFO"}, f"picks.csv, impacts.csv and trajectories.csv are in {self.directory}.")
+        _report(self, f"picks.csv, impacts.csv and trajectories.csv are in {self.directory}.", left_out)
         return {"FINISHED"}
 
 
@@ -100,9 +102,18 @@ class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        written = project.save_project(context.scene, Path(bpy.path.abspath(self.directory)))
-        self.report({"INFO"}, f"{written.name} is in {self.directory}.")
+        written, left_out = project.save_project(context.scene, Path(bpy.path.abspath(self.directory)))
+        _report(self, f"{written.name} is in {self.directory}.", left_out)
         return {"FINISHED"}
+
+
+def _report(operator: bpy.types.Operator, text: str, left_out: Sequence[Remark]) -> None:
+    """Say what was written; when something is missing in it, that first."""
+    if not left_out:
+        operator.report({"INFO"}, text)
+        return
+    more = f" {len(left_out) - 1} more remarks are in step 4." if len(left_out) > 1 else ""
+    operator.report({"WARNING"}, f"Something is missing: {left_out[0].text}{more} The rest is written: {text}")
 
 
 CLASSES = (ROCKFALL_OT_export_tables, ROCKFALL_OT_export_simulation, ROCKFALL_OT_export_project)

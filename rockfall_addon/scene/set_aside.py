@@ -30,6 +30,8 @@ MOST_NAMED = 4
 """Picks that are named one by one; of further ones the number is said."""
 MOST_OF_VALUE, MOST_OF_NAME = 40, 60
 PARAMETERS = (store.MODEL_PARAMETERS, store.OTHER_PARAMETERS)
+SUFFIX = " (set aside)"
+"""Behind the names of the picks' objects, so that the outliner shows it."""
 ABOUT = "set aside"
 """What all remarks of here are about."""
 WORDS = {
@@ -59,13 +61,14 @@ def look(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> set[str]
         there = there or store.SET_ASIDE in values
         if _wrong(values):
             obj[store.ROLE] = store.SET_ASIDE_ROLE
+            obj.name = f"{obj.name.removesuffix(SUFFIX)}{SUFFIX}"
             changed.add(trajectory_of(obj))
         elif _put_away(obj, values, BESIDE_A_PICK) or _put_back(obj):
             stale.add(trajectory_of(obj))
     for obj in waiting:
         values = dict(obj.items())
         if not _wrong(values):
-            obj[store.ROLE] = store.PICK_ROLE
+            obj[store.ROLE], obj.name = store.PICK_ROLE, obj.name.removesuffix(SUFFIX)
             _put_away(obj, values, BESIDE_A_PICK)
             changed.add(trajectory_of(obj))
     for obj in (obj for name in asked for obj in store.of_role(scene, store.BLOCK_ROLE, name)):
@@ -240,7 +243,8 @@ def _of_pick(obj: bpy.types.Object) -> str:
     name, (key, problem) = trajectory_of(obj), _wrong(dict(obj.items())) or ("", "")
     goes_on = f"Trajectory {readable(name, MOST_OF_NAME)} goes without it" if name else "It is of no trajectory"
     return (
-        f"The {WORDS[key]} of the pick {readable(obj.name, MOST_OF_NAME)} {_said(obj.get(key), problem)}. {goes_on}: "
+        f"Set aside: the {WORDS[key]} of {readable(obj.name.removesuffix(SUFFIX), MOST_OF_NAME)} "
+        f"{_said(obj.get(key), problem)}. {goes_on}: "
         f"recover it from its marker, correct its custom property {key}, or delete it."
     )
 

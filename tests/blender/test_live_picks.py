@@ -197,7 +197,7 @@ def test_a_pick_that_lost_a_property(scene: bpy.types.Scene, part, key: str) -> 
     said = [remark.text for remark in part("rockfall_addon.scene.problems").remarks(scene)]
     if key in ("rockfall_time_s", "rockfall_position_m"):
         (text,) = said
-        assert "of the pick A 03 impact is missing. Trajectory A goes without it" in text
+        assert "of A impact 2 is missing. Trajectory A goes without it" in text
     else:
         assert said == []
     check_shown(scene, part)

@@ -150,7 +150,7 @@ def test_an_unknown_kind_is_told(scene: bpy.types.Scene, part) -> None:
     pick["rockfall_kind"] = "impakt"
     pick.location.y += 0.2
     update()
-    assert "The kind of the pick A 03 impact ('impakt') is none of impact" in scene["rockfall_problem"]
+    assert "Set aside: the kind of A impact 2 ('impakt') is none of impact" in scene["rockfall_problem"]
     assert "(did you mean impact?). Trajectory A goes without it" in scene["rockfall_problem"]
     pick.rockfall_pick.kind = "impact"
     assert scene["rockfall_problem"] == ""

@@ -70,20 +70,20 @@ CASES = {
     "position nan": (of_pick("position_m", [NAN, 0.0, 0.0]), "rockfall_position_m", WITHOUT_PICK),
     "position 2": (of_pick("position_m", [0.0, 0.0]), "no list of 3 numbers", WITHOUT_PICK),
     "position beyond": (of_pick("position_m", [1e300, 0.0, 0.0]), "beyond what can be", WITHOUT_PICK),
-    "time inf": (of_pick("time_s", INF), "The time of the pick A 02 impact (inf) is not finite", WITHOUT_PICK),
-    "time text": (of_pick("time_s", "soon"), "The time of the pick A 02 impact ('soon') is no number", WITHOUT_PICK),
-    "kind gone": (of_pick("kind", None), "The kind of the pick A 02 impact is missing", WITHOUT_PICK),
+    "time inf": (of_pick("time_s", INF), "Set aside: the time of A impact 1 (inf) is not finite", WITHOUT_PICK),
+    "time text": (of_pick("time_s", "soon"), "Set aside: the time of A impact 1 ('soon') is no number", WITHOUT_PICK),
+    "kind gone": (of_pick("kind", None), "Set aside: the kind of A impact 1 is missing", WITHOUT_PICK),
     "kind unknown": (of_pick("kind", "impakt"), "did you mean impact?", WITHOUT_PICK),
-    "status number": (of_pick("status", 3), "The status of the pick A 02 impact (3)", WITHOUT_PICK),
+    "status number": (of_pick("status", 3), "Set aside: the status of A impact 1 (3)", WITHOUT_PICK),
     "trajectory number": (of_pick("trajectory", 5), "It is of no trajectory", WITHOUT_PICK),
-    "sigma text": (of_pick("sigma_position_m", "x"), "rockfall_sigma_position_m of A 02 impact ('x')", ALL),
+    "sigma text": (of_pick("sigma_position_m", "x"), "rockfall_sigma_position_m of A impact 1 ('x')", ALL),
     "sigma negative": (of_pick("sigma_position_m", [-1.0]), "beyond what can be", ALL),
     "normal zero": (of_pick("normal", [0.0, 0.0, 0.0]), "has length zero", ALL),
-    "extra text": (of_pick("extra", "x"), "rockfall_extra of A 02 impact ('x')", ALL),
-    "key frame text": (of_pick("key_frame", "x"), "rockfall_key_frame of A 02 impact ('x')", ALL),
-    "written text": (of_pick("written", "x"), "rockfall_written of A 02 impact ('x')", ALL),
-    "result text": (of_pick("result", "x"), "rockfall_result of A 02 impact ('x')", ALL),
-    "shift of pick nan": (of_pick("pick_shift_m", [NAN, 0.0, 0.0]), "rockfall_pick_shift_m of A 02 impact", ALL),
+    "extra text": (of_pick("extra", "x"), "rockfall_extra of A impact 1 ('x')", ALL),
+    "key frame text": (of_pick("key_frame", "x"), "rockfall_key_frame of A impact 1 ('x')", ALL),
+    "written text": (of_pick("written", "x"), "rockfall_written of A impact 1 ('x')", ALL),
+    "result text": (of_pick("result", "x"), "rockfall_result of A impact 1 ('x')", ALL),
+    "shift of pick nan": (of_pick("pick_shift_m", [NAN, 0.0, 0.0]), "rockfall_pick_shift_m of A impact 1", ALL),
     "id gone": (of_pick("id", None), "", ALL),
     "id twice": (same_id, "", ALL),
     "id twice, frame 50": (same_id_at_frame_50, "", ALL),
@@ -229,7 +229,7 @@ def test_what_is_set_aside_is_selected_and_deleted(scene: bpy.types.Scene, part,
     of_scene("gravity_mps2", NAN)(scene)
     scene = opened(tmp_path / "damaged.blend")
     assert bpy.ops.rockfall.select_set_aside() == {"FINISHED"}
-    assert [obj.name for obj in bpy.context.selected_objects] == ["A 02 impact"]
+    assert [obj.name for obj in bpy.context.selected_objects] == ["A impact 1 (set aside)"]
     assert part("rockfall_addon.scene.next_step").next_step(scene).actions[0] == "rockfall.recover_picks"
     assert bpy.ops.rockfall.remove_set_aside() == {"FINISHED"}
     assert said_of(scene, part) == ""

@@ -7,11 +7,18 @@ import bpy
 
 from ...core.reconstruction.block import SHAPES, Block
 from . import store
+from .stored_values import block_problem
 
 
 def has(scene: bpy.types.Scene, name: str) -> bool:
     """Whether a trajectory has a block of its own."""
     return name in _kept(scene)
+
+
+def problem_of(scene: bpy.types.Scene, name: str) -> str:
+    """What is wrong with the block that a trajectory has of its own; empty when nothing is."""
+    values = _kept(scene).get(name)
+    return "" if values is None else block_problem(values)
 
 
 def give(scene: bpy.types.Scene, name: str, block: Block) -> None:

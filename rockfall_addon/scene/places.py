@@ -14,7 +14,7 @@ from ...core.reconstruction.triangulation import contact_points, pick_on_terrain
 from ...core.terrain.raycast import cast_rays
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
-from . import picks, pictures, reconstruction, store
+from . import own_blocks, picks, pictures, reconstruction, store
 
 FIRST_NAME = "B01"
 
@@ -61,7 +61,9 @@ def surface_of(scene: bpy.types.Scene) -> Surface:
 
 
 def block_of(scene: bpy.types.Scene, name: str) -> Block:
-    """The block of a trajectory, also of one that has no picks yet."""
+    """The block of a trajectory, also of one that has no picks yet; that of the settings where its own cannot be."""
+    if own_blocks.problem_of(scene, name):
+        return reconstruction.default_block(scene)
     return reconstruction.blocks_of(scene, {name})[name]
 
 

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene's picks and settings → the core's reconstruction → the scene."""
 
-import json
 from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
 from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
-from ...core.errors import RockfallError
+from ...core.errors import InputError, RockfallError
 from ...core.exchange.opening import block_of
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
 from ...core.reconstruction.block import Block
@@ -99,15 +98,21 @@ def ground(scene: bpy.types.Scene) -> Surface | None:
 
 def blocks_of(scene: bpy.types.Scene, names: set[str]) -> dict[str, Block]:
     """The block of each trajectory: its own, or that of the settings."""
-    default = Block(*_default_block(scene))
+    default = default_block(scene)
     own = store.read_json(scene, store.BLOCKS, {})
     return {name: _own_block(name, own[name]) if name in own else default for name in names}
+
+
+def default_block(scene: bpy.types.Scene) -> Block:
+    """The block of the settings."""
+    return Block(*_default_block(scene))
 
 
 def _own_block(name: str, values: list[float]) -> Block:
     problem = block_problem(values)
     if problem:
-        raise RockfallError(f"Trajectory {name} has a block that cannot be: {problem} Give it another one.")
+        advice = "Give it another one: step 4, panel Block"
+        raise InputError(f"Its block cannot be: {problem.rstrip('.')}", trajectory=name, advice=advice)
     return Block(*values)
 
 

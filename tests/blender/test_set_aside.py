@@ -88,7 +88,11 @@ CASES = {
     "id twice": (same_id, "", ALL),
     "id twice, frame 50": (same_id_at_frame_50, "", ALL),
     "two picks at one time": (same_time, "Two picks at one time, 10.7312 s", WITHOUT_A),
-    "block of A without density": (of_scene("blocks", json.dumps(OF_A)), "Trajectory A has a block", WITHOUT_A),
+    "block of A without density": (
+        of_scene("blocks", json.dumps(OF_A)),
+        "trajectory A: Its block cannot be: The block's density must be a positive number",
+        WITHOUT_A,
+    ),
     "blocks broken": (of_scene("blocks", "{"), "rockfall_blocks of the scene ('{') is no readable JSON", ALL),
     "blocks a list": (of_scene("blocks", "[1]"), "rockfall_blocks of the scene ('[1]') is no JSON object", ALL),
     "default block text": (of_scene("default_block", "x"), "rockfall_default_block of the scene ('x')", ALL),

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 from ....core.reconstruction.block import SHAPES, Block
 from ...scene import impact_rows, own_blocks, places, store, sync
 from ...scene.settings import BLOCK_SHAPES
-from ...view.panel import RockfallPanel, facts, fields, kilograms
+from ...view.panel import RockfallPanel, facts, fields, kilograms, paragraph
 
 
 def trajectory_in_hand(scene: bpy.types.Scene) -> str:
@@ -102,6 +102,9 @@ class ROCKFALL_PT_block(RockfallPanel, bpy.types.Panel):
         settings, name = scene.rockfall_block, trajectory_in_hand(scene)
         block = places.block_of(scene, name)
         layout.prop(settings, "own", text=f"{name} has a block of its own")
+        if problem := own_blocks.problem_of(scene, name):
+            paragraph(context, layout, f"{problem} Switch it off, and on again to give another one.", "ERROR")
+            return
         if settings.own:
             fields(layout.column(align=True), settings, ("d1", "d2", "d3", "density", "shape"))
         facts(layout, [("Mean diameter", f"{block.diameter_m:.3g} m"), ("Mass", kilograms(block.mass_kg))])

@@ -61,7 +61,9 @@ STEPS = (
         ("screen.animation_play", "Play or Pause", {}), "rockfall.frame_trajectory",
         "rockfall.open_motion_graphs", "rockfall.open_keys", "rockfall.show_relief",
     )),
-    ("film", "9  Film", ("rockfall.set_up_film", "rockfall.render_film", "rockfall.remove_film")),
+    ("film", "9  Film", (
+        "rockfall.set_up_film", "rockfall.preview_film", "rockfall.render_film", "rockfall.remove_film",
+    )),
     ("share", "10  Share", (
         "rockfall.export_tables", "rockfall.export_graphs", "rockfall.export_simulation", "rockfall.export_project",
     )),

@@ -54,11 +54,12 @@ class PrintedProgress:
 
     def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
         """Now doing `text`."""
-        now, is_new, is_last = time.monotonic(), text != self._text, 0 < total == done
+        now, is_new = time.monotonic(), text != self._text
         if is_new:
             self._text, self._since = text, now
             self._end_line()
-        self._line = progress_line(text, done, total, now - self._since)
+        before, self._line = self._line, progress_line(text, done, total, now - self._since)
+        is_last = 0 < total == done and self._line != before
         if self._is_loud and (is_new or is_last or now - self._printed >= (REDRAW_S if self._terminal else BETWEEN_S)):
             self._print(now)
 

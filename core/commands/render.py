@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--preset",
         metavar="NAME",
         default="preview",
-        help="of the project, or: preview (640×360, the default), hd (1920×1080)",
+        help="of the project, or: preview (640×360, the default), 720p, hd (1920×1080), 4k",
     )
     parser.add_argument(
         "--out",

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from ..impact_models.machinery.parameters import Value
 from .simulated import NUMBER
 
-Kind = Literal["film", "still", "slope", "terrain"]
+Kind = Literal["film", "still", "slope", "terrain", "scene"]
 GraphKind = Literal["impacts", "motion"]
 GRAPH_KINDS: tuple[GraphKind, ...] = get_args(GraphKind)
 
@@ -22,8 +22,8 @@ class FilmJob:
     Attributes
     ----------
     kind : "film" (MP4); "still" (one frame of the film, PNG); "slope" (the whole slope with all trajectories, PNG);
-        "terrain" (a terrain file without trajectories, PNG).
-    source : the project, for "terrain" the terrain file.
+        "terrain" (a terrain file without trajectories, PNG); "scene" (the film for which a .blend is set up, MP4).
+    source : the project, for "terrain" the terrain file, for "scene" the .blend.
     out : the file to write.
     preset : name of the render preset.
     engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen.
@@ -34,7 +34,7 @@ class FilmJob:
     number, seed : of simulated blocks for each real one and model, and of their random numbers.
     parameters : model → parameter → value, where it is not the default.
     graphs : which stand in a film or still and follow its time; None for none.
-    title : written into the picture of a terrain; empty for the name of its file.
+    title : written into the picture of a terrain, empty for the name of its file; name of the .blend's scene.
     """
 
     kind: Kind

@@ -5,10 +5,12 @@ import importlib.util
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 from threading import Thread
+from typing import IO
 
 from ..dependencies import require_blender_libraries
 from ..errors import DependencyError, RockfallError
@@ -19,6 +21,8 @@ from .job import FilmJob
 
 CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try --engine cycles."
 LINES_TOLD, MOST_KEPT = 5, 200
+BEAT_S = 0.2
+"""So often progress is told again while a process says nothing: whoever wants it to end says so there."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +90,21 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str,
     RockfallError : with what the process says is wrong, or the last lines that it printed when it crashed.
     """
     problem, remarks, said = "", [], deque[str](maxlen=MOST_KEPT)
+    at = "Starting Blender", 0, 0
     with child(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None
         listener = Thread(target=said.extend, args=(process.stderr,))
         listener.start()
         try:
-            for line in process.stdout:
+            progress(*at)
+            for line in _lines(process.stdout):
                 word, _, rest = line.strip().partition(" ")
                 if word == "progress":
                     done, total, text = rest.split(maxsplit=2)
-                    progress(text, int(done), int(total))
+                    at = text, int(done), int(total)
+                if word == "progress" or not line:
+                    progress(*at)
                 elif word == "remark":
                     remarks.append(rest)
                 elif word == "error":
@@ -114,6 +122,26 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str,
         words = f" It said: {' / '.join(lines)}." if lines else ""
         raise RockfallError(CRASHED.format(name=name, status=status, said=words))
     return tuple(remarks)
+
+
+def _lines(stream: IO[str]) -> Iterator[str]:
+    """The lines of a stream as they come; now and then an empty one, without an end of line, while none comes."""
+    come: SimpleQueue[str | None] = SimpleQueue()
+
+    def listen() -> None:
+        for line in stream:
+            come.put(line)
+        come.put(None)
+
+    Thread(target=listen, daemon=True).start()
+    while True:
+        try:
+            line = come.get(timeout=BEAT_S)
+        except Empty:
+            line = ""
+        if line is None:
+            return
+        yield line
 
 
 def _make(job: FilmJob, progress: Progress) -> tuple[str, ...]:

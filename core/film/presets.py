@@ -9,8 +9,10 @@ from ..errors import InputError
 from ..exchange.project import Project, RenderPreset
 
 PREVIEW = RenderPreset("preview", width=640, height=360, fps=25.0, stagger_s=0.25)
+HD_720 = RenderPreset("720p", width=1280, height=720, fps=25.0, stagger_s=0.25)
 HD = RenderPreset("hd", width=1920, height=1080, fps=25.0, stagger_s=0.25)
-BUILT_IN = (PREVIEW, HD)
+UHD = RenderPreset("4k", width=3840, height=2160, fps=25.0, stagger_s=0.25)
+BUILT_IN = (PREVIEW, HD_720, HD, UHD)
 
 AFTERGLOW_S = 1.0
 """How long the film stays on the finished picture."""

@@ -38,6 +38,18 @@ def speed_note(time_scale: float) -> str:
     return f"slowed down {1 / time_scale:.3g}×" if time_scale < 1 else f"sped up {time_scale:.3g}×"
 
 
+def duration_words(seconds: float) -> str:
+    """A duration that is known roughly: "20 s", "4 min", "2.5 h"."""
+    if seconds < 90:
+        return f"{max(5 * round(seconds / 5), 5)} s"
+    return f"{round(seconds / 60)} min" if seconds < 90 * 60 else f"{round(seconds / 1800) / 2:g} h"
+
+
+def estimate(frame_s: float, frames: int) -> str:
+    """How long a film will take, from how long one of its frames took [s]."""
+    return f"About {duration_words(frame_s * frames)} for {frames} frames on this machine"
+
+
 def compared_lines(models: int) -> tuple[str, str]:
     """Two lines that say what is seen when the blocks of models are shown beside the real ones."""
     return (

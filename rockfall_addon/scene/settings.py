@@ -143,15 +143,6 @@ class SceneSettings(bpy.types.PropertyGroup):
     table_trajectory: BoolProperty(
         name="This trajectory only", description="List the impacts of the selected pick's trajectory", default=False
     )
-    film_graphs: EnumProperty(
-        name="Graphs", description="Graphs in the film, at the right of the picture, that follow its time",
-        items=[
-            ("NONE", "None", "The slope alone"),
-            ("IMPACTS", "Impacts", "The graphs of the impacts, whose points appear as the impacts happen"),
-            ("MOTION", "Motion", "Speed, height above ground and energy over time, drawn up to the present"),
-        ],
-        default="NONE",
-    )  # fmt: skip
     show_legend: BoolProperty(name="Legend", description="Draw the colour scale over the 3-D view", default=True)
 
 

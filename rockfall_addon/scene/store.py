@@ -37,6 +37,7 @@ SITE, SITE_DESCRIPTION = "rockfall_site", "rockfall_site_description"
 PICKS_SOURCE = "rockfall_picks_source"
 RENDER_PRESETS = "rockfall_render_presets"
 BEFORE_FILM = "rockfall_film_before"
+FILM_FILE, FILM_OF = "rockfall_film_file", "rockfall_film_of"  # the latter: fingerprint of what it shows
 WORKSPACE, GRAPHS_WORKSPACE = "rockfall_workspace", "rockfall_graphs_workspace"  # of the workspaces
 
 # of the scene: how trajectories are computed

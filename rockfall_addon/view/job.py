@@ -33,12 +33,16 @@ class Work:
     keep : stores what was computed in the scene in which the work began, and says so in a sentence; RockfallError where
         that cannot be done any more.
     keeps_part : when it is stopped, `compute` gives what is finished, which is kept.
+    changes : what is computed changes the scene: an undo step.
+    unchanged : what is true when it was stopped.
     """
 
     step: str
     compute: Callable[[Progress], object]
     keep: Callable[[bpy.types.Scene, object], str]
     keeps_part: bool = False
+    changes: bool = True
+    unchanged: str = "Nothing has changed."
 
 
 class Job:
@@ -225,7 +229,7 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str) -> N
 
 
 def _stopped(job: Job) -> str:
-    return f"{job.label} was stopped. Nothing has changed."
+    return f"{job.label} was stopped. {job.work.unchanged}"
 
 
 def _busy() -> str:
@@ -240,7 +244,7 @@ def _keep(job: Job) -> None:
     except Exception as error:  # noqa: BLE001 - a timer that fails is called no more
         problems.failed(job.label, error)
         words, is_problem = f"Something went wrong in Rockfall ({job.label}): {type(error).__name__}: {error}", True
-    if not is_problem:
+    if not is_problem and job.work.changes:
         _in_window(lambda window: bpy.ops.ed.undo_push(message=job.label))
     _end(job, words, is_problem=is_problem)
 

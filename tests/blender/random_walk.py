@@ -15,8 +15,8 @@ import bpy
 
 DEMO = ("load_demo", "load_footage_demo", "open_project")
 SLOW = {
-    "render_film", "calibrate", "find_equivalent", "simulate", "track_block", "follow_background", "refine",
-    "build_proxy", "export_graphs", "propose_pairs", "propose_impacts",
+    "render_film", "preview_film", "calibrate", "find_equivalent", "simulate", "track_block", "follow_background",
+    "refine", "build_proxy", "export_graphs", "propose_pairs", "propose_impacts",
 }  # fmt: skip
 """Operators that may take more than a second."""
 REPLACES = {"import_picks", "load_demo", "open_project", "load_footage_demo"}

@@ -162,7 +162,7 @@ def test_a_ring_for_each_impact_where_and_when_it_was(scene, part) -> None:
 def test_set_up_and_removal_leave_the_scene_as_it_was(scene, part) -> None:
     def state() -> dict:
         remembered = part("rockfall_addon.steps.film.remembered")
-        owners = {name: remembered._owner(scene, name) for name in remembered.SETTINGS}
+        owners = {name: remembered.owner(scene, name) for name in remembered.SETTINGS}
         values = {name: getattr(*owner) for name, owner in owners.items()}
         objects = {
             obj.name: (obj.hide_render, tuple(obj.scale), tuple(obj.location), len(obj.modifiers))
@@ -179,7 +179,9 @@ def test_set_up_and_removal_leave_the_scene_as_it_was(scene, part) -> None:
     scene.frame_set(3)
     before = state()
     for size in ("preview", "hd"):  # setting up twice is as good as once
-        assert bpy.ops.rockfall.set_up_film(size=size, engine="cycles", time_scale=0.5) == {"FINISHED"}
+        wanted = scene.rockfall_film
+        wanted.size, wanted.engine, wanted.time_scale = size, "cycles", 0.5
+        assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     assert film_objects(scene)
     assert scene.render.resolution_x == 1920
     assert bpy.ops.rockfall.remove_film() == {"FINISHED"}
@@ -264,3 +266,130 @@ def test_whole_job_in_another_process(picks: Path, tmp_path: Path, part) -> None
     assert bad.returncode == 1
     assert "picks.csv, row 2" in bad.stderr
     assert not (tmp_path / "other").exists()
+
+
+@pytest.fixture
+def small_film(scene, part):
+    """A scene that is set up for a film of few frames, each of few pixels."""
+    film = scene.rockfall_film
+    film.size, film.engine, film.time_scale = "preview", "cycles", 20.0
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
+    scene.cycles.samples, scene.render.resolution_percentage = 1, 10
+    scene.frame_start, scene.frame_end = 2, 4
+    return film
+
+
+def test_the_file_of_a_film_has_a_name(scene, small_film, part, tmp_path: Path) -> None:
+    properties = part("rockfall_addon.steps.film.properties")
+    assert Path(small_film.file).name == "rockfall.mp4"
+    folder = tmp_path / "films"
+    folder.mkdir()
+    for asked, name in (
+        (str(folder), "films/rockfall.mp4"), (f"{tmp_path}/new/", "new/rockfall.mp4"), (f"{tmp_path}/a.b", "a.b.mp4"),
+        (f"{tmp_path}/fall.MP4", "fall.MP4"),
+    ):  # fmt: skip
+        small_film.file = asked
+        assert properties.file_of(scene) == tmp_path / name
+    small_film.file = " "
+    assert properties.file_of(scene).name == "rockfall.mp4"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    assert small_film.file == "//site.mp4"
+    assert properties.file_of(scene) == tmp_path / "site.mp4"
+
+
+def test_settings_are_in_the_blend(scene, small_film, tmp_path: Path) -> None:
+    small_film.file, small_film.graphs = "//fall.mp4", "MOTION"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
+    film = bpy.context.scene.rockfall_film
+    assert (film.size, film.engine, film.time_scale, film.graphs, film.file) == (
+        "preview", "cycles", 20.0, "MOTION", "//fall.mp4",
+    )  # fmt: skip
+
+
+def test_a_film_that_is_older_than_a_change_is_not_rendered(scene, small_film, part) -> None:
+    assert bpy.ops.rockfall.render_film.poll()
+    small_film.size = "hd"
+    assert not bpy.ops.rockfall.render_film.poll()
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
+    assert bpy.ops.rockfall.preview_film.poll()
+    pick = next(obj for obj in scene.objects if obj.get("rockfall_kind") == "impact")
+    pick.location.z += 0.5
+    bpy.context.view_layer.update()
+    part("rockfall_addon.scene.sync").sync(scene)
+    assert not bpy.ops.rockfall.preview_film.poll()
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
+    bpy.data.objects.remove(scene.camera)
+    assert not bpy.ops.rockfall.render_film.poll()
+
+
+def test_a_preview_tells_the_time_and_writes_nothing(scene, small_film, part, tmp_path: Path) -> None:
+    stopwatch = part("rockfall_addon.steps.film.stopwatch")
+    small_film.file = str(tmp_path / "film.mp4")
+    scene.frame_set(3)
+    assert not stopwatch.expected(scene)
+    assert bpy.ops.rockfall.preview_film() == {"FINISHED"}
+    assert scene.frame_current == 3
+    assert stopwatch.expected(scene) == "About 5 s for 3 frames on this machine"
+    assert not list(tmp_path.glob("*.mp4"))
+    small_film.graphs = "MOTION"
+    assert not stopwatch.expected(scene)
+
+
+def test_the_open_scene_becomes_a_film(scene, small_film, part, tmp_path: Path) -> None:
+    path, output = tmp_path / "film.mp4", scene.render.filepath
+    path.write_bytes(b"an old film")
+    small_film.file = str(path)
+    assert bpy.ops.rockfall.render_film() == {"FINISHED"}
+    part("core.film.check").check_film(path, 3, (64, 36))
+    assert scene.render.filepath == output
+    assert [file.name for file in tmp_path.glob("*film*")] == ["film.mp4"]
+    whole = path.read_bytes()
+    small_film.file = str(tmp_path / "no" / "film.mp4")
+    with pytest.raises(RuntimeError, match="No film was written"):
+        bpy.ops.rockfall.render_film()
+    assert path.read_bytes() == whole
+
+
+def test_an_old_film_stays_where_the_new_one_is_not_whole(scene, small_film, part, tmp_path: Path, monkeypatch) -> None:
+    """Blender says nothing on a full disk: what it has written is looked at."""
+    path, progress = tmp_path / "film.mp4", part("core.progress")
+    path.write_bytes(b"an old film")
+    small_film.file = str(path)
+    error = part("core.errors").RockfallError
+
+    def half(command: list[str], name: str, _: object) -> None:
+        raise error(f"Blender has not made {name} as it should be: 1 of its 3 frames can be read.")
+
+    def stopped(*_: object) -> None:
+        raise progress.CancelledError
+
+    beside = part("rockfall_addon.steps.film.beside")
+    monkeypatch.setattr(beside, "run_job", half)
+    with pytest.raises(RuntimeError, match=r"1 of its 3 frames can be read\. The old film\.mp4 is as it was\."):
+        bpy.ops.rockfall.render_film()
+    monkeypatch.setattr(beside, "run_job", stopped)
+    with pytest.raises(progress.CancelledError):
+        beside.film_of(scene, path)(progress.silent)
+    assert [(file.name, file.read_bytes()) for file in tmp_path.glob("*film*")] == [("film.mp4", b"an old film")]
+
+
+def test_a_scene_whose_animation_was_cleared_is_set_up_again(scene, small_film, part) -> None:
+    """Clear Animation takes the keys of the blocks, and the drivers of captions and background."""
+    small_film.size = "preview"
+    scene.render.resolution_percentage = 100
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
+
+    def state() -> list[tuple]:
+        scene.frame_set(scene.frame_end)
+        bpy.context.view_layer.update()
+        return [(obj.name, obj.hide_render, np.round(np.array(obj.matrix_world), 5).tolist()) for obj in scene.objects]
+
+    before = state()
+    for obj in scene.objects:
+        obj.animation_data_clear()
+    scene.camera.data.animation_data_clear()
+    part("rockfall_addon.scene.sync").sync(scene)
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
+    assert sorted(state()) == sorted(before)

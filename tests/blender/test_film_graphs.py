@@ -78,15 +78,15 @@ def test_the_slope_is_left_of_the_graphs_and_all_is_taken_away(scene, preset, pa
     from mathutils import Vector
 
     before = {obj.name for obj in scene.objects}
-    scene.rockfall.film_graphs = "MOTION"
-    assert bpy.ops.rockfall.set_up_film(size="preview", engine="cycles") == {"FINISHED"}
+    scene.rockfall_film.size, scene.rockfall_film.engine, scene.rockfall_film.graphs = "preview", "cycles", "MOTION"
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     bpy.context.view_layer.update()
     motions = part("rockfall_addon.steps.film.motions").motions_of(scene)
     across = [world_to_camera_view(scene, scene.camera, Vector(p)).x for m in motions for p in m.position]
     assert max(across) < 0.62
     assert any(obj.name.startswith("Film graphs panel") for obj in scene.objects)
-    scene.rockfall.film_graphs = "NONE"
-    assert bpy.ops.rockfall.set_up_film(size="preview", engine="cycles") == {"FINISHED"}
+    scene.rockfall_film.graphs = "NONE"
+    assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     assert not any(obj.name.startswith("Film graphs") for obj in scene.objects)
     assert bpy.ops.rockfall.remove_film() == {"FINISHED"}
     assert {obj.name for obj in scene.objects} == before

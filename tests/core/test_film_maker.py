@@ -11,6 +11,7 @@ from rockfall.core.film import maker as maker_module
 from rockfall.core.film.engines import PASSED, choose_engine, probe, probe_script
 from rockfall.core.film.job import FilmJob
 from rockfall.core.film.maker import FilmMaker, film_maker, inside_blender, run_job
+from rockfall.core.progress import CancelledError
 
 KILL_YOURSELF = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"]
 ANSWER = "print('chatter'); print('{} {}')"
@@ -61,7 +62,19 @@ def test_the_progress_of_a_process_is_reported() -> None:
     )
     remarks = run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said))
     assert remarks == ("3 blocks stopped.",)
-    assert seen == [("Simulating a model", 0, 9), ("Rendering", 2, 2)]
+    assert list(dict.fromkeys(seen)) == [("Starting Blender", 0, 0), ("Simulating a model", 0, 9), ("Rendering", 2, 2)]
+
+
+def test_a_process_that_says_nothing_is_ended_when_a_person_wants_it() -> None:
+    asked, script = [], "import time; print('progress 1 9 Rendering', flush=True); time.sleep(600)"
+
+    def stop(*said: object) -> None:
+        asked.append(said)
+        if asked.count(("Rendering", 1, 9)) == 2:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        run_job([sys.executable, "-c", script], "x.mp4", stop)
 
 
 def test_what_a_process_says_is_wrong_is_our_error() -> None:

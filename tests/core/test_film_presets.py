@@ -18,7 +18,7 @@ def test_presets_that_every_project_has() -> None:
     assert (hd.width, hd.height) == (1920, 1080)
     own = RenderPreset("preview", width=320, height=180)
     assert find_preset(Project(render=(own,)), "preview") is own
-    with pytest.raises(InputError, match=r"no render preset 'film'.*Known presets: preview, hd, mine"):
+    with pytest.raises(InputError, match=r"no render preset 'film'.*Known presets: preview, 720p, hd, 4k, mine"):
         find_preset(Project(render=(RenderPreset("mine"),)), "film")
 
 

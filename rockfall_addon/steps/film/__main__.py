@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender as a module, in a process of its own: one job, given as JSON.
+"""Blender, or Blender as a module, in a process of its own: one job, given as JSON.
 
 Blender prints a lot, so its standard output goes to the error stream. What the parent process reads from our standard
 output are lines "progress DONE TOTAL TEXT", "remark TEXT", and "error TEXT" for what the user can put right.
@@ -31,8 +31,9 @@ def main(text: str) -> NoReturn:
 
     status = 0
     try:
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        rockfall_addon.register()
+        if not bpy.app.binary_path:  # Blender as a module; Blender itself has Rockfall enabled
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            rockfall_addon.register()
         for remark in make(
             FilmJob.from_json(text), lambda what, done=0, total=0: say(f"progress {done} {total} {what}")
         ):

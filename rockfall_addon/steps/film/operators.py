@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Set the scene up for a film, render it, take the set-up away."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import bpy
-from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ....core.film.presets import BUILT_IN
-from ...scene import store, timing
+from ....core.errors import RockfallError
+from ....core.progress import Progress
+from ...scene import store
+from ...view import job
+from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
-from . import dressing, remembered
+from . import beside, dressing, remembered, stopwatch, up_to_date
 from .engine import quickest_engine
-from .render import use_movie
+from .properties import file_of, graphs_of, preset_of
 
 
 class ROCKFALL_OT_set_up_film(bpy.types.Operator):
@@ -22,26 +21,6 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
     bl_idname = "rockfall.set_up_film"
     bl_label = "Set Up Film"
     bl_options = {"REGISTER", "UNDO"}
-
-    size: EnumProperty(
-        name="Size",
-        items=[(p.name, f"{p.width} × {p.height}", "") for p in BUILT_IN],
-        default="hd",
-    )
-    engine: EnumProperty(
-        name="Engine",
-        items=[
-            ("auto", "Quickest", "Workbench with a graphics card, Cycles without"),
-            ("workbench", "Workbench", "Quickest with a graphics card"),
-            ("cycles", "Cycles", "Smoothest edges, needs no graphics card"),
-            ("eevee", "EEVEE", "Needs a graphics card"),
-        ],
-        default="auto",
-    )
-    time_scale: FloatProperty(
-        name="Time", description="Seconds of the fall in one second of film; below 1 is slow motion",
-        default=1.0, min=0.01, soft_max=2.0, max=20.0,
-    )  # fmt: skip
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -53,50 +32,78 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scene, settings = context.scene, context.scene.rockfall
-        preset = replace(
-            next(preset for preset in BUILT_IN if preset.name == self.size),
-            fps=timing.frame_rate(scene),
-            stagger_s=settings.stagger_s if settings.playback == "TOGETHER" else None,
-            time_scale=float(f"{self.time_scale:.6g}"),
-        )
-        graphs = None if settings.film_graphs == "NONE" else settings.film_graphs.lower()
-        engine = quickest_engine() if self.engine == "auto" else self.engine
-        dressing.set_up_film(scene, preset, engine, graphs)
+        scene, preset = context.scene, preset_of(context.scene)
+        engine = quickest_engine() if preset.engine == "auto" else preset.engine
+        dressing.set_up_film(scene, preset, engine, graphs_of(scene))
+        up_to_date.keep(scene)
         for area in context.screen.areas if context.screen else ():
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"
-        self.report({"INFO"}, "Press Render Film, or play: the camera view shows the film")
+        self.report({"INFO"}, "Press Preview Frame or Render Film, or play: the camera view shows the film")
         return {"FINISHED"}
 
 
-class ROCKFALL_OT_render_film(bpy.types.Operator):
-    """Render the film to an MP4 file"""
+class ROCKFALL_OT_preview_film(bpy.types.Operator):
+    """Render the present frame as it will be in the film, and show it. The film's file is not touched"""
+
+    bl_idname = "rockfall.preview_film"
+    bl_label = "Preview Frame"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _is_ready(cls, context)
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        scene, start = context.scene, stopwatch.started()
+        bpy.ops.render.render(scene=scene.name)
+        stopwatch.measured(scene, start)
+        if not bpy.app.background:
+            bpy.ops.render.view_show("INVOKE_DEFAULT")
+        self.report({"INFO"}, f"Frame {scene.frame_current}. {stopwatch.expected(scene)}")
+        return {"FINISHED"}
+
+
+class ROCKFALL_OT_render_film(InBackground, bpy.types.Operator):
+    """Render the film to its file, an MP4, in the background. It is checked before it replaces an old one"""
 
     bl_idname = "rockfall.render_film"
     bl_label = "Render Film"
     bl_options = {"REGISTER"}
 
-    filepath: StringProperty(subtype="FILE_PATH", default="rockfall.mp4")
-    filter_glob: StringProperty(default="*.mp4", options={"HIDDEN"})
-
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return possible(cls, remembered.is_set_up(context.scene), "Set up the film first")
+        return _is_ready(cls, context) and job.is_free(cls)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if bpy.data.filepath:
-            self.filepath = str(Path(bpy.data.filepath).with_suffix(".mp4"))
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+        path = file_of(context.scene)
+        if not path.exists():
+            return self.execute(context)
+        return context.window_manager.invoke_confirm(
+            self, event, title="Replace the film?", message=str(path), confirm_text="Replace", icon="WARNING"
+        )
 
-    @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        scene = context.scene
-        use_movie(scene, Path(bpy.path.abspath(self.filepath)).with_suffix(".mp4"))
-        how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        bpy.ops.render.render(how, animation=True, scene=scene.name)
-        return {"FINISHED"}
+        return super().execute(context) if bpy.app.background else self._begin(context)
+
+    def prepare(self, context: bpy.types.Context) -> Work:
+        scene, path = context.scene, file_of(context.scene)
+        frames = scene.frame_end - scene.frame_start + 1
+        unchanged = f"The old {path.name} is as it was." if path.exists() else "No film was written."
+        render, start = beside.film_of(scene, path), stopwatch.started()
+
+        def compute(progress: Progress) -> None:
+            try:
+                render(stopwatch.with_time_left(progress))
+            except RockfallError as error:
+                raise RockfallError(f"{error} {unchanged}") from error
+
+        def keep(scene: bpy.types.Scene, _: None) -> str:
+            stopwatch.measured(scene, start, frames)
+            return f"Written: {path}, {frames} frames, checked."
+
+        return Work("film", compute, keep, changes=False, unchanged=unchanged)
 
 
 class ROCKFALL_OT_remove_film(bpy.types.Operator):
@@ -116,4 +123,11 @@ class ROCKFALL_OT_remove_film(bpy.types.Operator):
         return {"FINISHED"}
 
 
-CLASSES = (ROCKFALL_OT_set_up_film, ROCKFALL_OT_render_film, ROCKFALL_OT_remove_film)
+def _is_ready(cls: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """For a poll: whether the film that would be made is the one that is wanted."""
+    if not possible(cls, remembered.is_set_up(context.scene), "Set up the film first"):
+        return False
+    return possible(cls, up_to_date.is_up_to_date(context.scene), "Something has changed: press Update Set-up first")
+
+
+CLASSES = (ROCKFALL_OT_set_up_film, ROCKFALL_OT_preview_film, ROCKFALL_OT_render_film, ROCKFALL_OT_remove_film)

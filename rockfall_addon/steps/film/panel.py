@@ -4,8 +4,9 @@
 import bpy
 
 from ...scene import store
-from ...view.panel import RockfallPanel, State
-from . import remembered
+from ...view import job
+from ...view.panel import RockfallPanel, State, field, fields, paragraph
+from . import remembered, stopwatch, up_to_date
 
 
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
@@ -16,21 +17,36 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
 
     @staticmethod
     def step_state(context: bpy.types.Context) -> State:
-        return "READY" if remembered.is_set_up(context.scene) else "TO_DO"
+        if not remembered.is_set_up(context.scene):
+            return "TO_DO"
+        return "READY" if up_to_date.is_up_to_date(context.scene) else "ATTENTION"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
-        ready = remembered.is_set_up(scene)
-        row = layout.row(heading="Graphs")
-        row.prop(scene.rockfall, "film_graphs", expand=True)
+        settings, ready = scene.rockfall_film, remembered.is_set_up(scene)
+        fields(layout, settings, ("size", "engine", "time_scale"))
+        field(layout, "Graphs").prop(settings, "graphs", expand=True)
+        fields(layout, settings, ("file",))
         layout.operator("rockfall.set_up_film", text="Update Set-up" if ready else "Set Up Film", icon="VIEW_CAMERA")
         if ready:
+            self._draw_film(context)
+
+    def _draw_film(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        if up_to_date.is_up_to_date(scene):
             rate = scene.render.fps / scene.render.fps_base
             frames = scene.frame_end - scene.frame_start + 1
-            size = f"{scene.render.resolution_x} × {scene.render.resolution_y}"
-            layout.label(text=f"{frames / rate:.0f} s of film, {frames} frames, {size}")
-            layout.operator("rockfall.render_film", icon="RENDER_ANIMATION")
-            layout.operator("rockfall.remove_film", icon="X")
+            layout.label(text=f"{frames / rate:.0f} s of film, {frames} frames", icon="TIME")
+        else:
+            paragraph(context, layout, "Something has changed since: press Update Set-up.", "ERROR")
+        layout.operator("rockfall.preview_film", icon="RENDER_STILL")
+        expected = stopwatch.expected(scene)
+        paragraph(context, layout, f"{expected}." if expected else "A preview tells how long the film will take.")
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("rockfall.render_film", icon="RENDER_ANIMATION")
+        job.draw(context, layout, "film")
+        layout.operator("rockfall.remove_film", icon="X")
 
 
 CLASSES = (ROCKFALL_PT_film,)

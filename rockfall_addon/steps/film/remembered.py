@@ -22,7 +22,7 @@ def is_set_up(scene: bpy.types.Scene) -> bool:
 def remember(scene: bpy.types.Scene) -> None:
     """Keep the settings, unless they are kept already."""
     if store.BEFORE_FILM not in scene:
-        values = {name: getattr(*_owner(scene, name)) for name in SETTINGS}
+        values = {name: getattr(*owner(scene, name)) for name in SETTINGS}
         scene[store.BEFORE_FILM] = {**values, "camera": scene.camera.name if scene.camera else ""}
 
 
@@ -30,14 +30,16 @@ def put_back(scene: bpy.types.Scene) -> None:
     """Restore what was kept."""
     before = scene[store.BEFORE_FILM].to_dict()
     del scene[store.BEFORE_FILM]
+    scene.pop(store.FILM_OF, None)
     scene.camera = scene.objects.get(before.pop("camera"))
     for name, value in before.items():
-        owner, attribute = _owner(scene, name)
-        if getattr(owner, attribute) != value:
-            setattr(owner, attribute, value)
+        place, attribute = owner(scene, name)
+        if getattr(place, attribute) != value:
+            setattr(place, attribute, value)
 
 
-def _owner(scene: bpy.types.Scene, name: str) -> tuple[bpy.types.bpy_struct, str]:
+def owner(scene: bpy.types.Scene, name: str) -> tuple[bpy.types.bpy_struct, str]:
+    """What has a setting, and the setting's name there."""
     path, _, attribute = name.rpartition(".")
     return (scene.path_resolve(path) if path else scene), attribute
 

@@ -29,7 +29,9 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     RockfallError : the project is bad, has nothing to show, or the file cannot be written.
     """
     scene, remarks = bpy.context.scene, ()
-    if job.kind == "terrain":
+    if job.kind == "scene":
+        scene = _open(job)
+    elif job.kind == "terrain":
         _show_terrain(scene, job)
     else:
         project = read_project(job.source)
@@ -43,7 +45,7 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
             dressing.set_up_picture(scene, preset, job.engine)
         else:
             dressing.set_up_film(scene, preset, job.engine, job.graphs)
-    if job.kind == "film":
+    if job.kind in ("film", "scene"):
         render_film(scene, job.out, job.frames, progress)
     else:
         if job.kind == "still":
@@ -111,6 +113,15 @@ def render_picture(scene: bpy.types.Scene, path: Path) -> None:
     except RuntimeError as error:
         raise RockfallError(f"Blender could not render the picture: {error}") from error
     check_picture(path, _size(scene))
+
+
+def _open(job: FilmJob) -> bpy.types.Scene:
+    """The scene of a .blend that is set up for a film."""
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(job.source))
+    except RuntimeError as error:
+        raise RockfallError(f"Blender could not open the scene: {error}") from error
+    return bpy.data.scenes[job.title]
 
 
 def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Reconstruction:

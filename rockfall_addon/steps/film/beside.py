@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The film of an open .blend, rendered by another Blender: one goes on working, and stops it at any time.
+
+The other one gets a copy of the .blend. What it makes is checked, and then replaces the file of the old film.
+"""
+
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import mkdtemp
+
+import bpy
+
+from .... import __package__ as PACKAGE  # noqa: N812
+from ....core.errors import RockfallError
+from ....core.film.job import FilmJob
+from ....core.film.maker import run_job
+from ....core.output import output_file
+from ....core.progress import Progress
+
+RUN = "import sys; from {package}.rockfall_addon.steps.film.__main__ import main; main(sys.argv[-1])"
+
+
+def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
+    """What renders the film for which a scene is set up, as it is now; it needs no Blender, so that a thread can do it.
+
+    Raises
+    ------
+    RockfallError : the copy of the .blend cannot be written. So does what is returned, when the film cannot be made; the
+        old one is as it was.
+    """
+    folder = Path(mkdtemp(prefix="rockfall_film_", dir=bpy.app.tempdir))
+    copy = folder / "film.blend"
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=False)
+    except RuntimeError as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise RockfallError(
+            f"The copy of the scene that is rendered cannot be written: {error}. Make room on the disk of {folder.parent}."
+        ) from error
+    name, command = scene.name, _command()
+
+    def render(progress: Progress) -> None:
+        try:
+            with output_file(path) as draft:
+                run_job([*command, FilmJob("scene", copy, draft, title=name).to_json()], path.name, progress)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    return render
+
+
+def _command() -> list[str]:
+    """What runs `__main__` in another Blender of this kind."""
+    if not bpy.app.binary_path:
+        return [sys.executable, "-m", __package__]
+    script = RUN.format(package=PACKAGE)
+    options = ["--background", "--addons", PACKAGE, "--python-exit-code", "1", "--python-expr", script]
+    return [bpy.app.binary_path, *options, "--"]

@@ -27,53 +27,66 @@ def case_set_up_a_film(window):
     assert sorted(o.name for o in scene.objects) == before
 
 
+PICKS = """trajectory,time_s,x_m,y_m,z_m,kind,status
+A,0,0,0,40,release,ok
+A,0.75,4.1,0.3,36.2,impact,ok
+A,1.9,11.3,-0.5,27.9,impact,ok
+A,2.4,13.9,0.1,26,stop,ok
+"""
+SET_UP, PREVIEW, RENDER = 161, 213, 290
+"""How far below the panel's header its buttons are [px]."""
+
+
 def case_preview_and_render_a_film(window):
     """Settings in the panel, a preview that tells the time, a film in the background, a second one stopped by Esc."""
     job, stopwatch = window.part("rockfall_addon.view.job"), window.part("rockfall_addon.steps.film.stopwatch")
     folder = Path(tempfile.mkdtemp())
+    table = folder / "picks.csv"
+    table.write_text(PICKS, encoding="utf-8")
     with window.override():
-        assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
-    yield from window.show_sidebar(width=300)
-    yield from window.open_panel("ROCKFALL_PT_film")
-    window.screenshot("1-settings")
-    scene = bpy.context.scene
-    film = scene.rockfall_film
+        assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    film = bpy.context.scene.rockfall_film
+    assert Path(film.file).name == "rockfall.mp4", "the name is never empty"
     film.size, film.engine, film.time_scale, film.file = "preview", "cycles", 20.0, str(folder)
-    with window.override():
-        bpy.ops.ed.undo_push(message="settings")
-        assert bpy.ops.rockfall.set_up_film("INVOKE_DEFAULT", True) == {"FINISHED"}
+    yield from window.show_sidebar()
+    x, header = yield from window.open_panel("ROCKFALL_PT_film")
+    yield from window.click(x, header - SET_UP)
+    yield 0.5
     scene = bpy.context.scene
-    scene.frame_set(scene.frame_end // 2)
     assert window.part("rockfall_addon.steps.film.up_to_date").is_up_to_date(scene)
+    window.screenshot("1-set-up")
+    scene.frame_set(8)
+    yield from window.click(x, header - PREVIEW)
     yield 1.0
-    window.screenshot("2-set-up")
-    with window.override():
-        assert bpy.ops.rockfall.preview_film("INVOKE_DEFAULT") == {"FINISHED"}
-    yield 1.5
-    window.screenshot("3-preview")
+    window.screenshot("2-preview")
+    assert "frames on this machine" in stopwatch.expected(scene)
     for each in bpy.context.window_manager.windows[1:]:
         with bpy.context.temp_override(window=each):
             bpy.ops.wm.window_close()
-    assert "frames on this machine" in stopwatch.expected(scene)
-    assert not list(folder.iterdir())
+    assert [file.name for file in folder.iterdir()] == ["picks.csv"]
     scene.frame_end = 2
-    with window.override():
-        bpy.ops.rockfall.render_film("INVOKE_DEFAULT")
-    yield 1.0
-    window.screenshot("4-rendering")
+    yield from window.click(x, header - RENDER)
+    assert job.is_running()
+    window.screenshot("3-rendering")
     yield from window.wait_for(lambda: not job.is_running(), 60, "rendered")
     yield 0.5
-    window.screenshot("5-rendered")
+    window.screenshot("4-rendered")
     path = folder / "rockfall.mp4"
     window.part("core.film.check").check_film(path, 3, (640, 360))
     before = path.read_bytes()
-    with window.override():
-        bpy.ops.rockfall.render_film()
+    yield from window.click(x, header - RENDER)
     yield 0.5
+    window.screenshot("5-replace")
+    yield from window.press("RET", *window.centre())
+    assert job.is_running()
     yield from window.press("ESC", *window.centre())
     assert not job.is_running()
-    yield 0.5
     window.screenshot("6-stopped")
-    assert [file.name for file in folder.glob("*.mp4")] == ["rockfall.mp4"]
     assert path.read_bytes() == before
+    yield 0.5
+    assert sorted(file.name for file in folder.iterdir()) == ["picks.csv", "rockfall.mp4"]
+    with window.override():
+        bpy.ops.ed.undo()
+    assert not window.part("rockfall_addon.steps.film.remembered").is_set_up(bpy.context.scene)
+    assert bpy.context.scene.rockfall_film.size == "preview"
     shutil.rmtree(folder)

@@ -82,8 +82,11 @@ class Window:
         yield 0.5
         assert sidebar.active_panel_category == tab, f"the sidebar has no tab {tab}"
 
-    def open_panel(self, name: str, area: str = "VIEW_3D") -> Steps:
-        """Unfold one of our panels in a sidebar that shows them, and fold the others, by clicks on their headers."""
+    def open_panel(self, name: str, area: str = "VIEW_3D") -> Generator[float, None, tuple[int, int]]:
+        """Unfold one of our panels in a sidebar that shows them, and fold the others, by clicks on their headers.
+
+        Returns the place of its header in the window.
+        """
         sidebar = self.region("UI", area)
         x, top = sidebar.x + 90, sidebar.y + sidebar.height - HEADER_PX // 2
         yield from self.click(x, top, ctrl=True)  # folds all but the first, however high they were
@@ -108,6 +111,7 @@ class Window:
         finally:
             panel.draw = draw
         assert drawn, f"{name} is not open"
+        return x, top - HEADER_PX * names.index(name)
 
     def move(self, x: float, y: float) -> Steps:
         """Move the mouse to a pixel of the window, counted from the bottom left."""

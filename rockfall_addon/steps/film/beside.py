@@ -19,6 +19,9 @@ from ....core.film.maker import run_job
 from ....core.output import output_file
 from ....core.progress import Progress
 
+written: dict[int, Path] = {}
+"""session_uid of a scene → the film that was made of it."""
+
 RUN = "import sys; from {package}.rockfall_addon.steps.film.__main__ import main; main(sys.argv[-1])"
 
 
@@ -27,8 +30,8 @@ def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
 
     Raises
     ------
-    RockfallError : the copy of the .blend cannot be written. So does what is returned, when the film cannot be made; the
-        old one is as it was.
+    RockfallError : the copy of the .blend cannot be written. What is returned raises it when the film cannot be made:
+        the old one is as it was.
     """
     folder = Path(mkdtemp(prefix="rockfall_film_", dir=bpy.app.tempdir))
     copy = folder / "film.blend"
@@ -37,7 +40,8 @@ def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
     except RuntimeError as error:
         shutil.rmtree(folder, ignore_errors=True)
         raise RockfallError(
-            f"The copy of the scene that is rendered cannot be written: {error}. Make room on the disk of {folder.parent}."
+            f"The copy of the scene that is to be rendered cannot be written: {error}. "
+            f"Make room on the disk of {folder.parent}."
         ) from error
     name, command = scene.name, _command()
 

@@ -91,7 +91,7 @@ class ROCKFALL_OT_render_film(InBackground, bpy.types.Operator):
         scene, path = context.scene, file_of(context.scene)
         frames = scene.frame_end - scene.frame_start + 1
         unchanged = f"The old {path.name} is as it was." if path.exists() else "No film was written."
-        render, start = beside.film_of(scene, path), stopwatch.started()
+        render = beside.film_of(scene, path)
 
         def compute(progress: Progress) -> None:
             try:
@@ -100,7 +100,7 @@ class ROCKFALL_OT_render_film(InBackground, bpy.types.Operator):
                 raise RockfallError(f"{error} {unchanged}") from error
 
         def keep(scene: bpy.types.Scene, _: None) -> str:
-            stopwatch.measured(scene, start, frames)
+            beside.written[scene.session_uid] = path
             return f"Written: {path}, {frames} frames, checked."
 
         return Work("film", compute, keep, changes=False, unchanged=unchanged)

@@ -5,8 +5,8 @@ import bpy
 
 from ...scene import store
 from ...view import job
-from ...view.panel import RockfallPanel, State, field, fields, paragraph
-from . import remembered, stopwatch, up_to_date
+from ...view.panel import RockfallPanel, State, fields, paragraph
+from . import beside, remembered, stopwatch, up_to_date
 
 
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
@@ -24,9 +24,8 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         settings, ready = scene.rockfall_film, remembered.is_set_up(scene)
-        fields(layout, settings, ("size", "engine", "time_scale"))
-        field(layout, "Graphs").prop(settings, "graphs", expand=True)
-        fields(layout, settings, ("file",))
+        fields(layout, settings, ("size", "engine", "time_scale", "graphs"))
+        layout.prop(settings, "file", text="", icon="FILE_MOVIE")
         layout.operator("rockfall.set_up_film", text="Update Set-up" if ready else "Set Up Film", icon="VIEW_CAMERA")
         if ready:
             self._draw_film(context)
@@ -36,7 +35,7 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
         if up_to_date.is_up_to_date(scene):
             rate = scene.render.fps / scene.render.fps_base
             frames = scene.frame_end - scene.frame_start + 1
-            layout.label(text=f"{frames / rate:.0f} s of film, {frames} frames", icon="TIME")
+            layout.label(text=f"{frames / rate:.3g} s of film, {frames} frames", icon="TIME")
         else:
             paragraph(context, layout, "Something has changed since: press Update Set-up.", "ERROR")
         layout.operator("rockfall.preview_film", icon="RENDER_STILL")
@@ -46,6 +45,9 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
         row.scale_y = 1.4
         row.operator("rockfall.render_film", icon="RENDER_ANIMATION")
         job.draw(context, layout, "film")
+        path = beside.written.get(scene.session_uid)
+        if path is not None:
+            layout.operator("wm.path_open", text=f"Open {path.name}", icon="PLAY").filepath = str(path)
         layout.operator("rockfall.remove_film", icon="X")
 
 

@@ -16,9 +16,9 @@ def started() -> float:
     return perf_counter()
 
 
-def measured(scene: bpy.types.Scene, start: float, frames: int = 1) -> None:
-    """So many frames of a scene have taken the time since then."""
-    _taken[_key(scene)] = (perf_counter() - start) / frames
+def measured(scene: bpy.types.Scene, start: float) -> None:
+    """A frame of a scene has taken the time since then."""
+    _taken[_key(scene)] = perf_counter() - start
 
 
 def expected(scene: bpy.types.Scene) -> str:
@@ -34,10 +34,9 @@ def with_time_left(progress: Progress) -> Progress:
     def told(text: str, done: int = 0, total: int = 0) -> None:
         now = perf_counter()
         since, first = begun.setdefault(text, (now, done))
-        left = (
-            f", {duration_words((now - since) / (done - first) * (total - done))} left" if first < done < total else ""
-        )
-        progress(text + left, done, total)
+        if first < done < total:
+            text += f", {duration_words((now - since) / (done - first) * (total - done))} left"
+        progress(text, done, total)
 
     return told
 

@@ -289,7 +289,7 @@ def test_the_file_of_a_film_has_a_name(scene, small_film, part, tmp_path: Path) 
         (f"{tmp_path}/fall.MP4", "fall.MP4"),
     ):  # fmt: skip
         small_film.file = asked
-        assert properties.file_of(scene) == tmp_path / name
+        assert properties.file_of(scene) == tmp_path / name == Path(small_film.file)
     small_film.file = " "
     assert properties.file_of(scene).name == "rockfall.mp4"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))

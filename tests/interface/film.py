@@ -48,6 +48,8 @@ def case_preview_and_render_a_film(window):
     film = bpy.context.scene.rockfall_film
     assert Path(film.file).name == "rockfall.mp4", "the name is never empty"
     film.size, film.engine, film.time_scale, film.file = "preview", "cycles", 20.0, str(folder)
+    with window.override():
+        bpy.ops.ed.undo_push(message="settings")
     yield from window.show_sidebar()
     x, header = yield from window.open_panel("ROCKFALL_PT_film")
     yield from window.click(x, header - SET_UP)

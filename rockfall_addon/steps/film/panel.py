@@ -35,7 +35,7 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
         if up_to_date.is_up_to_date(scene):
             rate = scene.render.fps / scene.render.fps_base
             frames = scene.frame_end - scene.frame_start + 1
-            layout.label(text=f"{frames / rate:.3g} s of film, {frames} frames", icon="TIME")
+            layout.label(text=f"{frames / rate:.1f} s of film, {frames} frames", icon="TIME")
         else:
             paragraph(context, layout, "Something has changed since: press Update Set-up.", "ERROR")
         layout.operator("rockfall.preview_film", icon="RENDER_STILL")

@@ -20,10 +20,15 @@ def _file(self: bpy.types.PropertyGroup) -> str:
 
 
 def _set_file(self: bpy.types.PropertyGroup, value: str) -> None:
-    if value.strip():
-        self.id_data[store.FILM_FILE] = value.strip()
-    else:
+    """Shown with its name at once, where a folder is chosen."""
+    value = value.strip()
+    if not value:
         self.id_data.pop(store.FILM_FILE, None)
+        return
+    path = _whole(value)
+    if path != Path(bpy.path.abspath(value)):
+        value = bpy.path.relpath(str(path)) if value.startswith("//") else str(path)
+    self.id_data[store.FILM_FILE] = value
 
 
 class FilmSettings(bpy.types.PropertyGroup):
@@ -65,7 +70,7 @@ class FilmSettings(bpy.types.PropertyGroup):
 
 def file_of(scene: bpy.types.Scene) -> Path:
     """Where the film goes; the name is never empty."""
-    return film_file(bpy.path.abspath(scene.rockfall_film.file), Path(bpy.path.abspath(_suggested())))
+    return _whole(scene.rockfall_film.file)
 
 
 def preset_of(scene: bpy.types.Scene) -> RenderPreset:
@@ -84,6 +89,10 @@ def graphs_of(scene: bpy.types.Scene) -> GraphKind | None:
     """The graphs that are wanted."""
     kind = scene.rockfall_film.graphs
     return None if kind == "NONE" else kind.lower()
+
+
+def _whole(value: str) -> Path:
+    return film_file(bpy.path.abspath(value), Path(bpy.path.abspath(_suggested())))
 
 
 def _suggested() -> str:

@@ -297,8 +297,10 @@ def test_the_file_of_a_film_has_a_name(scene, small_film, part, tmp_path: Path) 
     assert properties.file_of(scene) == tmp_path / "site.mp4"
 
 
-def test_settings_are_in_the_blend(scene, small_film, tmp_path: Path) -> None:
-    small_film.file, small_film.graphs = "//fall.mp4", "MOTION"
+def test_settings_are_in_the_blend(rockfall, tmp_path: Path) -> None:
+    film = bpy.context.scene.rockfall_film
+    film.size, film.engine, film.time_scale, film.graphs = "preview", "cycles", 20.0, "MOTION"
+    film.file = "//fall.mp4"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))

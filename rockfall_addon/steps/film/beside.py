@@ -33,7 +33,7 @@ def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
     RockfallError : the copy of the .blend cannot be written. What is returned raises it when the film cannot be made:
         the old one is as it was.
     """
-    folder = Path(mkdtemp(prefix="rockfall_film_", dir=bpy.app.tempdir))
+    folder = Path(mkdtemp(dir=bpy.app.tempdir))
     copy = folder / "film.blend"
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=False)

@@ -20,14 +20,15 @@ def _file(self: bpy.types.PropertyGroup) -> str:
 
 
 def _set_file(self: bpy.types.PropertyGroup, value: str) -> None:
-    """Shown with its name at once, where a folder is chosen."""
+    """A folder, or a name without .mp4, is shown at once as the file that it means."""
     value = value.strip()
     if not value:
         self.id_data.pop(store.FILM_FILE, None)
         return
     path = _whole(value)
-    if path != Path(bpy.path.abspath(value)):
-        value = bpy.path.relpath(str(path)) if value.startswith("//") else str(path)
+    if path.name != Path(bpy.path.abspath(value)).name:
+        relative = value.startswith("//") and bpy.data.filepath
+        value = bpy.path.relpath(str(path)) if relative else str(path)
     self.id_data[store.FILM_FILE] = value
 
 

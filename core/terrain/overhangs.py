@@ -33,6 +33,8 @@ class Overhangs:
     share : part of the cloud's area in plan.
     height_m : greatest clearance between the two sheets.
     place : (3,) point on the upper sheet in the middle of the largest patch, local coordinates [m].
+    cells : (k, 2) the columns in plan, counted from their origin.
+    cell_m, origin : side of a column and, in local coordinates, corner of the first [m].
     """
 
     patches: int
@@ -40,6 +42,9 @@ class Overhangs:
     share: float
     height_m: float
     place: Array
+    cells: NDArray[np.int64]
+    cell_m: float
+    origin: Array
 
     def sentence(self, shift: GlobalShift) -> str:
         """What a user has to know, with a place in survey coordinates."""
@@ -48,8 +53,7 @@ class Overhangs:
         where = "near" if self.patches == 1 else "the largest near"
         return (
             f"The cloud has {number} over {self.area_m2:,.3g} m² ({100 * self.share:.2g} % of its area in plan), up to "
-            f"{self.height_m:.2g} m high, {where} ({x:.0f}, {y:.0f}). Meshing in plan cannot show that: points above "
-            "others become steep spikes. Mesh the cloud in another program (CloudCompare, MeshLab) and read that mesh."
+            f"{self.height_m:.2g} m high, {where} ({x:.0f}, {y:.0f})."
         )
 
 
@@ -82,13 +86,16 @@ def find_overhangs(points: Array) -> Overhangs | None:
     upper = ordered[gaps + 1]
     in_largest = upper[patch == sizes.argmax()]
     middle = in_largest[np.abs(in_largest - np.median(in_largest, axis=0)).sum(axis=1).argmin()]
-    columns, hung = 1 + int((~same).sum()), len(np.unique(cells[gaps], axis=0))
+    columns, hung = 1 + int((~same).sum()), np.unique(cells[gaps], axis=0)
     return Overhangs(
         int((sizes >= TOGETHER).sum()),
-        hung * cell**2,
-        hung / columns,
+        len(hung) * cell**2,
+        len(hung) / columns,
         float((upper[:, 2] - ordered[gaps, 2]).max()),
         middle,
+        hung,
+        cell,
+        points[:, :2].min(axis=0),
     )
 
 

@@ -15,6 +15,7 @@ from ..reading import reader, reading
 from ..vectors import Array
 from . import advice, cleaning, clouds, triangulation, winding
 from .cloud import Cloud
+from .folds import mesh_folds
 from .joining import join
 from .opening import (
     LAS_EXTENSIONS,
@@ -192,7 +193,10 @@ def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Su
     elif source.faces is None:
         meshed = triangulation.mesh_cloud(source.points, max_edge_m)
         overhangs = find_overhangs(source.points)
-        before = before if overhangs is None else (overhangs.sentence(shift), *before)
+        if overhangs is not None:
+            progress("Meshing overhangs", 1, 2)
+            meshed, said = mesh_folds(source.points, meshed, overhangs, max_edge_m)
+            before = (overhangs.sentence(shift), said, *before)
     else:
         meshed = triangulation.Meshed(source.points, source.faces, ())
     kind = source.kind
@@ -243,6 +247,8 @@ def _cleaned(meshed: triangulation.Meshed, kind: str) -> tuple[Array, NDArray[np
     vertices, faces, loose = cleaning.drop_loose(vertices, faces)
     if loose:
         notes.append(f"Left out {loose:,} points that no triangle uses.")
+    if kind != "mesh":
+        return vertices, faces, notes
     oriented = winding.orient(vertices, faces, bool(any_up), bool(any_down), float(total[2]))
     if oriented.flipped:
         notes.append(f"Turned {oriented.flipped:,} of {len(faces):,} faces, so that normals point out of the ground.")
@@ -250,6 +256,6 @@ def _cleaned(meshed: triangulation.Meshed, kind: str) -> tuple[Array, NDArray[np
         notes.append(f"At {oriented.contradictions:,} edges no winding agrees (a one-sided surface).")
     if oriented.components > 1:
         notes.append(f"The surface has {oriented.components:,} separate pieces.")
-    if kind == "mesh" and abs(total[1]) > advice.MUCH_MORE * abs(total[2]) and abs(total[1]) > abs(total[0]):
+    if abs(total[1]) > advice.MUCH_MORE * abs(total[2]) and abs(total[1]) > abs(total[0]):
         notes.append(advice.Y_UP)
     return vertices, oriented.faces, notes

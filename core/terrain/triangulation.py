@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshing of grids and clouds in plan (2.5-D): overhangs need a mesh file."""
+"""Meshing of grids and clouds in plan (2.5-D); `folds` meshes the overhangs of clouds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,13 @@ class Meshed:
     points : (n, 3) the points that were meshed.
     faces : (m, 3).
     notes : sentences for the summary.
+    origin : (n,) number of each among the points that were given; empty when they are the same.
     """
 
     points: Array
     faces: NDArray[np.int32]
     notes: tuple[str, ...]
+    origin: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
 
 
 def mesh_grid(points: Array, shape: tuple[int, int]) -> Meshed:
@@ -91,8 +93,10 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
     from scipy.spatial import Delaunay, QhullError
 
     total = len(points)
-    lowest_first = points[np.lexsort((points[:, 2], points[:, 1], points[:, 0]))]
-    points = lowest_first[np.r_[True, (np.diff(lowest_first[:, :2], axis=0) != 0).any(axis=1)]] if total else points
+    origin = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
+    if total:
+        origin = origin[np.r_[True, (np.diff(points[origin, :2], axis=0) != 0).any(axis=1)]]
+    points = points[origin]
     notes = []
     if len(points) < total:
         notes.append(f"{total - len(points):,} points above another at the same place in plan were left out.")
@@ -123,7 +127,7 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
         f"Edges over {limit:.3g} m in plan were left out, with {int((~short).sum()):,} of {len(faces):,} triangles"
         + (f"; the maximum is {MAX_EDGE_SPACINGS:g} times the spacing." if max_edge_m is None else "."),
     ]
-    return Meshed(points, np.ascontiguousarray(faces[short], dtype=np.int32), tuple(notes))
+    return Meshed(points, np.ascontiguousarray(faces[short], dtype=np.int32), tuple(notes), origin)
 
 
 def _on_a_line() -> InputError:

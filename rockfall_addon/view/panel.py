@@ -22,6 +22,7 @@ class RockfallPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Rockfall"
+    bl_order = 2  # the same for all steps, which stay in the order in which they are registered
     needs = ""
     """The role of objects without which there is no panel."""
 
@@ -80,7 +81,12 @@ def paragraph(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: 
 def show_remarks(context: bpy.types.Context, layout: bpy.types.UILayout, remarks: Iterable[Remark]) -> None:
     """What the core has to say about a result."""
     for remark in remarks:
-        paragraph(context, layout, remark.text, "ERROR" if remark.severity in ("warning", "problem") else "INFO")
+        paragraph(context, layout, remark.text, "ERROR" if is_grave(remark) else "INFO")
+
+
+def is_grave(remark: Remark) -> bool:
+    """Whether a remark is more than a note: what has one is marked with ⚠."""
+    return remark.severity in ("warning", "problem")
 
 
 def fields(layout: bpy.types.UILayout, owner: bpy.types.bpy_struct, names: Iterable[str]) -> None:

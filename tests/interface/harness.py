@@ -101,6 +101,7 @@ class Window:
                 and not getattr(panel, "bl_parent_id", "")
                 and (not hasattr(panel, "poll") or panel.poll(bpy.context))
             ]
+        panels.sort(key=lambda panel: getattr(panel, "bl_order", 0))
         names = [panel.__name__ for panel in panels]
         panel, drawn = panels[names.index(name)], []
         draw = panel.draw

@@ -87,6 +87,10 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
         if solution.problem and not next_step:
             paragraph(context, layout, solution.problem, "ERROR")
         show_remarks(context, layout, solution.remarks)
+        if following.is_stale(camera):
+            paragraph(
+                context, layout, "The focal length has changed since the camera was followed. Follow again.", "ERROR"
+            )
         if next_step:
             advise(context, layout, False, next_step)
 
@@ -202,8 +206,6 @@ class ROCKFALL_PT_alignment_motion(RockfallPanel, bpy.types.Panel):
             rows.append(("Poses known to", f"{known['sigma_px']:.2f} px"))
         facts(layout, rows)
         show_remarks(context, layout, known["remarks"])
-        if following.is_stale(camera):
-            paragraph(context, layout, "The focal length has changed since. Follow again.", "ERROR")
 
 
 class ROCKFALL_PT_alignment_files(RockfallPanel, bpy.types.Panel):

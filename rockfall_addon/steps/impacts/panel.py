@@ -6,7 +6,7 @@ import math
 import bpy
 
 from ...scene import store
-from ...view import impact_words
+from ...view import impact_words, pointing
 from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 
 NUMBERS = (  # what is shown, key of the result, key of its standard deviation, unit, digits
@@ -28,13 +28,14 @@ NUMBERS = (  # what is shown, key of the result, key of its standard deviation, 
 class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
     bl_label = "Selected Impact"
     bl_idname = "ROCKFALL_PT_impact"
-    needs = store.PICK_ROLE
+    bl_order = 1  # before the steps: it is there while a pick is selected, and must be in sight then
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return pointing.active_pick(context) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, pick = self.layout, context.object
-        if pick is None or pick.get(store.ROLE) != store.PICK_ROLE or store.TRAJECTORY not in pick:
-            layout.label(text="Click a disc on the slope.", icon="RESTRICT_SELECT_OFF")
-            return
+        layout, pick = self.layout, pointing.active_pick(context)
         result = pick.get(store.RESULT)
         number = f", impact {result['number']}" if result is not None else ""
         row = layout.row(align=True)

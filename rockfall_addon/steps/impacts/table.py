@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import bpy
 
 from ...scene import impact_marks, impact_rows, store
-from ...view.panel import RockfallPanel, Rows
+from ...view import impact_words
+from ...view.panel import RockfallPanel, Rows, paragraph
 
 WIDTHS = {  # of the columns in pixels at interface scale 1, in the order in which they are shown
     "trajectory": 72,
@@ -177,6 +178,9 @@ class ROCKFALL_PT_impact_table(RockfallPanel, bpy.types.Panel):
             rows=6,
             maxrows=14,
         )
+        pick = impact_rows.selected(context)
+        for reason in impact_words.reasons(pick) if pick is not None else ():
+            paragraph(context, layout, f"{pick.name}: {reason}", "ERROR")
 
 
 CLASSES = (ROCKFALL_UL_impacts, ROCKFALL_PT_impact_table)

@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import camera_paths, places, problems, sightings, store, videos
 from ...view import job, pointing
-from ...view.panel import RockfallPanel, State, advise, fields, paragraph, show_remarks
+from ...view.panel import RockfallPanel, State, advise, fields, is_grave, paragraph, show_remarks
 from . import editing, set_aside
 
 
@@ -17,7 +17,7 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
     def step_state(context: bpy.types.Context) -> State:
         if not store.has_role(context.scene, store.PICK_ROLE):
             return "TO_DO"
-        return "ATTENTION" if problems.remarks(context.scene) else "READY"
+        return "ATTENTION" if any(map(is_grave, problems.remarks(context.scene))) else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene

@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import proposal
 from ...scene.proposal import Proposal
-from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
+from ...view.panel import RockfallPanel, State, advise, facts, is_grave, paragraph, show_remarks
 
 MOST_ROWS = 12
 
@@ -47,7 +47,9 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
     box = layout.box()
     if found.stale:
         paragraph(context, box, "The picks were changed since: refine again.", "ERROR")
-    grave = [remark for remark in found.remarks if remark.severity in ("warning", "problem")]
+    else:
+        paragraph(context, box, "Nothing is changed yet: apply it, or discard it.", "ERROR")
+    grave = [remark for remark in found.remarks if is_grave(remark)]
     show_remarks(context, box, grave)
     for texts in (("", "Before", "After"), ("Residual", f"{found.before_px:.2f} px", f"{found.after_px:.2f} px")):
         row = box.row()

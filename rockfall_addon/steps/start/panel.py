@@ -37,6 +37,7 @@ LOOKS = {
 class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
     bl_label = "Next Step"  # only panels with a header have a background, which text needs over footage
     bl_idname = "ROCKFALL_PT_start"
+    bl_order = 0
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What panels say of a selected impact, and that ⚠ never stands without its reason."""
+
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from two_runs import picks_of
+
+
+class Layout:
+    """Stands in for a Blender layout, which exists only while a window is drawn: keeps what is written, by icon."""
+
+    def __init__(self, written: list[tuple[str, str]]) -> None:
+        self.written = written
+
+    def label(self, *, text: str = "", icon: str = "NONE", **_: object) -> None:
+        self.written.append((icon, text))
+
+    def prop(self, owner: bpy.types.bpy_struct, name: str, *, text: str | None = None, **_: object) -> None:
+        self.written.append(("", owner.bl_rna.properties[name].name if text is None else text))
+
+    def operator(self, *_: object, **__: object) -> SimpleNamespace:
+        return SimpleNamespace()
+
+    def __getattr__(self, name: str) -> object:
+        return lambda *_, **__: self
+
+
+def in_sidebar() -> SimpleNamespace:
+    """A context as a panel gets it; without a window Blender has no region and no interface scale."""
+    return SimpleNamespace(
+        scene=bpy.context.scene, object=bpy.context.object, view_layer=bpy.context.view_layer,
+        region=SimpleNamespace(width=2000), preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def draw(part):
+    def draw(name: str) -> list[tuple[str, str]]:
+        """What a panel writes, as (icon, text)."""
+        panel, written = getattr(bpy.types, name), []
+        plain = type(name, (), {key: value for key, value in vars(panel).items() if not key.startswith("bl_")})()
+        plain.layout = Layout(written)
+        panel.draw(plain, in_sidebar())
+        return written
+
+    return draw
+
+
+def select(pick: bpy.types.Object) -> None:
+    bpy.context.view_layer.objects.active = pick
+
+
+def test_the_selected_impact_is_before_the_steps_and_there_while_one_is_selected(scene, part) -> None:
+    panel, shared = bpy.types.ROCKFALL_PT_impact, part("rockfall_addon.view.panel").RockfallPanel
+    order = {one.__name__: one.bl_order for one in part("rockfall_addon.steps").classes() if issubclass(one, shared)}
+    assert sorted(order, key=order.get)[:2] == ["ROCKFALL_PT_start", "ROCKFALL_PT_impact"]
+    assert 0 <= order["ROCKFALL_PT_start"] < panel.bl_order < shared.bl_order, "Blender takes no negative ones"
+    select(None)
+    assert not panel.poll(bpy.context)
+    select(picks_of(scene, "A")[1])
+    assert panel.poll(bpy.context)
+    select(scene.objects["A block"])
+    assert not panel.poll(bpy.context)
+
+
+def test_the_selected_impact_and_the_table_say_why(scene, draw) -> None:
+    select(scene.objects["B impact 3"])
+    written = draw("ROCKFALL_PT_impact")
+    assert ("NONE", "B, impact 3") in written
+    assert ("ERROR", "Marked as doubtful") in written
+    assert any(text.endswith(" kJ") for _, text in written)
+    bpy.types.ROCKFALL_PT_impact_table.draw_table(Layout(written := []), in_sidebar(), 300.0)
+    assert ("ERROR", "B impact 3: Marked as doubtful") in written
+
+
+def test_a_step_that_needs_attention_says_why(scene, draw) -> None:
+    panel = bpy.types.ROCKFALL_PT_picks
+    marks = {"ATTENTION": True, "READY": False}
+    assert any(icon == "ERROR" for icon, _ in draw("ROCKFALL_PT_picks")) == marks[panel.step_state(bpy.context)]
+    scene["rockfall_problem"] = '[{"text": "A note.", "severity": "note", "about": "A"}]'
+    assert panel.step_state(bpy.context) == "READY", "a note needs no attention"
+    time = repr(scene.objects["A impact 2"]["rockfall_time_s"])
+    scene.objects["A impact 1"].rockfall_pick.time_s = time
+    assert panel.step_state(bpy.context) == "ATTENTION"
+    assert any(icon == "ERROR" and "trajectory A" in text for icon, text in draw("ROCKFALL_PT_picks"))
+
+
+def test_the_block_panel_says_what_fell(scene, draw) -> None:
+    select(scene.objects["B impact 1"])
+    assert ("", "B has a block of its own") in draw("ROCKFALL_PT_block")
+    assert ("NONE", "59.5 kg") in draw("ROCKFALL_PT_block")
+    scene.rockfall_block.d1 = 1.5
+    assert {("NONE", "255 kg"), ("NONE", "0.733 m")} <= set(draw("ROCKFALL_PT_block"))

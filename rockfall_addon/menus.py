@@ -10,6 +10,7 @@ STEPS = (
     ("terrain", "1  Terrain", (
         "rockfall.import_terrain", "rockfall.show_relief", "rockfall.reset_relief", "rockfall.toggle_full_terrain",
         "rockfall.lock_terrain", "rockfall.put_terrain_back", "rockfall.toggle_left_out",
+        "rockfall.remove_terrain",
     )),
     ("videos", "2  Videos", (
         "rockfall.add_video", "rockfall.look_through", "rockfall.fit_footage", None,

@@ -2,6 +2,7 @@
 """Terrain: core surfaces ↔ Blender mesh objects, one for each tile."""
 
 import uuid
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -49,13 +50,27 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     return obj
 
 
+def remove(scene: bpy.types.Scene, tiles: Sequence[bpy.types.Object]) -> None:
+    """Remove tiles with their coarse views and what the ground filter left out of their files."""
+    files = {str(tile.get(store.TERRAIN_FILE, "")) for tile in tiles}
+    apart = [obj for obj in store.with_role(scene, store.LEFT_OUT_ROLE) if obj.get(store.TERRAIN_FILE) in files]
+    views = [view for view in map(terrain_mesh.stand_in, tiles) if view is not None]
+    store.remove_objects([*tiles, *apart, *views])
+    terrain_view.follow(scene)
+
+
+def has_part(tile: bpy.types.Object, name: str) -> bool:
+    """Whether a tile has a vertex group or an attribute of a name."""
+    return name in tile.vertex_groups or name in tile.data.attributes
+
+
 def _show_left_out(scene: bpy.types.Scene, surface: Surface) -> None:
     """Some of the points that the ground filter left out, beside the terrain: what it took for vegetation is seen."""
     points = surface.left_out[:: max(1, -(-len(surface.left_out) // MOST_LEFT_OUT))]
     mesh = bpy.data.meshes.new(f"{surface.name}, left out")
     mesh.from_pydata(points.tolist(), [], [])
     obj = bpy.data.objects.new(mesh.name, mesh)
-    obj[store.ROLE] = store.LEFT_OUT_ROLE
+    obj[store.ROLE], obj[store.TERRAIN_FILE] = store.LEFT_OUT_ROLE, surface.name
     obj.hide_select = obj.hide_render = True
     store.link(store.collection(scene, "Terrain"), obj)
 

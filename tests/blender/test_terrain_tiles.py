@@ -174,3 +174,60 @@ def test_a_conflicting_shift_is_refused_in_words(part, demo) -> None:
     second = next(o for o in bpy.context.scene.objects if o != ground)
     low = [[min(c[i] for c in obj.bound_box) for i in range(3)] for obj in (ground, second)]
     np.testing.assert_allclose(*low, atol=1e-4)
+
+
+PLANES = {"low.obj": 0.0, "high.obj": 0.05}
+
+
+@pytest.fixture
+def planes(tmp_path):
+    """Two planes, the second a little higher."""
+    for name, height in PLANES.items():
+        corners = [(x, y, 50 - 0.7 * x + height) for x, y in ((-10, -20), (60, -20), (60, 30), (-10, 30))]
+        lines = [f"v {x} {y} {z}\n" for x, y, z in corners]
+        (tmp_path / name).write_text("".join(lines) + "f 1 2 3\nf 1 3 4\n", encoding="utf-8")
+    return [str(tmp_path / name) for name in PLANES]
+
+
+def grounds(part):
+    return part("rockfall_addon.scene.store").with_role(bpy.context.scene, "terrain")
+
+
+def picked(part):
+    found = part("rockfall_addon.scene.picks").picks_of(bpy.context.scene)
+    return found.position.tolist(), found.time_s.tolist()
+
+
+def test_a_terrain_is_removed_and_its_picks_stay(part, table, planes, capfd) -> None:
+    assert bpy.ops.rockfall.import_terrain(filepath=planes[0]) == {"FINISHED"}
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    before, scene = picked(part), bpy.context.scene
+    numbers = scene.objects["A impact 2"]["rockfall_result"].to_dict()
+    bpy.ops.ed.undo_push(message="before")
+    (tile,) = grounds(part)
+    assert bpy.ops.rockfall.remove_terrain(identifier=tile["rockfall_id"]) == {"FINISHED"}
+    assert "Removed low.obj. 10 picks stay where they are." in capfd.readouterr().out
+    bpy.ops.ed.undo_push(message="removed")
+    assert not grounds(part)
+    assert picked(part) == before
+    assert scene.objects["A impact 2"]["rockfall_result"].to_dict() == numbers
+    assert "terrain is gone" in scene["rockfall_problem"]
+    assert not bpy.ops.rockfall.remove_terrain.poll()
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert [tile.name for tile in grounds(part)] == ["low.obj"]
+    assert picked(part) == before
+
+
+def test_one_terrain_takes_the_place_of_another(part, table, planes, capfd) -> None:
+    assert bpy.ops.rockfall.import_terrain(filepath=planes[0]) == {"FINISHED"}
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    before, (tile,) = picked(part), grounds(part)
+    assert bpy.ops.rockfall.import_terrain(filepath=planes[1], replaces=tile["rockfall_id"]) == {"FINISHED"}
+    assert "Replaced low.obj. 10 picks stay where they are." in capfd.readouterr().out
+    assert [tile.name for tile in grounds(part)] == ["high.obj"]
+    assert picked(part) == before
+    missing = bpy.ops.rockfall.import_terrain
+    with pytest.raises(RuntimeError, match="not there any more"):
+        missing(filepath=planes[0], replaces="nothing")
+    assert [tile.name for tile in grounds(part)] == ["high.obj"], "nothing is added when nothing can be replaced"

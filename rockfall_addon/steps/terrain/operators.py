@@ -16,6 +16,7 @@ from ...scene import georeference, materials, start_up, store, sync, terrain, te
 from ...view import look
 from ...view.first_import import FirstImport
 from ...view.reporting import possible, reported
+from .removing import tiles_of, what_stays
 
 TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
 
@@ -57,8 +58,15 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         name="Longest edge", description="Longer edges of a meshed cloud are left out. 0: from the points' spacing",
         default=0.0, min=0.0, unit="LENGTH",
     )  # fmt: skip
+    replaces: StringProperty(description="Id of a tile that it takes the place of", options={"HIDDEN", "SKIP_SAVE"})
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        if properties.replaces:
+            return "Import another scan in the place of this one. What was picked and paired stays where it is"
+        return str(cls.__doc__)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self.by_hand = True
@@ -118,19 +126,25 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             ground_only={"AUTO": None, "GROUND": True, "ALL": False, "FILTER": None}[self.ground],
             ground_filter_m=self.filter_m if self.ground == "FILTER" else None,
         )
-        terrain.add_terrain(context.scene, surface, shade(surface))
+        shading = shade(surface)
+        old = tiles_of(context.scene, self.replaces) if self.replaces else []
+        old_names, stays = ", ".join(tile.name for tile in old), what_stays(context.scene, old) if old else ""
+        terrain.remove(context.scene, old)
+        terrain.add_terrain(context.scene, surface, shading)
         sync.recompute(context.scene)
         look.show_relief(context, frame_all=True)
         if first:
             self.begin_file(context)
         self.report({"INFO"}, " ".join(surface.summary))
+        if stays:
+            self.report({"WARNING"}, f"Replaced {old_names}. {stays}")
         return {"FINISHED"}
 
     def _ask_again(self) -> set[str]:
         """The dialog after the file browser, whose operator ends with it. An error in an operator that is called by
         another is an exception, which Blender would show as a traceback."""
         try:
-            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath)
+            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath, replaces=self.replaces)
         except RuntimeError as error:
             raise RockfallError(str(error).removeprefix("Error: ").strip()) from None
 

@@ -59,7 +59,9 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
             row.label(text=ground.name, icon="MESH_GRID", translate=False)
             icon = "LOCKED" if terrain.is_locked(ground) else "UNLOCKED"
             lock = row.operator("rockfall.lock_terrain", text="", icon=icon, emboss=False)
-            lock.identifier = ground.get(store.ID, "")
+            other = row.operator("rockfall.import_terrain", text="", icon="FILE_REFRESH", emboss=False)
+            gone = row.operator("rockfall.remove_terrain", text="", icon="X", emboss=False)
+            lock.identifier = other.replaces = gone.identifier = ground.get(store.ID, "")
             count = terrain.grouped(len(ground.data.polygons) if ground.type == "MESH" else 0)
             file = str(ground.get(store.TERRAIN_FILE, ground.name))
             column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")

@@ -244,8 +244,7 @@ def _of_pick(obj: bpy.types.Object) -> str:
     goes_on = f"Trajectory {readable(name, MOST_OF_NAME)} goes without it" if name else "It is of no trajectory"
     return (
         f"Set aside: the {WORDS[key]} of {readable(obj.name.removesuffix(SUFFIX), MOST_OF_NAME)} "
-        f"{_said(obj.get(key), problem)}. {goes_on}: "
-        f"recover it from its marker, correct its custom property {key}, or delete it."
+        f"{_said(obj.get(key), problem)}. {goes_on}: recover it from its marker, or correct its custom property {key}."
     )
 
 

@@ -13,13 +13,14 @@ from ...core.exchange.simulation_entry import MEASURED, STEEP, ReleaseEntry, Sim
 from ...core.exchange.simulation_project import measured_source, placed_source
 from ...core.reconstruction.picks import take
 from ...core.reconstruction.trajectory import Reconstruction
+from ...core.remarks import Remark
 from ...core.simulation.distributions import Distribution
 from ...core.simulation.engine import Rolling
 from ...core.simulation.ground import Contact
 from ...core.simulation.measured_releases import start_times
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ReleaseSource
-from . import drawn_releases, fingerprints, georeference, models, picks, reconstruction, store
+from . import drawn_releases, fingerprints, georeference, models, reconstruction, store
 from .simulation import Origin
 
 FILMED = ("MEASURED", "PICK")
@@ -95,8 +96,8 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
 
 def source_of(
     scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface
-) -> tuple[ReleaseSource, Mapping[str, Origin]]:
-    """What puts the blocks on the ground, and when the blocks of each release start in the scene.
+) -> tuple[ReleaseSource, Mapping[str, Origin], tuple[Remark, ...]]:
+    """What puts the blocks on the ground, when the blocks of each release start in the scene, and what is missing.
 
     Raises
     ------
@@ -104,15 +105,15 @@ def source_of(
     """
     block = reconstruction.project_settings(scene, []).block
     if entry.releases.source != MEASURED:
-        return placed_source(entry, block), {}
-    table = picks.picks_of(scene)
+        return placed_source(entry, block), {}, ()
+    table, left_out = reconstruction.good_picks(scene)
     if entry.releases.trajectory:
         onward = table.trajectory == entry.releases.trajectory
         if entry.releases.time_s is not None:
             onward &= table.time_s >= entry.releases.time_s - SAME_TIME_S
         table = take(table, onward)
     measured = reconstruction.reconstruct_scene(scene, table, surface=surface)
-    return measured_source(entry, block, measured), _origins(measured)
+    return measured_source(entry, block, measured), _origins(measured), left_out
 
 
 def fingerprint(scene: bpy.types.Scene) -> str:

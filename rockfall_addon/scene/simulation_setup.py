@@ -50,11 +50,13 @@ class Plan:
     scenario : for the core.
     origins : release → when its blocks start in the scene.
     said : the settings in words that a file keeps, and their fingerprint.
+    remarks : what of the measured trajectories is missing in it.
     """
 
     scenario: Scenario
     origins: Mapping[str, Origin]
     said: dict[str, object]
+    remarks: tuple[Remark, ...] = ()
 
 
 def plan(scene: bpy.types.Scene) -> Plan:
@@ -69,11 +71,12 @@ def plan(scene: bpy.types.Scene) -> Plan:
         raise RockfallError(lacking)
     surface, entry = ground(scene), simulated_sources.entry_of(scene)
     met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
-    source, origins = simulated_sources.source_of(scene, entry, surface)
+    source, origins, left_out = simulated_sources.source_of(scene, entry, surface)
     how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
     measured = None
     if any(MODELS[name].draws_from_impacts for name in entry.models):
-        measured = measured_rebounds(reconstruction.reconstruct_scene(scene, surface=surface).impacts)
+        good, left_out = reconstruction.reconstruct_good(scene)
+        measured = measured_rebounds(good.impacts)
     scenario = Scenario(
         met,
         source,
@@ -87,7 +90,7 @@ def plan(scene: bpy.types.Scene) -> Plan:
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
     )
-    return Plan(scenario, origins, {"print": fingerprint(scene)})
+    return Plan(scenario, origins, {"print": fingerprint(scene)}, left_out)
 
 
 def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, ...]]:
@@ -108,7 +111,7 @@ def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, .
             "Lower the number, or use `rockfall simulate`, which has no such limit."
         )
     simulations = run_models(ground, releases, plan.scenario.settings, progress=progress)
-    remarks = gravest_first([*remarks_of(simulations, models), *_stays(simulations)])
+    remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *_stays(simulations)])
     return [simulation.prepare(one) for one in simulations], tuple(remarks)
 
 

@@ -468,7 +468,7 @@ def _finish(scene: bpy.types.Scene, rebuilt: list[str]) -> None:
     simulation.follow(scene)
     if models.shown_models(scene):
         try:
-            models.follow(scene, reconstruction.reconstruct_scene(scene))
+            models.follow(scene, reconstruction.reconstruct_good(scene)[0])
         except RockfallError as error:
             problems.keep_trajectories(
                 scene, problems.of_trajectories(scene) | {"": [Remark(str(error), "problem", "models")]}

@@ -177,6 +177,33 @@ def test_keys_between_the_impacts_are_put_back(scene: bpy.types.Scene, part) -> 
     check_shown(scene, part)
 
 
+def test_a_key_moved_onto_another_is_put_back_with_it(scene: bpy.types.Scene, part) -> None:
+    """Blender deletes the other key then; nobody has deleted its pick."""
+    second, third = picks_of(scene, "A")[1:3]
+    times = second["rockfall_time_s"], third["rockfall_time_s"]
+    for curve in curves_of(block_of(scene, "A")):
+        moved, other = (nearest(curve, pick["rockfall_key_frame"]) for pick in (second, third))
+        moved.co_ui[0] = other.co[0]
+        curve.keyframe_points.remove(other)
+        curve.update()
+    update()
+    assert (second["rockfall_time_s"], third["rockfall_time_s"]) == times
+    assert len(picks_of(scene, "A")) == 5
+    assert "moved to the time of another" in scene["rockfall_problem"]
+    check_block(scene, part, "A")
+
+
+def test_a_key_at_no_finite_place_is_put_back(scene: bpy.types.Scene, part) -> None:
+    pick = picks_of(scene, "A")[2]
+    place = list(pick["rockfall_position_m"])
+    nearest(curves_of(block_of(scene, "A"))[0], pick["rockfall_key_frame"]).co[1] = float("nan")
+    block_of(scene, "A").update_tag()
+    update()
+    assert list(pick["rockfall_position_m"]) == place
+    assert "no finite time or place" in scene["rockfall_problem"]
+    check_block(scene, part, "A")
+
+
 def test_the_picks_own_key_goes_before_the_blocks(scene: bpy.types.Scene, part) -> None:
     """Both in a selection of all keys: moved once, not twice."""
     pick = picks_of(scene, "A")[2]

@@ -242,6 +242,19 @@ def test_what_is_set_aside_is_selected_and_deleted(scene: bpy.types.Scene, part,
         bpy.ops.rockfall.remove_set_aside()
 
 
+def test_one_bad_trajectory_stops_nothing_that_is_made_of_the_others(slope: bpy.types.Scene, part) -> None:
+    same_time(slope)
+    assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
+    result, left_out = part("rockfall_addon.scene.reconstruction").reconstruct_good(slope)
+    assert set(result.picks.trajectory.tolist()) == {"B"}
+    assert [remark.about for remark in left_out] == ["A"]
+    assert bpy.ops.rockfall.show_models(models={"noel_2017"}) == {"FINISHED"}
+    slope.rockfall_simulation.source = "MEASURED"
+    plan = part("rockfall_addon.scene.simulation_setup").plan(slope)
+    assert set(plan.origins) == {"B"}
+    assert [remark.about for remark in plan.remarks] == ["A"]
+
+
 def test_a_marker_that_is_nowhere_goes_back(scene: bpy.types.Scene, part) -> None:
     pick = picks_of(scene, "A")[1]
     place = list(pick["rockfall_position_m"])

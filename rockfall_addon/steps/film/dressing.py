@@ -117,8 +117,9 @@ def remove_film(scene: bpy.types.Scene) -> None:
     """Take the set-up away: the scene is as it was."""
     _remove_furniture(scene)
     presence.show_always(scene)
-    for obj in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.BLOCK_ROLE):
-        obj.hide_render = False
+    for objects in store.by_role(scene, store.PICK_ROLE, store.SET_ASIDE_ROLE, store.BLOCK_ROLE):
+        for obj in objects:
+            obj.hide_render = False
     simulation.look(scene)
     trails.paint_observed(scene)
     if remembered.is_set_up(scene):
@@ -165,7 +166,7 @@ def _furnish(
 
     Returns the sheet of the captions.
     """
-    for obj in store.with_role(scene, store.PICK_ROLE):
+    for obj in store.with_role(scene, store.PICK_ROLE) + store.with_role(scene, store.SET_ASIDE_ROLE):
         obj.hide_render = True
     if motions:
         radius = max(scene.rockfall.marker_radius_m, MARK_PX * _pixel_m(scene, view, motions))

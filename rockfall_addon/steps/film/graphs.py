@@ -73,7 +73,7 @@ def graphs_of(
     ------
     RockfallError : there is nothing to show in them.
     """
-    result = reconstruction.reconstruct_scene(scene)
+    result, _ = reconstruction.reconstruct_good(scene)  # panel 4 says what is missing
     offsets = timing.shown_offsets(scene, result.picks)
     shown = models.shown_models(scene)
     if kind == "motion":

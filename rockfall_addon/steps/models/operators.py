@@ -45,13 +45,16 @@ class ROCKFALL_OT_show_models(bpy.types.Operator):
             models.remove_models(scene)
             return {"FINISHED"}
         chosen = [name for name in models.ORDER if name in self.models]
-        marks = score_landings(models.show_models(scene, reconstruction.reconstruct_scene(scene), chosen))
+        result, left_out = reconstruction.reconstruct_good(scene)
+        marks = score_landings(models.show_models(scene, result, chosen))
         scene.rockfall_comparison.models |= set(chosen)
         said = [
             f"{MODELS[mark.model].title}: {mark.median_offset_m:.1f} m"
             for mark in marks
             if np.isfinite(mark.median_offset_m)
         ]
+        if left_out:
+            self.report({"WARNING"}, f"Something is missing: {left_out[0].text}")
         if said:
             self.report({"INFO"}, f"Median distance of the landings from the real ones: {', '.join(said)}.")
         return {"FINISHED"}
@@ -71,7 +74,7 @@ class ROCKFALL_OT_load_parameters(FromFile, bpy.types.Operator):
         scene = context.scene
         models.keep_parameters(scene, read_parameters(self.chosen(context)))
         if models.shown_models(scene):
-            models.follow(scene, reconstruction.reconstruct_scene(scene))
+            models.follow(scene, reconstruction.reconstruct_good(scene)[0])
         return {"FINISHED"}
 
 

@@ -5,7 +5,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ....core.exchange.tables import read_picks
-from ...scene import georeference, reconstruction, store
+from ...scene import georeference, problems, reconstruction, store, sync
 from ...view import look
 from ...view.from_file import FromFile
 from ...view.reporting import possible, reported
@@ -51,7 +51,10 @@ class ROCKFALL_OT_reconstruct(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        reconstruction.refresh(context.scene)
+        sync.recompute(context.scene)
+        grave = [remark.text for remark in problems.remarks(context.scene) if remark.severity == "problem"]
+        if grave:
+            self.report({"WARNING"}, f"Not all could be computed: {grave[0]}")
         return {"FINISHED"}
 
 

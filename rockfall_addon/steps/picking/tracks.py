@@ -50,7 +50,7 @@ def propose(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> list
         {name: places.block_of(scene, name)},
         gravity_mps2=reconstruction.project_settings(scene, []).reconstruction.gravity_mps2,
         normal_radius_m=places.normal_radius(scene),
-        marked=picks.picks_of(scene),
+        marked=picks.read(scene, picks.ordered(scene, picks.objects_of(scene, [name]))),
     ).picks
     made = []
     for i in range(len(found)):

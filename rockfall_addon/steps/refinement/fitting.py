@@ -27,7 +27,7 @@ def propose(scene: bpy.types.Scene, names: Collection[str] | None, free: Collect
     if not seen:
         raise RockfallError(f"The block of {', '.join(names or ())} was not seen in an aligned video. Track it first.")
     sync.sync(scene)
-    table = picks.trusted(picks.picks_of(scene))
+    table = picks.trusted(picks.read(scene, picks.ordered(scene, picks.objects_of(scene, seen))))
     used = [name for name in seen if name in table.trajectory]
     if not used:
         raise RockfallError(f"There are no picks of {', '.join(seen)}. Pick them, or propose them from the track.")

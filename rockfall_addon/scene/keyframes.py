@@ -18,6 +18,8 @@ from . import store
 
 DRAG_KEY_STEP_S = 0.1  # with drag the cubic is an approximation: Hermite's error at this step is below 0.1 mm
 JUMP_FRAMES = 1e-3
+SAME_TIME_S, SAME_PLACE_M, SAME_PLACE_SHARE = 1e-9, 1e-6, 1e-5
+"""A segment that starts as near to the end of the one before goes on from it; the share is of the coordinates."""
 MANY_ACTIONS = 100
 """More new actions than this are copies of one, and named like it."""
 CONSTANT, BEZIER = 0, 2  # as the interpolation of keys is numbered
@@ -40,29 +42,24 @@ def motion_keys(flights: Flights, which: Array, offset: Array | float = 0.0) -> 
 
     offset : (3,) [m] added to the positions, from the surface to the block's centre.
     """
+    which = np.asarray(which, dtype=int)
+    knots = [_knots(flights, index) for index in which]
+    ends = np.cumsum([len(each) for each in knots])
+    clock = np.concatenate([np.zeros(0), *knots])
+    states = flight_states(flights, np.repeat(which, [len(each) for each in knots]), clock)
     times, positions, before, after, held = [], [], [], [], []
-    for index in np.asarray(which, dtype=int):
-        start, end = flights.start_time_s[index], flights.end_time_s[index]
-        pieces = 1 if flights.drag_per_m[index] == 0 else max(1, int(np.ceil((end - start) / DRAG_KEY_STEP_S)))
-        knots = np.linspace(start, end, pieces + 1)
-        position, velocity = flight_states(flights, np.full(len(knots), index), knots)
-        joined = bool(times) and abs(times[-1] - start) < 1e-9 and np.allclose(positions[-1], position[0], atol=1e-6)
+    for own, position, velocity in zip(knots, *(np.split(each, ends[:-1]) for each in states), strict=True):
+        joined = bool(times) and abs(times[-1] - own[0]) < SAME_TIME_S and _same_place(positions[-1], position[0])
         if joined:
             after[-1], held[-1] = velocity[0], False
-        else:
-            if times:
-                held[-1] = True
-            times.append(start)
-            positions.append(position[0])
-            before.append(velocity[0])
-            after.append(velocity[0])
-            held.append(False)
-        for knot, place, speed in zip(knots[1:], position[1:], velocity[1:], strict=True):
-            times.append(knot)
-            positions.append(place)
-            before.append(speed)
-            after.append(speed)
-            held.append(False)
+        elif times:
+            held[-1] = True
+        new = slice(1 if joined else 0, None)
+        times += own[new].tolist()
+        positions += list(position[new])
+        before += list(velocity[new])
+        after += list(velocity[new])
+        held += [False] * len(own[new])
     return Keys(
         np.array(times),
         np.array(positions).reshape(-1, 3) + offset,
@@ -70,6 +67,18 @@ def motion_keys(flights: Flights, which: Array, offset: Array | float = 0.0) -> 
         np.array(after).reshape(-1, 3),
         np.array(held, dtype=bool),
     )
+
+
+def _knots(flights: Flights, index: int) -> Array:
+    """(m,) times of the keys of one segment [s]."""
+    start, end = flights.start_time_s[index], flights.end_time_s[index]
+    pieces = 1 if flights.drag_per_m[index] == 0 else max(1, int(np.ceil((end - start) / DRAG_KEY_STEP_S)))
+    return np.linspace(start, end, pieces + 1)
+
+
+def _same_place(one: Array, other: Array) -> bool:
+    """Whether two places (3,) differ by no more than rounding."""
+    return bool((np.abs(one - other) <= SAME_PLACE_M + SAME_PLACE_SHARE * np.abs(other)).all())
 
 
 def write_location_keys(

@@ -132,7 +132,8 @@ def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
             "shows are not those of the slope: set Scene Properties > Units > Unit Scale to 1."
         )
         said.append(Remark(text, "warning", "units"))
-    homes = {home.name for obj in picks.objects_of(scene) if (home := picks.home_of(obj, scene)) is not None}
+    shared = picks.objects_of(scene) if len(bpy.data.scenes) > 1 else []
+    homes = {home.name for obj in shared if (home := picks.home_of(obj, scene)) is not None}
     if homes:
         text = (
             f"Some picks are shared with the scene {min(homes)}, which has another origin, and stay where that scene "

@@ -185,6 +185,14 @@ def _table(scene: bpy.types.Scene) -> _Table:
     return table
 
 
+def trajectories_of(scene: bpy.types.Scene, role: str) -> set[str]:
+    """The trajectories of which the scene has objects of a role."""
+    if scene.session_uid not in _tables:
+        return {obj[TRAJECTORY] for obj in of_role(scene, role) if TRAJECTORY in obj}
+    of_role(scene, role)
+    return {name for each, name in _tables[scene.session_uid] if each == role and name is not None}
+
+
 def with_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
     """The scene's objects of one role, by name."""
     return sorted(of_role(scene, role), key=lambda o: o.name)
@@ -198,6 +206,8 @@ def link(folder: bpy.types.Collection, obj: bpy.types.Object) -> None:
 
 def has_role(scene: bpy.types.Scene, role: str) -> bool:
     """Whether the scene has an object of a role: quicker than to list them, for what is asked at every redraw."""
+    if scene.session_uid in _tables:
+        return bool(of_role(scene, role))
     return any(o.get(ROLE) == role for o in scene.objects)
 
 

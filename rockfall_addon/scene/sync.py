@@ -194,7 +194,7 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
         objects = picks.objects_of(scene, wanted)
     groups = fingerprints.by_trajectory(objects)
     prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
-    there = groups if wanted is None else {obj[store.TRAJECTORY] for obj in picks.objects_of(scene)}
+    there = groups if wanted is None else store.trajectories_of(scene, store.PICK_ROLE)
     gone = [name for name in prints if name not in there]
     apart = {set_aside.trajectory_of(obj) for obj in set_aside.of_picks(scene)}
     for name in gone:

@@ -236,6 +236,8 @@ def _key(obj: bpy.types.Object) -> tuple:
 
 
 def _scene_of(obj: bpy.types.Object) -> bpy.types.Scene:
+    if len(bpy.data.scenes) == 1:  # to ask an object, Blender goes through all
+        return bpy.data.scenes[0]
     return next(iter(obj.users_scene), bpy.context.scene)
 
 

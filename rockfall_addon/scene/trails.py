@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.colours import MEASURED_COLOUR, rounded_top, scale_colours, srgb_to_linear
+from ...core.reconstruction.flight import Flights
 from ...core.vectors import Array
 from . import materials, store
 
@@ -47,6 +48,11 @@ class Marks:
     below: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
     doubt: Array = field(default_factory=lambda: np.zeros(0))
     tick: Array = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+
+def are_many(flights: Flights) -> bool:
+    """Whether there are so many flights that renders have tubes of them, and the 3-D view only lines."""
+    return len(flights.start_time_s) > MANY_FLIGHTS
 
 
 def moments(start_s: float, end_s: float, step_s: float = SAMPLE_STEP_S) -> Array:

@@ -39,12 +39,14 @@ class Rows:
     ----------
     flights, picks : (k,) rows in the reconstruction.
     folder : the collection of what is shown of it.
+    doubt : (k,) doubt about its flights.
     like : an action that a new block copies, see `keyframes.write_location_keys`.
     """
 
     flights: Indices
     picks: Indices
     folder: bpy.types.Collection
+    doubt: Array
     like: bpy.types.Action | None = None
 
 
@@ -74,9 +76,9 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     parts, flown = parts_of(scene), rows_of(result.flights.trajectory)
     picked, folders = rows_of(result.picks.trajectory), store.collections(scene, "Trajectories", flown)
     store.remove_objects([obj for (_, name), obj in parts.items() if name not in flown])
-    last, like = 1.0, None
+    doubt, last, like = _doubt(result, np.arange(len(result.flights.start_time_s))), 1.0, None
     for name in (name for name in offsets if name in flown):
-        rows = Rows(flown[name], picked[name], folders[name], like)
+        rows = Rows(flown[name], picked[name], folders[name], doubt[flown[name]], like)
         show_trajectory(scene, name, result, objects, offsets[name], surface, parts, rows=rows)
         last = max(last, float(result.flights.end_time_s[rows.flights].max()) - offsets[name])
         if len(flown) > keyframes.MANY_ACTIONS and like is None:
@@ -144,7 +146,7 @@ def show_trajectory(
     """
     if rows is None:
         which, mine = (np.flatnonzero(each == name) for each in (result.flights.trajectory, result.picks.trajectory))
-        rows = Rows(which, mine, store.collection(scene, "Trajectories", name))
+        rows = Rows(which, mine, store.collection(scene, "Trajectories", name), _doubt(result, which))
     trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
     if not rows.flights.size:
         store.remove_objects([obj for obj in (trail, block) if obj is not None])
@@ -182,7 +184,7 @@ def _show_flights(
     obj: bpy.types.Object | None,
 ) -> bpy.types.Object:
     flights, which, rate = result.flights, rows.flights, timing.frame_rate(scene)
-    step_s = trails.COARSE_STEP_S if len(flights.start_time_s) > trails.MANY_FLIGHTS else trails.SAMPLE_STEP_S
+    step_s = trails.COARSE_STEP_S if trails.are_many(flights) else trails.SAMPLE_STEP_S
     sampled = [
         trails.moments_with_ticks(float(flights.start_time_s[i]), float(flights.end_time_s[i]), offset, rate, step_s)
         for i in which
@@ -193,7 +195,7 @@ def _show_flights(
     lines = trails.Lines(counts, clock - offset, position, norm(velocity))
     marks = trails.Marks(
         below=_below(result, name, position, surface),
-        doubt=np.repeat(_doubt(result, which), counts),
+        doubt=np.repeat(rows.doubt, counts),
         tick=np.concatenate([tick for _, tick in sampled]),
     )
     new = obj is None
@@ -209,6 +211,8 @@ def _show_flights(
         store.link(rows.folder, obj)
     if bare:
         trails.set_trail(scene.rockfall, obj)
+        if trails.are_many(flights):  # the lines of the view are enough
+            obj.modifiers["Trail"].show_viewport = False
     return obj
 
 
@@ -314,7 +318,7 @@ def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -
         columns["sigma_speed2"] = speed_sigma(impacts.v2, sigma["v2"])
         columns["sigma_kinetic1_j"] = impacts.mass_kg * norm(impacts.v1) * columns["sigma_speed1"]
         columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
-    rows = {name: [np.atleast_1d(value).tolist() for value in values] for name, values in columns.items()}
+    rows = {name: (values if values.ndim > 1 else values[:, None]).tolist() for name, values in columns.items()}
     impact_marks.results_written(set(result.picks.trajectory.tolist()))
     i = 0
     for obj, kind in zip(objects, result.picks.kind.tolist(), strict=True):

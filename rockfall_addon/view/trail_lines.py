@@ -134,8 +134,8 @@ def trails_of(scene: bpy.types.Scene) -> Trails:
     key = scene.session_uid
     if key in _looked:
         return _kept[key]
-    roles = (store.FLIGHTS_ROLE, store.MODEL_FLIGHTS_ROLE)
-    shown = [obj for role in roles for obj in store.with_role(scene, role) if obj.visible_get()]
+    found = store.by_role(scene, store.FLIGHTS_ROLE, store.MODEL_FLIGHTS_ROLE)
+    shown = [obj for each in found for obj in sorted(each, key=lambda one: one.name) if obj.visible_get()]
     parts = tuple(trail for obj in shown if (trail := _trail(obj)) is not None)
     if key not in _kept or _kept[key].parts != parts:
         _kept[key] = _joined(parts)

@@ -147,6 +147,34 @@ def test_flight_curve_lies_on_the_parabola_and_ends_now(scene: bpy.types.Scene) 
     assert tube.attributes.active_color_name == "speed_colour"
 
 
+def test_of_many_flights_only_renders_have_tubes(part, scene: bpy.types.Scene, table: Path, monkeypatch) -> None:
+    monkeypatch.setattr(part("rockfall_addon.scene.trails"), "MANY_FLIGHTS", 2)
+    bpy.data.objects.remove(scene.objects["A flights"])
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    shown = {
+        name: (scene.objects[name].modifiers["Trail"].show_viewport, scene.objects[name].modifiers["Trail"].show_render)
+        for name in ("A flights", "B flights")
+    }
+    assert shown == {"A flights": (False, True), "B flights": (True, True)}
+    graph = bpy.context.evaluated_depsgraph_get()
+    bare, tube = (scene.objects[name].evaluated_get(graph).data for name in shown)
+    assert len(bare.vertices) == len(scene.objects["A flights"].data.vertices)
+    assert len(tube.vertices) > 3 * len(scene.objects["B flights"].data.vertices)
+
+
+def test_what_is_looked_up_is_what_is_there(part, scene: bpy.types.Scene) -> None:
+    store, picks = part("rockfall_addon.scene.store"), part("rockfall_addon.scene.picks")
+    bpy.data.objects.remove(scene.objects["A flights"])
+    with store.looking(scene):
+        assert store.trajectories_of(scene, store.PICK_ROLE) == {"A", "B"}
+        assert store.trajectories_of(scene, store.FLIGHTS_ROLE) == {"B"}
+        assert store.has_role(scene, store.BLOCK_ROLE)
+        assert not store.has_role(scene, store.MODEL_FLIGHTS_ROLE)
+        store.remove_objects(picks.objects_of(scene, ["A"]))
+        assert store.trajectories_of(scene, store.PICK_ROLE) == {"B"}
+    assert store.trajectories_of(scene, store.PICK_ROLE) == {"B"}
+
+
 def test_impact_object_keeps_the_impacts_numbers(scene: bpy.types.Scene) -> None:
     pick = scene.objects["A impact 2"]
     d1, d2 = np.diff(TIMES)[1:3]

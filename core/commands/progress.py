@@ -36,7 +36,7 @@ class PrintedProgress:
     def __init__(self, stream: TextIO | None = None, quiet_s: float = QUIET_S) -> None:
         self._stream = sys.stderr if stream is None else stream
         self._terminal = self._stream.isatty()
-        self._text = self._line = ""
+        self._text = self._line = self._said = ""
         self._since = self._printed = 0.0
         self._is_loud = self._is_open = False
         self._timer = Timer(quiet_s, self._wake)
@@ -54,13 +54,13 @@ class PrintedProgress:
 
     def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
         """Now doing `text`."""
-        now, is_new = time.monotonic(), text != self._text
+        now, is_new, is_last = time.monotonic(), text != self._text, 0 < total == done
         if is_new:
             self._text, self._since = text, now
             self._end_line()
-        before, self._line = self._line, progress_line(text, done, total, now - self._since)
-        is_last = 0 < total == done and self._line != before
-        if self._is_loud and (is_new or is_last or now - self._printed >= (REDRAW_S if self._terminal else BETWEEN_S)):
+        self._line = progress_line(text, done, total, now - self._since)
+        is_due = is_new or is_last or now - self._printed >= (REDRAW_S if self._terminal else BETWEEN_S)
+        if self._is_loud and is_due and self._line != self._said:
             self._print(now)
 
     def _wake(self) -> None:
@@ -69,7 +69,7 @@ class PrintedProgress:
             self._print(time.monotonic())
 
     def _print(self, now: float) -> None:
-        self._printed, self._is_open = now, self._terminal
+        self._printed, self._is_open, self._said = now, self._terminal, self._line
         print(f"\r{self._line}\x1b[K" if self._terminal else self._line, end="" if self._terminal else "\n",
               file=self._stream, flush=True)  # fmt: skip
 

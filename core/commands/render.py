@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..film.engines import ENGINES
-from ..film.job import GRAPH_KINDS, Kind
+from ..film.job import AS_SET_UP, BLEND, GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
 from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, whole
@@ -17,11 +17,12 @@ FILES = {"film": "rockfall.mp4", "still": "rockfall.png", "slope": "slope.png"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("project", metavar="PROJECT", type=Path, help="project.toml")
+    parser.add_argument(
+        "project", metavar="PROJECT", type=Path, help="project.toml; or a .blend, for the film as its step Film says"
+    )
     parser.add_argument(
         "--preset",
         metavar="NAME",
-        default="preview",
         help="of the project, or: preview (640×360, the default), 720p, hd (1920×1080), 4k",
     )
     parser.add_argument(
@@ -65,9 +66,11 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.project import read_project
     from ..film.job import FilmJob
     from ..film.maker import film_maker
-    from ..film.presets import find_preset
+    from ..film.presets import PREVIEW, find_preset
     from ..output import output_folder
 
+    if arguments.project.suffix.lower() == BLEND:
+        return _render_scene(arguments)
     models = models_as_asked(arguments.model)
     simulate = models_as_asked(arguments.simulate, flag="--simulate")
     if models and simulate:
@@ -93,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
     parameters = model_parameters(arguments, models or simulate, known)
-    preset = find_preset(project, arguments.preset)
+    preset = find_preset(project, arguments.preset or PREVIEW.name)
     maker = film_maker()
     kind: Kind = "slope" if arguments.slope else "still" if arguments.still else "film"
     name = FILES[kind]
@@ -117,4 +120,28 @@ def run(arguments: argparse.Namespace) -> int:
         print(remark)
     print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")
     print(f"Written: {Path(arguments.out) / name}")
+    return 0
+
+
+def _render_scene(arguments: argparse.Namespace) -> int:
+    """Render the film, or a still of it, that a .blend says."""
+    from ..film.job import FilmJob
+    from ..film.maker import film_maker
+    from ..output import output_folder
+
+    source = arguments.project
+    others = ("preset", "model", "simulate", "number", "seed", "set", "parameters", "graphs", "slope")
+    given = [f"--{name}" for name in others if getattr(arguments, name, None)]
+    if given:
+        raise InputError(
+            f"{given[0]} is of a project; a .blend has its own film", file=source, advice="Set it in Blender, and save"
+        )
+    if not source.is_file():
+        raise InputError("There is no such file", file=source)
+    kind: Kind = "still" if arguments.still else "film"
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+        out = folder.absolute() / FILES[kind]
+        job = FilmJob(kind, source, out, arguments.engine or AS_SET_UP, frames=arguments.frames)
+        film_maker().film(job, progress)
+    print(f"Written: {Path(arguments.out) / FILES[kind]}")
     return 0

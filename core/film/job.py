@@ -10,8 +10,9 @@ from typing import Literal, get_args
 from ..impact_models.machinery.parameters import Value
 from .simulated import NUMBER
 
-Kind = Literal["film", "still", "slope", "terrain", "scene"]
+Kind = Literal["film", "still", "slope", "terrain"]
 GraphKind = Literal["impacts", "motion"]
+AS_SET_UP, BLEND = "", ".blend"
 GRAPH_KINDS: tuple[GraphKind, ...] = get_args(GraphKind)
 
 
@@ -22,11 +23,11 @@ class FilmJob:
     Attributes
     ----------
     kind : "film" (MP4); "still" (one frame of the film, PNG); "slope" (the whole slope with all trajectories, PNG);
-        "terrain" (a terrain file without trajectories, PNG); "scene" (the film for which a .blend is set up, MP4).
-    source : the project, for "terrain" the terrain file, for "scene" the .blend.
+        "terrain" (a terrain file without trajectories, PNG).
+    source : the project; a .blend, whose film or still is as its settings say; for "terrain" the terrain file.
     out : the file to write.
     preset : name of the render preset.
-    engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen.
+    engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen; `AS_SET_UP` of a .blend.
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
     models : impact models whose blocks are shown beside the real ones, from each impact to the next.
@@ -34,7 +35,8 @@ class FilmJob:
     number, seed : of simulated blocks for each real one and model, and of their random numbers.
     parameters : model → parameter → value, where it is not the default.
     graphs : which stand in a film or still and follow its time; None for none.
-    title : written into the picture of a terrain, empty for the name of its file; name of the .blend's scene.
+    title : written into the picture of a terrain; empty for the name of its file.
+    scene : of a .blend; empty for the one that was open when it was saved.
     """
 
     kind: Kind
@@ -46,6 +48,7 @@ class FilmJob:
     up: str = "auto"
     unit_m: float = 1.0
     title: str = ""
+    scene: str = ""
     graphs: GraphKind | None = None
     models: tuple[str, ...] = ()
     simulate: tuple[str, ...] = ()

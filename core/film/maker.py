@@ -17,7 +17,7 @@ from ..errors import DependencyError, RockfallError
 from ..progress import Progress, silent
 from .children import child
 from .engines import choose_engine
-from .job import FilmJob
+from .job import AS_SET_UP, FilmJob
 
 CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try --engine cycles."
 LINES_TOLD, MOST_KEPT = 5, 200
@@ -55,7 +55,7 @@ class FilmMaker:
         RockfallError : what the job says is wrong, or Blender crashed.
         """
         require_blender_libraries()
-        chosen = job.with_engine(choose_engine(job.engine, self.probe))
+        chosen = job if job.engine == AS_SET_UP else job.with_engine(choose_engine(job.engine, self.probe))
         return Film(chosen.engine, self.make(chosen, progress))
 
 

@@ -395,3 +395,29 @@ def test_a_scene_whose_animation_was_cleared_is_set_up_again(scene, small_film, 
     part("rockfall_addon.scene.sync").sync(scene)
     assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     assert sorted(state()) == sorted(before)
+
+
+def test_a_saved_scene_becomes_what_its_settings_say(scene, part, tmp_path: Path, monkeypatch) -> None:
+    """As `rockfall render FILE.blend` makes it: set up where nobody has done it, refused where it is too old."""
+    monkeypatch.setattr(part("rockfall_addon.steps.film.engine"), "PICTURE_SAMPLES", 1)
+    render, errors, job = (part(name) for name in ("rockfall_addon.steps.film.render", "core.errors", "core.film.job"))
+    film, blend = scene.rockfall_film, tmp_path / "site.blend"
+    film.size, film.engine, film.time_scale = "preview", "cycles", 20.0
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    still = job.FilmJob("still", blend, tmp_path / "still.png", job.AS_SET_UP, frames=(2, 2))
+    render.make(still, lambda *_: None)
+    part("core.film.check").check_picture(still.out, (640, 360))
+    scene = bpy.context.scene
+    assert (scene.frame_current, scene.render.frame_map_old / scene.render.frame_map_new) == (2, 20.0)
+    part("rockfall_addon.steps.film.up_to_date").keep(scene)
+    scene.rockfall_film.graphs = "MOTION"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    with pytest.raises(errors.InputError, match=r"site\.blend.*Something has changed since the film was set up"):
+        render.make(still, lambda *_: None)
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    with pytest.raises(errors.InputError, match="no trajectories to film"):
+        render.make(still, lambda *_: None)
+    blend.write_bytes(b"BLENDER")
+    with pytest.raises(errors.InputError, match=r"site\.blend.*cannot open this"):
+        render.make(still, lambda *_: None)

@@ -9,7 +9,7 @@ from rockfall.core import cli
 from rockfall.core.errors import DependencyError, RockfallError
 from rockfall.core.film import maker as maker_module
 from rockfall.core.film.engines import PASSED, choose_engine, probe, probe_script
-from rockfall.core.film.job import FilmJob
+from rockfall.core.film.job import AS_SET_UP, FilmJob
 from rockfall.core.film.maker import FilmMaker, film_maker, inside_blender, run_job
 from rockfall.core.progress import CancelledError
 
@@ -145,3 +145,20 @@ def test_a_film_that_succeeds_is_moved_into_place(
     printed = capsys.readouterr()
     assert "1920×1080, rendered with Cycles" in printed.out
     assert "There is no render preset 'blue'" in printed.err
+
+
+def test_a_blend_is_rendered_as_it_says(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    jobs, blend, out = [], project.with_suffix(".blend"), project.parent / "film"
+    token = inside_blender.set(FilmMaker(lambda job, _: (jobs.append(job), job.out.write_bytes(b"film"), ())[-1], ()))
+    try:
+        assert cli.main(["render", str(blend), "--out", str(out)]) == 1
+        blend.write_bytes(b"")
+        assert cli.main(["render", str(blend), "--out", str(out), "--preset", "hd"]) == 1
+        assert cli.main(["render", str(blend), "--out", str(out), "--frames", "5-9"]) == 0
+    finally:
+        inside_blender.reset(token)
+    said = capsys.readouterr().err
+    assert "There is no such file" in said
+    assert "--preset is of a project; a .blend has its own film" in said
+    assert [(job.kind, job.source, job.engine, job.frames) for job in jobs] == [("film", blend, AS_SET_UP, (5, 9))]
+    assert (out / "rockfall.mp4").read_bytes() == b"film"

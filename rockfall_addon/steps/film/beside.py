@@ -14,7 +14,7 @@ import bpy
 
 from .... import __package__ as PACKAGE  # noqa: N812
 from ....core.errors import RockfallError
-from ....core.film.job import FilmJob
+from ....core.film.job import AS_SET_UP, FilmJob
 from ....core.film.maker import run_job
 from ....core.output import output_file
 from ....core.progress import Progress
@@ -48,7 +48,7 @@ def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
     def render(progress: Progress) -> None:
         try:
             with output_file(path) as draft:
-                run_job([*command, FilmJob("scene", copy, draft, title=name).to_json()], path.name, progress)
+                run_job([*command, FilmJob("film", copy, draft, AS_SET_UP, scene=name).to_json()], path.name, progress)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 

@@ -4,6 +4,7 @@
 import bpy
 import gpu
 
+from ....core.film.engines import IDENTIFIERS
 from ...scene import materials
 
 FILM_SAMPLES, PICTURE_SAMPLES = 4, 24
@@ -20,6 +21,11 @@ def use_engine(scene: bpy.types.Scene, engine: str, still: bool = False) -> None
     scene.view_settings.view_transform = "Standard"
     scene.view_settings.look = "None"
     scene.render.film_transparent = False
+
+
+def engine_of(scene: bpy.types.Scene) -> str:
+    """The engine for which a scene is set up."""
+    return next(name for name, identifier in IDENTIFIERS.items() if identifier == scene.render.engine)
 
 
 def quickest_engine() -> str:

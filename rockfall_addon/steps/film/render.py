@@ -9,7 +9,7 @@ from ....core.errors import InputError, RockfallError
 from ....core.exchange.project import Project, RenderPreset, read_project
 from ....core.film.check import check_film, check_picture
 from ....core.film.falls import fall_beside
-from ....core.film.job import FilmJob
+from ....core.film.job import BLEND, FilmJob
 from ....core.film.presets import HD, FilmTiming, find_preset
 from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
@@ -17,20 +17,20 @@ from ....core.simulation.measured_releases import start_times
 from ....core.workflow.simulation import remarks_of
 from ...scene import models, simulation
 from ...scene.project import load_project
-from . import dressing
-from .engine import use_engine
+from . import dressing, saved
+from .engine import engine_of, use_engine
 
 
 def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
-    """Do a job in an empty file, which is filled; returns what a user should know of it.
+    """Do a job in an empty file, which is filled, or in that of a .blend; returns what a user should know of it.
 
     Raises
     ------
     RockfallError : the project is bad, has nothing to show, or the file cannot be written.
     """
     scene, remarks = bpy.context.scene, ()
-    if job.kind == "scene":
-        scene = _open(job)
+    if job.source.suffix.lower() == BLEND:
+        scene = saved.open_film(job)
     elif job.kind == "terrain":
         _show_terrain(scene, job)
     else:
@@ -45,11 +45,11 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
             dressing.set_up_picture(scene, preset, job.engine)
         else:
             dressing.set_up_film(scene, preset, job.engine, job.graphs)
-    if job.kind in ("film", "scene"):
+    if job.kind == "film":
         render_film(scene, job.out, job.frames, progress)
     else:
         if job.kind == "still":
-            use_engine(scene, job.engine, still=True)
+            use_engine(scene, engine_of(scene), still=True)
             scene.frame_set(min(job.frames[0] if job.frames else scene.frame_end, scene.frame_end))
         render_picture(scene, job.out)
         progress("Rendering", 1, 1)
@@ -113,15 +113,6 @@ def render_picture(scene: bpy.types.Scene, path: Path) -> None:
     except RuntimeError as error:
         raise RockfallError(f"Blender could not render the picture: {error}") from error
     check_picture(path, _size(scene))
-
-
-def _open(job: FilmJob) -> bpy.types.Scene:
-    """The scene of a .blend that is set up for a film."""
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(job.source))
-    except RuntimeError as error:
-        raise RockfallError(f"Blender could not open the scene: {error}") from error
-    return bpy.data.scenes[job.title]
 
 
 def _load(scene: bpy.types.Scene, project: Path, preset: RenderPreset) -> Reconstruction:

@@ -139,12 +139,12 @@ def hint(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> str:
     pairs, pair = pairs_of(camera), open_pair(camera)
     if pair is not None and pair.proposed:
         where = "on the terrain" if pair.proposed == POINT else "in the picture"
-        return f"Pair {pair.name}: drag the dashed mark {where} to the right place, or press Enter if it fits."
+        return f"Pair {pair.name}: drag the dashed mark {where} to the right place; click it if it fits."
     if pair is not None:
         where = "on the terrain" if pair.missing == POINT else "in the picture"
         return f"Pair {pair.name}: now click the same place {where}."
     if waiting := sum(bool(each.proposed) for each in pairs):
-        return f"Drag {waiting} dashed marks to where they are seen in this frame; Enter takes one that fits."
+        return f"Drag {waiting} dashed marks to where they are seen in this frame; click one that fits."
     if not pairs:
         return (
             "Click a place in the picture that you will find again on the terrain: a boulder's edge, a ledge, a crack."

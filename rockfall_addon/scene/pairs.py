@@ -32,6 +32,7 @@ class Pair:
     frame : the video's frame in which the pixel was marked.
     enabled : the camera is solved with it; otherwise the pair only checks the camera.
     proposed : the side that was computed and waits to be confirmed: "pixel", "point", or empty.
+    agreed : the side that was computed and taken as it was: no measurement, so the pair only checks the camera.
     colour : number of its colour.
     """
 
@@ -42,6 +43,7 @@ class Pair:
     frame: int
     enabled: bool = True
     proposed: str = ""
+    agreed: str = ""
     colour: int = 0
     sigma_px: float = math.nan
     sigma_m: float = math.nan
@@ -50,6 +52,11 @@ class Pair:
     def is_complete(self) -> bool:
         """Both sides are there, and a person has seen them."""
         return self.pixel is not None and self.point is not None and not self.proposed
+
+    @property
+    def counts(self) -> bool:
+        """Whether the camera is solved with it: it is wanted, and a person has measured both sides."""
+        return self.enabled and not self.agreed
 
     @property
     def missing(self) -> str:
@@ -105,7 +112,7 @@ def table(complete: Sequence[Pair], shift: GlobalShift, source: Path | None = No
         frame=np.array([pair.frame for pair in complete], dtype=np.intp),
         sigma_px=np.array([pair.sigma_px for pair in complete], dtype=np.float64),
         sigma_m=np.array([pair.sigma_m for pair in complete], dtype=np.float64),
-        used=np.array([pair.enabled for pair in complete], dtype=np.bool_),
+        used=np.array([pair.counts for pair in complete], dtype=np.bool_),
         shift=shift,
         source=source,
     )

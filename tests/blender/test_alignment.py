@@ -196,9 +196,17 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
     assert proposed.proposed == "pixel"
     assert np.hypot(*(np.array(proposed.pixel) - table.pixel[8])) < 5
     assert aligned.solution_of(camera).rmse_px == pytest.approx(before, rel=1e-9), "a prediction does not count"
+    ready = aligned.ready_pairs(scene, camera)
     marking.accept(scene, camera, pair)
     assert pairs.with_id(pairs.pairs_of(camera), pair).is_complete
     assert pairs.open_pair(camera) is None
+    assert aligned.solution_of(camera).rmse_px == pytest.approx(before, rel=1e-9), "nor does one that was agreed with"
+    assert aligned.ready_pairs(scene, camera) == ready
+    assert camera.rockfall_alignment.rows[-1].agreed
+    marking.move(scene, camera, pair, "pixel", table.pixel[8])
+    assert not camera.rockfall_alignment.rows[-1].agreed
+    assert aligned.ready_pairs(scene, camera) == ready + 1, "dragged, it is measured"
+    assert aligned.solution_of(camera).rmse_px != pytest.approx(before, rel=1e-9)
 
 
 def test_known_focal_length_needs_four_pairs(part, scene, marking, camera, table) -> None:

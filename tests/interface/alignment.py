@@ -167,6 +167,16 @@ def case_align_with_clicks(window):
             bpy.ops.ed.undo()
         yield 0.7
     assert pairs.open_pair(the_camera(window)).proposed == "pixel", "the drag is one step, and so is each click"
+    predicted = pairs.open_pair(the_camera(window)).pixel
+    x, y = in_picture(window, predicted)
+    yield from held(window, (x, y))
+    yield from window.move(x + 2, y + 1)
+    yield from let_go(window, (x + 2, y + 1))
+    taken = pairs.pairs_of(the_camera(window))[-1]
+    assert (taken.agreed, taken.pixel) == ("pixel", predicted), "a click takes it, though the mouse trembles"
+    assert aligned.ready_pairs(bpy.context.scene, the_camera(window)) == 5, "it only checks the camera"
+    yield from sidebar(window, True)
+    window.screenshot("6-as-predicted")
     assert not window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene)
 
 

@@ -122,7 +122,7 @@ def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, file: str | 
         if complete:
             table = pairs.table(complete, georeference.read_shift(scene))
             left, away = pair_residuals(path, table, pairs.times_of(camera, table.frame))
-            used = np.array([pair.enabled and pair.id not in solution.wrong for pair in complete])
+            used = np.array([pair.counts and pair.id not in solution.wrong for pair in complete])
             write_pair_residuals(folder / beside, table, left, away, used)
     return [file.name, beside] if complete else [file.name]
 

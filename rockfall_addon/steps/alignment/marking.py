@@ -77,7 +77,7 @@ def move(
     *,
     is_held: bool = False,
 ) -> None:
-    """Move one side of a pair; a prediction that was moved is one no longer, once the mouse is let go.
+    """Move one side of a pair; a prediction that was moved is measured, once the mouse is let go.
 
     is_held : while the mouse is.
     """
@@ -91,19 +91,19 @@ def move(
         pair = replace(pair, pixel=place)
     else:
         pair = replace(pair, point=place)
-    if pair.proposed == side and not is_held:
-        pair = replace(pair, proposed="")
+    if side in (pair.proposed, pair.agreed) and not is_held:
+        pair = replace(pair, proposed="", agreed="")
     elif pair.proposed and pair.proposed != side:
         pair = _with_prediction(scene, camera, pair, side)
     _store(scene, camera, marked, pair)
 
 
 def accept(scene: bpy.types.Scene, camera: bpy.types.Object, identifier: str) -> None:
-    """A person agrees with a prediction."""
+    """A person agrees with a prediction: it is where the camera has it, so its residual is no measurement."""
     marked = pairs_of(camera)
     pair = with_id(marked, identifier)
     if pair is not None and pair.proposed:
-        _store(scene, camera, marked, replace(pair, proposed=""))
+        _store(scene, camera, marked, replace(pair, proposed="", agreed=pair.proposed))
 
 
 def edit(scene: bpy.types.Scene, camera: bpy.types.Object, identifier: str, **values: object) -> None:

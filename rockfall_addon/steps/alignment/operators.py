@@ -17,6 +17,7 @@ from . import following, looking, marking, solving
 
 TOOL = "rockfall.align_tool"
 FINE = 0.1
+STILL_PX = 3.0
 NEAR_PX = 11.0
 """A click this near to a mark takes hold of it, in pixels at interface scale 1."""
 
@@ -79,7 +80,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         self._mouse = np.array([event.mouse_region_x, event.mouse_region_y], dtype=np.float64)
-        self._shift, self._moved = event.shift, False
+        self._shift, self._moved, self._press = event.shift, False, self._mouse
         return self._begin(context)
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -91,7 +92,7 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
             now = np.array([event.mouse_region_x, event.mouse_region_y], dtype=np.float64)
             step, self._mouse = now - self._mouse, now
             self._place += step * (FINE if event.shift else 1.0)
-            self._moved = self._moved or bool(step.any())
+            self._moved = self._moved or bool(np.hypot(*(now - self._press)) > self._still(context))
             self._move(context, camera, is_held=True)
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if self._taken:
@@ -103,6 +104,11 @@ class ROCKFALL_OT_mark_pair(bpy.types.Operator):
             self._show(context)
             return {"CANCELLED"}
         return {"RUNNING_MODAL"}
+
+    def _still(self, context: bpy.types.Context) -> float:
+        """How far the mouse may tremble in a click on a dashed mark [px]; any other mark follows at once."""
+        pair = pairs.with_id(pairs.pairs_of(videos.by_id(context.scene, self._camera)), self._pair)
+        return STILL_PX * context.preferences.system.ui_scale if pair is not None and pair.proposed == self._side else 0
 
     def _move(self, context: bpy.types.Context, camera: bpy.types.Object, *, is_held: bool) -> None:
         try:
@@ -179,7 +185,7 @@ class ROCKFALL_OT_delete_pair(bpy.types.Operator):
 
 
 class ROCKFALL_OT_accept_pair(bpy.types.Operator):
-    """The dashed mark fits: take it as it is"""
+    """The dashed mark fits: take it as it is, as a check. It was not measured, so the camera is not solved with it"""
 
     bl_idname = "rockfall.accept_pair"
     bl_label = "Accept Prediction"
@@ -369,7 +375,7 @@ class AlignTool(bpy.types.WorkSpaceTool):
         "Mark the same place in the footage and on the terrain, in either order.\n"
         "• Click: mark, or take hold of a mark\n"
         "• Drag: correct, with Shift finely\n"
-        "• Enter: a dashed mark fits\n"
+        "• Click a dashed mark, or Enter: it fits, as a check\n"
         "• X: delete the active pair\n"
         "• Shift Click in the footage: the terrain that shines through there"
     )

@@ -134,7 +134,7 @@ def _mark(place: tuple[float, float], pair: pairs.Pair, colour: Colour, scale: f
 def _colour(pair: pairs.Pair, solution: alignment.Solution) -> Colour:
     if pair.id in solution.wrong:
         return (*WRONG, 1.0)
-    return (*palette(pair.colour), 1.0 if pair.enabled else 0.4)
+    return (*palette(pair.colour), 1.0 if pair.counts else 0.4)
 
 
 def palette(number: int) -> tuple[float, float, float]:

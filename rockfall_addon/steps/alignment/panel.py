@@ -25,9 +25,11 @@ class ROCKFALL_UL_pairs(Rows, bpy.types.UIList):
         cells = row.split(factor=0.4, align=True)
         cells.prop(item, "name", text="", emboss=False)
         right = cells.row(align=True)
-        right.active = item.enabled
+        right.active = item.enabled and not item.agreed
         if item.missing:
             right.label(text="terrain?" if item.missing == pairs.POINT else "picture?")
+        elif item.agreed:
+            right.label(text="as predicted")
         else:
             for value in (item.residual_px, item.residual_m):
                 right.label(text=short(value))
@@ -69,7 +71,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
         row.prop(settings, "use_wipe", text="", icon="MOD_MIRROR")
         if settings.use_wipe:
             layout.prop(settings, "wipe", slider=True)
-        self._pairs(layout, settings)
+        self._pairs(context, settings)
 
     def _state(self, context: bpy.types.Context, camera: bpy.types.Object, solution: alignment.Solution) -> None:
         """How this step stands, and what to do next."""
@@ -80,7 +82,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
         elif placed == alignment.FROM_FILE:
             advise(context, layout, True, f"{camera.name} comes from a file.")
         elif placed and not solution.problem:
-            count = sum(pair.enabled for pair in pairs.complete_of(camera))
+            count = sum(pair.counts for pair in pairs.complete_of(camera))
             good = count - len(solution.wrong)
             fit = f"{good} pairs fit to {solution.rmse_px:.2f} px." if math.isfinite(solution.rmse_px) else ""
             advise(context, layout, True, f"{camera.name} is solved. {fit}")
@@ -94,7 +96,8 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
         if next_step:
             advise(context, layout, False, next_step)
 
-    def _pairs(self, layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
+    def _pairs(self, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
+        layout = self.layout
         if len(settings.rows):
             head = layout.split(factor=0.46, align=True)
             head.label(text="Pairs")
@@ -108,6 +111,10 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
             column.separator()
             column.prop(settings, "show_pairs", text="", icon="HIDE_OFF")
             column.prop(settings, "magnify", text="", icon="FULLSCREEN_ENTER")
+        agreed = [row.name for row in settings.rows if row.agreed]
+        if agreed:
+            text = f"As predicted: {', '.join(agreed)}. No measurement, so not counted; drag a mark to measure it."
+            paragraph(context, layout, text, "INFO")
         row = layout.row(align=True)
         row.operator("rockfall.import_pairs", text="Import", icon="IMPORT")
         if len(settings.rows):

@@ -70,6 +70,7 @@ class PairRow(bpy.types.PropertyGroup):
     frame: IntProperty()
     missing: StringProperty()
     is_wrong: BoolProperty()
+    agreed: BoolProperty()
     residual_px: FloatProperty()
     residual_m: FloatProperty()
 

@@ -96,6 +96,7 @@ def fill_rows(camera: bpy.types.Object) -> None:
         row.pair = ""  # while it is empty the row does not answer
         row.name, row.enabled, row.colour = pair.name, pair.enabled, pair.colour
         row.frame, row.missing, row.is_wrong = pair.frame, pair.missing, pair.id in solution.wrong
+        row.agreed = bool(pair.agreed)
         residual = (solution.residual or {}).get(pair.id)
         row.residual_px = math.hypot(*residual) if residual is not None else math.nan
         row.residual_m = (solution.residual_m or {}).get(pair.id, math.nan)

@@ -36,6 +36,8 @@ STEPS = (
         ("rockfall.nudge_pick_time", "A Tenth of a Frame Later", {"frames": 0.1}),
         ("rockfall.show_impact", "Go to the Pick's Moment", {}), "rockfall.use_triangulated", None,
         "rockfall.track_block", "rockfall.propose_impacts", "rockfall.clear_track", None,
+        ("wm.tool_set_by_id", "Tool: Mark Spin", {"name": "rockfall.spin_tool"}), "rockfall.remove_spin_mark",
+        "rockfall.clear_spin_marks", "rockfall.measure_spin", "rockfall.set_spin_axis", "rockfall.count_turns", None,
         "rockfall.import_picks", "rockfall.reconstruct", "rockfall.impact_table", None,
         "rockfall.recover_picks", "rockfall.select_set_aside", "rockfall.remove_set_aside",
     )),
@@ -71,7 +73,7 @@ STEPS = (
 )  # fmt: skip
 """Name, title and entries of each menu: an operator, or an operator with its text and properties; None is a line."""
 
-CHOOSING = {"rockfall.pick_kind": "kind"}
+CHOOSING = {"rockfall.pick_kind": "kind", "rockfall.set_spin_axis": "axis"}
 """Operators whose entry opens the list of a property."""
 
 IMPORTS = (

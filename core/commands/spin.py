@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         spins = measure_spins(made, videos, surface)
         made = reconstruct_project(project, surface, with_spins(made.picks, spins))
         progress("Writing the tables")
-        write_spins(spins, made.impacts, made.picks, folder / "spin.csv")
+        write_spins(spins.flights, folder / "spin.csv")
         write_picks(made.picks, folder / "picks.csv")
         write_impacts(made.impacts, folder / "impacts.csv")
     for line in _summary(spins):

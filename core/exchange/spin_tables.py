@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """spin_marks.csv: one point of a block, marked in pictures of a video; spin.csv: what was measured from such marks."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,11 +10,9 @@ import numpy as np
 from ..errors import InputError
 from ..georeference import GlobalShift
 from ..reading import reader
-from ..reconstruction.impact import Impacts
-from ..reconstruction.picks import Picks
 from ..reconstruction.refinement.views import View
 from ..vectors import Array, Indices, Names
-from ..workflow.spins import AXES, AXIS_WORDS, FlightSpin, MarkedVideo, MeasuredSpins, SpinMarks
+from ..workflow.spins import AXES, AXIS_WORDS, FlightSpin, MarkedVideo, SpinMarks
 from .cameras import read_camera
 from .csv_text import read_table
 from .footage import clock_of
@@ -113,19 +111,13 @@ def read_marked_videos(project: Project, shift: GlobalShift | None = None) -> tu
     return tuple(found)
 
 
-def write_spins(spins: MeasuredSpins, impacts: Impacts, picks: Picks, path: str | Path) -> None:
-    """Write spin.csv: a row for each flight with marks, with empty cells where its spin is not known.
-
-    Parameters
-    ----------
-    impacts, picks : of the reconstruction, for the number of the impact that ends each flight.
-    """
-    flights = spins.flights
+def write_spins(flights: Sequence[FlightSpin], path: str | Path) -> None:
+    """Write spin.csv: a row for each flight with marks, with empty cells where its spin is not known."""
     omega = np.array([np.full(3, np.nan) if f.spin is None else f.spin.angular_velocity for f in flights])
     columns: Columns = {
         "trajectory": [f.trajectory for f in flights],
         "flight": [str(f.flight) for f in flights],
-        "impact": impact_numbers_of(spins, impacts, picks),
+        "impact": [str(f.impact or "") for f in flights],
         "start_time_s": _numbers([f.start_time_s for f in flights]),
         "end_time_s": _numbers([f.end_time_s for f in flights]),
         "marks": [str(f.mark_time_s.size) for f in flights],
@@ -143,13 +135,6 @@ def write_spins(spins: MeasuredSpins, impacts: Impacts, picks: Picks, path: str 
         "remarks": [" ".join(map(str, f.remarks)) for f in flights],
     }
     write_columns(path, columns)
-
-
-def impact_numbers_of(spins: MeasuredSpins, impacts: Impacts, picks: Picks) -> list[str]:
-    """The number of the impact that ends each flight; empty where something else ends it."""
-    own = np.flatnonzero(picks.kind == "impact").tolist()
-    number = dict(zip(own, impacts.impact.tolist(), strict=True))
-    return [str(number.get(flight.last_pick, "")) for flight in spins.flights]
 
 
 def _rate(flight: FlightSpin) -> tuple[float, float]:

@@ -85,11 +85,11 @@ class SeenVideo:
         return float(np.median(np.diff(times))) if times.size > 1 else np.nan
 
 
-def some[T: (Sightings, Events)](kind: type[T], table: T, rows: Indices | Mask) -> T:
+def some[T: Sightings | Events](kind: type[T], table: T, rows: Indices | Mask) -> T:
     """Some rows of sightings or events; further columns that a table may have are left out."""
     return kind(*(getattr(table, column.name)[rows] for column in fields(kind)))
 
 
-def joined[T: (Sightings, Events)](kind: type[T], tables: Sequence[T]) -> T:
+def joined[T: Sightings | Events](kind: type[T], tables: Sequence[T]) -> T:
     """The rows of several tables, one after the other."""
     return kind(*(np.concatenate([getattr(table, column.name) for table in tables]) for column in fields(kind)))

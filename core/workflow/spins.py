@@ -77,7 +77,7 @@ class FlightSpin:
     Attributes
     ----------
     trajectory : name. flight : its number in the trajectory, from 1, contacts not counted.
-    last_pick : index of the pick that ends it.
+    last_pick : index of the pick that ends it. impact : number of its impact, 0 where it is none.
     start_time_s, end_time_s : of the flight [s].
     mark_time_s, direction : (n,) times of the marks that count, (n, 3) unit vectors from the centre to the point then.
     axis : what was assumed.
@@ -91,6 +91,7 @@ class FlightSpin:
     trajectory: str
     flight: int
     last_pick: int
+    impact: int
     start_time_s: float
     end_time_s: float
     mark_time_s: Array
@@ -297,6 +298,7 @@ def _measure(made: Reconstruction, flights: Flights, k: int, marks: _Marks) -> F
         trajectory=name,
         flight=int(np.flatnonzero(np.flatnonzero(same) == k)[0]) + 1,
         last_pick=int(flights.last_pick[k]),
+        impact=_impact_number(made, int(flights.last_pick[k])),
         start_time_s=float(flights.start_time_s[k]),
         end_time_s=float(flights.end_time_s[k]),
         mark_time_s=marks.time_s,
@@ -309,6 +311,11 @@ def _measure(made: Reconstruction, flights: Flights, k: int, marks: _Marks) -> F
         sigma_energy_j=sigma_energy,
         remarks=(*more, *remarks),
     )
+
+
+def _impact_number(made: Reconstruction, pick: int) -> int:
+    own = np.flatnonzero(made.picks.kind == "impact")
+    return int(made.impacts.impact[own == pick].sum())
 
 
 def _axis(kind: Axis, marks: _Marks, velocity: Array) -> Array:

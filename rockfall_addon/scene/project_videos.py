@@ -3,7 +3,7 @@
 
 import re
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
@@ -13,9 +13,11 @@ from ...core.camera.model import SIGMA_PX
 from ...core.exchange.cameras import CameraFile, read_camera, write_camera
 from ...core.exchange.footage_tables import Track, read_track, write_track
 from ...core.exchange.project import Project, VideoEntry
+from ...core.exchange.spin_tables import read_spin_marks, write_spin_marks
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import Video, open_video
 from ...core.georeference import GlobalShift
+from ...core.workflow.spins import SpinMarks
 from . import (
     camera_paths,
     clocks,
@@ -23,6 +25,7 @@ from . import (
     georeference,
     new_videos,
     sightings,
+    spins,
     store,
     video_files,
     video_times,
@@ -39,6 +42,7 @@ class ReadVideo:
     camera: CameraFile | None
     track: Track | None
     clock: Clock
+    spin_marks: SpinMarks | None = None
 
 
 def read_videos(project: Project, shift: GlobalShift | None) -> list[ReadVideo]:
@@ -63,7 +67,8 @@ def read_videos(project: Project, shift: GlobalShift | None) -> list[ReadVideo]:
         clock = clock_for(
             video, entry.capture_rate_hz, offset_s=entry.offset_s, drift=entry.drift, origin_s=entry.origin_s
         )
-        found.append(ReadVideo(entry, video, camera, track, clock))
+        marks = None if entry.spin_marks is None else read_spin_marks(entry.spin_marks)
+        found.append(ReadVideo(entry, video, camera, track, clock, marks))
     return found
 
 
@@ -100,6 +105,8 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
             )
         if read.track is not None:
             _keep_track(camera, read.track, name)
+        if read.spin_marks is not None:
+            spins.keep_marks(camera, _of_frames(camera, read.spin_marks))
         objects.append(camera)
     if objects:
         video_times.fit_range(scene)
@@ -112,7 +119,7 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
     entries = []
     for camera in videos.cameras(scene):
         stem = re.sub(r"[^\w.-]+", "_", camera.name)
-        files: dict[str, Path | None] = {"camera": None, "track": None, "events": None}
+        files: dict[str, Path | None] = {"camera": None, "track": None, "events": None, "spin_marks": None}
         if camera_paths.is_solved(camera):
             files["camera"] = folder / f"{stem}_camera.toml"
             rmse = camera.get(store.RMSE)
@@ -131,6 +138,10 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
         if events.is_file():
             files["events"] = folder / f"{stem}_events.csv"
             shutil.copyfile(events, files["events"])
+        marks = spins.all_marks(camera)
+        if marks is not None:
+            files["spin_marks"] = folder / f"{stem}_spin_marks.csv"
+            write_spin_marks(marks, files["spin_marks"])
         clock = clocks.clock_of(camera)
         entries.append(
             VideoEntry(
@@ -172,6 +183,13 @@ def _keep_track(camera: bpy.types.Object, track: Track, name: str) -> None:
         by_hand = np.zeros(int(rows.sum()))
         seen = sightings.Seen(frame[rows], track.time_s[rows], track.pixel[rows], sigma[rows], by_hand)
         sightings.keep_track(camera, each, seen)
+
+
+def _of_frames(camera: bpy.types.Object, marks: SpinMarks) -> SpinMarks:
+    """The marks with the frames and standard deviations that the table does not give."""
+    nearest = np.abs(videos.times_of(camera)[:, None] - marks.time_s).argmin(axis=0)
+    frame = np.where(marks.frame >= 0, marks.frame, nearest)
+    return replace(marks, frame=frame, sigma_px=np.where(np.isnan(marks.sigma_px), SIGMA_PX, marks.sigma_px))
 
 
 def _track_of(camera: bpy.types.Object) -> Track | None:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the block was seen in the videos: pixels of its centre, tracked or clicked, kept with each video's camera."""
 
-import json
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -12,9 +11,9 @@ from ...core.footage.tracking import BlockTrack
 from ...core.reconstruction.refinement.views import View
 from ...core.vectors import Array, Indices
 from ...core.workflow.sightings import SeenVideo, Sightings, joined
-from . import camera_paths, clocks, pictures, store, videos
+from . import camera_paths, clocks, named_rows, pictures, store, videos
 
-COLUMNS = 7  # number of the name, frame, video time, u, v, sigma, clicked by hand
+COLUMNS = 6  # frame, video time, u, v, sigma, clicked by hand
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +37,14 @@ def names_in(camera: bpy.types.Object) -> list[str]:
 
 def seen_in(camera: bpy.types.Object, name: str) -> Seen:
     """What was seen of a trajectory in a video, in the order of time."""
-    rows = _tables(camera).get(name, np.zeros((0, COLUMNS - 1)))
+    rows = _tables(camera).get(name, np.zeros((0, COLUMNS)))
     return Seen(rows[:, 0].astype(np.intp), rows[:, 1], rows[:, 2:4], rows[:, 4], rows[:, 5] > 0)
 
 
 def click(camera: bpy.types.Object, name: str, frame: int, time_s: float, pixel: Array, sigma_px: float) -> None:
     """Keep a pixel that a person clicked on the block; another one in this picture is replaced."""
     tables = _tables(camera)
-    rows = tables.get(name, np.zeros((0, COLUMNS - 1)))
+    rows = tables.get(name, np.zeros((0, COLUMNS)))
     rows = rows[rows[:, 0] != frame]
     tables[name] = np.vstack([rows, [frame, time_s, *pixel, sigma_px, 1.0]])
     _keep(camera, tables)
@@ -54,7 +53,7 @@ def click(camera: bpy.types.Object, name: str, frame: int, time_s: float, pixel:
 def keep_track(camera: bpy.types.Object, name: str, track: BlockTrack) -> None:
     """Keep a track; what was clicked by hand stays."""
     tables = _tables(camera)
-    rows = tables.get(name, np.zeros((0, COLUMNS - 1)))
+    rows = tables.get(name, np.zeros((0, COLUMNS)))
     clicked = rows[rows[:, 5] > 0]
     new = np.column_stack([track.frame, track.time_s, track.pixel, track.sigma_px, np.zeros(track.frame.size)])
     tables[name] = np.vstack([clicked, new[~np.isin(new[:, 0], clicked[:, 0])]])
@@ -90,21 +89,8 @@ def seen_video(camera: bpy.types.Object, names: Collection[str]) -> SeenVideo:
 
 def _tables(camera: bpy.types.Object) -> dict[str, Array]:
     """Name → (m, 6) rows: frame, video time, u, v, sigma, by hand."""
-    names = store.read_json(camera, store.TRACK_NAMES, [])
-    rows = np.array(camera.get(store.TRACK_ROWS, ()), dtype=np.float64).reshape(-1, COLUMNS)
-    return {name: rows[rows[:, 0] == i, 1:] for i, name in enumerate(names)}
+    return named_rows.tables(camera, store.TRACK_NAMES, store.TRACK_ROWS, COLUMNS)
 
 
 def _keep(camera: bpy.types.Object, tables: dict[str, Array]) -> None:
-    tables = {name: rows for name, rows in tables.items() if len(rows)}
-    if not tables:
-        for key in (store.TRACK_NAMES, store.TRACK_ROWS):
-            if key in camera:
-                del camera[key]
-        return
-    blocks = [
-        np.c_[np.full(len(rows), i), rows[np.argsort(rows[:, 0], kind="stable")]]
-        for i, rows in enumerate(tables.values())
-    ]
-    camera[store.TRACK_NAMES] = json.dumps(list(tables))
-    camera[store.TRACK_ROWS] = np.vstack(blocks).ravel().tolist()
+    named_rows.keep(camera, store.TRACK_NAMES, store.TRACK_ROWS, tables)

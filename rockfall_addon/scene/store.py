@@ -77,6 +77,7 @@ ROW, EXTRA = "rockfall_row", "rockfall_extra"  # where it stood in a table, and 
 KEY_FRAME, PICK_SHIFT = "rockfall_key_frame", "rockfall_pick_shift_m"
 SEEN = "rockfall_seen"  # id of a video → frame and pixel in it
 RESULT = "rockfall_result"
+MEASURED_SPIN = "rockfall_measured_spin"  # of the flight that ends here, from marks in videos, as text
 
 # of picks, of what is shown of a run, and of the actions of both; 0.1.0 had none of these
 WRITTEN = "rockfall_written"  # how often something was written: the older of two was brought back by an undo
@@ -89,6 +90,7 @@ THIN_SHARE, REACH = "rockfall_thin_share", "rockfall_reach_m"
 COARSE_VIEW_OF = "rockfall_view_of"  # of the full mesh: vertices, triangles, triangles that were wanted, checksums
 
 # of the scene: its videos
+SPIN_REMARKS = "rockfall_spin_remarks"  # trajectory → marks that are in no flight, as text
 KNOWN_VIDEOS, ACTIVE_CAMERA = (
     "rockfall_known_videos",
     "rockfall_active_camera",
@@ -114,6 +116,7 @@ KNOWN_LENS, PLACED, FOLLOWED = "rockfall_known_lens", "rockfall_placed", "rockfa
 
 # of a camera: where a block is seen, and what its refinement proposes
 TRACK_NAMES, TRACK_ROWS = "rockfall_track_names", "rockfall_track"
+SPIN_MARK_NAMES, SPIN_MARK_ROWS = "rockfall_spin_mark_names", "rockfall_spin_marks"  # of one point of a block
 PROPOSAL, PROPOSAL_PATH = "rockfall_proposal", "rockfall_proposal_path"
 PROPOSAL_ROWS, PROPOSAL_POSES = "rockfall_proposal_rows", "rockfall_proposal_poses"
 

@@ -210,6 +210,10 @@ OF_A_PICK: dict[str, Check] = {
 }
 """What no pick can be without."""
 
+OF_A_SPIN = (
+    "flight", "marks", "start_s", "end_s", "verdict", "axis", "rate", "sigma_rate", "omega", "energy_j",
+    "sigma_energy_j", "others", "remarks", "point_s", "point", "print",
+)  # fmt: skip
 BESIDE_A_PICK: dict[str, Check] = {
     store.ID: name,
     store.NORMAL: direction,
@@ -222,6 +226,7 @@ BESIDE_A_PICK: dict[str, Check] = {
     store.PICK_SHIFT: _vector,
     store.SEEN: group,
     store.RESULT: group,
+    store.MEASURED_SPIN: json_of(dict, _having(*OF_A_SPIN)),
     store.WRITTEN: count,
 }
 """What a pick can be without; where it is missing, nothing is wrong."""
@@ -245,6 +250,7 @@ OF_THE_SCENE: dict[str, tuple[Check, str]] = {
     store.SHOWN: (json_of(dict, _texts_by_name), AGAIN),
     store.PROBLEM: (_remarks, AGAIN),
     store.TRAJECTORY_PROBLEMS: (json_of(dict, _remarks_by_name), AGAIN),
+    store.SPIN_REMARKS: (json_of(dict, _lists_by_name), AGAIN),
     store.SHOWN_MODELS: (_models, "no models are shown"),
     store.MODEL_PARAMETERS: (json_of(dict), "the models have their defaults"),
     store.OTHER_PARAMETERS: (json_of(dict), "the second set of parameters has the defaults"),

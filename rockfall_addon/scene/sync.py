@@ -32,6 +32,7 @@ from . import (
     reconstruction,
     set_aside,
     simulation,
+    spins,
     store,
     terrain_mesh,
     terrain_view,
@@ -406,6 +407,8 @@ def _rebuild(
             picks.absorb(scene, obj, surface, reach)
     members = picks.ordered(scene, members, held)
     result = reconstruction.reconstruct_scene(scene, picks.read(scene, members, surface, reach, held))
+    if not dragging:
+        result = spins.follow(scene, members, result)
     offset = timing.offset_of(scene, name, float(result.picks.time_s[0]))
     trajectories.store_results(members, result)
     if not dragging:

@@ -17,6 +17,7 @@ STEPS = (
     "videos",
     "alignment",
     "picking",
+    "spin",
     "impacts",
     "strip",
     "refinement",

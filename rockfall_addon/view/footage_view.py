@@ -6,7 +6,6 @@ on the picture is kept until the picks change.
 """
 
 import zlib
-from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -32,12 +31,15 @@ from ..scene import (
     proposal,
     reconstruction,
     sightings,
+    spins,
     store,
     sync,
     trails,
     trajectories,
     videos,
 )
+from . import spin_marks
+from .drawn import Drawing, Line, Mark, Path
 
 BELOW = (1.0, 0.0, 0.0)
 PROPOSED = (0.2, 0.9, 1.0)
@@ -45,60 +47,6 @@ OUTLINE = (1.0, 1.0, 0.35)
 EPIPOLAR = (1.0, 0.55, 0.95)
 SEEN, SEEN_SIZE = (0.35, 1.0, 0.45), 2.5
 CIRCLE = np.linspace(0.0, 2 * np.pi, 49)
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """The path of one block's centre: n points in the order of time, those of a flight together.
-
-    Attributes
-    ----------
-    time_s, position : (n,) common time, (n, 3) local [m].
-    colour : (n, 3) sRGB: by speed, red below the terrain.
-    joined : (n,) whether a point is joined with the next one.
-    tick : (n,) points at the frames of the video.
-    radius_m : of the block.
-    edged : with a dark edge, so that a white path shows on bright ground.
-    """
-
-    time_s: Array
-    position: Array
-    colour: Array
-    joined: np.ndarray
-    tick: np.ndarray
-    radius_m: float
-    edged: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Line:
-    """Segments (k, 2, 2) in pixels of the video, with colours (k, 2, 4); width in pixels at interface scale 1."""
-
-    segments: Array
-    colour: Array
-    width: float
-
-
-@dataclass(frozen=True, eq=False)
-class Mark:
-    """Something of a fixed size on the screen, at a pixel: "dot", "ring" or "diamond"; its text beside it."""
-
-    pixel: Array
-    shape: str
-    colour: tuple[float, float, float, float]
-    size: float
-    text: str = ""
-
-
-@dataclass(eq=False)
-class Drawing:
-    """All that is drawn over a picture."""
-
-    lines: list[Line] = field(default_factory=list)
-    dots: list[tuple[Array, Array, float]] = field(default_factory=list)
-    """(k, 2) pixels, (k, 4) colours, size."""
-    marks: list[Mark] = field(default_factory=list)
-
 
 _paths: dict[tuple[int, str], tuple[object, Path | None]] = {}
 _seen: dict[tuple[int, str, str], tuple[object, tuple[Array, Array]]] = {}
@@ -127,6 +75,9 @@ def draw(scene: bpy.types.Scene, camera: bpy.types.Object, active: bpy.types.Obj
     if settings.show_track:
         for name in sightings.names_in(camera):
             _add_seen(found, scene, camera, lens, name, filmed.get(name), video_s)
+    for name in spins.names_in(camera):
+        if name in filmed:
+            spin_marks.add(found, scene, camera, lens, name, filmed[name], video_s)
     for members in objects.values():
         for obj in members:
             near = abs(obj[store.TIME] - moment) <= pictures.SAME_PICTURE * step

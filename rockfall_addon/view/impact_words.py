@@ -6,7 +6,7 @@ import math
 import bpy
 
 from ...core.reconstruction.summary import MEANINGS
-from ..scene import impact_marks, store
+from ..scene import impact_marks, spins, store
 
 FLAG_WORDS = {
     "first": "First of its chain: no incident velocity",
@@ -40,8 +40,10 @@ def numbers(pick: bpy.types.Object) -> list[str]:
     coefficients = [
         (name, _number(result, key, f"sigma_{key}", 1.0, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))
     ]
-    known = "   ".join(f"{name} {value}" for name, value in coefficients if value)
-    return [f"v {speeds} m/s", *([known] if known else []), f"E {energies} kJ"]
+    coefficient = "   ".join(f"{name} {value}" for name, value in coefficients if value)
+    spin = "   ".join(value for _, value in spins.words(pick))
+    lines = [f"v {speeds} m/s", coefficient, f"E {energies} kJ", f"ω {spin}" if spin else ""]
+    return [line for line in lines if line]
 
 
 def reasons(pick: bpy.types.Object) -> list[str]:

@@ -13,7 +13,7 @@ from ...core.vectors import Array
 from ..scene import camera_paths, pictures, places, problems, reconstruction, video_files, videos
 from . import drawing, footage_view, image_view, pointing
 
-SHOWN_BY = {"rockfall.pick_tool", "rockfall.align_tool"}
+SHOWN_BY = {"rockfall.pick_tool", "rockfall.spin_tool", "rockfall.align_tool"}
 SIDE = 25
 """Pixels of the video along each side."""
 OUTSIDE = 40  # grey level

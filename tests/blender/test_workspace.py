@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-POINTED = {"rockfall.mark_pair", "rockfall.drag_pick"}
+POINTED = {"rockfall.mark_pair", "rockfall.drag_pick", "rockfall.mark_spin"}
 """What only the tools call: they need a mouse on the terrain or the footage."""
 WITH_PANEL = {
     "rockfall.compare_model",
@@ -15,6 +15,7 @@ WITH_PANEL = {
     "rockfall.use_ground",
     "rockfall.sort_impacts", "rockfall.remove_video", "rockfall.choose_simulated_model", "rockfall.next_run",
     "rockfall.add_zone", "rockfall.remove_zone", "rockfall.remove_structure", "rockfall.reset_parameter",
+    "rockfall.go_to_spin_mark",
 }  # fmt: skip
 """What works on a row of a panel's list, or is another name of what the menu has."""
 OVER_GRAPHS = {

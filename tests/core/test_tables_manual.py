@@ -22,14 +22,11 @@ from rockfall.core.exchange.spin_tables import MARKS_KNOWN, write_spins
 from rockfall.core.exchange.tables import PICKS_KNOWN, impact_columns, write_impacts, write_trajectories
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.impact import FLAGS
-from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.sampling import sample_trajectories
-from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases
 from rockfall.core.terrain.surface import Surface
-from rockfall.core.workflow.spins import MeasuredSpins
 
 MANUAL = Path(__file__).parents[2] / "docs" / "manual" / "tables.md"
 SIMULATED = MANUAL.with_name("simulation_tables.md")
@@ -61,12 +58,7 @@ def header(path: Path) -> set[str]:
 
 
 def test_spins(sections, tmp_path) -> None:
-    write_spins(
-        MeasuredSpins((), ()),
-        reconstruct(make_picks([], [], [])).impacts,
-        make_picks([], [], []),
-        tmp_path / "spin.csv",
-    )
+    write_spins([], tmp_path / "spin.csv")
     assert header(tmp_path / "spin.csv") <= sections["spin.csv"]
     assert set(MARKS_KNOWN) <= sections["spin_marks.csv"]
 

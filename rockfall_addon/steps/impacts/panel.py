@@ -5,7 +5,7 @@ import math
 
 import bpy
 
-from ...scene import store
+from ...scene import spins, store
 from ...view import impact_words, pointing
 from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 
@@ -44,7 +44,7 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
         _draw_editable(layout, pick.rockfall_pick)
         if result is None:
             return
-        facts(layout, [_fact(result, *how) for how in NUMBERS if how[1] in result])
+        facts(layout, [*(_fact(result, *how) for how in NUMBERS if how[1] in result), *spins.words(pick)])
         reasons = impact_words.reasons(pick)
         for reason in reasons:
             paragraph(context, layout, reason, "ERROR")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...scene import clicks, picks, places, problems, proposal, store, videos
 from ...view import drawing, footage_view, image_view, pointing
-from ...view.footage_view import Drawing, Mark
+from ...view.drawn import Drawing, Mark
 
 _handles: list[object] = []
 

@@ -7,12 +7,13 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
+from ....core.exchange.spin_tables import write_spins
 from ....core.exchange.tables import write_impacts, write_picks, write_trajectories
 from ....core.output import output_folder
 from ....core.progress import Progress
 from ....core.reconstruction.sampling import sample_trajectories
 from ....core.remarks import Remark
-from ...scene import project, reconstruction, simulation, simulation_setup, store, terrain, trails
+from ...scene import project, reconstruction, simulation, simulation_setup, spins, store, terrain, trails
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
 
@@ -39,7 +40,7 @@ class _IntoFolder:
 
 
 class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
-    """Write picks.csv, impacts.csv and trajectories.csv in survey coordinates"""
+    """Write picks.csv, impacts.csv, trajectories.csv and, of measured spins, spin.csv in survey coordinates"""
 
     bl_idname = "rockfall.export_tables"
     bl_label = "Export Tables"
@@ -47,13 +48,17 @@ class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
+        measured = spins.measure_all(scene)
         result, left_out = reconstruction.reconstruct_good(scene)
         samples = sample_trajectories(result, trails.SAMPLE_STEP_S, surface=terrain.surface_of_scene(scene))
         with output_folder(Path(bpy.path.abspath(self.directory))) as folder:
             write_picks(result.picks, folder / "picks.csv")
             write_impacts(result.impacts, folder / "impacts.csv")
             write_trajectories(samples, folder / "trajectories.csv")
-        _report(self, f"picks.csv, impacts.csv and trajectories.csv are in {self.directory}.", left_out)
+            if measured:
+                write_spins(measured, folder / "spin.csv")
+        names = "picks.csv, impacts.csv, trajectories.csv" + (", spin.csv" if measured else "")
+        _report(self, f"{names} are in {self.directory}.", left_out)
         return {"FINISHED"}
 
 

@@ -46,6 +46,7 @@ from . import (
     simulation_setup,
     store,
     structures,
+    sync,
     terrain,
 )
 
@@ -103,6 +104,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
     if result is not None:
         reconstruction.show(scene, result)
+        sync.follow_spins(scene)
     if project.simulation is not None:
         said = simulated_sources.keep_entry(scene, project.simulation, left_out)
         if said:

@@ -130,17 +130,6 @@ def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
     problems.update(scene)
     simulation.follow(scene)
     models.follow(scene, result)
-    _measure_spins(scene)
-
-
-def _measure_spins(scene: bpy.types.Scene) -> None:
-    """Spins are measured on the flights that are shown; a trajectory whose spin has changed is computed again."""
-    from . import spins, sync  # both reconstruct
-
-    names = spins.names(scene)
-    if names:
-        spins.measure_all(scene)
-        sync.sync(scene, names)
 
 
 def refresh(scene: bpy.types.Scene) -> Reconstruction | None:

@@ -255,11 +255,20 @@ def recompute(scene: bpy.types.Scene) -> None:
     _recomputing.add(scene.session_uid)  # showing what has no flights yet sets sizes, which are settings
     try:
         reconstruction.refresh(scene)
+        follow_spins(scene)
     except RockfallError:
         sync(scene, again=True)
     finally:
         _recomputing.discard(scene.session_uid)
     simulation.follow(scene)
+
+
+def follow_spins(scene: bpy.types.Scene) -> None:
+    """Everything was shown anew: spins are measured on these flights; where one has changed, its trajectory follows."""
+    names = spins.names(scene)
+    if names:
+        spins.measure_all(scene)
+        sync(scene, names)
 
 
 def retime(obj: bpy.types.Object, text: str) -> None:

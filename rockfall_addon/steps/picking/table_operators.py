@@ -32,6 +32,7 @@ class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
         if not georeference.has_shift(scene):
             georeference.write_shift(scene, picks.shift)
         reconstruction.show(scene, result)
+        sync.follow_spins(scene)
         look.show_relief(context, frame_all=True)
         count = len(set(picks.trajectory.tolist()))
         self.report({"INFO"}, f"{len(picks.time_s)} picks: {count} trajectories, {len(result.impacts.rn)} impacts.")

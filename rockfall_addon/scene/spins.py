@@ -211,12 +211,12 @@ def words(obj: bpy.types.Object) -> list[tuple[str, str]]:
         turns, sigma = one.rate / (2 * math.pi), one.sigma_rate / (2 * math.pi)
         return [
             ("Spin before ω", f"{one.rate:.1f} ± {one.sigma_rate:.1f} rad/s"),
-            ("Turns", f"{turns:.2f} ± {sigma:.2f} turns/s"),
-            ("Rotational energy", f"{one.energy_j / 1e3:.3g} ± {one.sigma_energy_j / 1e3:.2g} kJ"),
+            ("Turns per second", f"{turns:.2f} ± {sigma:.2f}"),
+            ("Rotational energy", f"{one.energy_j / 1e3:.2f} ± {one.sigma_energy_j / 1e3:.2f} kJ"),
         ]
     if store.SPIN in obj:
         rate = math.hypot(*obj[store.SPIN])
-        return [("Spin before ω", f"{rate:.1f} rad/s"), ("Turns", f"{rate / (2 * math.pi):.2f} turns/s")]
+        return [("Spin before ω", f"{rate:.1f} rad/s"), ("Turns per second", f"{rate / (2 * math.pi):.2f}")]
     return []
 
 

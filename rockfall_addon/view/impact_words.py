@@ -41,9 +41,17 @@ def numbers(pick: bpy.types.Object) -> list[str]:
         (name, _number(result, key, f"sigma_{key}", 1.0, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))
     ]
     coefficient = "   ".join(f"{name} {value}" for name, value in coefficients if value)
-    spin = "   ".join(value for _, value in spins.words(pick))
-    lines = [f"v {speeds} m/s", coefficient, f"E {energies} kJ", f"ω {spin}" if spin else ""]
+    lines = [f"v {speeds} m/s", coefficient, f"E {energies} kJ", _spin(pick)]
     return [line for line in lines if line]
+
+
+def _spin(pick: bpy.types.Object) -> str:
+    """The spin before the impact and its energy; empty where it is not known."""
+    values = [value for _, value in spins.words(pick)]
+    if not values:
+        return ""
+    rate, turns, *energy = values
+    return "   ".join([f"ω {rate}", f"{turns} turns/s", *(f"Eω {each}" for each in energy)])
 
 
 def reasons(pick: bpy.types.Object) -> list[str]:

@@ -14,7 +14,7 @@ from ...view import pointing
 from ...view.reporting import possible, reported
 
 TOOL = "rockfall.spin_tool"
-AXIS_NAMES = {"rolling": "Rolling", "sight": "Line of Sight"}
+AXIS_NAMES = {"rolling": "Rolling", "sight": "Sight"}
 
 
 def follow(scene: bpy.types.Scene, name: str) -> None:

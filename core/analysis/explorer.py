@@ -10,6 +10,7 @@ from html import escape
 from typing import Any
 
 from ..errors import RockfallError
+from ..extras import PAGES, demand
 from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..progress import Progress
@@ -18,7 +19,6 @@ from .background import Job
 from .comparison import predict, thinned
 from .courses import Courses
 from .estimation import FitOptions, FittedModel
-from .extras import PAGES, demand
 from .linked_columns import model_columns
 from .linked_graphs import SHEET, WEB, LinkedGraphs, link_graphs
 from .local_server import ADDRESS, local_server

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..extras import FIGURES, demand
 from ..impact_models.registry import find_model
 from ..output import output_file
 from ..progress import Progress, silent
 from .curves import Curve, number
-from .extras import FIGURES, demand
 from .graphs import Graph
 from .variables import Variable, find_variable
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..extras import FIGURES, demand
 from ..reconstruction.impact import Impacts
 from .curves import number
-from .extras import FIGURES, demand
 from .figures import COLUMN_IN, FORMATS, INK, MEASURED, MUTED, PAGE_IN, STYLE, beyond_lines, curve_text, save_named
 from .graphs import PAPER_GRAPHS, Graph, GraphSpec, make_graph
 from .group_statistics import Grouping

@@ -6,8 +6,8 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
+from ..extras import FIGURES, demand
 from ..progress import Progress, silent
-from .extras import FIGURES, demand
 from .figures import FORMATS, LINK, MEASURED, MUTED, PAGE_IN, STYLE, save_named
 from .motion_graphs import (
     QUANTITIES,

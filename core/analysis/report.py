@@ -10,11 +10,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from ..extras import PAGES, demand
 from ..impact_models.registry import find_model
 from ..output import write_text
 from ..reconstruction.impact import Impacts
 from .comparison import Predictions, thinned
-from .extras import PAGES, demand
 from .linked_columns import symbol_html
 from .linked_graphs import WEB, link_graphs
 from .scores import Score

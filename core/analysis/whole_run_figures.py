@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..extras import FIGURES, demand
 from ..impact_models.registry import find_model
 from ..simulation.ground import Ground
 from ..vectors import Array, norm
-from .extras import FIGURES, demand
 from .figures import FORMATS, MEASURED, MUTED, PAGE_IN, STYLE, save_named
 from .paths import Paths
 from .sections import Axis

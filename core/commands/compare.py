@@ -138,10 +138,10 @@ def _draw(
     progress: PrintedProgress,
 ) -> list[str]:
     """The figures and the page, as far as their libraries are there; returns what to install for the others."""
-    from ..analysis.extras import FIGURES, PAGES, install_command, is_there
     from ..analysis.figures import save_figures
     from ..analysis.graphs import make_sheet
     from ..analysis.report import write_report
+    from ..extras import FIGURES, PAGES, install_command, is_there
 
     notes = []
     if is_there(FIGURES):

@@ -286,8 +286,8 @@ def _draw(
     arguments: argparse.Namespace, comparison: "WholeRuns", ground: "Ground", folder: Path, progress: PrintedProgress
 ) -> list[str]:
     """The figures, if their library is there; else what to install."""
-    from ..analysis.extras import FIGURES, install_command, is_there
     from ..analysis.whole_run_figures import save_whole_run_figures
+    from ..extras import FIGURES, install_command, is_there
 
     if not is_there(FIGURES):
         return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]

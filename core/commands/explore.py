@@ -35,9 +35,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve the page until interrupted or asked to end."""
     from ..analysis.courses import find_courses
     from ..analysis.explorer import Exploration, serve
-    from ..analysis.extras import PAGES, demand
     from ..exchange.parameters import read_parameters, write_parameters
     from ..exchange.tables import read_impacts
+    from ..extras import PAGES, demand
     from ..impact_models.registry import COMPARED
 
     demand(PAGES)

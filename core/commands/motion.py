@@ -28,12 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, write the tables and figures, print the summary."""
-    from ..analysis.extras import FIGURES, install_command, is_there
     from ..analysis.motion_figures import save_motion_figures
     from ..analysis.motion_graphs import QUANTITIES, motion_courses
     from ..exchange.motion_tables import write_motion, write_track_residuals
     from ..exchange.opening import open_terrain, read_project_picks, reconstruct_project
     from ..exchange.project import read_project
+    from ..extras import FIGURES, install_command, is_there
     from ..output import output_folder
     from ..workflow.refinement import pixels_of
 

@@ -168,8 +168,8 @@ def _draw(
     progress: "Progress",
 ) -> list[str]:
     """The figures, if Matplotlib is there; returns what to install otherwise."""
-    from ..analysis.extras import FIGURES, install_command, is_there
     from ..analysis.measured_figures import save_measured_figures
+    from ..extras import FIGURES, install_command, is_there
 
     if not is_there(FIGURES):
         return [f"No figures without Matplotlib. Install it: {install_command(FIGURES)}"]

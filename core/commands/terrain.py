@@ -11,7 +11,7 @@ from .progress import PrintedProgress
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    formats = "mesh (PLY, OBJ, STL, glTF), grid (ASC, TIF) or cloud (LAS, LAZ, XYZ)"
+    formats = "mesh (PLY, OBJ, STL, glTF), grid (ASC, TIF) or cloud (LAS, LAZ, XYZ, PTX, E57)"
     parser.add_argument("files", metavar="FILE", nargs="+", help=f"{formats}; several tiles become one surface")
     add_out(parser)
     add_terrain_options(parser)

@@ -12,7 +12,7 @@ from ..georeference import GlobalShift
 from ..plausibility import GREATEST_M
 from ..reading import reader
 from ..vectors import Array
-from . import advice, clouds, geotiff, gltf, grids, meshes, ply
+from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, ptx
 from .crs import surely_different
 from .ground_filter import filter_ground
 from .source import Source
@@ -29,6 +29,8 @@ READERS: dict[str, Callable[[Path], Source]] = {
     ".xyz": clouds.read_xyz,
     ".txt": clouds.read_xyz,
     ".csv": clouds.read_xyz,
+    ".ptx": ptx.read_ptx,
+    ".e57": e57.read_e57,
 }
 LAS_EXTENSIONS = (".las", ".laz")
 EXTENSIONS = (*READERS, *LAS_EXTENSIONS)

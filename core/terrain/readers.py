@@ -74,7 +74,7 @@ def read_terrain(
 
     Parameters
     ----------
-    path : PLY, OBJ, STL, glTF, GLB; ASC, TIF; LAS, LAZ, XYZ, TXT, CSV.
+    path : PLY, OBJ, STL, glTF, GLB; ASC, TIF; LAS, LAZ, XYZ, TXT, CSV, PTX, E57.
     shift : the project's; one is proposed from the data when None.
     up : axis that points up in the file: "z", "y", or "auto" (y in glTF, as its standard says, else z).
     unit_m : length of the file's unit [m], 0.001 for millimetres.

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from rockfall.core.extras import E57, is_there
 from rockfall.core.georeference import GlobalShift
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,6 +25,17 @@ def _hill(n: int = 12) -> tuple[np.ndarray, np.ndarray]:
         [np.stack([corner, corner + 1, corner + n], axis=1), np.stack([corner + 1, corner + n + 1, corner + n], axis=1)]
     )
     return points, faces
+
+
+def _e57(points: np.ndarray, path: Path) -> bytes:
+    import pye57
+
+    file = pye57.E57(str(path), mode="w")
+    for part in np.split(points, 2):
+        raw = {f"cartesian{axis}": np.ascontiguousarray(column) for axis, column in zip("XYZ", part.T, strict=True)}
+        file.write_scan_raw(raw, rotation=np.array([1.0, 0.0, 0.0, 0.0]), translation=SHIFT.vector)
+    file.close()
+    return path.read_bytes()
 
 
 def terrain_files(folder: Path) -> dict[str, bytes]:
@@ -58,6 +70,13 @@ def terrain_files(folder: Path) -> dict[str, bytes]:
         "a.csv": ("x;y;z\n" + rows.replace(" ", ";").replace(".", ",")).encode(),
         "b.csv": ("name,x,y,z\n" + "".join(f"p,{line}\n" for line in rows.replace(" ", ",").split("\n")[:-1])).encode(),
     }  # fmt: skip
+    scan = "{}\n12\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n988400 6375600 1500 1\n{}"
+    seen = [
+        "".join(f"{x:.3f} {y:.3f} {z:.3f} 0.5\n" for x, y, z in part) for part in np.split(points - SHIFT.vector, 2)
+    ]
+    files["a.ptx"] = "".join(scan.format(7, "0 0 0 0.5\n" * 12 + part) for part in seen).encode()
+    if is_there(E57):
+        files["a.e57"] = _e57(points - SHIFT.vector, folder / "a.e57")
     parts = local.export(file_type="gltf")
     text = json.loads(parts.pop("model.gltf"))
     for buffer in text["buffers"]:

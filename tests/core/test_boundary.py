@@ -24,6 +24,7 @@ CORE_FLOORS = (
         "compiled",
         "kept_code",
         "dependencies",
+        "extras",
         "colours",
         "least_squares",
         "file_locks",

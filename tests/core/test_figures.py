@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from rockfall.core.analysis import extras
+from rockfall.core import extras
 from rockfall.core.analysis.comparison import compare, thinned
 from rockfall.core.analysis.courses import find_courses
 from rockfall.core.analysis.graphs import GraphSpec, make_graph, make_sheet

@@ -32,7 +32,7 @@ def refused(path: Path, match: str, **options) -> str:
     return said
 
 
-TEXTS = (".obj", ".asc", ".xyz", ".txt", ".csv")
+TEXTS = (".obj", ".asc", ".xyz", ".txt", ".csv", ".ptx")
 FOREIGN = {
     ".ply": 'Not a PLY file: it does not begin with "ply"',
     ".obj": "The OBJ file has no vertices",
@@ -45,6 +45,8 @@ FOREIGN = {
     ".tiff": "The TIFF file cannot be read",
     ".las": 'Not a LAS file: it does not begin with "LASF"',
     ".laz": 'Not a LAS file: it does not begin with "LASF"',
+    ".ptx": "is no number of columns or rows",
+    ".e57": 'Not an E57 file: it does not begin with "ASTM-E57"',
 }
 
 

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Libraries that only figures and pages need."""
+"""Libraries that only figures, pages and some files need."""
 
 from importlib.util import find_spec
 
-from ..errors import DependencyError
+from .errors import DependencyError
 
 FIGURES = ("figures", "Figures", "matplotlib")
 PAGES = ("explore", "The interactive graphs", "bokeh")
+E57 = ("e57", "E57 files", "pye57")
 """The optional extra of the package, what it is for, and the import name of its library."""
 
 

@@ -24,6 +24,8 @@ inlined = partial(borrowing, inline=True)
 LEAF_POINTS = 16
 SPREAD_POINTS = 32
 """So many points of a node, or up to twice as many, tell in which direction they spread least."""
+COINCIDENT = 1e-6
+"""Points within so little of where others are expected are one point that is stored several times."""
 SHORTER = 1.0 - 1e-6
 FARTHER = 3.0
 LEAST_PLANE = 8
@@ -235,7 +237,7 @@ def spacings(tree, places, enough, reach, result):  # type: ignore[no-untyped-de
         while found < enough and found < tree[3].shape[0]:
             radius *= 1.3
             found = within(tree, stack, p, radius)
-        while found > 4 * enough:
+        while found > 4 * enough and radius > COINCIDENT * reach:
             radius *= 0.7
             found = within(tree, stack, p, radius)
         result[k] = radius * np.sqrt(np.pi / found)

@@ -65,6 +65,12 @@ def test_trees_are_no_overhangs(name):
     assert find_overhangs(points - points.min(axis=0)) is None
 
 
+def test_points_that_are_stored_many_times_have_none():
+    points = slope(np.random.default_rng(4), 30, 0.0, count=400)
+    assert find_overhangs(np.vstack([points, np.repeat(points[:5], 60, axis=0)])) is None
+    assert find_overhangs(np.repeat(points[:1], 200, axis=0)) is None
+
+
 def test_it_is_said_first_with_a_place_in_survey_coordinates(tmp_path):
     points = with_roof(np.random.default_rng(3), 0.0) + np.array([2_600_000, 1_200_000, 0])
     np.savetxt(tmp_path / "roof.xyz", points, fmt="%.4f")

@@ -6,6 +6,7 @@ from bpy.app.handlers import persistent
 
 from .scene import (
     comparison,
+    defaults,
     fingerprints,
     footage,
     graph_settings,
@@ -116,6 +117,7 @@ def _catch_up() -> None:
     """Files of older versions, and picks that were changed while nobody watched."""
     for scene in bpy.data.scenes:
         migration.migrate(scene)
+        defaults.begin(scene)
         if not migration.is_newer(scene):
             set_aside.look(scene)  # before anything reads it
             for members in fingerprints.by_trajectory(picks.objects_of(scene)).values():

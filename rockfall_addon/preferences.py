@@ -9,6 +9,8 @@ import bpy
 
 from .. import __package__ as ADDON_ID  # noqa: N812
 from .. import __version__
+from ..core.constants import ROCK_DENSITY_KGPM3
+from .scene.settings import BLOCK_SHAPES
 
 problem = ""
 """Why nothing but this module is registered; empty when all is well. Set by the add-on's `register`."""
@@ -47,6 +49,15 @@ class InstallationPanel(bpy.types.Panel):
         draw_state(self.layout, width=max(20, int(context.region.width / context.preferences.system.ui_scale / 7)))
 
 
+def _changed(self: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
+    if problem:
+        return
+    from .scene import defaults
+
+    for scene in bpy.data.scenes:
+        defaults.begin(scene)
+
+
 class RockfallPreferences(bpy.types.AddonPreferences):
     bl_idname = ADDON_ID
 
@@ -54,11 +65,32 @@ class RockfallPreferences(bpy.types.AddonPreferences):
         name="Folder", description="Where the next file browser opens: beside the file that was read last",
         subtype="DIR_PATH",
     )  # fmt: skip
+    block_diameter_m: bpy.props.FloatProperty(
+        name="Block diameter", description="Of the blocks of new projects",
+        default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_changed,
+    )  # fmt: skip
+    density_kgpm3: bpy.props.FloatProperty(
+        name="Density [kg/m³]", description="Of the rock of new projects",
+        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_changed,
+    )  # fmt: skip
+    block_shape: bpy.props.EnumProperty(
+        name="Block shape", description="Of the blocks of new projects", items=BLOCK_SHAPES, update=_changed
+    )
+    sigma_px: bpy.props.FloatProperty(
+        name="Click ± [px]", description="Standard deviation of a click in the footage, in new projects",
+        default=1.0, min=0.05, soft_max=10.0, precision=2, update=_changed,
+    )  # fmt: skip
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_state(self.layout, width=90)
-        if not problem:
-            self.layout.prop(self, "folder")
+        if problem:
+            return
+        layout = self.layout.column()
+        layout.use_property_split = True
+        layout.prop(self, "folder")
+        layout.label(text="New projects begin with")
+        for name in ("block_diameter_m", "density_kgpm3", "block_shape", "sigma_px"):
+            layout.prop(self, name)
 
 
 CLASSES = (InstallationPanel, RockfallPreferences)

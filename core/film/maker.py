@@ -19,7 +19,7 @@ from .children import child
 from .engines import choose_engine
 from .job import AS_SET_UP, FilmJob
 
-CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try --engine cycles."
+CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try the engine Cycles (--engine cycles)."
 LINES_TOLD, MOST_KEPT = 5, 200
 BEAT_S = 0.2
 """So often progress is told again while a process says nothing: whoever wants it to end says so there."""

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.project import Project, RenderPreset
+from rockfall.core.film.files import film_file
 from rockfall.core.film.job import FilmJob
 from rockfall.core.film.presets import AFTERGLOW_S, FilmTiming, find_preset, parse_frames
-from rockfall.core.film.wording import fastest_speed, notes
+from rockfall.core.film.wording import estimate, fastest_speed, notes
 
 
 def test_presets_that_every_project_has() -> None:
@@ -105,3 +106,21 @@ def test_job_survives_the_way_to_another_process() -> None:
     )
     assert FilmJob.from_json(job.to_json()) == job
     assert FilmJob.from_json(FilmJob("slope", Path("p"), Path("q")).to_json()).frames is None
+
+
+@pytest.mark.parametrize(
+    ("asked", "file"),
+    [
+        ("", "site/fall.mp4"), ("  ", "site/fall.mp4"), ("{0}", "fall.mp4"), ("{0}/", "fall.mp4"),
+        ("{0}/new/", "new/fall.mp4"), ("{0}/new/..", "new/../fall.mp4"), ("own", "site/own.mp4"), ("{0}/v1.2", "v1.2.mp4"), ("{0}/A.MP4", "A.MP4"),
+    ],
+)  # fmt: skip
+def test_a_film_always_has_a_name_in_the_folder_that_is_meant(asked: str, file: str, tmp_path: Path) -> None:
+    assert film_file(asked.format(tmp_path), tmp_path / "site" / "fall.mp4") == tmp_path / file
+
+
+@pytest.mark.parametrize(
+    ("frame_s", "frames", "said"), [(0.01, 3, "5 s"), (0.28, 200, "55 s"), (0.28, 452, "2 min"), (12.0, 1000, "3.5 h")]
+)
+def test_how_long_a_film_takes_is_said_as_roughly_as_it_is_known(frame_s: float, frames: int, said: str) -> None:
+    assert estimate(frame_s, frames) == f"About {said} for {frames} frames on this machine"

@@ -57,7 +57,10 @@ class ROCKFALL_OT_preview_film(bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, start = context.scene, stopwatch.started()
-        bpy.ops.render.render(scene=scene.name)
+        try:
+            bpy.ops.render.render(scene=scene.name)
+        except RuntimeError as error:
+            raise RockfallError(f"Blender could not render the frame: {error}") from error
         stopwatch.measured(scene, start)
         if not bpy.app.background:
             bpy.ops.render.view_show("INVOKE_DEFAULT")

@@ -112,7 +112,8 @@ def test_job_survives_the_way_to_another_process() -> None:
     ("asked", "file"),
     [
         ("", "site/fall.mp4"), ("  ", "site/fall.mp4"), ("{0}", "fall.mp4"), ("{0}/", "fall.mp4"),
-        ("{0}/new/", "new/fall.mp4"), ("{0}/new/..", "new/../fall.mp4"), ("own", "site/own.mp4"), ("{0}/v1.2", "v1.2.mp4"), ("{0}/A.MP4", "A.MP4"),
+        ("{0}/new/", "new/fall.mp4"), ("{0}/new/..", "new/../fall.mp4"),
+        ("own", "site/own.mp4"), ("{0}/v1.2", "v1.2.mp4"), ("{0}/A.MP4", "A.MP4"),
     ],
 )  # fmt: skip
 def test_a_film_always_has_a_name_in_the_folder_that_is_meant(asked: str, file: str, tmp_path: Path) -> None:

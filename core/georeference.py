@@ -14,6 +14,14 @@ from .vectors import Array
 
 LARGE_COORDINATE_M = 10_000.0
 """Beyond this, single precision no longer resolves a millimetre, and a shift is proposed."""
+Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""From coordinates in which y points up to those in which z does; x stays."""
+
+
+def z_up(vectors: Array) -> Array:
+    """Vectors (..., 3) with y up in coordinates with z up."""
+    turned = np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
+    return np.ascontiguousarray(turned)
 
 
 @dataclass(frozen=True)

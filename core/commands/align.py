@@ -3,6 +3,7 @@
 
 import argparse
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,6 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..output import output_folder
     from ..workflow.alignment import align
     from ..workflow.following import follow_background
+    from ..workflow.uprightness import turned_camera, turned_pairs
 
     if arguments.moving and not arguments.video:
         raise InputError("--moving follows the background through a video", advice="Give it with --video FILE")
@@ -100,11 +102,13 @@ def run(arguments: argparse.Namespace) -> int:
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
-        pairs = read_pairs(arguments.pairs, None if surface is None else surface.shift)
+        pairs, turned = turned_pairs(read_pairs(arguments.pairs, None if surface is None else surface.shift), surface)
         video = open_video(arguments.video, progress) if arguments.video else None
         _check_frames(arguments, pairs, video)
         progress("Solving the camera")
         options = _options(arguments, pairs, video)
+        if turned and arguments.camera and options.start is not None:
+            options = replace(options, start=turned_camera(options.start))
         with naming(arguments.pairs):
             aligned = align(pairs, options)
         path, motion = fixed(aligned.found.camera), list[str]()
@@ -138,7 +142,7 @@ def run(arguments: argparse.Namespace) -> int:
             _draw(folder / "align.png", video, aligned.frame, pairs, residual_px, aligned.used, shown)
             written.append("align.png")
     placed = _on_terrain(pairs, surface) if surface is not None else []
-    for sentence in (*_summary(aligned, pairs, residual_px), *placed, *motion):
+    for sentence in (*turned, *_summary(aligned, pairs, residual_px), *placed, *motion):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0

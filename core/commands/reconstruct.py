@@ -87,11 +87,13 @@ def run(arguments: argparse.Namespace) -> int:
     from ..reconstruction.sampling import sample_trajectories
     from ..reconstruction.summary import summarise
     from ..reconstruction.trajectory import reconstruct
+    from ..workflow.uprightness import turned_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.picks}")
         picks = read_picks(arguments.picks)
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
+        picks, turned = turned_picks(picks, surface)
         block = _block(arguments)
         check_plausible("air_density_kgpm3", arguments.air_density, "density of the air")
         check_plausible("drag_coefficient", arguments.drag_coefficient, "drag coefficient")
@@ -112,7 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
         progress("Writing the tables")
         write_impacts(reconstruction.impacts, folder / "impacts.csv")
         write_trajectories(sample_trajectories(reconstruction, arguments.step, surface), folder / "trajectories.csv")
-    for sentence in (*(surface.summary if surface else ()), *summarise(reconstruction)):
+    for sentence in (*(surface.summary if surface else ()), *turned, *summarise(reconstruction)):
         print(sentence)
     print(f"Written: impacts.csv, trajectories.csv in {arguments.out}")
     return 0

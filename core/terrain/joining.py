@@ -53,7 +53,7 @@ def join(surfaces: Sequence[Surface]) -> Surface:
     said = [f"{tile.name}: {sentence}" for tile in tiles for sentence in tile.summary]
     said.append(f"{len(tiles)} tiles are one surface of {len(faces):,} faces.")
     name, left_out = ", ".join(tile.name for tile in tiles), np.concatenate([tile.left_out for tile in tiles])
-    return Surface(vertices, faces, tiles[0].shift, name, tuple(said), left_out)
+    return Surface(vertices, faces, tiles[0].shift, name, tuple(said), left_out, any(tile.turned for tile in tiles))
 
 
 def _same_points(tiles: Sequence[Surface], starts: NDArray[np.int64]) -> NDArray[np.int64]:

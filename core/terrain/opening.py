@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..georeference import GlobalShift
+from ..georeference import GlobalShift, z_up
 from ..plausibility import GREATEST_M
 from ..reading import reader
 from ..vectors import Array
@@ -124,9 +124,13 @@ def _one_cloud(paths: Sequence[Path], sources: Sequence[Source]) -> tuple[Path, 
     notes = [f"{path.name}: {note}" for path, source in zip(paths, sources, strict=True) for note in source.notes]
     notes.append(f"The {len(paths)} clouds are read as one.")
     points = np.concatenate([source.points for source in sources])
-    geographic = any(source.geographic for source in sources)
+    geographic, turned = (any(getattr(source, what) for source in sources) for what in ("geographic", "turned"))
     name = ", ".join(path.name for path in paths)
-    return paths[0], name, Source(points, crs=crs, geographic=geographic, notes=tuple(notes))
+    return (
+        paths[0],
+        name,
+        Source(points, crs=crs, geographic=geographic, turned=turned, notes=tuple(notes)),
+    )
 
 
 def _localised(source: Source, path: Path, name: str, how: HowToRead, shift: GlobalShift | None) -> Opened:
@@ -235,17 +239,17 @@ def placed(source: Source, how: HowToRead, path: Path) -> Source:
             file=path,
             advice="The file is damaged or in another unit: export it again, or give the length of its unit",
         )
-    notes = list(source.notes)
+    notes, turned = list(source.notes), False
     if source.faces is not None:
         notes.append(f"Mesh of {len(points):,} vertices and {len(source.faces):,} faces.")
     if up == "y" or (up == "auto" and source.up == "y"):
-        points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
+        points, turned = z_up(points), True
         notes.append(
             "Turned from Y up to Z up" + (", as the format's standard says." if up == "auto" else ", as asked.")
         )
     if unit_m != 1.0:
         notes.append(f"Multiplied by {unit_m:g} to metres, as asked.")
-    return replace(source, points=np.ascontiguousarray(points), up="z", notes=tuple(notes))
+    return replace(source, points=np.ascontiguousarray(points), up="z", turned=turned, notes=tuple(notes))
 
 
 def box_of(points: Array, path: Path, count: int | None = None) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..georeference import z_up
 from ..reading import reader
 from ..vectors import Array
 from .ply import FACE_LISTS, Element, list_counts, read_header, read_ply, row_type
@@ -34,7 +35,7 @@ class PlyAttribute:
     def in_metres(self, up: str, unit_m: float) -> Array:
         """(k, 3) the places as `read_terrain` puts them, with its arguments, in survey coordinates."""
         places = self.places * unit_m
-        return np.stack([places[:, 0], -places[:, 2], places[:, 1]], axis=1) if up == "y" else places
+        return z_up(places) if up == "y" else places
 
 
 def read_ply_attributes(paths: Sequence[str | Path], name: str) -> PlyAttribute:

@@ -199,10 +199,10 @@ def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Su
             before = (overhangs.sentence(shift), said, *before)
     else:
         meshed = triangulation.Meshed(source.points, source.faces, ())
-    kind = source.kind
+    kind, turned = source.kind, source.turned
     del source, opened  # their points are as large as what follows
     vertices, faces, done = _cleaned(meshed, kind)
-    return Surface(vertices, faces, shift, name, (*before, *meshed.notes, *done, *after), left_out)
+    return Surface(vertices, faces, shift, name, (*before, *meshed.notes, *done, *after), left_out, turned)
 
 
 @reader("terrain")

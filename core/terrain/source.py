@@ -23,6 +23,7 @@ class Source:
     crs : "EPSG:2056", another name that the file gives, or empty.
     geographic : the file says that its coordinates are degrees.
     up : axis that points up by the format's standard.
+    turned : y was up, and the points were turned.
     notes : sentences for the summary.
     """
 
@@ -32,6 +33,7 @@ class Source:
     crs: str = ""
     geographic: bool = False
     up: str = "z"
+    turned: bool = False
     notes: tuple[str, ...] = ()
 
     @property

@@ -27,6 +27,7 @@ class Surface:
     name : of the file, for people.
     summary : what the reader did, in sentences.
     left_out : (k, 3) points of the cloud that the ground filter took for vegetation [m].
+    turned : the file has y up; what came with it may have so too.
     """
 
     vertices: Array
@@ -35,6 +36,7 @@ class Surface:
     name: str
     summary: tuple[str, ...] = ()
     left_out: Array = field(default_factory=lambda: np.empty((0, 3)))
+    turned: bool = False
 
     @cached_property
     def _cross(self) -> Array:

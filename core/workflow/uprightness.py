@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A terrain whose file has y up is turned; what was made with it in the same program has to be turned too."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..camera.model import Camera
+from ..camera.pairs import Pairs
+from ..georeference import Z_UP, GlobalShift, z_up
+from ..reconstruction.picks import Picks
+from ..terrain.raycast import closest_points
+from ..terrain.surface import Surface
+from ..vectors import Array
+
+MUCH_NEARER = 4.0
+"""Places belong to the terrain in the way in which they are so many times nearer to it."""
+
+
+def turned_picks(picks: Picks, surface: Surface | None) -> tuple[Picks, tuple[str, ...]]:
+    """Picks as they lie on the terrain: turned from Y up to Z up as it was, if only so they do; with what to say."""
+    if surface is None or not _only_turned(surface, picks.shift, picks.position):
+        return picks, ()
+    turned = replace(
+        picks,
+        position=_turned(picks.position, picks.shift, surface.shift),
+        normal=z_up(picks.normal),
+        angular_velocity=z_up(picks.angular_velocity),
+        shift=surface.shift,
+    )
+    return turned, ("The picks were turned from Y up to Z up with the terrain: only so they lie on it.",)
+
+
+def turned_pairs(pairs: Pairs, surface: Surface | None) -> tuple[Pairs, tuple[str, ...]]:
+    """The same of the pairs of a camera."""
+    if surface is None or not _only_turned(surface, pairs.shift, pairs.point):
+        return pairs, ()
+    turned = replace(pairs, point=_turned(pairs.point, pairs.shift, surface.shift), shift=surface.shift)
+    return turned, ("The pairs were turned from Y up to Z up with the terrain: only so they lie on it.",)
+
+
+def turned_camera(camera: Camera) -> Camera:
+    """A camera whose place and rotation have y up."""
+    position = _turned(camera.position, camera.shift, camera.shift)
+    return replace(camera, position=position, rotation=camera.rotation @ Z_UP.T)
+
+
+def _only_turned(surface: Surface, shift: GlobalShift, places: Array) -> bool:
+    if not surface.turned or not len(places):
+        return False
+    as_read = surface.shift.to_local(shift.to_survey(places))
+    way, turned = (
+        float(np.median(closest_points(surface, each).distance))
+        for each in (as_read, _turned(places, shift, surface.shift))
+    )
+    return MUCH_NEARER * turned < way
+
+
+def _turned(places: Array, shift: GlobalShift, new: GlobalShift) -> Array:
+    return new.to_local(z_up(shift.to_survey(places)))

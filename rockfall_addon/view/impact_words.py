@@ -20,6 +20,7 @@ FLAG_WORDS = {
     "shattered": "The block shatters here",
     "discarded": "Discarded: not used",
 }
+MORE_DIGITS = 2
 TOO_FAST = "R over 1: faster after the impact than before it"
 
 
@@ -72,13 +73,20 @@ def meaning(flag: str) -> str:
     return FLAG_WORDS.get(flag) or MEANINGS.get(flag, flag)
 
 
+def measured(value: float, sigma: float, digits: int) -> str:
+    """A number with its standard deviation, which has a digit that is not 0; empty where the number is not defined."""
+    if math.isnan(value):
+        return ""
+    if 0 < sigma < 0.5 * 10.0**-digits:
+        digits = min(-math.floor(math.log10(sigma)), digits + MORE_DIGITS)
+    return f"{value:.{digits}f}" + ("" if math.isnan(sigma) else f" ± {sigma:.{digits}f}")
+
+
 def _number(result: dict[str, object], key: str, sigma_key: str, factor: float, digits: int) -> str:
     """A value with its standard deviation; empty where it is not defined."""
     value = factor * (math.hypot(*result[key]) if len(result[key]) == 3 else result[key][0])
     sigma = factor * result[sigma_key][0] if sigma_key in result else math.nan
-    if math.isnan(value):
-        return ""
-    return f"{value:.{digits}f}" + ("" if math.isnan(sigma) else f" ± {sigma:.{digits}f}")
+    return measured(value, sigma, digits)
 
 
 def _pair(

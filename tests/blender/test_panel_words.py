@@ -75,6 +75,19 @@ def test_the_selected_impact_and_the_table_say_why(scene, draw) -> None:
     assert ("ERROR", "B impact 3: Marked as doubtful") in written
 
 
+def test_a_standard_deviation_has_a_digit_that_is_not_zero_where_two_more_suffice(part) -> None:
+    measured = part("rockfall_addon.view.impact_words").measured
+    nan = float("nan")
+    found = [measured(*each) for each in ((19.6249, 0.0217, 1), (4.96, 0.32, 1), (2.13, 1e-9, 2), (0.5, nan, 2))]
+    assert found == ["19.62 ± 0.02", "5.0 ± 0.3", "2.1300 ± 0.0000", "0.50"]
+    assert measured(nan, 0.1, 2) == ""
+
+
+def test_a_pick_that_is_no_impact_is_named_by_its_kind(scene, draw) -> None:
+    select(scene.objects["A release 1"])
+    assert ("NONE", "A, release") in draw("ROCKFALL_PT_impact")
+
+
 def test_a_step_that_needs_attention_says_why(scene, draw) -> None:
     panel = bpy.types.ROCKFALL_PT_picks
     marks = {"ATTENTION": True, "READY": False}

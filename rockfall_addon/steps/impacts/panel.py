@@ -37,9 +37,9 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, pick = self.layout, pointing.active_pick(context)
         result = pick.get(store.RESULT)
-        number = f", impact {result['number']}" if result is not None else ""
+        name = f"impact {result['number']}" if result is not None else pick[store.KIND]
         row = layout.row(align=True)
-        row.label(text=f"{pick[store.TRAJECTORY]}{number}")
+        row.label(text=f"{pick[store.TRAJECTORY]}, {name}")
         row.operator("rockfall.show_impact", text="", icon="TIME")
         _draw_editable(layout, pick.rockfall_pick)
         if result is None:
@@ -68,11 +68,9 @@ def _fact(result: dict[str, object], label: str, key: str, sigma_key: str, unit:
     value, sigma = math.hypot(*result[key]) if len(result[key]) == 3 else result[key][0], math.nan
     if sigma_key in result:
         sigma = result[sigma_key][0]
-    if math.isnan(value):
-        return label, "not defined"
     factor = 1e-3 if unit == " kJ" else 1.0
-    value, sigma = factor * value, factor * sigma
-    return label, f"{value:.{digits}f}{'' if math.isnan(sigma) else f' ± {sigma:.{digits}f}'}{unit}"
+    text = impact_words.measured(factor * value, factor * sigma, digits)
+    return label, f"{text}{unit}" if text else "not defined"
 
 
 CLASSES = (ROCKFALL_PT_impact,)

@@ -308,10 +308,20 @@ def text(
     return width
 
 
+LEAST_TEXT = 0.6
+"""Of the usual size: in a card for which a view is too narrow."""
+
+
 def card(place: tuple[float, float], rows: Sequence[str], look: Look, within: Rectangle) -> None:
-    """Lines of text in a box beside a pixel, where there is room; the first line is the title."""
-    pad, step = 0.7 * look.text, 1.35 * look.text
-    width = max(look.measure(row) for row in rows) + 2 * pad
+    """Lines of text in a box beside a pixel, where there is room; the first line is the title.
+
+    In a narrow view the text is smaller; where it would be too small to be read, there is none.
+    """
+    wanted = max(look.measure(row) for row in rows) + 1.4 * look.text
+    size = look.text * min(1.0, within.width / wanted)
+    if size < LEAST_TEXT * look.text:
+        return
+    pad, step, width = 0.7 * size, 1.35 * size, wanted * size / look.text
     height = step * len(rows) + pad
     away = 1.2 * look.point
     left = place[0] + away if place[0] + away + width <= within.right else place[0] - away - width
@@ -322,7 +332,7 @@ def card(place: tuple[float, float], rows: Sequence[str], look: Look, within: Re
     fill(area, alpha(look.card, 0.95))
     outline(area, alpha(look.faint, 0.6), look.line)
     for i, row in enumerate(rows):
-        text(area.left + pad, area.top - pad / 2 - (i + 0.8) * step, row, look.text, look.ink if i else look.chosen)
+        text(area.left + pad, area.top - pad / 2 - (i + 0.8) * step, row, size, look.ink if i else look.chosen)
 
 
 @contextmanager

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The scene's picks and settings → the core's reconstruction → the scene."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import bpy
 import numpy as np
@@ -10,6 +11,7 @@ from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
 from ...core.errors import InputError, RockfallError
 from ...core.exchange.opening import block_of
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
+from ...core.progress import Progress, silent
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
@@ -30,10 +32,18 @@ def reconstruct_scene(
     ------
     RockfallError : whatever the core refuses.
     """
+    picks = pick_objects.picks_of(scene) if picks is None else picks
+    return reconstruction_of(scene, picks, surface)()
+
+
+def reconstruction_of(
+    scene: bpy.types.Scene, picks: Picks, surface: Surface | None = None
+) -> Callable[[], Reconstruction]:
+    """`reconstruct_scene` as work that knows nothing of Blender, for a thread: settings are those of now."""
     gravity_mps2, drag = forces_of(scene)
-    picks = pick_objects.trusted(pick_objects.picks_of(scene) if picks is None else picks)
-    return reconstruct(
-        picks,
+    return partial(
+        reconstruct,
+        pick_objects.trusted(picks),
         surface=ground(scene) if surface is None else surface,
         block=blocks_of(scene, set(picks.trajectory.tolist())),
         drag=drag,
@@ -116,7 +126,7 @@ def _own_block(name: str, values: list[float]) -> Block:
     return Block(*values)
 
 
-def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
+def show(scene: bpy.types.Scene, result: Reconstruction, progress: Progress = silent) -> None:
     """Bring everything that is shown in line with a reconstruction, the models' twins included.
 
     Raises
@@ -124,7 +134,7 @@ def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
     RockfallError : the twins that were shown cannot be had any more; they are gone, the rest is shown.
     """
     scene[store.SCHEMA] = migration.SCHEMA
-    trajectories.show_reconstruction(scene, result, ground(scene))
+    trajectories.show_reconstruction(scene, result, ground(scene), progress)
     fingerprints.remember_all(scene)
     problems.keep_trajectories(scene, problems.of_result(scene, result))
     problems.update(scene)

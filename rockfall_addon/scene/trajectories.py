@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 
 from ...core.colours import MEASURED_COLOUR
+from ...core.progress import Progress, silent
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.trajectory import Reconstruction
@@ -58,10 +59,13 @@ def rows_of(names: Names) -> dict[str, Indices]:
     return {name: np.array(rows) for name, rows in found.items()}
 
 
-def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface: Surface | None = None) -> None:
+def show_reconstruction(
+    scene: bpy.types.Scene, result: Reconstruction, surface: Surface | None = None, progress: Progress = silent
+) -> None:
     """Bring the scene's picks, flights, blocks and impact table in line with a reconstruction.
 
     surface : the terrain, to tell what passes below it.
+    progress : hears of the trajectories; to stop here would leave half of them.
     """
     settings = scene.rockfall
     timing.follow_frame_rate(scene)
@@ -77,7 +81,8 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
     picked, folders = rows_of(result.picks.trajectory), store.collections(scene, "Trajectories", flown)
     store.remove_objects([obj for (_, name), obj in parts.items() if name not in flown])
     doubt, last, like = _doubt(result, np.arange(len(result.flights.start_time_s))), 1.0, None
-    for name in (name for name in offsets if name in flown):
+    for number, name in enumerate(name for name in offsets if name in flown):
+        progress("Showing trajectories", number, len(flown))
         rows = Rows(flown[name], picked[name], folders[name], doubt[flown[name]], like)
         show_trajectory(scene, name, result, objects, offsets[name], surface, parts, rows=rows)
         last = max(last, float(result.flights.end_time_s[rows.flights].max()) - offsets[name])

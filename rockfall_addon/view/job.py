@@ -5,7 +5,8 @@ A person goes on meanwhile: undoes, changes the scene, opens another file. So th
 result goes to the scene in which it began, or nowhere.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Event, Thread
 
@@ -213,6 +214,24 @@ def tick() -> float | None:
     elif not sync.is_dragging():  # a person's drag is a step of its own
         _keep(job)
     return TICK_S if _running else None
+
+
+@contextmanager
+def at_the_cursor() -> Iterator[Progress]:
+    """For what keeps Blender busy: the share that is done, at the mouse, in per cent."""
+    manager, shown = bpy.context.window_manager, [-1]
+
+    def progress(text: str, done: int, total: int) -> None:
+        percent = 100 * done // total if total else 0
+        if percent != shown[0]:  # to set the cursor takes longer than a step
+            shown[0] = percent
+            manager.progress_update(percent)
+
+    manager.progress_begin(0, 100)
+    try:
+        yield progress
+    finally:
+        manager.progress_end()
 
 
 def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str) -> None:

@@ -4,11 +4,18 @@
 import bpy
 from bpy.props import StringProperty
 
+from ....core.errors import RockfallError
 from ....core.exchange.tables import read_picks
+from ....core.progress import Progress, silent
+from ....core.reconstruction.picks import Picks
+from ....core.reconstruction.trajectory import Reconstruction
 from ...scene import georeference, problems, reconstruction, store, sync
-from ...view import look
+from ...view import job, look
 from ...view.from_file import FromFile
 from ...view.reporting import possible, reported
+
+MANY_PICKS = 2000
+"""More than these are computed beside Blender: with the first ray on a large terrain that takes seconds."""
 
 
 class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
@@ -28,15 +35,39 @@ class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
         scene = context.scene
         known = georeference.read_shift(scene) if georeference.has_shift(scene) else None
         picks = read_picks(self.chosen(context), known)
-        result = reconstruction.reconstruct_scene(scene, picks)
+        work = _work(scene, picks)
+        if len(picks) > MANY_PICKS and not bpy.app.background:
+            job.begin(work, self.bl_label, scene)
+            return {"INTERFACE"}  # the result is an undo step of its own
+        self.report({"INFO"}, work.keep(scene, work.compute(silent)))
+        return {"FINISHED"}
+
+
+def _work(scene: bpy.types.Scene, picks: Picks) -> job.Work:
+    """The import of picks: to compute their trajectories, then to show them."""
+    reconstruct = reconstruction.reconstruction_of(scene, picks)
+
+    def compute(progress: Progress) -> Reconstruction:
+        progress("Computing the trajectories", 0, 0)
+        result = reconstruct()
+        progress("Showing the trajectories", 0, 0)
+        return result
+
+    def keep(scene: bpy.types.Scene, result: object) -> str:
         if not georeference.has_shift(scene):
             georeference.write_shift(scene, picks.shift)
-        reconstruction.show(scene, result)
+        elif georeference.read_shift(scene) != picks.shift:
+            raise RockfallError("The scene got another origin while the picks were computed. Import them again.")
+        with job.at_the_cursor() as progress:
+            reconstruction.show(scene, result, progress)
         sync.follow_spins(scene)
-        look.show_relief(context, frame_all=True)
+        windows = [window for window in bpy.context.window_manager.windows if window.scene == scene]
+        with bpy.context.temp_override(window=bpy.context.window or next(iter(windows), None)):
+            look.show_relief(bpy.context, frame_all=True)
         count = len(set(picks.trajectory.tolist()))
-        self.report({"INFO"}, f"{len(picks.time_s)} picks: {count} trajectories, {len(result.impacts.rn)} impacts.")
-        return {"FINISHED"}
+        return f"{len(picks)} picks: {count} trajectories, {len(result.impacts)} impacts."
+
+    return job.Work("picking", compute, keep)
 
 
 class ROCKFALL_OT_reconstruct(bpy.types.Operator):

@@ -116,7 +116,8 @@ def from_reconstruction(
     Parameters
     ----------
     blocks : None takes the block of each trajectory.
-    spin : of a block that starts with an impact; see `from_impacts`. A release has none, unless it was measured.
+    spin : of a block that starts with an impact; see `from_impacts`. A release has none, unless it was measured there
+        or in its flight, which keeps it.
 
     Raises
     ------
@@ -136,7 +137,8 @@ def from_reconstruction(
         if release >= 0:
             position.append(picks.position[release])
             velocity.append(flights.start_velocity[reconstruction.restituted_flight[release]])
-            omega.append(np.nan_to_num(picks.angular_velocity[release]))
+            turning = picks.angular_velocity[[release, flights.last_pick[reconstruction.restituted_flight[release]]]]
+            omega.append(np.nan_to_num(turning[0] if np.isfinite(turning[0]).all() else turning[1]))
             reach.append(FAR_IN_THE_AIR_M)
         else:
             position.append(ground.shift.to_local(impacts.shift.to_survey(impacts.position[impact])))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where blocks are released: touching the terrain, as many on each square metre, as they were measured."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -226,6 +227,14 @@ def test_measured_releases_and_impacts_start_as_they_were_measured(cliff: Ground
     np.testing.assert_allclose(leaving.mass_kg, 2700 * 0.6 * 0.5 * 0.4)
     np.testing.assert_allclose(from_impacts(cliff, measured.impacts, spin="zero").angular_velocity[1], 0.0)
     assert "2 of 4 impacts are left out" in str(leaving.remarks[0])
+
+
+def test_a_release_has_the_spin_that_was_measured_in_its_flight(cliff: Ground, measured) -> None:
+    np.testing.assert_allclose(from_reconstruction(cliff, measured).angular_velocity[0], 0.0)
+    omega = measured.picks.angular_velocity.copy()
+    omega[1] = [1.0, 9.0, -2.0]
+    turning = replace(measured, picks=replace(measured.picks, angular_velocity=omega))
+    np.testing.assert_allclose(from_reconstruction(cliff, turning).angular_velocity[0], [1.0, 9.0, -2.0])
     other = from_impacts(cliff, measured.impacts, SMALL, 3)
     assert len(other) == 6
     np.testing.assert_allclose(other.diameter_m, 0.2)

@@ -21,6 +21,8 @@ from .job import AS_SET_UP, FilmJob
 
 CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try the engine Cycles (--engine cycles)."
 LINES_TOLD, MOST_KEPT = 5, 200
+OURS = "rockfall "
+"""Begins the lines that are ours: other add-ons print on the same standard output while Blender starts."""
 BEAT_S = 0.2
 """So often progress is told again while a process says nothing: whoever wants it to end says so there."""
 
@@ -99,7 +101,8 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str,
         try:
             progress(*at)
             for line in _lines(process.stdout):
-                word, _, rest = line.strip().partition(" ")
+                told = line.removeprefix(OURS) if line.startswith(OURS) else ""
+                word, _, rest = told.strip().partition(" ")
                 if word == "progress":
                     done, total, text = rest.split(maxsplit=2)
                     at = text, int(done), int(total)

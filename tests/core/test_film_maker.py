@@ -58,7 +58,8 @@ def test_the_probe_gets_the_script() -> None:
 def test_the_progress_of_a_process_is_reported() -> None:
     seen = []
     script = (
-        "print('progress 0 9 Simulating a model'); print('progress 2 2 Rendering'); print('remark 3 blocks stopped.')"
+        "print('error of an add-on'); print('progress bar'); print('rockfall progress 0 9 Simulating a model'); "
+        "print('rockfall progress 2 2 Rendering'); print('rockfall remark 3 blocks stopped.')"
     )
     remarks = run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said))
     assert remarks == ("3 blocks stopped.",)
@@ -66,7 +67,7 @@ def test_the_progress_of_a_process_is_reported() -> None:
 
 
 def test_a_process_that_says_nothing_is_ended_when_a_person_wants_it() -> None:
-    asked, script = [], "import time; print('progress 1 9 Rendering', flush=True); time.sleep(600)"
+    asked, script = [], "import time; print('rockfall progress 1 9 Rendering', flush=True); time.sleep(600)"
 
     def stop(*said: object) -> None:
         asked.append(said)
@@ -78,7 +79,7 @@ def test_a_process_that_says_nothing_is_ended_when_a_person_wants_it() -> None:
 
 
 def test_what_a_process_says_is_wrong_is_our_error() -> None:
-    script = "import sys; print('error The project names no picks.'); sys.exit(1)"
+    script = "import sys; print('rockfall error The project names no picks.'); sys.exit(1)"
     with pytest.raises(RockfallError, match=r"^The project names no picks\.$"):
         run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None)
 

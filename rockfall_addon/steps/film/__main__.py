@@ -2,7 +2,8 @@
 """Blender, or Blender as a module, in a process of its own: one job, given as JSON.
 
 Blender prints a lot, so its standard output goes to the error stream. What the parent process reads from our standard
-output are lines "progress DONE TOTAL TEXT", "remark TEXT", and "error TEXT" for what the user can put right.
+output are lines "rockfall progress DONE TOTAL TEXT", "rockfall remark TEXT", and "rockfall error TEXT" for what the user
+can put right.
 """
 
 import os
@@ -15,6 +16,7 @@ from .... import rockfall_addon
 from ....core.errors import RockfallError
 from ....core.film.children import end_with_parent
 from ....core.film.job import FilmJob
+from ....core.film.maker import OURS
 from .render import make
 
 
@@ -25,7 +27,7 @@ def main(text: str) -> NoReturn:
 
     def say(line: str) -> None:
         try:
-            parent.write(line + "\n")
+            parent.write(f"{OURS}{line}\n")
         except BrokenPipeError:  # nobody waits for this film any more
             os._exit(1)
 

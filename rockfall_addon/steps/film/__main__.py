@@ -2,8 +2,8 @@
 """Blender, or Blender as a module, in a process of its own: one job, given as JSON.
 
 Blender prints a lot, so its standard output goes to the error stream. What the parent process reads from our standard
-output are lines "rockfall progress DONE TOTAL TEXT", "rockfall remark TEXT", and "rockfall error TEXT" for what the user
-can put right.
+output are lines "rockfall progress DONE TOTAL TEXT", "rockfall remark TEXT", and "rockfall error TEXT" for what the
+user can put right.
 """
 
 import os

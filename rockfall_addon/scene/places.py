@@ -14,7 +14,7 @@ from ...core.reconstruction.triangulation import contact_points, pick_on_terrain
 from ...core.terrain.raycast import cast_rays
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
-from . import own_blocks, picks, pictures, reconstruction, store
+from . import fingerprints, own_blocks, picks, pictures, reconstruction, store
 
 FIRST_NAME = "B01"
 
@@ -77,8 +77,8 @@ def trajectory(scene: bpy.types.Scene) -> str:
     chosen = scene.rockfall_picking.trajectory.strip()
     if chosen:
         return chosen
-    names = trajectories(scene)
-    return names[0] if names else FIRST_NAME
+    shown = fingerprints.remembered(scene)  # asked at every redraw, when thousands of picks cannot be gone through
+    return min(shown or trajectories(scene), default=FIRST_NAME)
 
 
 def trajectories(scene: bpy.types.Scene) -> list[str]:

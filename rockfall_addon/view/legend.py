@@ -9,6 +9,7 @@ import gpu
 from gpu_extras.batch import batch_for_shader
 
 from ...core.colours import SPEED_SCALE
+from .workspace import free_part
 
 WIDTH, HEIGHT, MARGIN, TEXT = 220, 12, 28, 12  # in pixels at interface scale 1
 
@@ -44,8 +45,15 @@ def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], titl
     text(left, bottom + (len(rows) + 0.2) * step, title)
 
 
+def fitting(context: bpy.types.Context) -> tuple[float, float]:
+    """Where a legend begins, and its scale: the interface's, less in a view that is too narrow for the bar."""
+    low, _, high, _ = free_part(context.area, context.region)
+    scale = min(context.preferences.system.ui_scale, (high - low) / (WIDTH + 2 * MARGIN))
+    return low + MARGIN * scale, scale
+
+
 def bar(left: float, scale: float, top: float, title: str) -> None:
-    """The scale of colours from 0 to `top`, and a title above."""
+    """The scale of colours from 0 to `top`, and a title above, a line for each part of it that a semicolon ends."""
     bottom, width, height = (MARGIN + TEXT) * scale, WIDTH * scale, HEIGHT * scale
     steps = len(SPEED_SCALE)
     places, colours = [], []
@@ -58,7 +66,8 @@ def bar(left: float, scale: float, top: float, title: str) -> None:
     for part in (0.0, 0.5, 1.0):
         words = f"{top * part:g}"
         text(left + width * part - blf.dimensions(0, words)[0] / 2, bottom - (TEXT + 4) * scale, words)
-    text(left, bottom + height + 6 * scale, title)
+    for i, words in enumerate(reversed(title.split("; "))):
+        text(left, bottom + height + (6 + 1.4 * TEXT * i) * scale, words)
 
 
 def text(x: float, y: float, words: str) -> None:

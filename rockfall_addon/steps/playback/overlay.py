@@ -30,8 +30,7 @@ def _draw() -> None:
         return
     if not store.has_role(scene, store.FLIGHTS_ROLE):
         return
-    scale = context.preferences.system.ui_scale
-    left = legend.MARGIN * scale + legend.covered_left(context.area)
+    left, scale = legend.fitting(context)
     legend.begin(scale)
     shown = models.shown_models(scene)
     if shown:

@@ -302,7 +302,6 @@ def test_settings_are_in_the_blend(rockfall, tmp_path: Path) -> None:
     film.size, film.engine, film.time_scale, film.graphs = "preview", "cycles", 20.0, "MOTION"
     film.file = "//fall.mp4"
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
-    bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     film = bpy.context.scene.rockfall_film
     assert (film.size, film.engine, film.time_scale, film.graphs, film.file) == (

@@ -15,6 +15,7 @@ import bpy
 from ...core.errors import InputError, readable
 from ...core.remarks import Remark, gravest_first
 from . import keyframes, store
+from .stored_objects import BY_ROLE, incomplete
 from .stored_values import (
     AGAIN,
     BESIDE_A_PICK,
@@ -23,6 +24,7 @@ from .stored_values import (
     OF_THE_SCENE,
     Check,
     block_problem,
+    count,
     model_problem,
 )
 
@@ -30,6 +32,8 @@ MOST_NAMED = 4
 """Picks that are named one by one; of further ones the number is said."""
 MOST_OF_VALUE, MOST_OF_NAME = 40, 60
 PARAMETERS = (store.MODEL_PARAMETERS, store.OTHER_PARAMETERS)
+ASIDE = "_set_aside"
+"""Behind the role of what is set aside."""
 SUFFIX = " (set aside)"
 """Behind the names of the picks' objects, so that the outliner shows it."""
 ABOUT = "set aside"
@@ -65,6 +69,10 @@ def look(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> set[str]
             changed.add(trajectory_of(obj))
         elif _put_away(obj, values, BESIDE_A_PICK) or _put_back(obj):
             stale.add(trajectory_of(obj))
+        action = keyframes.action_of(obj)
+        if action is not None and store.WRITTEN in action and count(action[store.WRITTEN]):
+            _put_away(action, dict(action.items()), OF_KEYS)
+            stale.add(trajectory_of(obj))
     for obj in waiting:
         values = dict(obj.items())
         if not _wrong(values):
@@ -75,11 +83,12 @@ def look(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> set[str]
         action = keyframes.action_of(obj)
         if action is not None and _put_away(action, dict(action.items()), OF_KEYS):
             stale.add(trajectory_of(obj))
-    if changed:
-        store.look_again()
     if names is None:
         stale |= bad_blocks(scene).keys()
         look_at_scene(scene)
+        there = _look_at_objects(scene) or there
+    if changed:
+        store.look_again()
     _compute_again(scene, stale)
     if (there or changed or stale or store.SET_ASIDE in scene) and not scene.get(store.HAS_SET_ASIDE):
         scene[store.HAS_SET_ASIDE] = True
@@ -96,6 +105,34 @@ def look_at_scene(scene: bpy.types.Scene) -> None:
     """The same for the values of the scene alone; all is computed again where some of them cannot be used."""
     if _set_aside_of(scene):
         scene.pop(store.SHOWN, None)
+
+
+def _look_at_objects(scene: bpy.types.Scene) -> bool:
+    """The same for the objects of other roles; whether any of them is or has something that is set aside."""
+    found, roles = False, {f"{role}{ASIDE}": role for role in BY_ROLE}
+    for obj in scene.objects:
+        held = obj.get(store.ROLE)
+        role = roles.get(held, held) if isinstance(held, str) else None
+        if role not in BY_ROLE:
+            continue
+        kept, values = BY_ROLE[role], dict(obj.items())
+        is_whole = not any(check(values.get(key)) for key, check in kept.needed.items())
+        if is_whole != (held == role):
+            obj[store.ROLE] = role if is_whole else f"{role}{ASIDE}"
+            obj.name = obj.name.removesuffix(SUFFIX) + ("" if is_whole else SUFFIX)
+            store.look_again()
+        if is_whole and _put_away(obj, values, kept.beside):
+            values = dict(obj.items())
+        for key in incomplete(role, values) if is_whole else ():
+            _keep(obj, key, obj[key])
+            del obj[key]
+        found = found or not is_whole or store.SET_ASIDE in obj
+    return found
+
+
+def _others(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Objects of other roles than picks that are set aside."""
+    return [obj for role in BY_ROLE for obj in store.with_role(scene, f"{role}{ASIDE}")]
 
 
 def of_picks(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -120,6 +157,7 @@ def remarks(scene: bpy.types.Scene) -> list[Remark]:
     if len(apart) > MOST_NAMED:
         text = f"{len(apart) - MOST_NAMED} more picks are set aside: select them to see why."
         said.append(Remark(text, "problem", ABOUT))
+    said += [_of_other(obj) for obj in _others(scene)[:MOST_NAMED]]
     return gravest_first([*said, *_of_values(scene), *_of_scene(scene)])
 
 
@@ -138,15 +176,21 @@ def grave(scene: bpy.types.Scene) -> list[Remark]:
     return [remark for remark in remarks(scene) if remark.severity in ("warning", "problem")]
 
 
+def objects_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """All objects that are set aside, or have a value that is."""
+    having = [holder for holder in _holders(scene) if isinstance(holder, bpy.types.Object)]
+    return list(dict.fromkeys([*of_picks(scene), *_others(scene), *having]))
+
+
 def remove(scene: bpy.types.Scene) -> int:
     """Delete all that is set aside; returns how many picks and values there were."""
-    apart = of_picks(scene)
-    count = len(apart)
+    apart = of_picks(scene) + _others(scene)
+    removed = len(apart)
     store.remove_objects(apart)
     for holder in _holders(scene):
-        count += len(holder[store.SET_ASIDE])
+        removed += len(holder[store.SET_ASIDE])
         del holder[store.SET_ASIDE]
-    return count
+    return removed
 
 
 def keep(holder: bpy.types.ID, key: str) -> None:
@@ -233,8 +277,9 @@ def _compute_again(scene: bpy.types.Scene, names: set[str]) -> None:
 
 def _holders(scene: bpy.types.Scene) -> Iterator[bpy.types.ID]:
     """All that keeps values that are set aside."""
-    actions = map(keyframes.action_of, store.of_role(scene, store.BLOCK_ROLE))
-    for holder in (scene, *store.of_role(scene, store.PICK_ROLE), *actions):
+    roles = (store.PICK_ROLE, store.SET_ASIDE_ROLE, *BY_ROLE)
+    objects = [obj for found in store.by_role(scene, *roles) for obj in found]
+    for holder in (scene, *objects, *map(keyframes.action_of, objects)):
         if holder is not None and store.SET_ASIDE in holder:
             yield holder
 
@@ -248,11 +293,19 @@ def _of_pick(obj: bpy.types.Object) -> str:
     )
 
 
+def _of_other(obj: bpy.types.Object) -> Remark:
+    kept = BY_ROLE[obj[store.ROLE].removesuffix(ASIDE)]
+    key, problem = next((key, said) for key, check in kept.needed.items() if (said := check(obj.get(key))))
+    name = readable(obj.name.removesuffix(SUFFIX), MOST_OF_NAME)
+    text = f"Set aside: {name}, as its {key} {_said(obj.get(key), problem)}. {kept.do}, or correct the custom property."
+    return Remark(text, kept.severity, ABOUT)
+
+
 def _of_values(scene: bpy.types.Scene) -> Iterator[Remark]:
     """Of picks and keys."""
     found = [(holder, key, value) for holder in _holders(scene) if holder != scene for key, value in _aside(holder)]
     for holder, key, value in found[:MOST_NAMED]:
-        name, check = key.split(" ")[0], {**OF_A_PICK, **BESIDE_A_PICK, **OF_KEYS}
+        name, check = key.split(" ")[0], _checks(holder)
         said = _said(value, check[name](value)) if name in check else ""
         again = name in holder
         text = f"{key} of {readable(holder.name, MOST_OF_NAME)} {said} and is set aside: "
@@ -287,6 +340,12 @@ def _of_scene(scene: bpy.types.Scene) -> Iterator[Remark]:
 
 GRAVE = (store.SHIFT, store.BLOCKS)
 """Of the scene, without which numbers or places may be wrong."""
+
+
+def _checks(holder: bpy.types.ID) -> Mapping[str, Check]:
+    """How the values of an object or an action are checked."""
+    kept = BY_ROLE.get(holder.get(store.ROLE, ""))
+    return kept.beside if kept is not None else {**OF_A_PICK, **BESIDE_A_PICK, **OF_KEYS}
 
 
 def _aside(holder: bpy.types.ID) -> list[tuple[str, object]]:

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 import pytest
 from two_runs import check_shown, picks_of, trail, update
+from video_scene import add, solved
 
 NAN, INF = float("nan"), float("inf")
 KEY = "rockfall_{}"
@@ -54,9 +55,25 @@ def same_time(scene: bpy.types.Scene) -> None:
     second["rockfall_time_s"] = first["rockfall_time_s"]
 
 
-def broken_block_keys(scene: bpy.types.Scene) -> None:
+def block_of_a(scene: bpy.types.Scene) -> bpy.types.Object:
     (block,) = [o for o in scene.objects if o.get("rockfall_role") == "block" and o["rockfall_trajectory"] == "A"]
-    block.animation_data.action["rockfall_block_keys"] = "[[1]]"
+    return block
+
+
+def broken_block_keys(scene: bpy.types.Scene) -> None:
+    block_of_a(scene).animation_data.action["rockfall_block_keys"] = "[[1]]"
+
+
+def written_of_action(scene: bpy.types.Scene) -> None:
+    picks_of(scene, "A")[1].animation_data.action["rockfall_written"] = NAN
+
+
+def block_of_no_trajectory(scene: bpy.types.Scene) -> None:
+    block_of_a(scene)["rockfall_trajectory"] = 5
+
+
+def mass_of_flights(scene: bpy.types.Scene) -> None:
+    trail(scene, "A")["rockfall_mass_kg"] = "heavy"
 
 
 JUNK = (
@@ -105,6 +122,9 @@ CASES = {
     "shift text": (of_scene("shift_m", "x"), "it was taken from the picks", ALL),
     "unknown model": (of_scene("model_parameters", '{"nobody_1999": {"x": 1}}'), "nobody_1999", ALL),
     "schema text": (of_scene("schema", "x"), "", ALL),
+    "written of an action": (written_of_action, "(nan) is no whole number and is set aside", ALL),
+    "block of no trajectory": (block_of_no_trajectory, "Set aside: A block, as its rockfall_trajectory (5)", ALL),
+    "mass text": (mass_of_flights, "rockfall_mass_kg of A flights ('heavy') is no number", ALL),
     "keys of a block": (broken_block_keys, "rockfall_block_keys of A block", ALL),
 }
 
@@ -263,6 +283,30 @@ def test_a_marker_that_is_nowhere_goes_back(scene: bpy.types.Scene, part) -> Non
     assert list(pick["rockfall_position_m"]) == place
     np.testing.assert_allclose(pick.location, place, atol=1e-6)
     check_shown(scene, part)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words", "aside", "is_solved"),
+    [
+        ("video_size", "x", "Set aside: constant, as its rockfall_video_size", True, None),
+        ("video_times_s", [NAN], "Set aside: constant, as its rockfall_video_times_s", True, None),
+        ("poses", [1.0] * 11, "rockfall_poses of constant", False, False),
+        ("pose_sigma", "x", "rockfall_pose_sigma of constant ('x')", False, True),
+        ("video_facts", "{", "rockfall_video_facts of constant ('{')", False, True),
+    ],
+)
+def test_a_damaged_camera(part, tmp_path: Path, key: str, value: object, words: str, aside: bool, is_solved) -> None:
+    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "constant.mp4")
+    camera_paths.set_camera_path(bpy.context.scene, camera, solved(part, camera, 20))
+    write(camera, key, value)
+    scene = opened(tmp_path / "damaged.blend")
+    said = said_of(scene, part)
+    assert words in said
+    assert "Something went wrong" not in said
+    found = part("rockfall_addon.scene.videos").cameras(scene)
+    assert [camera_paths.is_solved(each) for each in found] == ([] if aside else [is_solved])
+    scene.frame_set(5)
+    assert "Something went wrong" not in said_of(scene, part)
 
 
 def test_a_newer_file_is_left_as_it_is(scene: bpy.types.Scene, part, tmp_path: Path) -> None:

@@ -3,14 +3,14 @@
 
 import bpy
 
-from ...scene import picks, recovery, set_aside, store, sync
+from ...scene import recovery, set_aside, store, sync
 from ...view.reporting import possible, reported
 
 NOTHING = "Nothing is set aside"
 
 
 class ROCKFALL_OT_select_set_aside(bpy.types.Operator):
-    """Select the picks that are set aside, or that have a value that is: it is among their custom properties"""
+    """Select what is set aside, or has a value that is: it is among its custom properties"""
 
     bl_idname = "rockfall.select_set_aside"
     bl_label = "Select What Is Set Aside"
@@ -24,10 +24,9 @@ class ROCKFALL_OT_select_set_aside(bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, layer = context.scene, context.view_layer
-        found = set_aside.of_picks(scene) + [obj for obj in picks.objects_of(scene) if store.SET_ASIDE in obj]
-        found = [obj for obj in found if obj.name in layer.objects]
+        found = [obj for obj in set_aside.objects_of(scene) if obj.name in layer.objects]
         if not found:
-            self.report({"INFO"}, "It is of no pick: look in Scene Properties > Custom Properties.")
+            self.report({"INFO"}, "It is of no object: look in Scene Properties > Custom Properties.")
             return {"CANCELLED"}
         for obj in layer.objects.selected:
             obj.select_set(False)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the objects of each role, but picks, must hold to be used; see `stored_values`."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...core.impact_models.registry import MODELS
+from ...core.plausibility import GREATEST_M, OF_UNIT
+from ...core.remarks import Severity
+from . import store
+from .stored_values import BEYOND, NO_TEXT, NOT_FINITE, Check, json_of, name, number, numbers
+
+PER_POSE, PER_SIGHTING = 12, 7
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What an object of a role holds.
+
+    Attributes
+    ----------
+    needed : without which it is none.
+    beside : what it can be without.
+    together : keys of these that are used together: where one cannot be used, all go.
+    do : what to do when it is set aside.
+    severity : of its being set aside.
+    """
+
+    needed: Mapping[str, Check] = field(default_factory=dict)
+    beside: Mapping[str, Check] = field(default_factory=dict)
+    together: tuple[tuple[str, ...], ...] = ()
+    do: str = ""
+    severity: Severity = "note"
+
+
+def series(multiple: int) -> Check:
+    """Finite numbers, so many or a multiple of it."""
+
+    def check(value: object) -> str:
+        if getattr(value, "typecode", "") not in ("d", "f", "i") or not len(value) or len(value) % multiple:
+            return "is no list of numbers" if multiple == 1 else f"is no list of {multiple} numbers each"
+        return "" if np.isfinite(np.array(value)).all() else NOT_FINITE
+
+    return check
+
+
+def _text(value: object) -> str:
+    return "" if isinstance(value, str) else NO_TEXT
+
+
+def _clock(value: object) -> str:
+    problem = numbers(4)(value)
+    return problem or ("" if 1 + value[1] > 0 and value[3] > 0 else BEYOND)
+
+
+def _texts(found: list) -> None:
+    if not all(isinstance(each, str) for each in found):
+        raise TypeError
+
+
+def _releases(found: list) -> None:
+    for release, trajectory, time_s in found:
+        if not isinstance(release, str) or not isinstance(trajectory, str) or number()(time_s):
+            raise ValueError
+
+
+def _is_model(value: object) -> str:
+    return "" if isinstance(value, str) and value in MODELS else "names no model"
+
+
+_model = {store.MODEL: _is_model}
+_trajectory = {store.TRAJECTORY: name}
+_amount = number(0.0)
+_place = numbers(3, -GREATEST_M, GREATEST_M)
+POSE = (store.SOLVED, store.CAMERA, store.REFERENCE_POSE, store.POSE_TIMES, store.POSES)
+_poses: dict[str, Check] = {
+    store.CAMERA: numbers(9),
+    store.REFERENCE_POSE: numbers(PER_POSE),
+    store.POSE_TIMES: series(1),
+    store.POSES: series(PER_POSE),
+}
+
+BY_ROLE: dict[str, Kept] = {
+    store.CAMERA_ROLE: Kept(
+        needed={
+            store.ID: name,
+            store.VIDEO_FILE: _text,
+            store.VIDEO_SIZE: numbers(2, 1.0, 1e5),
+            store.VIDEO_TIMES: series(1),
+            store.CLOCK: _clock,
+        },
+        beside={
+            **_poses,
+            store.SOLVED: lambda value: "" if isinstance(value, (bool, int)) else "is neither true nor false",
+            store.POSE_SIGMA: series(2),
+            store.POSE_COVARIANCE: numbers(36),
+            store.CAMERA_SHIFT: _place,
+            store.RMSE: _amount,
+            store.ASPECT: numbers(2, 1e-3, 1e3),
+            store.CAMERA_KEYED: numbers(6),
+            store.CAPTURE_RATE: number(0.0, OF_UNIT["hz"]),
+            store.ROW_TIME: number(-1.0, 1.0),
+            store.VIDEO_FACTS: json_of(dict),
+            store.TRACK_NAMES: json_of(list, _texts),
+            store.TRACK_ROWS: series(PER_SIGHTING),
+            store.SOLUTION: json_of(dict),
+            store.FOLLOWED: json_of(dict),
+            store.EVENTS: json_of(dict),
+            store.KNOWN_LENS: numbers(9),
+        },
+        together=(POSE, (store.TRACK_NAMES, store.TRACK_ROWS)),
+        do="Add the video again",
+        severity="problem",
+    ),
+    store.FLIGHTS_ROLE: Kept(_trajectory, {store.MASS: _amount, store.TOP_SPEED: _amount}, do="Others were made"),
+    store.BLOCK_ROLE: Kept(_trajectory, do="Another one was made"),
+    store.MODEL_BLOCK_ROLE: Kept(_model | _trajectory, {store.LANE: _amount}, do="Show the models again"),
+    store.MODEL_FLIGHTS_ROLE: Kept(_model, do="Show the models again"),
+    store.SIMULATED_BLOCKS_ROLE: Kept({**_model, store.RELEASES: json_of(list, _releases)}, do="Simulate again"),
+    store.SIMULATED_PATHS_ROLE: Kept(
+        {**_model, store.RELEASES: json_of(list, _releases), store.ENDS: json_of(list, _texts)}, do="Simulate again"
+    ),
+    store.SIMULATED_PATTERN_ROLE: Kept(_model, do="Simulate again"),
+    store.TERRAIN_ROLE: Kept(beside={store.REACH: _amount, store.THIN_SHARE: number(0.0, 1.0)}),
+}
+
+
+def incomplete(role: str, values: Mapping[str, object]) -> tuple[str, ...]:
+    """Keys that are of no use, as others are missing that belong to them."""
+    lost: list[str] = []
+    for keys in BY_ROLE[role].together:
+        there = [key for key in keys if key in values]
+        if there and len(there) < len(keys) and (keys != POSE or values.get(store.SOLVED) or len(there) > 1):
+            lost += there
+    if role == store.CAMERA_ROLE and store.POSES in values and store.POSE_TIMES in values and not lost:
+        poses, times = len(values[store.POSES]), len(values[store.POSE_TIMES])
+        if poses != PER_POSE * times:
+            lost += POSE
+        elif store.POSE_SIGMA in values and len(values[store.POSE_SIGMA]) != 2 * times:
+            lost.append(store.POSE_SIGMA)
+    return tuple(lost)

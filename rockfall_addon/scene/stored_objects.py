@@ -61,6 +61,8 @@ def _texts(found: list) -> None:
 
 
 def _releases(found: list) -> None:
+    if not found:
+        raise ValueError
     for release, trajectory, time_s in found:
         if not isinstance(release, str) or not isinstance(trajectory, str) or number()(time_s):
             raise ValueError

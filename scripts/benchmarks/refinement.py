@@ -89,6 +89,8 @@ class Case:
     pairs: Pairs = Pairs()
     azimuth_deg: tuple[float, float] = (45.0, 60.0)
     """Of the first camera, from the fall line."""
+    memory: float = 0.0
+    """Correlation of the tracker's noise from one frame to the next."""
 
 
 CASES = (
@@ -100,6 +102,8 @@ CASES = (
     Case("1080p, 60 Hz, 300 m, one view", 1920, 1080, 60.0, 300.0, 1),
     Case("1080p, 60 Hz, 300 m, three views", 1920, 1080, 60.0, 300.0, 3),
     Case("4K, 30 Hz, 150 m, one view along the slope", 3840, 2160, 30.0, 150.0, 1, azimuth_deg=(80.0, 100.0)),
+    Case("4K, 30 Hz, 150 m, one view, noise correlated by 0.9", 3840, 2160, 30.0, 150.0, 1, memory=0.9),
+    Case("4K, 30 Hz, 150 m, two views, noise correlated by 0.9", 3840, 2160, 30.0, 150.0, 2, memory=0.9),
 )
 
 
@@ -280,12 +284,20 @@ def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) ->
         where = truth.centre[flight] + since[:, None] * truth.v2[flight] - fallen
         pixel = project(camera, where, rotation=held[inside], position=positions[inside])
         size = focal * 2 * RADIUS / np.linalg.norm(where - place, axis=1)
-        pixel = pixel + np.outer(size, SIGMA_AIM * rng.normal(size=2)) + SIGMA_TRACK * rng.normal(size=pixel.shape)
+        pixel = pixel + np.outer(size, SIGMA_AIM * rng.normal(size=2)) + SIGMA_TRACK * noise_of(case, len(pixel), rng)
         rows.append((np.full(inside.size, number), video[inside], pixel))
 
     view, video_s, pixel = (np.concatenate(column) for column in zip(*rows, strict=True))
     pixels = PixelObservations(view, np.full(view.size, "a"), video_s, pixel, np.full(view.size, SIGMA_TRACK))
     return Footage(truth, tuple(true_views), tuple(views), marked(surface, truth, true_views[0], views[0], rng), pixels)
+
+
+def noise_of(case: Case, count: int, rng: np.random.Generator) -> np.ndarray:
+    """(count, 2) normal numbers with a standard deviation of one, each correlated with the one before."""
+    fresh = rng.normal(size=(count, 2))
+    for i in range(1, count):
+        fresh[i] = case.memory * fresh[i - 1] + np.sqrt(1 - case.memory**2) * fresh[i]
+    return fresh
 
 
 def marked(surface: Surface, truth: Fall, true: View, solved: View, rng: np.random.Generator):

@@ -58,6 +58,7 @@ def remarks_on(
         remarks += [
             *_second_solutions(fit),
             *_on_the_search(fit),
+            *_alike_from_frame_to_frame(fit),
             *_without_pixels(fit),
             *_pulled(fit),
             *_open_ends(fit),
@@ -148,6 +149,21 @@ def _on_the_search(fit: Fit) -> Iterator[Remark]:
             "enlarged by this factor."
         )
         yield Remark(f"{_who(fit.setup)}: {text}", "note", about)
+
+
+def _alike_from_frame_to_frame(fit: Fit) -> Iterator[Remark]:
+    """Tracks that are off by about the same in neighbouring frames."""
+    deviation = np.sqrt(np.diag(fit.covariance) / np.maximum(np.diag(fit.independent), 1e-300))
+    for track in fit.tracks:
+        if track.correlation > 0:
+            times = float(np.median(deviation[track.columns]))
+            text = (
+                f"What was tracked of trajectory {fit.setup.names[track.group]} in view "
+                f"{fit.setup.problem.views[track.view].name} is off by about the same from frame to frame (correlation "
+                f"{track.correlation:.2f}), or its flights are not those of gravity alone. The standard deviations "
+                f"contain it: they are {times:.1f} times as large as for independent pixels."
+            )
+            yield Remark(text, "note", fit.setup.names[track.group])
 
 
 def _without_pixels(fit: Fit) -> Iterator[Remark]:

@@ -11,6 +11,7 @@ from ...least_squares import inverse
 from ...vectors import Array, Indices, dot, perpendicular
 from ..impact import Impacts, apparent
 from ..node_motion import NodeMotion
+from .correlation import TrackNoise, track_noise
 from .problem import NODE, Problem
 from .search import Rival
 from .setup import Setup
@@ -26,14 +27,18 @@ class Fit:
     Attributes
     ----------
     covariance : of this solution, and of its rivals about it as much as they are likely.
+    independent : (size, size) of this solution, were the noise of its pixels independent.
     scale : factor on the stated standard deviations, which the covariance contains.
+    tracks : the noise of each track, which the covariance contains where it is correlated.
     rivals : other solutions within the noise; chance (r,) of each, this one's being the rest of its trajectory's.
     """
 
     setup: Setup
     solution: Solution
     covariance: Array
+    independent: Array
     scale: float
+    tracks: tuple[TrackNoise, ...] = ()
     rivals: tuple[Rival, ...] = ()
     chance: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -51,7 +56,12 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
     scale = 1.0
     if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
         scale = float(np.sqrt(squares / spare))
-    covariance = scale**2 * inverse(solution.information, partly=True)
+    independent = inverse(solution.information, partly=True)
+    tracks = tuple(track_noise(setup.problem, solution, independent))
+    alike = np.zeros_like(independent)
+    for track in tracks:
+        alike[np.ix_(track.columns, track.columns)] += track.excess
+    covariance = scale**2 * (independent + independent @ alike @ independent)
     odds = np.array([np.exp(-rival.worse / scale**2) for rival in rivals])
     of = np.array([rival.trajectory for rival in rivals])
     chance = np.array([one / (1 + odds[of == name].sum()) for one, name in zip(odds, of, strict=True)])
@@ -61,7 +71,7 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
         away[:, 3] = rival.time_s - solution.state.time_s[rival.nodes]
         place = (NODE * rival.nodes[:, None] + np.arange(NODE)).ravel()
         covariance[place[:, None], place] += weight * np.outer(away, away)
-    return Fit(setup, solution, covariance, scale, tuple(rivals), chance)
+    return Fit(setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance)
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

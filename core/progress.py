@@ -17,3 +17,12 @@ class CancelledError(Exception):
 
 def silent(text: str, done: int = 0, total: int = 0) -> None:
     """Progress that nobody listens to."""
+
+
+def part(progress: Progress, done: int, total: int) -> Progress:
+    """The steps of one part of the work, as progress through all `total` parts of which `done` are done."""
+
+    def of_all(text: str, _step: int = 0, _most: int = 0) -> None:
+        progress(text, done, total)
+
+    return of_all

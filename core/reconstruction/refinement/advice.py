@@ -153,17 +153,19 @@ def _on_the_search(fit: Fit) -> Iterator[Remark]:
 
 def _alike_from_frame_to_frame(fit: Fit) -> Iterator[Remark]:
     """Tracks that are off by about the same in neighbouring frames."""
+    alike = [track for track in fit.tracks if track.correlation > 0]
+    if not alike:
+        return
     deviation = np.sqrt(np.diag(fit.covariance) / np.maximum(np.diag(fit.independent), 1e-300))
-    for track in fit.tracks:
-        if track.correlation > 0:
-            times = float(np.median(deviation[track.columns]))
-            text = (
-                f"What was tracked of trajectory {fit.setup.names[track.group]} in view "
-                f"{fit.setup.problem.views[track.view].name} is off by about the same from frame to frame (correlation "
-                f"{track.correlation:.2f}), or its flights are not those of gravity alone. The standard deviations "
-                f"contain it: they are {times:.1f} times as large as for independent pixels."
-            )
-            yield Remark(text, "note", fit.setup.names[track.group])
+    times = [float(np.median(deviation[track.columns])) for track in alike]
+    least, most = min(track.correlation for track in alike), max(track.correlation for track in alike)
+    text = (
+        f"{_who(fit.setup)}: {len(alike)} of {len(fit.tracks)} tracks are off by about the same from frame to frame "
+        f"(correlation {least:.2f}{'' if len(alike) == 1 else f' to {most:.2f}'}), or the flights are not those of "
+        "gravity alone. The standard deviations contain it: they are "
+        f"{float(np.median(times)):.1f} times as large as for independent pixels."
+    )
+    yield Remark(text, "note", fit.setup.names[0] if len(fit.setup.names) == 1 else "")
 
 
 def _without_pixels(fit: Fit) -> Iterator[Remark]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...constants import GRAVITY_MPS2
 from ...errors import InputError, RockfallError
-from ...progress import Progress, silent
+from ...progress import Progress, part, silent
 from ..block import Block, per_pick
 from ..choices import FREE, LOSSES, SIGMA_AIM, Loss
 from ..drag import Drag
@@ -107,7 +107,9 @@ def refine(
     def alone(name: str) -> Setup:
         return set_up(ground, moved_views, observations, [name], gravity_mps2, clock, sigma_aim)
 
-    fits = [_solve(setup, alone, loss, free_set, _part(progress, i, len(setups))) for i, setup in enumerate(setups)]
+    count = len(setups)
+    parts = [progress] if count == 1 else [part(progress, i, count) for i in range(count)]
+    fits = [_solve(setup, alone, loss, free_set, own) for setup, own in zip(setups, parts, strict=True)]
     return summarise(
         ground, moved_views, observations, fits,
         block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, site=site,
@@ -128,7 +130,12 @@ def _solve(setup: Setup, alone: Callable[[str], Setup], loss: Loss, free: frozen
         state, rivals = search_one_by_one(setup, [alone(name) for name in setup.names], loss, progress)
     if "clock" in free:
         state = find_clocks(setup.problem, state)
-    found = solve_with_noise(setup.problem, state, loss, progress) if several else search(setup, state, loss, progress)
+    if several:
+        found = solve_with_noise(
+            setup.problem, state, loss, lambda *_: progress("Fitting all trajectories together", 0, 0)
+        )
+    else:
+        found = search(setup, state, loss, progress)
     return with_covariance(
         replace(setup, problem=found.problem, noise=found.noise), found.solution, [*rivals, *found.rivals]
     )
@@ -148,12 +155,3 @@ def _check_parameters(
         if value is not None and not (np.isfinite(value) and value > 0):
             raise RockfallError(f"The {label} must be a positive number [m], not {value}.")
     return frozenset(free)
-
-
-def _part(progress: Progress, done: int, total: int) -> Progress:
-    """The steps towards one solution, as progress through all of them."""
-
-    def of_all(text: str, _step: int, _most: int) -> None:
-        progress(text, done, total)
-
-    return of_all

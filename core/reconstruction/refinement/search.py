@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...progress import Progress, silent
+from ...progress import Progress, part, silent
 from ...vectors import Array, Indices, norm
 from ..choices import Loss
 from .problem import Problem, Unknowns
@@ -75,11 +75,16 @@ def search(setup: Setup, state: Unknowns, loss: Loss, progress: Progress = silen
     solution from there, across whose rays little is left open. The least squares win; what is within the noise of them
     and farther off than half a block is a rival.
     """
-    problem = setup.problem
-    tried = [solve(problem, state, loss, progress, roughly=True)]
-    for start in states_along_rays(problem, state, SIGMA_MARK_PX)[:MOST_MARKED]:
-        tried.append(solve(problem, start, loss, progress, roughly=True))
-    found = solve_with_noise(problem, min(tried, key=lambda one: objective(one, loss)).state, loss, progress)
+    problem, most = setup.problem, MOST_MARKED + MOST_FOUND + 3
+
+    def roughly(start: Unknowns) -> Solution:
+        return solve(problem, start, loss, part(progress, len(tried), most), roughly=True)
+
+    tried = list[Solution]()
+    for start in [state, *states_along_rays(problem, state, SIGMA_MARK_PX)[:MOST_MARKED]]:
+        tried.append(roughly(start))
+    nearest = min(tried, key=lambda one: objective(one, loss)).state
+    found = solve_with_noise(problem, nearest, loss, part(progress, len(tried), most))
     problem, best = found.problem, found.solution
     others = [one.state for one in tried if _apart(problem, one.state, best.state)]
     others += states_along_rays(problem, best.state, SIGMA_FOUND_PX)[:MOST_FOUND]
@@ -87,11 +92,11 @@ def search(setup: Setup, state: Unknowns, loss: Loss, progress: Progress = silen
     tried = [best]
     for start in others:
         if all(_apart(problem, start, other) for other in different):
-            tried.append(solve(problem, start, loss, progress, roughly=True))
+            tried.append(roughly(start))
             different += [start, tried[-1].state]
     tried.sort(key=lambda one: objective(one, loss))
     if tried[0] is not best:
-        found = replace(found, solution=solve(problem, tried[0].state, loss, progress))
+        found = replace(found, solution=solve(problem, tried[0].state, loss, part(progress, most - 1, most)))
     least, kept, rivals = objective(found.solution, loss), [found.solution.state], list[Rival]()
     for one in tried:
         worse = objective(one, loss) - least
@@ -113,8 +118,8 @@ def search_one_by_one(
     """
     rivals = list[Rival]()
     centre, time_s = setup.state.centre.copy(), setup.state.time_s.copy()
-    for one in alone:
-        found = search(one, one.state, loss, progress)
+    for i, one in enumerate(alone):
+        found = search(one, one.state, loss, part(progress, i, len(alone)))
         rows = setup.node_of[one.nodes]
         centre[rows], time_s[rows] = found.solution.state.centre, found.solution.state.time_s
         rivals += [replace(rival, nodes=rows[rival.nodes]) for rival in found.rivals]

@@ -467,5 +467,5 @@ def _counted(marks: int) -> str:
 
 def _listed(rates: Sequence[float]) -> str:
     """At most six rates, from the slowest on."""
-    texts = [f"{rate:.1f}" for rate in sorted(rates, key=abs)]
+    texts = [f"{round(rate, 1) + 0.0:.1f}" for rate in sorted(rates, key=abs)]  # no -0.0
     return ", ".join(texts[:6]) + (f" and {len(texts) - 6} more" if len(texts) > 6 else "")

@@ -132,6 +132,15 @@ def test_what_the_frame_rate_cannot_tell():
     assert spin.turns_per_s == pytest.approx(-2.7, abs=1e-6)
 
 
+def test_a_block_that_may_stand_still():
+    """Marks on one side in pictures 0.1 s apart: no turn, or one in either sense."""
+    time = np.array([0.3, 0.4])
+    pixel = seen(SIDE, time, 0 * FORWARDS, towards(SIDE, 0.35))
+    (spin,) = measure_spins(flight(), [video(SIDE, time, pixel)]).flights
+    assert spin.verdict == "ambiguous"
+    assert ": 0.0, " in spin.remarks[0].text
+
+
 def test_a_third_mark_at_an_uneven_time_tells_the_turns():
     time, omega = np.array([0.3, 0.4, 0.433]), 2 * np.pi * 7.3 * FORWARDS
     point = Rotation.from_rotvec(-0.35 * omega).apply(towards(SIDE, 0.35))

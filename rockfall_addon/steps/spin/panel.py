@@ -11,6 +11,7 @@ from .operators import AXIS_NAMES, SpinTool
 
 MOST_MARKS = 12
 MOST_RATES = 4
+LEAST_COUNTED = 1e-3  # a count of 0 is none
 
 
 class ROCKFALL_PT_spin(RockfallPanel, bpy.types.Panel):
@@ -59,10 +60,10 @@ def _draw_flight(context: bpy.types.Context, box: bpy.types.UILayout, obj: bpy.t
         row = box.row(align=True)
         shown = one.others if not one.is_known else ()
         for rate in shown[:MOST_RATES]:
-            button = row.operator("rockfall.count_turns", text=f"{rate:.1f} /s")
-            button.turns_per_s, button.flight = rate, one.flight
-        again = row.operator("rockfall.count_turns", text="Counted …", icon="NONE")
-        again.flight = one.flight
+            button = row.operator("rockfall.count_turns", text=f"{round(rate, 1) + 0.0:.1f} /s")
+            button.turns_per_s = rate if abs(rate) > LEAST_COUNTED else LEAST_COUNTED
+            button.flight = one.flight
+        box.operator("rockfall.count_turns", text="Counted …").flight = one.flight
 
 
 def _draw_marks(layout: bpy.types.UILayout, camera: bpy.types.Object, name: str) -> None:

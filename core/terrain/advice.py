@@ -48,6 +48,12 @@ def faces_along_y(points: Array) -> bool:
     return bool(across[1] > MUCH_MORE * across[2] and across[1] > across[0])
 
 
+def mesh_faces_along_y(total: Array) -> bool:
+    """Whether a mesh of some total vector area (3,) faces along y much more than along z."""
+    across = np.abs(total)
+    return bool(across[1] > MUCH_MORE * across[2] and across[1] > across[0])
+
+
 def sentences(low: Array, high: Array, shift: GlobalShift) -> list[str]:
     """Advice on units and place, for the summary."""
     notes = []

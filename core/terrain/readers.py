@@ -45,6 +45,7 @@ class TerrainInfo:
     crs : as the file states it, empty when unknown.
     shift : proposed.
     summary : sentences, advice included.
+    y_up : it looks as if y pointed up.
     """
 
     name: str
@@ -56,6 +57,7 @@ class TerrainInfo:
     crs: str
     shift: GlobalShift
     summary: tuple[str, ...]
+    y_up: bool = False
 
 
 @reader("terrain")
@@ -228,8 +230,13 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     advice.refuse_degrees(source, low, high, unit_m, path)
     shift = GlobalShift.proposed(low, high, source.crs)
     notes = (*source.notes, *advice.sentences(low, high, shift))
+    y_up = False
+    if source.faces is not None:
+        y_up = advice.mesh_faces_along_y(cleaning.examine_faces(points, source.faces)[1])
+    elif source.kind == "cloud" and len(points) == count:
+        y_up = advice.faces_along_y(points)
     faces = 0 if source.faces is None else len(source.faces)
-    return TerrainInfo(path.name, source.kind, low, high, count, faces, source.crs, shift, notes)
+    return TerrainInfo(path.name, source.kind, low, high, count, faces, source.crs, shift, notes, y_up)
 
 
 def _cleaned(meshed: triangulation.Meshed, kind: str) -> tuple[Array, NDArray[np.int32], list[str]]:
@@ -256,6 +263,6 @@ def _cleaned(meshed: triangulation.Meshed, kind: str) -> tuple[Array, NDArray[np
         notes.append(f"At {oriented.contradictions:,} edges no winding agrees (a one-sided surface).")
     if oriented.components > 1:
         notes.append(f"The surface has {oriented.components:,} separate pieces.")
-    if abs(total[1]) > advice.MUCH_MORE * abs(total[2]) and abs(total[1]) > abs(total[0]):
+    if advice.mesh_faces_along_y(total):
         notes.append(advice.Y_UP)
     return vertices, oriented.faces, notes

@@ -38,6 +38,7 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     obj = bpy.data.objects.new(surface.name, mesh)
     obj[store.ROLE], obj[store.ID] = store.TERRAIN_ROLE, uuid.uuid4().hex
     obj[store.TERRAIN_SUMMARY], obj[store.TERRAIN_FILE] = list(surface.summary), surface.name
+    obj[store.TURNED] = surface.turned
     obj[store.THIN_SHARE] = float(np.mean(shading.thin))
     obj[store.REACH] = float(np.abs(surface.bounds).max())
     set_locked(obj, True)
@@ -220,7 +221,7 @@ def _read(obj: bpy.types.Object) -> Surface:
     local = terrain_mesh.placed_vertices(obj)
     if np.linalg.det(np.array(obj.matrix_world)[:3, :3]) < 0:  # mirrored: the faces would look into the ground
         faces = np.ascontiguousarray(faces[:, ::-1])
-    return Surface(local, faces, georeference.read_shift(_scene_of(obj)), obj.name, ())
+    return Surface(local, faces, georeference.read_shift(_scene_of(obj)), obj.name, turned=bool(obj.get(store.TURNED)))
 
 
 def _way_m(tile: bpy.types.Object) -> float:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person imports scanned slopes."""
 
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -31,6 +32,22 @@ def case_import_vegetated_tile_after_asking(window):
     yield from window.wait_for(lambda: any("rockfall_role" in o for o in bpy.context.scene.objects), what="imported")
     yield 3.0
     window.screenshot("lareunion")
+
+
+def case_a_slope_that_stands_upright_asks_whether_y_points_up(window):
+    file = Path(tempfile.mkdtemp()) / "upright.obj"
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0, 41, 4.0), np.arange(0, 41, 4.0)))
+    corners = np.arange(121).reshape(11, 11)
+    corners = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=-1).reshape(-1, 4)
+    rows = [f"v {a} {30 - 0.2 * a} {-b}" for a, b in zip(x, y, strict=True)]
+    rows += [f"f {a} {b} {c} {d}" for a, b, c, d in corners + 1]
+    file.write_text("\n".join(rows) + "\n")
+    with window.override():
+        bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=str(file))
+    yield 1.0
+    window.screenshot("question")
+    yield from window.press("RET", *window.centre())
+    yield from window.wait_for(lambda: any("rockfall_role" in o for o in bpy.context.scene.objects), what="imported")
 
 
 def case_relief_sliders_at_their_ends(window):

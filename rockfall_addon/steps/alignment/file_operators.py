@@ -44,10 +44,10 @@ class ROCKFALL_OT_import_pairs(OfVideo, FromFile, bpy.types.Operator):
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, camera = context.scene, videos.active_camera(context.scene)
-        count = files.import_pairs(scene, camera, self.chosen(context))
+        said = files.import_pairs(scene, camera, self.chosen(context))
         solution = alignment.solution_of(camera)
         fit = f" They fit to {solution.rmse_px:.2f} px." if np.isfinite(solution.rmse_px) else ""
-        self.report({"INFO"}, f"{count} pairs.{fit}")
+        self.report({"INFO"}, f"{' '.join(said)}{fit}")
         return {"FINISHED"}
 
 

@@ -12,21 +12,23 @@ from ....core.errors import InputError
 from ....core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
 from ....core.output import output_folder
-from ...scene import alignment, camera_paths, clocks, georeference, pairs, store, videos
+from ....core.workflow.uprightness import turned_pairs
+from ...scene import alignment, camera_paths, clocks, georeference, pairs, store, terrain, videos
 from . import solving
 
 RESIDUALS = "pairs_residuals.csv"
 """Beside a camera: what is left of its pairs."""
 
 
-def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:
-    """Add the pairs of a table; those without a frame belong to the one that is shown. Returns how many came.
+def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> tuple[str, ...]:
+    """Add the pairs of a table; those without a frame belong to the one that is shown. Returns what was done.
 
     Raises
     ------
     RockfallError : the table is bad, or a pixel is outside of the video's picture. Nothing has changed.
     """
-    table = read_pairs(path, georeference.read_shift(scene) if georeference.has_shift(scene) else None)
+    shift = georeference.read_shift(scene) if georeference.has_shift(scene) else None
+    table, turned = turned_pairs(read_pairs(path, shift), terrain.surface_of_scene(scene))
     (width, height), shown = videos.size_of(camera), clocks.true_frame(scene, camera)
     frames = len(camera[store.VIDEO_TIMES])
     marked, added = pairs.pairs_of(camera), []
@@ -56,7 +58,7 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
         georeference.write_shift(scene, table.shift)
     pairs.keep_pairs(camera, [*marked, *added])
     solving.solve(scene, camera)
-    return len(added)
+    return (*turned, f"{len(added)} pairs.")
 
 
 def export_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | Path) -> int:

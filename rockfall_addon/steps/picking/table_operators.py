@@ -9,6 +9,7 @@ from ....core.exchange.tables import read_picks
 from ....core.progress import Progress, silent
 from ....core.reconstruction.picks import Picks
 from ....core.reconstruction.trajectory import Reconstruction
+from ....core.workflow.uprightness import turned_picks
 from ...scene import georeference, problems, reconstruction, store, sync
 from ...view import job, look
 from ...view.from_file import FromFile
@@ -34,8 +35,8 @@ class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
         known = georeference.read_shift(scene) if georeference.has_shift(scene) else None
-        picks = read_picks(self.chosen(context), known)
-        work = _work(scene, picks)
+        picks, turned = turned_picks(read_picks(self.chosen(context), known), reconstruction.ground(scene))
+        work = _work(scene, picks, turned)
         if len(picks) > MANY_PICKS and not bpy.app.background:
             job.begin(work, self.bl_label, scene)
             return {"INTERFACE"}  # the result is an undo step of its own
@@ -43,8 +44,8 @@ class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def _work(scene: bpy.types.Scene, picks: Picks) -> job.Work:
-    """The import of picks: to compute their trajectories, then to show them."""
+def _work(scene: bpy.types.Scene, picks: Picks, turned: tuple[str, ...]) -> job.Work:
+    """The import of picks, which were turned or not: to compute their trajectories, then to show them."""
     reconstruct = reconstruction.reconstruction_of(scene, picks)
 
     def compute(progress: Progress) -> Reconstruction:
@@ -65,7 +66,7 @@ def _work(scene: bpy.types.Scene, picks: Picks) -> job.Work:
         with bpy.context.temp_override(window=bpy.context.window or next(iter(windows), None)):
             look.show_relief(bpy.context, frame_all=True)
         count = len(set(picks.trajectory.tolist()))
-        return f"{len(picks)} picks: {count} trajectories, {len(result.impacts)} impacts."
+        return " ".join((*turned, f"{len(picks)} picks: {count} trajectories, {len(result.impacts)} impacts."))
 
     return job.Work("picking", compute, keep)
 

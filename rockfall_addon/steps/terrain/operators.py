@@ -60,6 +60,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     )  # fmt: skip
     replaces: StringProperty(description="Id of a tile that it takes the place of", options={"HIDDEN", "SKIP_SAVE"})
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+    y_up: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
@@ -80,7 +81,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         found = inspect_terrain(self.filepath)
         shift = georeference.read_shift(context.scene) if georeference.has_shift(context.scene) else found.shift
         self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
-        self.asked = True
+        self.asked, self.y_up = True, found.y_up
         self.facts = [
             f"{found.name}: {found.kind}, {found.point_count:,} points, {found.face_count:,} faces",
             *found.summary,
@@ -107,7 +108,19 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         column.label(
             text="The project's shift, shared by all its files." if known else "Proposed: kept for the project."
         )
-        for name in ("up", "unit_m", "ground", *(("filter_m",) if self.ground == "FILTER" else ()), "max_edge_m"):
+        if self.y_up:
+            column = layout.column(align=True)
+            column.label(text="The surface stands upright: does Y point up in this file?", icon="QUESTION")
+            row = column.row(align=True)
+            row.alert = self.up == "auto"
+            row.prop(self, "up", expand=True)
+        for name in (
+            *(() if self.y_up else ("up",)),
+            "unit_m",
+            "ground",
+            *(("filter_m",) if self.ground == "FILTER" else ()),
+            "max_edge_m",
+        ):
             layout.prop(self, name)
         self.draw_offer(context, layout)
 

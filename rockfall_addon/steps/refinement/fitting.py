@@ -7,11 +7,14 @@ import bpy
 
 from ....core.errors import RockfallError
 from ....core.exchange.opening import drag_of
+from ....core.progress import Progress, silent
 from ....core.workflow.refinement import refine_picks
 from ...scene import camera_paths, picks, proposal, reconstruction, sightings, sync, videos
 
 
-def propose(scene: bpy.types.Scene, names: Collection[str] | None, free: Collection[str]) -> None:
+def propose(
+    scene: bpy.types.Scene, names: Collection[str] | None, free: Collection[str], progress: Progress = silent
+) -> None:
     """Fit, and keep the result in the scene as a proposal.
 
     names : the trajectories, None for all that were seen.
@@ -43,5 +46,6 @@ def propose(scene: bpy.types.Scene, names: Collection[str] | None, free: Collect
         normal_radius_m=project.reconstruction.normal_radius_m,
         names=used,
         free=free,
+        progress=progress,
     )
     proposal.keep(scene, refined, cameras, free)

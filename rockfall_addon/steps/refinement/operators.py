@@ -4,7 +4,7 @@
 import bpy
 
 from ...scene import places, proposal, store
-from ...view import pointing
+from ...view import job, pointing
 from ...view.reporting import possible, reported
 from . import fitting
 
@@ -30,7 +30,8 @@ class ROCKFALL_OT_refine(bpy.types.Operator):
         if settings.scope == "ACTIVE":
             obj = pointing.active_pick(context)
             names = [places.trajectory(scene) if obj is None else obj[store.TRAJECTORY]]
-        fitting.propose(scene, names, sorted(settings.free))
+        with job.at_the_cursor() as progress:
+            fitting.propose(scene, names, sorted(settings.free), progress)
         found = proposal.read(scene)
         worries = [remark.text for remark in found.remarks if remark.severity in ("warning", "problem")]
         numbers = f"{found.before_px:.2f} px before, {found.after_px:.2f} px after."

@@ -34,6 +34,17 @@ def test_it_is_noticed_before_the_import(part, files):
     assert not inspect(files[0] / "slope.obj", up="y").y_up
 
 
+def test_a_shift_that_was_proposed_for_z_up_does_not_serve_y_up(part, tmp_path):
+    x, z = (each.ravel() for each in np.meshgrid(np.arange(0, 41, 4.0), np.arange(0, 41, 4.0)))
+    points = np.column_stack([2_600_000 + x, 500 + 0.2 * x, -1_200_000 - z])
+    np.savetxt(tmp_path / "upright.xyz", points, fmt="%.3f")
+    told = {"shift_x": "2600000.0", "shift_y": "0.0", "shift_z": "-1200000.0"}
+    told |= {"asked": True, "proposed": " ".join(told.values())}
+    assert bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "upright.xyz"), up="y", **told) == {"FINISHED"}
+    shift = part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene)
+    assert (shift.x, shift.y, shift.z) == (2_600_000, 1_200_000, 0)
+
+
 @pytest.mark.parametrize("picks", ["picks_y.csv", "picks_z.csv"])
 def test_picks_that_came_with_it_are_turned_too(part, scene, files, picks):
     folder, right = files

@@ -61,6 +61,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     replaces: StringProperty(description="Id of a tile that it takes the place of", options={"HIDDEN", "SKIP_SAVE"})
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     y_up: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+    proposed: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
@@ -81,6 +82,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         found = inspect_terrain(self.filepath)
         shift = georeference.read_shift(context.scene) if georeference.has_shift(context.scene) else found.shift
         self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
+        self.proposed = " ".join((self.shift_x, self.shift_y, self.shift_z))
         self.asked, self.y_up = True, found.y_up
         self.facts = [
             f"{found.name}: {found.kind}, {found.point_count:,} points, {found.face_count:,} faces",
@@ -105,9 +107,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         column.enabled = not known
         for name in ("shift_x", "shift_y", "shift_z"):
             column.prop(self, name)
-        column.label(
-            text="The project's shift, shared by all its files." if known else "Proposed: kept for the project."
-        )
+        said = "The project's shift, shared by all its files." if known else "Proposed: kept for the project."
+        column.label(text="Proposed anew for Y up." if self._turned_since(context.scene) else said)
         if self.y_up:
             column = layout.column(align=True)
             column.label(text="The surface stands upright: does Y point up in this file?", icon="QUESTION")
@@ -132,7 +133,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         path, first = self.chosen(context), start_up.is_untouched(context.scene)
         surface = read_terrain(
             path,
-            shift=self._shift(context.scene),
+            shift=None if self._turned_since(context.scene) else self._shift(context.scene),
             up=self.up,
             unit_m=float(f"{self.unit_m:.7g}"),
             max_edge_m=self.max_edge_m or None,
@@ -160,6 +161,11 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath, replaces=self.replaces)
         except RuntimeError as error:
             raise RockfallError(str(error).removeprefix("Error: ").strip()) from None
+
+    def _turned_since(self, scene: bpy.types.Scene) -> bool:
+        """Whether the shift was proposed for a file with z up, and it is read with y up: then it is of no use."""
+        texts = " ".join((self.shift_x, self.shift_y, self.shift_z))
+        return self.asked and self.up == "y" and texts == self.proposed and not georeference.has_shift(scene)
 
     def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:
         """The project's shift, else the one that was given, else None: one is proposed.

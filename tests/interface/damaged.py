@@ -33,6 +33,7 @@ def case_a_damaged_file(window):
     yield 1.5
     assert (len(picks()), len(picks("pick_set_aside"))) == (count - 2, 2)
     yield from window.show_sidebar("Rockfall")
+    window.screenshot("guide")
     yield from window.open_panel("ROCKFALL_PT_picks")
     yield 1.0
     window.screenshot("opened")

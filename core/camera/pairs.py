@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pairs of a pixel and the point that is seen there, and how far a camera's path is from them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,20 @@ class Pairs:
 
     def __len__(self) -> int:
         return len(self.pixel)
+
+    def some(self, rows: Indices | Mask) -> "Pairs":
+        """Some of them."""
+        return replace(
+            self,
+            pixel=self.pixel[rows],
+            point=self.point[rows],
+            name=self.name[rows],
+            frame=self.frame[rows],
+            sigma_px=self.sigma_px[rows],
+            sigma_m=self.sigma_m[rows],
+            used=self.used[rows],
+            row=None if self.row is None else self.row[rows],
+        )
 
     def error(self, index: int, problem: str, advice: str) -> InputError:
         """An `InputError` that points at one pair."""

@@ -10,9 +10,10 @@ from ..camera.model import SIGMA_PX, Camera
 from ..camera.pairs import Pairs
 from ..camera.resection.problem import POSE_PAIRS
 from ..camera.resection.resect import Resection, resect
-from ..errors import InputError
+from ..errors import InputError, RockfallError
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask
+from .misread_pairs import check_reading
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +125,8 @@ def align(pairs: Pairs, options: AlignmentOptions) -> Alignment:
         used[rows], wrong[rows] = found.used, ~found.used
         return found
 
-    found = solved(np.flatnonzero(here), options.free, options.start)
+    found = _believed(pairs, np.flatnonzero(here), options)
+    used[here], wrong[here] = found.used, ~found.used
     keys: dict[int, Resection] = {}
     remarks: list[Remark] = []
     for other in np.unique(pairs.frame[pairs.used & ~here]).tolist():
@@ -136,6 +138,29 @@ def align(pairs: Pairs, options: AlignmentOptions) -> Alignment:
             text = f"Frame {other}: {rows.size} pairs fit to {keys[other].rmse_px:.2f} px."
         remarks.append(Remark(text, "note", f"frame {other}"))
     return Alignment(frame, found, keys, used, wrong, tuple(remarks))
+
+
+def _believed(pairs: Pairs, rows: Indices, options: AlignmentOptions) -> Resection:
+    """The camera of the reference frame.
+
+    Raises
+    ------
+    InputError : no camera fits the pairs, with how else they may have been written.
+    """
+
+    def solve(some: Pairs) -> Resection:
+        return _resected(some, np.arange(len(some)), options, options.free, options.start)
+
+    own = pairs.some(rows)
+    try:
+        found = solve(own)
+    except InputError:
+        raise
+    except RockfallError:
+        check_reading(own, None, options.size, options.sigma_px, solve)
+        raise
+    check_reading(own, found, options.size, options.sigma_px, solve)
+    return found
 
 
 def _resected(

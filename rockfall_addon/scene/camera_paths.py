@@ -57,7 +57,8 @@ def set_camera_path(
     Parameters
     ----------
     path : its pictures have the size of the video's.
-    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path.
+    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path; one that is not finite, since the
+        pairs do not determine it, is not kept.
 
     Raises
     ------
@@ -79,6 +80,8 @@ def set_camera_path(
     camera[store.POSES] = np.column_stack([position, path.rotation.reshape(f, 9)]).ravel().tolist()
     camera[store.POSE_SIGMA] = np.column_stack([path.sigma_position_m, path.sigma_rotation]).ravel().tolist()
     camera[store.CAMERA_SHIFT] = shift.vector.tolist()
+    if pose_covariance is not None and not np.isfinite(pose_covariance).all():
+        pose_covariance = None
     for key, value in ((store.RMSE, rmse_px), (store.POSE_COVARIANCE, pose_covariance)):
         if value is not None:
             camera[key] = float(value) if key == store.RMSE else np.asarray(value, np.float64).ravel().tolist()

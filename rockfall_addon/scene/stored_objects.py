@@ -12,7 +12,7 @@ from ...core.remarks import Severity
 from . import store
 from .stored_values import BEYOND, NO_TEXT, NOT_FINITE, Check, json_of, name, number, numbers
 
-PER_POSE, PER_SIGHTING = 12, 7
+PER_POSE, PER_SIGHTING, SIGMA_OF_SIGHTING = 12, 7, 5
 
 
 @dataclass(frozen=True)
@@ -35,15 +35,29 @@ class Kept:
     severity: Severity = "note"
 
 
-def series(multiple: int) -> Check:
-    """Finite numbers, so many or a multiple of it."""
+def series(multiple: int, unknown: int | None = None) -> Check:
+    """Finite numbers, so many or a multiple of it.
+
+    Parameters
+    ----------
+    unknown : which of so many is NaN where it was not given.
+    """
 
     def check(value: object) -> str:
         if getattr(value, "typecode", "") not in ("d", "f", "i") or not len(value) or len(value) % multiple:
             return "is no list of numbers" if multiple == 1 else f"is no list of {multiple} numbers each"
-        return "" if np.isfinite(np.array(value)).all() else NOT_FINITE
+        rows = np.array(value, dtype=np.float64).reshape(-1, multiple)
+        known = rows if unknown is None else np.delete(rows, unknown, axis=1)
+        return "" if np.isfinite(known).all() else NOT_FINITE
 
     return check
+
+
+def _pose_sigmas(value: object) -> str:
+    """Standard deviations of poses: infinite where the background was not recognised."""
+    if getattr(value, "typecode", "") not in ("d", "f", "i") or not len(value) or len(value) % 2:
+        return "is no list of 2 numbers each"
+    return "" if (np.array(value) >= 0).all() else BEYOND
 
 
 def _text(value: object) -> str:
@@ -96,7 +110,7 @@ BY_ROLE: dict[str, Kept] = {
         beside={
             **_poses,
             store.SOLVED: lambda value: "" if isinstance(value, (bool, int)) else "is neither true nor false",
-            store.POSE_SIGMA: series(2),
+            store.POSE_SIGMA: _pose_sigmas,
             store.POSE_COVARIANCE: numbers(36),
             store.CAMERA_SHIFT: _place,
             store.RMSE: _amount,
@@ -106,7 +120,7 @@ BY_ROLE: dict[str, Kept] = {
             store.ROW_TIME: number(-1.0, 1.0),
             store.VIDEO_FACTS: json_of(dict),
             store.TRACK_NAMES: json_of(list, _texts),
-            store.TRACK_ROWS: series(PER_SIGHTING),
+            store.TRACK_ROWS: series(PER_SIGHTING, unknown=SIGMA_OF_SIGHTING),
             store.SOLUTION: json_of(dict),
             store.FOLLOWED: json_of(dict),
             store.EVENTS: json_of(dict),

@@ -8,6 +8,7 @@ import json
 import random
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -307,6 +308,24 @@ def test_a_damaged_camera(part, tmp_path: Path, key: str, value: object, words: 
     assert [camera_paths.is_solved(each) for each in found] == ([] if aside else [is_solved])
     scene.frame_set(5)
     assert "Something went wrong" not in said_of(scene, part)
+
+
+def test_poses_that_are_not_known_are_no_damage(part, tmp_path: Path) -> None:
+    """Where the background is not recognised a pose's standard deviation is infinite, and so is one from few pairs."""
+    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "constant.mp4")
+    path = solved(part, camera, 20)
+    sigma = path.sigma_rotation.copy()
+    sigma[3:6] = np.inf
+    infinite = np.full((6, 6), np.inf)
+    camera_paths.set_camera_path(
+        bpy.context.scene, camera, replace(path, sigma_rotation=sigma), pose_covariance=infinite
+    )
+    scene = opened(tmp_path / "unknown.blend")
+    assert "Set aside" not in said_of(scene, part)
+    (found,) = part("rockfall_addon.scene.videos").cameras(scene)
+    kept = camera_paths.camera_path(found).sigma_rotation
+    assert np.flatnonzero(np.isinf(kept)).tolist() == [3, 4, 5]
+    assert camera_paths.pose_covariance(found) is None
 
 
 def test_a_newer_file_is_left_as_it_is(scene: bpy.types.Scene, part, tmp_path: Path) -> None:

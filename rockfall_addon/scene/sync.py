@@ -57,7 +57,7 @@ _recomputing: set[int] = set()  # session_uid of scenes
 
 @dataclass
 class Done:
-    """What a `sync` has done: trajectories it computed again or could not; whether picks came, went, were renamed."""
+    """What a `sync` has done: trajectories it computed again or could not; whether picks came or went."""
 
     rebuilt: list[str]
     failed: list[str]
@@ -215,8 +215,8 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
             if edited.get(name):
                 said[name].append(Remark(edited[name], "warning", name))
     if not dragging:
-        renamed = [pick_names.follow(members) for members in groups.values()]
-        done.picks_changed = done.picks_changed or any(renamed)
+        for members in groups.values():
+            pick_names.follow(members)  # follows again after an undo, so that no undo step has to know
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:

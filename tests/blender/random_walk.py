@@ -2,7 +2,7 @@
 """A random walk over what a person can do to a scene: every operator of ours, what Blender does to objects, scenes and
 collections, undo and redo, saving and loading. After each step no pick is lost and nothing has gone wrong.
 
-Used in Blender as a module (test_random_walk.py) and in a window (tests/interface/random_walk.py).
+Used in Blender as a module (test_random_walk.py) and in a window (tests/interface/walk_of_operators.py).
 """
 
 import contextlib

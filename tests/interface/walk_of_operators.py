@@ -13,7 +13,7 @@ sys.path.append(str(Path(__file__).parents[1] / "blender"))
 
 import random_walk
 
-STEPS, SEED = 30, 3
+STEPS, SEED = 15, 3
 DRAWN, BREATH_S = 4, 0.02
 """After every so many steps Blender draws the window, which takes longer than most of them."""
 LEAST_KINDS = 8

@@ -129,7 +129,9 @@ def line_of(obj: bpy.types.Object, run: int) -> Array:
 
 def ends_of(obj: bpy.types.Object) -> list[str]:
     """How runs end, in words, by their number."""
-    return [END_WORDS.get(name, name.replace("structure:", "held by ")) for name in json.loads(obj[store.ENDS])]
+    return [
+        END_WORDS.get(name, name.replace("structure:", "held by ")) for name in store.read_json(obj, store.ENDS, [])
+    ]
 
 
 def colours_of(lines: Lines, colour_by: str, speed_top_mps: float, energy_top_kj: float) -> Array:

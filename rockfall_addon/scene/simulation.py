@@ -210,7 +210,7 @@ def selected_run(scene: bpy.types.Scene) -> list[tuple[str, str]] | None:
         return None
     run = scene.rockfall_simulation.run - 1
     value = {name: float(simulated_paths.figure(obj, name)[run]) for name in simulated_paths.FIGURES}
-    release = json.loads(obj[store.RELEASES])[int(value["release"])][0]
+    release = store.read_json(obj, store.RELEASES, [])[int(value["release"])][0]
     rows = [
         ("Model", find_model(model_of(obj)).title),
         ("Run", f"{run + 1} of {len(obj.data.curves)}"),
@@ -249,7 +249,7 @@ def scale_tops(scene: bpy.types.Scene) -> tuple[float, float]:
 def release_begins(scene: bpy.types.Scene, obj: bpy.types.Object) -> Array:
     """(r,) display time at which the blocks of each release start [s]."""
     offsets = timing.kept_offsets(scene)
-    rows = json.loads(obj[store.RELEASES])
+    rows = store.read_json(obj, store.RELEASES, [])
     return np.array([time_s - offsets[name] if name in offsets else 0.0 for _, name, time_s in rows])
 
 

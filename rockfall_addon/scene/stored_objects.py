@@ -35,6 +35,13 @@ class Kept:
     severity: Severity = "note"
 
 
+def _no_list(value: object, multiple: int) -> str:
+    """Why something is no list of numbers, so many or a multiple of it; empty where it is one."""
+    if getattr(value, "typecode", "") in ("d", "f", "i") and len(value) and not len(value) % multiple:
+        return ""
+    return "is no list of numbers" if multiple == 1 else f"is no list of {multiple} numbers each"
+
+
 def series(multiple: int, unknown: int | None = None) -> Check:
     """Finite numbers, so many or a multiple of it.
 
@@ -44,8 +51,8 @@ def series(multiple: int, unknown: int | None = None) -> Check:
     """
 
     def check(value: object) -> str:
-        if getattr(value, "typecode", "") not in ("d", "f", "i") or not len(value) or len(value) % multiple:
-            return "is no list of numbers" if multiple == 1 else f"is no list of {multiple} numbers each"
+        if problem := _no_list(value, multiple):
+            return problem
         rows = np.array(value, dtype=np.float64).reshape(-1, multiple)
         known = rows if unknown is None else np.delete(rows, unknown, axis=1)
         return "" if np.isfinite(known).all() else NOT_FINITE
@@ -55,9 +62,7 @@ def series(multiple: int, unknown: int | None = None) -> Check:
 
 def _pose_sigmas(value: object) -> str:
     """Standard deviations of poses: infinite where the background was not recognised."""
-    if getattr(value, "typecode", "") not in ("d", "f", "i") or not len(value) or len(value) % 2:
-        return "is no list of 2 numbers each"
-    return "" if (np.array(value) >= 0).all() else BEYOND
+    return _no_list(value, 2) or ("" if (np.array(value) >= 0).all() else BEYOND)
 
 
 def _text(value: object) -> str:

@@ -99,9 +99,9 @@ def apply(scene: bpy.types.Scene, camera: bpy.types.Object, solved: SolvedFrames
 
 def followed(camera: bpy.types.Object) -> dict | None:
     """What came out last: reference, frames, focal, turn_deg, features, residual_px, sigma_px, remarks."""
-    if store.FOLLOWED not in camera:
+    known = store.read_json(camera, store.FOLLOWED, None)
+    if known is None:
         return None
-    known = json.loads(camera[store.FOLLOWED])
     return known | {"remarks": from_plain(known.get("remarks", known.get("advice", ())))}  # "advice" of version 0.1.0
 
 

@@ -22,7 +22,6 @@ from .options import (
     models_as_asked,
     positive,
     terrain_as_asked,
-    terrain_inputs,
     whole,
 )
 from .progress import PrintedProgress, stopped_by_interrupt
@@ -168,6 +167,7 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ca
 def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Case:
     """The runs of a table of picks, or of releases and stops."""
     from ..analysis.measured_rebounds import measured_rebounds
+    from ..exchange.project import terrain_inputs
     from ..exchange.simulation_tables import read_releases
     from ..exchange.tables import read_picks
     from ..exchange.whole_run_tables import read_stops

@@ -47,7 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
                 advice="rockfall refine makes them from the tracks: give the project.toml that it writes",
             )
         surface = open_terrain(project)
-        picks = _chosen(read_project_picks(project, surface), arguments.trajectory)
+        picks, turned = read_project_picks(project, surface)
+        picks = _chosen(picks, arguments.trajectory)
         footage = _footage(project, surface, picks)
         progress("Reconstructing")
         result = reconstruct_project(project, surface, picks)
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         if any(course.residuals for course in courses):
             write_track_residuals(courses, folder / "track_residuals.csv")
             written.append("track_residuals.csv")
-        notes = [] if footage is None else list(footage.notes)
+        notes = [*turned, *([] if footage is None else footage.notes)]
         if not arguments.tables_only and is_there(FIGURES):
             progress("Drawing the figures")
             save_motion_figures(
@@ -94,7 +95,7 @@ def _footage(project: "Project", surface: "Surface | None", picks: "Picks") -> "
 
     if not any(video.camera is not None and video.track is not None for video in project.videos):
         return None
-    return name_trajectory(open_footage(project, picks.shift if surface is None else surface.shift), picks)
+    return name_trajectory(open_footage(project, surface, picks.shift), picks)
 
 
 def _scale(footage: "Footage") -> "FrameScale | None":

@@ -125,11 +125,6 @@ def add_terrain_files(group: "argparse._ActionsContainer", text: str) -> None:
     )
 
 
-def terrain_inputs(files: Sequence[str]) -> dict[str, Path]:
-    """The files of a terrain by the names that they have in a summary: numbered when they are several."""
-    return {f"terrain {i}" if len(files) > 1 else "terrain": Path(file) for i, file in enumerate(files, start=1)}
-
-
 def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     """How to read a terrain file."""
     group = parser.add_argument_group("reading the terrain")

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         project = read_project(arguments.project)
         how = _settings(project.refinement, arguments)
         surface = open_terrain(project)
-        footage = open_footage(project, None if surface is None else surface.shift)
+        footage = open_footage(project, surface)
         picks, notes = _picks(project, surface, footage)
         footage = name_trajectory(footage, picks)
         refined = refine_picks(
@@ -108,10 +108,13 @@ def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
     """The project's picks, or first ones from what was seen; with a sentence about these."""
     from ..exchange.footage import picks_from_footage
+    from ..exchange.opening import read_project_picks
     from ..exchange.tables import read_picks
 
     if project.picks is not None:
-        return read_picks(project.picks, footage.shift if surface is None else surface.shift), ()
+        if surface is None:
+            return read_picks(project.picks, footage.shift), ()
+        return read_project_picks(project, surface)
     names = sorted({name for video in footage.seen for name in video.sightings.trajectory.tolist()} - {""})
     alone = names[0] if len(names) == 1 else project.blocks[0].name if len(project.blocks) == 1 else "block"
     picks = picks_from_footage(project, surface, name=alone)

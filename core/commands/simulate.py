@@ -23,7 +23,6 @@ from .options import (
     positive,
     reading_as_asked,
     terrain_as_asked,
-    terrain_inputs,
     whole,
     whole_range,
 )
@@ -139,6 +138,7 @@ class _Asked(NamedTuple):
 
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
     """What the options say."""
+    from ..exchange.project import terrain_inputs
     from ..reconstruction.drag import Drag
     from ..terrain.readers import read_structure, read_tile_points
     from ..workflow.simulation import Scenario

@@ -32,8 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
         progress(f"Reading {arguments.project}")
         project = read_project(arguments.project)
         surface = open_terrain(project)
-        picks = read_project_picks(project, surface)
-        videos = read_marked_videos(project, picks.shift)
+        picks, notes = read_project_picks(project, surface)
+        videos, turned = read_marked_videos(project, surface, picks.shift)
         progress("Reconstructing")
         made = reconstruct_project(project, surface, picks)
         spins = measure_spins(made, videos, surface)
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_spins(spins.flights, folder / "spin.csv")
         write_picks(made.picks, folder / "picks.csv")
         write_impacts(made.impacts, folder / "impacts.csv")
-    for line in _summary(spins):
+    for line in (*notes, *turned, *_summary(spins)):
         print(line)
     print(f"Written: spin.csv, picks.csv, impacts.csv in {arguments.out}")
     return 0

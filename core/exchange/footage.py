@@ -15,9 +15,9 @@ from ..terrain.surface import Surface
 from ..vectors import Array, Indices
 from ..workflow.first_picks import first_picks
 from ..workflow.sightings import NO_EVENTS, NO_SIGHTINGS, SeenVideo
-from .cameras import CameraFile, read_camera
+from .cameras import CameraFile
 from .footage_tables import EventTable, Track, read_events, read_track
-from .opening import block_of
+from .opening import block_of, read_project_camera
 from .project import Project, VideoEntry
 
 MARGIN = 0.1
@@ -62,12 +62,15 @@ class Footage:
         return self.videos[0].camera.path.reference.shift
 
 
-def open_footage(project: Project, shift: GlobalShift | None = None, name: str = "") -> Footage:
+def open_footage(
+    project: Project, surface: Surface | None = None, shift: GlobalShift | None = None, name: str = ""
+) -> Footage:
     """Read the cameras and tracks of a project.
 
     Parameters
     ----------
-    shift : of the local frame (the terrain's); None takes the one proposed for the first camera.
+    surface : the project's terrain, in whose frame the cameras are.
+    shift : of the local frame where there is no terrain; None takes the one proposed for the first camera.
     name : of the trajectory, for tracks that name none.
 
     Raises
@@ -84,7 +87,9 @@ def open_footage(project: Project, shift: GlobalShift | None = None, name: str =
     )
     videos: list[ReadVideo] = []
     for entry in entries:
-        videos.append(_read(entry, shift, name, with_events=False))
+        video, turned = _read(entry, surface, shift, name, with_events=False)
+        videos.append(video)
+        notes += turned
         shift = videos[0].camera.path.reference.shift
     return Footage(tuple(videos), notes)
 
@@ -133,7 +138,7 @@ def picks_from_footage(project: Project, surface: Surface | None, *, name: str =
         )
     if surface is None:
         raise RockfallError('Picks can be made from events on a terrain only: add [terrain] file = "…" to the project.')
-    videos = [_read(entry, surface.shift, name, with_events=True) for entry in entries]
+    videos = [_read(entry, surface, None, name, with_events=True)[0] for entry in entries]
     tables = [table for video in videos for table in (video.track, video.events) if table is not None]
     names = {one for table in tables for one in table.trajectory.tolist()}
     found = first_picks(
@@ -173,9 +178,11 @@ def clock_of(entry: VideoEntry, frame: Indices, time_s: Array) -> Clock:
     return Clock(entry.offset_s, entry.drift, entry.origin_s, rate)
 
 
-def _read(entry: VideoEntry, shift: GlobalShift | None, name: str, *, with_events: bool) -> ReadVideo:
-    """The files of a video that has a camera, and a track or events."""
-    camera = read_camera(Path(str(entry.camera)), shift)
+def _read(
+    entry: VideoEntry, surface: Surface | None, shift: GlobalShift | None, name: str, *, with_events: bool
+) -> tuple[ReadVideo, tuple[str, ...]]:
+    """The files of a video that has a camera, and a track or events; and sentences on what was done to them."""
+    camera, turned = read_project_camera(Path(str(entry.camera)), surface, shift)
     track = None if entry.track is None else read_track(entry.track)
     events = read_events(entry.events) if with_events and entry.events is not None else None
     if track is not None:
@@ -184,7 +191,8 @@ def _read(entry: VideoEntry, shift: GlobalShift | None, name: str, *, with_event
     if events is not None:
         events = replace(events, trajectory=np.where(events.trajectory == "", name, events.trajectory))
     timed = next(table for table in (track, events) if table is not None)
-    return ReadVideo(entry, camera, track, events, clock_of(entry, timed.frame, timed.time_s))
+    read = ReadVideo(entry, camera, track, events, clock_of(entry, timed.frame, timed.time_s))
+    return read, tuple(f"{entry.name}: {note}" for note in turned)
 
 
 def _file_rate(entry: VideoEntry, frame: Indices, time_s: Array) -> float:

@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From project.toml to numbers: its terrain, its picks, and what is reconstructed from them."""
 
+from dataclasses import replace
+from pathlib import Path
 from typing import cast
 
+import numpy as np
+
 from ..errors import InputError
+from ..georeference import Z_UP, GlobalShift
 from ..reconstruction.block import Block
 from ..reconstruction.choices import FlightEnds
 from ..reconstruction.drag import Drag
 from ..reconstruction.picks import Picks
 from ..reconstruction.trajectory import Reconstruction, reconstruct
-from ..terrain.readers import read_terrain
+from ..remarks import Remark
+from ..terrain.opening import HowToRead
+from ..terrain.readers import read_tiles
 from ..terrain.surface import Surface
+from ..workflow.uprightness import turned_path, turned_picks
+from .cameras import CameraFile, read_camera
 from .project import Project
 from .tables import read_picks
 
@@ -26,8 +35,8 @@ def open_project(project: Project) -> tuple[Surface | None, Reconstruction]:
     return surface, reconstruct_project(project, surface)
 
 
-def read_project_picks(project: Project, surface: Surface | None) -> Picks:
-    """The project's picks, in the frame of its terrain.
+def read_project_picks(project: Project, surface: Surface | None) -> tuple[Picks, tuple[str, ...]]:
+    """The project's picks, in the frame of its terrain and as upright as it; and sentences on what was done to them.
 
     Raises
     ------
@@ -35,7 +44,29 @@ def read_project_picks(project: Project, surface: Surface | None) -> Picks:
     """
     if project.picks is None:
         raise InputError("The project names no table of picks", advice='Add [picks] file = "picks.csv" to it')
-    return read_picks(project.picks, None if surface is None else surface.shift)
+    return turned_picks(read_picks(project.picks, None if surface is None else surface.shift), surface)
+
+
+def read_project_camera(
+    file: Path, surface: Surface | None, shift: GlobalShift | None = None
+) -> tuple[CameraFile, tuple[str, ...]]:
+    """A camera of a project, in the frame of its terrain and as upright as it; and sentences on what was done to it.
+
+    Parameters
+    ----------
+    shift : of the local frame where there is no terrain; None takes that proposed for the camera.
+
+    Raises
+    ------
+    InputError : see `read_camera`.
+    """
+    read = read_camera(file, shift if surface is None else surface.shift)
+    path, notes = turned_path(read.path, surface)
+    if notes and read.pose_covariance is not None:
+        turn = np.eye(6)
+        turn[3:, 3:] = Z_UP
+        read = replace(read, pose_covariance=turn @ read.pose_covariance @ turn.T)
+    return replace(read, path=path), notes
 
 
 def reconstruct_project(project: Project, surface: Surface | None, picks: Picks | None = None) -> Reconstruction:
@@ -45,10 +76,11 @@ def reconstruct_project(project: Project, surface: Surface | None, picks: Picks 
     ------
     RockfallError : see `read_project_picks`; the picks do not lie on the terrain.
     """
+    notes: tuple[str, ...] = ()
     if picks is None:
-        picks = read_project_picks(project, surface)
+        picks, notes = read_project_picks(project, surface)
     how = project.reconstruction
-    return reconstruct(
+    made = reconstruct(
         picks,
         surface=surface,
         block=blocks_of(project, picks),
@@ -58,19 +90,20 @@ def reconstruct_project(project: Project, surface: Surface | None, picks: Picks 
         site=project.site.name,
         flights=cast(FlightEnds, how.flights),
     )
+    return replace(made, remarks=(*(Remark(note, about="picks") for note in notes), *made.remarks))
 
 
 def open_terrain(project: Project) -> Surface | None:
-    """The project's terrain, None when it has none.
+    """The project's terrain, of all its files; None when it has none.
 
     Raises
     ------
-    RockfallError : the file is bad.
+    RockfallError : a file is bad.
     """
     source = project.terrain
     if source is None:
         return None
-    return read_terrain(source.file, shift=source.global_shift, up=source.up, unit_m=source.unit_m)
+    return read_tiles(source.files, HowToRead(source.up, source.unit_m), shift=source.global_shift)
 
 
 def block_of(project: Project, trajectory: str) -> Block:

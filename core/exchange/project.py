@@ -5,7 +5,7 @@ Paths are relative to the file. Keys and sections that this version does not kno
 written again, so that an older Rockfall does not lose what a newer one has stored.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -36,25 +36,35 @@ class Site:
     extra: Extra = field(default_factory=dict)
 
 
+def terrain_inputs(files: Sequence[str | Path]) -> dict[str, Path]:
+    """The files of a terrain by the names that they have in a summary: numbered when they are several."""
+    return {f"terrain {i}" if len(files) > 1 else "terrain": Path(file) for i, file in enumerate(files, start=1)}
+
+
 @dataclass(frozen=True)
 class TerrainSource:
-    """The terrain file, and how its numbers are to be understood.
+    """The files of the terrain, and how their numbers are to be understood.
 
     Attributes
     ----------
-    file : the mesh, grid or point cloud.
+    files : meshes, grids or point clouds, one or more that join; `[terrain] file` is a name or a list of names.
     shift : the survey coordinates of the local origin; None lets the reader propose it.
     crs : coordinate reference system as the survey states it ("EPSG:2154"), empty when unknown.
-    up : the axis that points up in the file, one of `UP_AXES`.
-    unit_m : length of the file's unit [m].
+    up : the axis that points up in the files, one of `UP_AXES`.
+    unit_m : length of the files' unit [m].
     """
 
-    file: Path
+    files: tuple[Path, ...]
     shift: Vector3 | None = None
     crs: str = ""
     up: str = "auto"
     unit_m: float = 1.0
     extra: Extra = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> dict[str, Path]:
+        """The files by the names that they have in a summary."""
+        return terrain_inputs(self.files)
 
     @property
     def global_shift(self) -> GlobalShift | None:
@@ -281,7 +291,9 @@ def write_project(project: Project, path: str | Path) -> None:
     picks_extra = extra.pop("picks", {})
     content: dict[str, Any] = {"schema": SCHEMA, "site": _plain(project.site)}
     if project.terrain is not None:
-        content["terrain"] = _plain(project.terrain) | {"file": relative(project.terrain.file)}
+        files = [relative(file) for file in project.terrain.files]
+        stated = {key: value for key, value in _plain(project.terrain).items() if key != "files"}
+        content["terrain"] = {"file": files[0] if len(files) == 1 else files} | stated
     if project.picks is not None or picks_extra:
         content["picks"] = ({} if project.picks is None else {"file": relative(project.picks)}) | picks_extra
     content["block"] = {key: value for key, value in _plain(project.block).items() if key != "name"}
@@ -332,7 +344,7 @@ def _check_schema(top: TomlTable) -> None:
 
 def _terrain(table: TomlTable) -> TerrainSource:
     return TerrainSource(
-        file=table.path("file"),
+        files=table.paths("file"),
         shift=table.optional_vector("shift"),
         crs=table.text("crs", ""),
         up=table.choice("up", UP_AXES, "auto"),

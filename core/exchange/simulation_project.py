@@ -22,7 +22,8 @@ from ..simulation.polygons import Polygon
 from ..simulation.release import Releases
 from ..simulation.release_sources import in_polygon, on_line, on_points, steeper_than
 from ..terrain.cloud import Cloud
-from ..terrain.readers import read_points, read_structure
+from ..terrain.opening import HowToRead
+from ..terrain.readers import read_structure, read_tile_points
 from ..terrain.surface import Surface
 from ..workflow.simulation import ReleaseSource, Scenario
 from .opening import open_terrain, read_project_picks, reconstruct_project
@@ -62,7 +63,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
     entry = project.stated_simulation
     known = checked_parameters(project.extra["models"], file) if "models" in project.extra else {}
     models = entry.models or COMPARED
-    inputs = {"project": file, "terrain": source.file}
+    inputs = {"project": file, **source.inputs}
     drawing = any(find_model(name).draws_from_impacts for name in models)
     if drawing and entry.observed is not None:
         inputs["observed"] = entry.observed
@@ -78,14 +79,14 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
     how = project.reconstruction
     met: Surface | Cloud = terrain
     if entry.contact == "points":
-        met = read_points(source.file, shift=terrain.shift, up=source.up, unit_m=source.unit_m)
+        met = read_tile_points(source.files, HowToRead(source.up, source.unit_m), shift=terrain.shift)
     zones = None
     if entry.zones is not None:
         progress(f"Reading {entry.zones.file.name}", 0, 0)
         inputs["zones"] = entry.zones.file
         zones = open_zones(
             entry.zones.file, entry.zones.attribute, met, models,
-            terrain_files=[source.file], up=source.up, unit_m=source.unit_m,
+            terrain_files=source.files, up=source.up, unit_m=source.unit_m,
         )  # fmt: skip
     scenario = Scenario(
         met,
@@ -151,7 +152,7 @@ def placed_source(entry: SimulationEntry, block: BlockEntry) -> ReleaseSource:
 def _measured(project: Project, terrain: Surface, entry: ReleaseEntry) -> Reconstruction:
     if not entry.trajectory:
         return reconstruct_project(project, terrain)
-    picks = read_project_picks(project, terrain)
+    picks, _ = read_project_picks(project, terrain)
     onward = picks.trajectory == entry.trajectory
     if not onward.any():
         known = ", ".join(dict.fromkeys(picks.trajectory.tolist()))

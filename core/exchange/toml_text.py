@@ -176,7 +176,19 @@ class TomlTable:
 
     def path(self, key: str, anywhere: bool = False) -> Path:
         """A file; it must be there unless it may be `anywhere`."""
-        file = self._file.parent / self.text(key)
+        return self._file_of(key, self.text(key), anywhere)
+
+    def paths(self, key: str) -> tuple[Path, ...]:
+        """One file or several, as a text or a list of texts; all must be there."""
+        if not isinstance(self._content.get(key), list):
+            return (self.path(key),)
+        names = self.texts(key, "a file")
+        if not names or "" in names:
+            raise self.wrong(key, "names no file", "Give the name of one file, or a list of them")
+        return tuple(self._file_of(key, name) for name in names)
+
+    def _file_of(self, key: str, name: str, anywhere: bool = False) -> Path:
+        file = self._file.parent / name
         if not (anywhere or file.is_file()):
             raise self.wrong(key, f"names a file that is not there: {file}", "Paths are relative to the project file")
         return file

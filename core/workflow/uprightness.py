@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..camera.model import Camera
+from ..camera.model import Camera, project
 from ..camera.pairs import Pairs
+from ..camera.path import CameraPath
 from ..georeference import Z_UP, GlobalShift, z_up
 from ..reconstruction.picks import Picks
 from ..terrain.raycast import closest_points
@@ -15,6 +16,8 @@ from ..vectors import Array
 
 MUCH_NEARER = 4.0
 """Places belong to the terrain in the way in which they are so many times nearer to it."""
+LOOKED_AT = 2000
+"""So many points of the terrain tell whether a camera sees it."""
 
 
 def turned_picks(picks: Picks, surface: Surface | None) -> tuple[Picks, tuple[str, ...]]:
@@ -43,6 +46,28 @@ def turned_camera(camera: Camera) -> Camera:
     """A camera whose place and rotation have y up."""
     position = _turned(camera.position, camera.shift, camera.shift)
     return replace(camera, position=position, rotation=camera.rotation @ Z_UP.T)
+
+
+def turned_path(path: CameraPath, surface: Surface | None) -> tuple[CameraPath, tuple[str, ...]]:
+    """The same of a camera, which is turned if only so the terrain is in its picture."""
+    if surface is None or not surface.turned or _sees(path.reference, surface):
+        return path, ()
+    shift = path.reference.shift
+    turned = replace(
+        path,
+        reference=turned_camera(path.reference),
+        position=_turned(path.position, shift, shift),
+        rotation=path.rotation @ Z_UP.T,
+    )
+    if not _sees(turned.reference, surface):
+        return path, ()
+    return turned, ("The camera was turned from Y up to Z up with the terrain: only so it sees it.",)
+
+
+def _sees(camera: Camera, surface: Surface) -> bool:
+    some = surface.vertices[:: 1 + len(surface.vertices) // LOOKED_AT]
+    pixel = project(camera, camera.shift.to_local(surface.shift.to_survey(some)))
+    return bool(((pixel >= 0) & (pixel < (camera.width, camera.height))).all(axis=1).any())
 
 
 def _only_turned(surface: Surface, shift: GlobalShift, places: Array) -> bool:

@@ -34,6 +34,7 @@ from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
 from ...core.workflow.simulation import Zones
 from . import (
+    film_preset,
     fit,
     georeference,
     models,
@@ -82,7 +83,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     met, left_out = _structures(project, surface)
     shading = None if surface is None else shade(surface)
     known = surface.shift if surface is not None else None if result is None else result.picks.shift
-    found = project_videos.read_videos(project, known) if with_videos else []
+    found = project_videos.read_videos(project, surface, known) if with_videos else []
     cameras = [read.camera.path.reference.shift for read in found if read.camera is not None]
 
     names = [block.name for block in project.blocks] if result is None else result.picks.trajectory.tolist()
@@ -91,7 +92,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         georeference.write_shift(scene, shift)
     reconstruction.keep_settings(scene, project)
     scene[store.SITE_DESCRIPTION] = project.site.description
-    scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in project.render])
+    scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in film_preset.take(scene, project.render)])
     fit.forget(scene)
     for which, values in parameters.items():
         models.keep_parameters(scene, values, which)
@@ -149,7 +150,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
         if stated is not None:
             stated = replace(stated, structures=_write_structures(met, place))
-        source = TerrainSource(place / "terrain.ply", (shift.x, shift.y, shift.z), shift.crs, up="z")
+        source = TerrainSource((place / "terrain.ply",), (shift.x, shift.y, shift.z), shift.crs, up="z")
         parameters = {"A": models.parameters_of(scene), "B": fit.second_set(scene)}
         project = Project(
             site=Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, ""))),
@@ -159,7 +160,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             blocks=settings.blocks,
             reconstruction=settings.reconstruction,
             videos=project_videos.write_videos(scene, place),
-            render=tuple(_preset(values) for values in store.read_json(scene, store.RENDER_PRESETS, [])),
+            render=_presets(scene),
             simulation=stated,
             extra={MODEL_TABLES[which]: values for which, values in parameters.items() if values},
         )
@@ -191,8 +192,16 @@ def _zones(project: Project, surface: Surface | None) -> Zones | None:
         return None
     return open_zones(
         entry.zones.file, entry.zones.attribute, surface, entry.models or COMPARED,
-        terrain_files=[source.file], up=source.up, unit_m=source.unit_m,
+        terrain_files=source.files, up=source.up, unit_m=source.unit_m,
     )  # fmt: skip
+
+
+def _presets(scene: bpy.types.Scene) -> tuple[RenderPreset, ...]:
+    """Those of the project that was opened, and the film that the panel asks for."""
+    kept = [_preset(values) for values in store.read_json(scene, store.RENDER_PRESETS, [])]
+    if any(preset.name == film_preset.NAME for preset in kept):  # of which the panel cannot show all
+        return tuple(kept)
+    return (*kept, replace(film_preset.preset_of(scene), name=film_preset.NAME))
 
 
 def _preset(values: dict) -> RenderPreset:

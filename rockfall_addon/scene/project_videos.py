@@ -10,13 +10,15 @@ import bpy
 import numpy as np
 
 from ...core.camera.model import SIGMA_PX
-from ...core.exchange.cameras import CameraFile, read_camera, write_camera
+from ...core.exchange.cameras import CameraFile, write_camera
 from ...core.exchange.footage_tables import Track, read_track, write_track
+from ...core.exchange.opening import read_project_camera
 from ...core.exchange.project import Project, VideoEntry
 from ...core.exchange.spin_tables import read_spin_marks, write_spin_marks
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import Video, open_video
 from ...core.georeference import GlobalShift
+from ...core.terrain.surface import Surface
 from ...core.workflow.spins import SpinMarks
 from . import (
     camera_paths,
@@ -45,12 +47,12 @@ class ReadVideo:
     spin_marks: SpinMarks | None = None
 
 
-def read_videos(project: Project, shift: GlobalShift | None) -> list[ReadVideo]:
+def read_videos(project: Project, surface: Surface | None, shift: GlobalShift | None) -> list[ReadVideo]:
     """Read all that belongs to a project's videos; those whose frames nothing tells are left out.
 
     Parameters
     ----------
-    shift : of the terrain or the picks; None takes that of the first camera.
+    surface : the terrain. shift : of the picks where there is none; None takes that of the first camera.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def read_videos(project: Project, shift: GlobalShift | None) -> list[ReadVideo]:
     """
     found = []
     for entry in project.videos:
-        camera = None if entry.camera is None else read_camera(entry.camera, shift)
+        camera = None if entry.camera is None else read_project_camera(entry.camera, surface, shift)[0]
         shift = camera.path.reference.shift if camera is not None and shift is None else shift
         track = None if entry.track is None else read_track(entry.track)
         video = _video(entry, camera, track)

@@ -53,7 +53,7 @@ def load(names: Sequence[str] | None = None) -> Table:
     surface = open_terrain(known)
     assert surface is not None
     assert known.picks is not None
-    footage = open_footage(known, surface.shift)
+    footage = open_footage(known, surface)
     picks = read_picks(known.picks, surface.shift)
     seen, _ = pixels_of(footage.seen)
     if names is not None:

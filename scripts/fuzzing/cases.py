@@ -129,7 +129,7 @@ def _projects(terrain: bytes) -> dict[str, Case]:
 
     def opened(at: Path) -> object:
         project = read_project(at / "project.toml")
-        return read_project_picks(project, open_terrain(project))
+        return read_project_picks(project, open_terrain(project))[0]
 
     files = {"project.toml": examples.PROJECT, "terrain.ply": terrain, "picks.csv": examples.PICKS}
     return {"project": Case(files, ("project.toml",), opened), "project's picks": Case(files, ("picks.csv",), opened)}

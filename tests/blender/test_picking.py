@@ -317,7 +317,7 @@ def test_proposals_are_the_first_picks_of_the_same_project(site, part, tmp_path)
 
     size = dict.fromkeys(("d1_m", "d2_m", "d3_m"), 0.39)
     project = exchange.Project(
-        terrain=exchange.TerrainSource(DEMO / "terrain.ply", shift=tuple(ORIGIN)),
+        terrain=exchange.TerrainSource((DEMO / "terrain.ply",), shift=tuple(ORIGIN)),
         block=exchange.BlockEntry(**size),
         videos=part("rockfall_addon.scene.project_videos").write_videos(site, tmp_path),
     )

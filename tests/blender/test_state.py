@@ -134,6 +134,20 @@ def test_a_project_goes_out_and_comes_in_the_same(scene: bpy.types.Scene, part, 
     assert read.reconstruction.flights == "centres"
 
 
+def test_the_film_of_the_panel_goes_with_the_project(scene: bpy.types.Scene, part, tmp_path: Path) -> None:
+    scene.rockfall_film.size, scene.rockfall_film.engine, scene.rockfall_film.time_scale = "720p", "workbench", 0.25
+    scene.rockfall.playback = "REAL"
+    path, _ = part("rockfall_addon.scene.project").save_project(scene, tmp_path)
+    film = part("core.film.presets").find_preset(part("core.exchange.project").read_project(path), "film")
+    assert (film.width, film.height, film.engine, film.time_scale) == (1280, 720, "workbench", 0.25)
+    assert film.stagger_s is None
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(path)) == {"FINISHED"}
+    asked = bpy.context.scene.rockfall_film
+    assert (asked.size, asked.engine, asked.time_scale) == ("720p", "workbench", 0.25)
+    assert bpy.context.scene.rockfall.playback == "REAL"
+
+
 def test_the_command_line_takes_an_exported_project(scene: bpy.types.Scene, part, tmp_path: Path) -> None:
     out = tmp_path / "out"
     path, _ = part("rockfall_addon.scene.project").save_project(scene, out)

@@ -42,7 +42,7 @@ def project() -> Project:
 @pytest.fixture(scope="module")
 def surface(project: Project) -> Surface:
     assert project.terrain is not None
-    return read_terrain(project.terrain.file, shift=project.terrain.global_shift, up=project.terrain.up)
+    return read_terrain(project.terrain.files[0], shift=project.terrain.global_shift, up=project.terrain.up)
 
 
 @pytest.fixture(scope="module")

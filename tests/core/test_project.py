@@ -4,9 +4,10 @@
 import dataclasses
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rockfall.core.errors import InputError, RockfallError
-from rockfall.core.exchange.opening import open_project
+from rockfall.core.exchange.opening import open_project, open_terrain
 from rockfall.core.exchange.project import (
     BlockEntry,
     CameraPlacement,
@@ -104,7 +105,7 @@ def test_everything_is_read(folder: Path) -> None:
     project = read(folder, FULL)
     assert project.site.name == "Gully"
     assert project.terrain is not None
-    assert project.terrain.file == folder / "data" / "terrain.ply"
+    assert project.terrain.files == (folder / "data" / "terrain.ply",)
     shift = project.terrain.global_shift
     assert shift is not None
     assert (shift.x, shift.y, shift.z, shift.crs) == (2600000.1, 1200000.0, 1234.5678901234567, "EPSG:2056")
@@ -146,7 +147,7 @@ def test_unknown_keys_and_sections_survive_reading_and_writing(folder: Path) -> 
 def test_round_trip_of_doubles_is_exact(folder: Path) -> None:
     project = Project(
         site=Site("Ülschen “Süd”", "two\nlines"),
-        terrain=TerrainSource(folder / "data" / "terrain.ply", shift=(0.1 + 0.2, 1e-300, 2_600_000.000_000_1)),
+        terrain=TerrainSource((folder / "data" / "terrain.ply",), shift=(0.1 + 0.2, 1e-300, 2_600_000.000_000_1)),
         picks=folder / "picks.csv",
         blocks=(BlockEntry("a", 0.30000000000000004), BlockEntry("b", density_kgpm3=2650.1, shape="box")),
         render=(RenderPreset("film", stagger_s=1 / 3, fps=29.97),),
@@ -359,3 +360,29 @@ def test_bad_simulations_are_located(tmp_path: Path, old: str, new: str, problem
         read_project(path)
     assert problem in error.value.problem
     assert error.value.file == path
+
+
+def test_the_terrain_may_be_of_several_files(tmp_path: Path) -> None:
+    """Two halves of a slope in one project: one surface, and the list comes back as it was."""
+    for name, x in (("west", 0), ("east", 2)):
+        rows = [f"v {x + i} {j} {-i - x}" for i in (0, 2) for j in (0, 2)] + ["f 1 3 4", "f 1 4 2"]
+        (tmp_path / f"{name}.obj").write_text("\n".join(rows) + "\n")
+    (tmp_path / "picks.csv").touch()
+    project = read(tmp_path, 'schema = 1\n[terrain]\nfile = ["west.obj", "east.obj"]\n')
+    surface = open_terrain(project)
+    assert surface is not None
+    assert len(surface.faces) == 4
+    assert np.ptp(surface.vertices[:, 0]) == 4.0
+    write_project(project, tmp_path / "again.toml")
+    assert read_project(tmp_path / "again.toml") == project
+    assert "file = [" in (tmp_path / "again.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("files", "problem"),
+    [("[]", "names no file"), ('["west.obj", ""]', "names no file"), ('["gone.obj"]', "not there"), ("[3]", "is")],
+)
+def test_a_list_of_files_that_is_none_is_refused(tmp_path: Path, files: str, problem: str) -> None:
+    (tmp_path / "west.obj").touch()
+    with pytest.raises(InputError, match=problem):
+        read(tmp_path, f"schema = 1\n[terrain]\nfile = {files}\n")

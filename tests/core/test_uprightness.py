@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, project
 from rockfall.core.camera.pairs import Pairs
+from rockfall.core.camera.path import fixed
 from rockfall.core.cli import main
-from rockfall.core.exchange.tables import read_impacts
+from rockfall.core.exchange.cameras import write_camera
+from rockfall.core.exchange.opening import open_project, read_project_camera
+from rockfall.core.exchange.project import read_project
+from rockfall.core.exchange.tables import read_impacts, read_picks
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.opening import HowToRead
 from rockfall.core.terrain.readers import read_terrain, read_tiles
@@ -94,3 +98,41 @@ def test_pairs_and_cameras_are_turned_so_that_they_see_the_same(site):
     local = surface.vertices[:200]
     np.testing.assert_allclose(project(turned_camera(there), local), project(camera, local), atol=1e-8)
     np.testing.assert_allclose(project(there, y_up(local)), project(camera, local), atol=1e-8)
+
+
+@pytest.mark.parametrize("kept", ["y", "z"])
+def test_a_project_reads_its_picks_and_cameras_as_upright_as_its_terrain(site, tmp_path, kept):
+    """All of a project with y up, and one whose terrain alone has it, are what they are with z up."""
+    camera = Camera(1280, 720, 900, 900, 640, 360, shift=GlobalShift(EAST, NORTH, UP))
+    camera = replace(camera, position=np.array([70.0, 20.0, 30.0]), rotation=looking_west())
+    there = replace(camera, shift=GlobalShift(EAST, UP, -NORTH))
+    there = replace(there, position=y_up(camera.position[None])[0], rotation=y_up(camera.rotation))
+    spread = np.diag([1e-6, 2e-6, 3e-6, 1e-2, 4e-2, 9e-2])
+    turn = np.eye(6)
+    turn[3:, 3:] = y_up(np.eye(3)).T
+    for name, each, covariance in (("z", camera, spread), ("y", there, turn @ spread @ turn.T)):
+        write_camera(tmp_path / f"camera_{name}.toml", fixed(each), pose_covariance=covariance)
+    (tmp_path / "project.toml").write_text(
+        f'schema = 1\n[terrain]\nfile = "{(site / "y.obj").as_posix()}"\nup = "y"\n'
+        f'[picks]\nfile = "{(site / f"picks_{kept}.csv").as_posix()}"\n'
+    )
+    read = read_project(tmp_path / "project.toml")
+    surface, made = open_project(read)
+    right = read_terrain(site / "z.obj")
+    picks = read_picks(site / "picks_z.csv", right.shift)
+    np.testing.assert_allclose(
+        made.picks.shift.to_survey(made.picks.position), picks.shift.to_survey(picks.position), atol=1e-6
+    )
+    assert any("The picks were turned" in remark.text for remark in made.remarks) == (kept == "y")
+    found, said = read_project_camera(tmp_path / f"camera_{kept}.toml", surface)
+    assert bool(said) == (kept == "y")
+    pixel = project(found.path.reference, surface.vertices)
+    expected = project(camera, camera.shift.to_local(surface.shift.to_survey(surface.vertices)))
+    assert np.isfinite(pixel).all()
+    np.testing.assert_allclose(pixel, expected, atol=1e-6)
+    np.testing.assert_allclose(found.pose_covariance, spread, atol=1e-12)
+
+
+def looking_west():
+    """(3, 3) from the world to a camera that looks along −x, with z up in the picture."""
+    return np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])

@@ -6,12 +6,13 @@ import bpy
 from ....core.errors import RockfallError
 from ....core.progress import Progress
 from ...scene import store
+from ...scene.film_preset import preset_of
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
 from . import beside, dressing, remembered, stopwatch, up_to_date
 from .engine import quickest_engine
-from .properties import file_of, graphs_of, preset_of
+from .properties import file_of, graphs_of
 
 
 class ROCKFALL_OT_set_up_film(bpy.types.Operator):

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What film is wanted. All of it is in the .blend."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 
-from ....core.exchange.project import RenderPreset
 from ....core.film.files import NAME, SUFFIX, film_file
 from ....core.film.job import GraphKind
 from ....core.film.presets import BUILT_IN
-from ...scene import store, timing
+from ...scene import store
 from ...view.from_file import last_folder
 
 
@@ -72,18 +70,6 @@ class FilmSettings(bpy.types.PropertyGroup):
 def file_of(scene: bpy.types.Scene) -> Path:
     """Where the film goes; the name is never empty."""
     return _whole(scene.rockfall_film.file)
-
-
-def preset_of(scene: bpy.types.Scene) -> RenderPreset:
-    """The film that is wanted, at the scene's frame rate and with its delay between blocks."""
-    wanted, settings = scene.rockfall_film, scene.rockfall
-    return replace(
-        next(preset for preset in BUILT_IN if preset.name == wanted.size),
-        fps=timing.frame_rate(scene),
-        engine=wanted.engine,
-        stagger_s=settings.stagger_s if settings.playback == "TOGETHER" else None,
-        time_scale=store.double(wanted.time_scale),
-    )
 
 
 def graphs_of(scene: bpy.types.Scene) -> GraphKind | None:

@@ -6,9 +6,10 @@ import bpy
 from ....core.errors import InputError
 from ....core.film.job import AS_SET_UP, FilmJob
 from ...scene import migration, store
+from ...scene.film_preset import preset_of
 from . import dressing, remembered, up_to_date
 from .engine import engine_of, quickest_engine
-from .properties import graphs_of, preset_of
+from .properties import graphs_of
 
 
 def open_film(job: FilmJob) -> bpy.types.Scene:

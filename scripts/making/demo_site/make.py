@@ -138,7 +138,7 @@ def project(observed: list[campaign.Observed], folder: Path) -> Project:
         site=Site(
             "Synthetic gully", "Made by a script after the Riou Bourdoux gully of Noël et al. 2018; no real place"
         ),
-        terrain=TerrainSource(folder / "terrain.ply", SHIFT, terrain.CRS, up="z"),
+        terrain=TerrainSource((folder / "terrain.ply",), SHIFT, terrain.CRS, up="z"),
         picks=folder / "picks.csv",
         block=BlockEntry(),
         blocks=tuple(BlockEntry(one.name, *one.diameters.tolist()) for one in observed),

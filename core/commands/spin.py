@@ -61,7 +61,7 @@ def _summary(spins: "MeasuredSpins") -> list[str]:
 
 
 def _measured(flight: "FlightSpin") -> str:
-    from ..workflow.spins import AXIS_WORDS
+    from ..workflow.spin_marks import AXIS_WORDS
 
     if flight.spin is None:
         return "not known."

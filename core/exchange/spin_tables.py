@@ -13,7 +13,8 @@ from ..reading import reader
 from ..reconstruction.refinement.views import View
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Names
-from ..workflow.spins import AXES, AXIS_WORDS, FlightSpin, MarkedVideo, SpinMarks
+from ..workflow.spin_marks import AXES, AXIS_WORDS, MarkedVideo, SpinMarks
+from ..workflow.spins import FlightSpin
 from .csv_text import read_table
 from .footage import clock_of
 from .footage_tables import PIXEL, frames_of, positive_of, whole_numbers

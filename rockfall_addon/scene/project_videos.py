@@ -19,7 +19,7 @@ from ...core.footage.clock import Clock, clock_for
 from ...core.footage.video import Video, open_video
 from ...core.georeference import GlobalShift
 from ...core.terrain.surface import Surface
-from ...core.workflow.spins import SpinMarks
+from ...core.workflow.spin_marks import SpinMarks
 from . import (
     camera_paths,
     clocks,

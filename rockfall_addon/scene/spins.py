@@ -19,7 +19,8 @@ from ...core.reconstruction.refinement.views import View
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.vectors import Array
 from ...core.workflow.sightings import joined
-from ...core.workflow.spins import AXES, Axis, FlightSpin, MarkedVideo, MeasuredSpins, SpinMarks, measure_spins
+from ...core.workflow.spin_marks import AXES, Axis, MarkedVideo, SpinMarks
+from ...core.workflow.spins import FlightSpin, MeasuredSpins, measure_spins
 from . import camera_paths, clocks, named_rows, picks, pictures, reconstruction, store, videos
 
 COLUMNS = 7  # frame, video time, u, v, sigma, number of the axis, turns per second that were counted

@@ -16,7 +16,7 @@ from . import (
     places,
     problems,
     proposal,
-    set_aside,
+    set_aside_words,
     sightings,
     store,
     terrain,
@@ -48,7 +48,8 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if terrain.displaced(scene):
         sentence = "The scan was moved, so nothing on it fits any more. Put it back; panel Terrain says how far it is."
         return NextStep(sentence, ("rockfall.put_terrain_back",))
-    apart = [each for each in problems.remarks(scene) if each.about == set_aside.ABOUT and each.severity == "problem"]
+    said = [remark for remark in problems.remarks(scene) if remark.about == set_aside_words.ABOUT]
+    apart = [remark for remark in said if remark.severity == "problem"]
     if apart:
         actions = ("rockfall.recover_picks", "rockfall.select_set_aside", "rockfall.remove_set_aside")
         return NextStep(apart[0].text, actions)

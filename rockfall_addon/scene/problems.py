@@ -11,7 +11,7 @@ import numpy as np
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, from_plain, from_text, gravest_first, to_plain, to_text
 from ...core.workflow.noticed import impossible_sizes
-from . import fingerprints, migration, picks, set_aside, store, timing
+from . import fingerprints, migration, picks, set_aside_words, store, timing
 
 MOST = 6
 BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon
@@ -122,7 +122,7 @@ def forget() -> None:
 
 
 def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
-    said = set_aside.remarks(scene)
+    said = set_aside_words.remarks(scene)
     if not said and store.HAS_SET_ASIDE in scene:
         del scene[store.HAS_SET_ASIDE]
     scale = scene.unit_settings.scale_length

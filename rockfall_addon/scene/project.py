@@ -41,7 +41,7 @@ from . import (
     picks,
     project_videos,
     reconstruction,
-    set_aside,
+    set_aside_words,
     simulated_sources,
     simulated_zones,
     simulation_setup,
@@ -127,7 +127,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
     RockfallError : there are neither picks nor terrain, no trajectory can be used, or the folder cannot be written.
     """
     surface, shift = reconstruction.ground(scene), georeference.read_shift(scene)
-    table, left_out = None, tuple(set_aside.grave(scene))
+    table, left_out = None, tuple(set_aside_words.grave(scene))
     if picks.objects_of(scene):
         table, left_out = reconstruction.good_picks(scene)
     if table is None and surface is None:

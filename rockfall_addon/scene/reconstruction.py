@@ -18,7 +18,18 @@ from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.remarks import Remark
 from ...core.terrain.surface import Surface
-from . import fingerprints, migration, models, own_blocks, problems, set_aside, simulation, store, terrain, trajectories
+from . import (
+    fingerprints,
+    migration,
+    models,
+    own_blocks,
+    problems,
+    set_aside_words,
+    simulation,
+    store,
+    terrain,
+    trajectories,
+)
 from . import picks as pick_objects
 from .stored_values import block_problem
 
@@ -73,7 +84,7 @@ def good_picks(scene: bpy.types.Scene) -> tuple[Picks, tuple[Remark, ...]]:
 
 def _good(scene: bpy.types.Scene) -> tuple[Picks, Reconstruction, tuple[Remark, ...]]:
     objects = pick_objects.ordered(scene, pick_objects.objects_of(scene))
-    surface, said = ground(scene), tuple(set_aside.grave(scene))
+    surface, said = ground(scene), tuple(set_aside_words.grave(scene))
 
     def together(members: Sequence[bpy.types.Object]) -> tuple[Picks, Reconstruction]:
         picks = pick_objects.read(scene, members)

@@ -12,12 +12,9 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import bpy
 
-from ...core.errors import InputError, readable
-from ...core.remarks import Remark, gravest_first
 from . import keyframes, store
 from .stored_objects import BY_ROLE, incomplete
 from .stored_values import (
-    AGAIN,
     BESIDE_A_PICK,
     OF_A_PICK,
     OF_KEYS,
@@ -28,23 +25,11 @@ from .stored_values import (
     model_problem,
 )
 
-MOST_NAMED = 4
-"""Picks that are named one by one; of further ones the number is said."""
-MOST_OF_VALUE, MOST_OF_NAME = 40, 60
 PARAMETERS = (store.MODEL_PARAMETERS, store.OTHER_PARAMETERS)
 ASIDE = "_set_aside"
 """Behind the role of what is set aside."""
 SUFFIX = " (set aside)"
 """Behind the names of the picks' objects, so that the outliner shows it."""
-ABOUT = "set aside"
-"""What all remarks of here are about."""
-WORDS = {
-    store.TRAJECTORY: "trajectory",
-    store.TIME: "time",
-    store.POSITION: "place",
-    store.KIND: "kind",
-    store.STATUS: "status",
-}
 
 
 def look(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> set[str]:
@@ -63,7 +48,7 @@ def look(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> set[str]
     for obj in (obj for name in asked for obj in store.of_role(scene, store.PICK_ROLE, name)):
         values = dict(obj.items())  # one by one they take twice as long
         there = there or store.SET_ASIDE in values
-        if _wrong(values):
+        if wrong(values):
             obj[store.ROLE] = store.SET_ASIDE_ROLE
             obj.name = f"{obj.name.removesuffix(SUFFIX)}{SUFFIX}"
             changed.add(trajectory_of(obj))
@@ -75,7 +60,7 @@ def look(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> set[str]
             stale.add(trajectory_of(obj))
     for obj in waiting:
         values = dict(obj.items())
-        if not _wrong(values):
+        if not wrong(values):
             obj[store.ROLE], obj.name = store.PICK_ROLE, obj.name.removesuffix(SUFFIX)
             _put_away(obj, values, BESIDE_A_PICK)
             changed.add(trajectory_of(obj))
@@ -130,7 +115,7 @@ def _look_at_objects(scene: bpy.types.Scene) -> bool:
     return found
 
 
-def _others(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+def others(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Objects of other roles than picks that are set aside."""
     return [obj for role in BY_ROLE for obj in store.with_role(scene, f"{role}{ASIDE}")]
 
@@ -148,46 +133,18 @@ def bad_blocks(scene: bpy.types.Scene) -> dict[str, str]:
     return {name: problem for name, values in own.items() if (problem := block_problem(values))}
 
 
-def remarks(scene: bpy.types.Scene) -> list[Remark]:
-    """What is set aside and why, and what to do; the gravest first."""
-    if not scene.get(store.HAS_SET_ASIDE):
-        return []
-    apart = of_picks(scene)
-    said = [Remark(_of_pick(obj), "problem", ABOUT) for obj in apart[:MOST_NAMED]]
-    if len(apart) > MOST_NAMED:
-        text = f"{len(apart) - MOST_NAMED} more picks are set aside: select them to see why."
-        said.append(Remark(text, "problem", ABOUT))
-    said += [_of_other(obj) for obj in _others(scene)[:MOST_NAMED]]
-    return gravest_first([*said, *_of_values(scene), *_of_scene(scene)])
-
-
-def grave(scene: bpy.types.Scene) -> list[Remark]:
-    """Those of the remarks that what is exported depends on.
-
-    Raises
-    ------
-    InputError : the origin of the survey coordinates is not known.
-    """
-    if store.SHIFT not in scene and store.SHIFT in dict(_aside(scene)):
-        raise InputError(
-            "The global shift of the scene cannot be read, so its survey coordinates are not known",
-            advice=f"Give it again as {store.SHIFT} in Scene Properties > Custom Properties, or import all anew",
-        )
-    return [remark for remark in remarks(scene) if remark.severity in ("warning", "problem")]
-
-
 def objects_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """All objects that are set aside, or have a value that is."""
-    having = [holder for holder in _holders(scene) if isinstance(holder, bpy.types.Object)]
-    return list(dict.fromkeys([*of_picks(scene), *_others(scene), *having]))
+    having = [holder for holder in holders(scene) if isinstance(holder, bpy.types.Object)]
+    return list(dict.fromkeys([*of_picks(scene), *others(scene), *having]))
 
 
 def remove(scene: bpy.types.Scene) -> int:
     """Delete all that is set aside; returns how many picks and values there were."""
-    apart = of_picks(scene) + _others(scene)
+    apart = of_picks(scene) + others(scene)
     removed = len(apart)
     store.remove_objects(apart)
-    for holder in _holders(scene):
+    for holder in holders(scene):
         removed += len(holder[store.SET_ASIDE])
         del holder[store.SET_ASIDE]
     return removed
@@ -199,7 +156,7 @@ def keep(holder: bpy.types.ID, key: str) -> None:
         _keep(holder, key, holder[key])
 
 
-def _wrong(values: Mapping[str, object]) -> tuple[str, str] | None:
+def wrong(values: Mapping[str, object]) -> tuple[str, str] | None:
     """Of what a pick holds, the first key that makes it no pick, and what is wrong with it."""
     for key, check in OF_A_PICK.items():
         problem = check(values.get(key))
@@ -227,15 +184,15 @@ def _keep(holder: bpy.types.ID, key: str, value: object) -> None:
     while free in there:
         number += 1
         free = f"{key} {number}"
-    holder[store.SET_ASIDE] = there | {free: _plain(value)}
+    holder[store.SET_ASIDE] = there | {free: plain(value)}
 
 
-def _plain(value: object) -> object:
+def plain(value: object) -> object:
     """An ID property as it can be assigned again."""
     for way in ("to_dict", "to_list"):
         if hasattr(value, way):
             return getattr(value, way)()
-    return [_plain(each) for each in value] if isinstance(value, list) else value
+    return [plain(each) for each in value] if isinstance(value, list) else value
 
 
 def _put_back(obj: bpy.types.Object) -> bool:
@@ -275,7 +232,7 @@ def _compute_again(scene: bpy.types.Scene, names: set[str]) -> None:
         scene[store.SHOWN] = json.dumps({name: text for name, text in prints.items() if name not in names})
 
 
-def _holders(scene: bpy.types.Scene) -> Iterator[bpy.types.ID]:
+def holders(scene: bpy.types.Scene) -> Iterator[bpy.types.ID]:
     """All that keeps values that are set aside."""
     roles = (store.PICK_ROLE, store.SET_ASIDE_ROLE, *BY_ROLE)
     objects = [obj for found in store.by_role(scene, *roles) for obj in found]
@@ -284,76 +241,6 @@ def _holders(scene: bpy.types.Scene) -> Iterator[bpy.types.ID]:
             yield holder
 
 
-def _of_pick(obj: bpy.types.Object) -> str:
-    name, (key, problem) = trajectory_of(obj), _wrong(dict(obj.items())) or ("", "")
-    goes_on = f"Trajectory {readable(name, MOST_OF_NAME)} goes without it" if name else "It is of no trajectory"
-    return (
-        f"Set aside: the {WORDS[key]} of {readable(obj.name.removesuffix(SUFFIX), MOST_OF_NAME)} "
-        f"{_said(obj.get(key), problem)}. {goes_on}: recover it from its marker, or correct its custom property {key}."
-    )
-
-
-def _of_other(obj: bpy.types.Object) -> Remark:
-    kept = BY_ROLE[obj[store.ROLE].removesuffix(ASIDE)]
-    key, problem = next((key, said) for key, check in kept.needed.items() if (said := check(obj.get(key))))
-    name = readable(obj.name.removesuffix(SUFFIX), MOST_OF_NAME)
-    text = f"Set aside: {name}, as its {key} {_said(obj.get(key), problem)}. {kept.do}, or correct the custom property."
-    return Remark(text, kept.severity, ABOUT)
-
-
-def _of_values(scene: bpy.types.Scene) -> Iterator[Remark]:
-    """Of picks and keys."""
-    found = [(holder, key, value) for holder in _holders(scene) if holder != scene for key, value in _aside(holder)]
-    for holder, key, value in found[:MOST_NAMED]:
-        name, check = key.split(" ")[0], _checks(holder)
-        said = _said(value, check[name](value)) if name in check else ""
-        again = name in holder
-        text = f"{key} of {readable(holder.name, MOST_OF_NAME)} {said} and is set aside: "
-        text += "it has another value now." if again else "it goes without."
-        yield Remark(text, "note" if again else "warning", ABOUT)
-    if len(found) > MOST_NAMED:
-        text = f"{len(found) - MOST_NAMED} more values are set aside: see the custom properties {store.SET_ASIDE}."
-        yield Remark(text, "warning", ABOUT)
-
-
-def _of_scene(scene: bpy.types.Scene) -> Iterator[Remark]:
-    for key, value in _aside(scene):
-        name = key.split(" ")[0]
-        if name not in OF_THE_SCENE:
-            continue
-        check, so = OF_THE_SCENE[name]
-        problem = check(value)
-        if not problem and name in PARAMETERS:  # single models of it
-            bad = json.loads(str(value))
-            problem = " ".join(model_problem(model, values) for model, values in bad.items())
-            yield Remark(f"{readable(problem, 200)} The defaults of {', '.join(bad)} are used.", "warning", ABOUT)
-            continue
-        if name == store.SHIFT and name in scene:
-            so = "it was taken from the picks"
-        elif name in scene and so != AGAIN:
-            so = "there is another value now"
-        grave = name not in scene and so != AGAIN
-        text = f"{name} of the scene {_said(value, problem)} and is set aside: {so}."
-        text += " Correct it in Scene Properties > Custom Properties." if grave else ""
-        yield Remark(text, "problem" if grave and name in GRAVE else "warning" if grave else "note", ABOUT)
-
-
-GRAVE = (store.SHIFT, store.BLOCKS)
-"""Of the scene, without which numbers or places may be wrong."""
-
-
-def _checks(holder: bpy.types.ID) -> Mapping[str, Check]:
-    """How the values of an object or an action are checked."""
-    kept = BY_ROLE.get(holder.get(store.ROLE, ""))
-    return kept.beside if kept is not None else {**OF_A_PICK, **BESIDE_A_PICK, **OF_KEYS}
-
-
-def _aside(holder: bpy.types.ID) -> list[tuple[str, object]]:
+def aside(holder: bpy.types.ID) -> list[tuple[str, object]]:
+    """Keys and values that are set aside of an object, an action or the scene."""
     return list(holder[store.SET_ASIDE].items()) if store.SET_ASIDE in holder else []
-
-
-def _said(value: object, problem: str) -> str:
-    """A value in few letters, and what is wrong with it."""
-    if value is None:
-        return "is missing"
-    return f"({readable(repr(_plain(value)), MOST_OF_VALUE)}) {problem or 'could not be used'}"

@@ -15,7 +15,7 @@ import argparse
 import csv
 import statistics
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +30,7 @@ from rockfall.core.camera.model import (
 from rockfall.core.camera.path import CameraPath
 from rockfall.core.camera.resection.resect import resect
 from rockfall.core.footage.clock import Clock
-from rockfall.core.georeference import GlobalShift
-from rockfall.core.reconstruction.block import Block
+from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.placement import terrain_normals
 from rockfall.core.reconstruction.refinement.deviations import velocity_rows
@@ -44,26 +43,16 @@ from rockfall.core.terrain.raycast import cast_rays, closest_points
 from rockfall.core.terrain.surface import Surface
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import least_squares
+from synthetic_falls import BLOCK, GRAVITY, GRID, GRID_STEP_M, NONE, RADIUS, SIGMA_TERRAIN, Air, Fall, fall, rough_slope
 
-GRAVITY = 9.81
-BLOCK = Block()
-RADIUS = BLOCK.radius_m
-DIP = np.radians(38.0)
-SIGMA_TERRAIN, SIGMA_TRACK, SIGMA_PICK, SIGMA_STEADY = 0.02, 1.5, 3.0, 0.2
+SIGMA_TRACK, SIGMA_PICK, SIGMA_STEADY = 1.5, 3.0, 0.2
 SIGMA_AIM = 0.15
 FILL = 0.7
-
-
-@dataclass(frozen=True, eq=False)
-class Fall:
-    """A true trajectory: n contacts with the centre, the contact point, times, velocities and R_N (NaN at the ends)."""
-
-    centre: np.ndarray
-    contact: np.ndarray
-    time_s: np.ndarray
-    v1: np.ndarray
-    v2: np.ndarray
-    rn: np.ndarray
+TERRAIN, CAMERA, SHUTTER = ("terrain",), ("camera",), ("rolling shutter",)
+AIR = ("drag", "lift", "acceleration")
+ROCK_DRAG = Drag().per_metre(BLOCK)
+MAGNUS = 0.15
+"""Acceleration by the speed [1/s], up to: a ball's, which spins with its velocity over its radius."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +80,41 @@ class Case:
     """Of the first camera, from the fall line."""
     memory: float = 0.0
     """Correlation of the tracker's noise from one frame to the next."""
+    wrong: "Wrong" = field(default_factory=lambda: Wrong())
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """What the program is not told, or told wrongly.
+
+    Attributes
+    ----------
+    terrain_m : standard deviation of smooth errors of the terrain [m]; smooth_m over how far they are alike [m].
+    raised_m : by how much the terrain is too high everywhere [m].
+    lifted_m : by how much the cameras are too high [m]; their poses are given by hand then, without a covariance.
+    readout_s : of the rolling shutter [s].
+    air : what acts on the blocks.
+    cause : words of the warning that names the cause; any of them will do.
+    """
+
+    terrain_m: float = 0.0
+    smooth_m: float = 4.0
+    raised_m: float = 0.0
+    lifted_m: float = 0.0
+    readout_s: float = 0.0
+    air: Air = NONE
+    cause: tuple[str, ...] = ()
+
+    def terrain(self, surface: Surface, rng: np.random.Generator) -> Surface:
+        """The terrain that the program is given."""
+        if not (self.terrain_m or self.raised_m):
+            return surface
+        vertices = surface.vertices.reshape(*GRID, 3).copy()
+        if self.terrain_m:
+            noise = gaussian_filter(rng.normal(size=GRID), self.smooth_m / GRID_STEP_M)
+            vertices[:, :, 2] += self.terrain_m * noise / noise.std()
+        vertices[:, :, 2] += self.raised_m
+        return Surface(vertices.reshape(-1, 3), surface.faces, surface.shift, surface.name)
 
 
 CASES = (
@@ -104,98 +128,24 @@ CASES = (
     Case("4K, 30 Hz, 150 m, one view along the slope", 3840, 2160, 30.0, 150.0, 1, azimuth_deg=(80.0, 100.0)),
     Case("4K, 30 Hz, 150 m, one view, noise correlated by 0.9", 3840, 2160, 30.0, 150.0, 1, memory=0.9),
     Case("4K, 30 Hz, 150 m, two views, noise correlated by 0.9", 3840, 2160, 30.0, 150.0, 2, memory=0.9),
-)
-
-
-def rough_slope(rng: np.random.Generator) -> Surface:
-    """A slope of 38° towards +x, with humps of metres and stones of decimetres; points 0.4 m apart."""
-    step, nx, ny = 0.4, 190, 110
-    x, y = np.meshgrid(np.arange(nx) * step, (np.arange(ny) - ny / 2) * step, indexing="ij")
-    rough = sum(
-        height * noise / noise.std()
-        for height, noise in (
-            (size, gaussian_filter(rng.normal(size=(nx, ny)), width))
-            for size, width in ((0.25, 6), (0.08, 2), (0.03, 0.7))
+    *(
+        Case(f"{'two views' if views == 2 else 'one view'}, {name}", 3840, 2160, 30.0, 150.0, views, wrong=wrong)
+        for name, views, wrong in (
+            ("terrain wrong by 20 cm", 1, Wrong(terrain_m=0.2, cause=TERRAIN)),
+            ("terrain wrong by 20 cm", 2, Wrong(terrain_m=0.2, cause=TERRAIN)),
+            ("terrain wrong by 20 cm over 12 m", 1, Wrong(terrain_m=0.2, smooth_m=12.0, cause=TERRAIN)),
+            ("terrain 20 cm too high", 1, Wrong(raised_m=0.2, cause=TERRAIN)),
+            ("camera 0.3 m too high", 1, Wrong(lifted_m=0.3, cause=CAMERA)),
+            ("rolling shutter of 10 ms", 1, Wrong(readout_s=0.01, cause=SHUTTER)),
+            ("rolling shutter of 20 ms", 1, Wrong(readout_s=0.02, cause=SHUTTER)),
+            ("rolling shutter of 30 ms", 1, Wrong(readout_s=0.03, cause=SHUTTER)),
+            ("rolling shutter of 20 ms", 2, Wrong(readout_s=0.02, cause=SHUTTER)),
+            ("drag not modelled", 1, Wrong(air=Air(drag_per_m=ROCK_DRAG), cause=AIR)),
+            ("Magnus force", 1, Wrong(air=Air(lift_per_s=MAGNUS), cause=AIR)),
+            ("Magnus force", 2, Wrong(air=Air(lift_per_s=MAGNUS), cause=AIR)),
         )
-    )
-    vertices = np.stack([x, y, -np.tan(DIP) * x + rough], axis=-1).reshape(-1, 3)
-    corner = (np.arange(nx - 1)[:, None] * ny + np.arange(ny - 1)).ravel()
-    faces = np.concatenate(
-        [np.stack([corner, corner + ny, corner + ny + 1], 1), np.stack([corner, corner + ny + 1, corner + 1], 1)]
-    )
-    return Surface(vertices, faces.astype(np.int32), GlobalShift(), "rough slope")
-
-
-def flown(centre: np.ndarray, velocity: np.ndarray, elapsed: np.ndarray) -> np.ndarray:
-    """Places along a parabola."""
-    return centre + np.outer(elapsed, velocity) - np.outer(elapsed**2, [0, 0, GRAVITY / 2])
-
-
-def next_contact(surface: Surface, centre: np.ndarray, velocity: np.ndarray, reach: float) -> float:
-    """When the sphere's centre comes within `reach` of the terrain again; NaN if not within 1.6 s."""
-
-    def distance(elapsed: np.ndarray) -> np.ndarray:
-        places = flown(centre, velocity, elapsed)
-        closest = closest_points(surface, places)
-        side = np.einsum("ni,ni->n", places - closest.point, surface.face_normals[closest.face])
-        return np.where(side < 0, -closest.distance, closest.distance) - reach
-
-    elapsed = np.arange(0.004, 1.6, 0.004)
-    above = distance(elapsed)
-    left = np.flatnonzero(above > 0.03)
-    if not left.size:
-        return np.nan
-    hit = np.flatnonzero(above[left[0] :] < 0)
-    if not hit.size:
-        return np.nan
-    high = elapsed[left[0] + hit[0]]
-    low = high - 0.004
-    for _ in range(8):
-        trial = np.linspace(low, high, 9)
-        under = int(np.argmax(distance(trial) < 0))
-        low, high = trial[under - 1], trial[under]
-    return float((low + high) / 2)
-
-
-def fall(surface: Surface, rng: np.random.Generator) -> Fall:
-    """A random fall of 6 to 10 contacts; flights of 0.3 s and more, 4 to 17 m/s."""
-    while True:
-        wanted = int(rng.integers(6, 11))
-        x, y = rng.uniform(6, 14), rng.uniform(-6, 6)
-        ground = cast_rays(surface, [[x, y, 50.0]], (0, 0, -1)).point[0]
-        centre = ground + np.array([0, 0, 1.0])
-        velocity = np.array([rng.uniform(3, 6), rng.normal() * 0.8, rng.uniform(-3, 0)])
-        t, rows = 0.0, []
-        while len(rows) < wanted:
-            off = rng.normal() * SIGMA_TERRAIN
-            duration = next_contact(surface, centre, velocity, RADIUS + off)
-            if not duration > (0.3 if rows else 0.05):
-                break
-            t += duration
-            centre = flown(centre, velocity, np.array([duration]))[0]
-            arriving = velocity - [0, 0, GRAVITY * duration]
-            contact = closest_points(surface, centre[None]).point[0]
-            ground_normal = terrain_normals(surface, contact[None], np.array([2 * RADIUS]), None)
-            normal = ground_normal.normal[0]
-            into = arriving @ normal
-            along = arriving - into * normal
-            pace = np.linalg.norm(along)
-            if into > -1.0 or pace < 2.0:
-                break
-            leaving = along / pace * min(rng.uniform(0.6, 0.9) * pace, rng.uniform(3.5, 8))
-            leaving = leaving + np.cross(normal, leaving) * rng.normal() * 0.15 + rng.uniform(1.8, 4.0) * normal
-            felt = normal + np.cross(normal, rng.normal(size=3) * ground_normal.spread[0] / np.sqrt(2))
-            felt_rn = -(leaving @ felt) / (arriving @ felt)
-            fast = max(np.linalg.norm(arriving), np.linalg.norm(leaving))
-            if fast > 17 or centre[0] > 68 or abs(centre[1]) > 18:
-                break
-            rows.append((centre, contact, t, arriving, leaving, felt_rn))
-            velocity = leaving
-        if len(rows) == wanted:
-            columns = [np.array(column) for column in zip(*rows, strict=True)]
-            columns[3][0], columns[4][-1] = np.nan, np.nan
-            columns[5][[0, -1]] = np.nan
-            return Fall(*columns)
+    ),
+)
 
 
 def solve_camera(
@@ -236,8 +186,8 @@ class Footage:
     pixels: PixelObservations
 
 
-def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) -> Footage:
-    """Film a fall."""
+def film(case: Case, surface: Surface, given: Surface, truth: Fall, rng: np.random.Generator) -> Footage:
+    """Film a fall over a terrain, and mark it on the one that is given."""
     middle = (truth.centre.min(axis=0) + truth.centre.max(axis=0)) / 2
     first = rng.uniform(*case.azimuth_deg)
     azimuths = np.radians([first, first - rng.uniform(60, 90), first - rng.uniform(30, 45)])[: case.views]
@@ -266,6 +216,9 @@ def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) ->
         path = CameraPath(camera, video, positions, held, still, still)
         true_views.append(View(f"camera {number + 1}", path, Clock(offset), 0.0, least))
 
+        lift = np.array([0, 0, case.wrong.lifted_m])
+        if case.wrong.lifted_m:
+            resected, covariance = replace(camera, position=place + lift), None
         solved = CameraPath(
             resected,
             video,
@@ -278,18 +231,18 @@ def film(case: Case, surface: Surface, truth: Fall, rng: np.random.Generator) ->
         views.append(View(f"camera {number + 1}", solved, Clock(guess), 0.0, covariance))
 
         inside = np.flatnonzero((common > truth.time_s[0]) & (common < truth.time_s[-1]))
-        flight = np.searchsorted(truth.time_s, common[inside], side="right") - 1
-        since = common[inside] - truth.time_s[flight]
-        fallen = np.outer(since**2, [0, 0, GRAVITY / 2])
-        where = truth.centre[flight] + since[:, None] * truth.v2[flight] - fallen
-        pixel = project(camera, where, rotation=held[inside], position=positions[inside])
+        late = np.zeros(inside.size)
+        for _ in range(4 if case.wrong.readout_s else 1):
+            where = truth.seen_at(common[inside] + late)
+            pixel = project(camera, where, rotation=held[inside], position=positions[inside])
+            late = case.wrong.readout_s * (pixel[:, 1] / case.height - 0.5)
         size = focal * 2 * RADIUS / np.linalg.norm(where - place, axis=1)
         pixel = pixel + np.outer(size, SIGMA_AIM * rng.normal(size=2)) + SIGMA_TRACK * noise_of(case, len(pixel), rng)
         rows.append((np.full(inside.size, number), video[inside], pixel))
 
     view, video_s, pixel = (np.concatenate(column) for column in zip(*rows, strict=True))
     pixels = PixelObservations(view, np.full(view.size, "a"), video_s, pixel, np.full(view.size, SIGMA_TRACK))
-    return Footage(truth, tuple(true_views), tuple(views), marked(surface, truth, true_views[0], views[0], rng), pixels)
+    return Footage(truth, tuple(true_views), tuple(views), marked(given, truth, true_views[0], views[0], rng), pixels)
 
 
 def noise_of(case: Case, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -364,25 +317,29 @@ class Tally:
     place_sigma: list
     seconds: list
     iterations: list
+    named: list
     unsettled: int = 0
 
 
 def measure(case: Case, surface: Surface, falls: list[Fall], seed: int) -> Tally:
     """Film, mark, refine and compare all falls."""
     rng = np.random.default_rng(seed)
-    tally = Tally(*([] for _ in range(16)))
-    free = ("camera",) if case.views == 1 else ("camera", "clock")
+    tally = Tally(*([] for _ in range(17)))
+    free = () if case.wrong.lifted_m else ("camera",)
+    if case.views > 1:
+        free = (*free, "clock")
+    stated = None if case.wrong.terrain_m or case.wrong.raised_m else SIGMA_TERRAIN
     for truth in falls:
-        footage = film(case, surface, truth, rng)
-        raw = reconstruct(footage.picks, surface=surface, block=BLOCK).impacts
+        given = case.wrong.terrain(surface, rng)
+        footage = film(case, surface, given, truth, rng)
+        raw = reconstruct(footage.picks, surface=given, block=BLOCK).impacts
         start = time.thread_time()
         result = refine(
-            footage.picks, footage.views, footage.pixels, surface=surface, block=BLOCK, free=free,
-            sigma_terrain_m=SIGMA_TERRAIN,
-        )  # fmt: skip
+            footage.picks, footage.views, footage.pixels, surface=given, block=BLOCK, free=free, sigma_terrain_m=stated
+        )
         tally.seconds.append(time.thread_time() - start)
         tally.iterations.append(result.iterations)
-        add(tally, truth, raw, result, footage, bound(surface, footage, free), case)
+        add(tally, truth, raw, result, footage, bound(surface, footage, ("camera", *free[-1:])), case)
     return tally
 
 
@@ -420,6 +377,8 @@ def add(tally: Tally, truth: Fall, raw, result: Refinement, footage: Footage, be
     for covariance in [view.pose_covariance[3:, 3:] for view in footage.true_views] if solved else best[2]:
         away = draws @ np.linalg.cholesky(covariance).T
         tally.camera_best += (np.linalg.norm(away, axis=1) / case.distance_m).tolist()
+    said = " ".join(remark.text for remark in result.remarks if remark.severity in ("warning", "advice"))
+    tally.named.append(any(word in said for word in case.wrong.cause))
     tally.unsettled += not result.converged
 
 
@@ -441,6 +400,7 @@ def row_of(case: Case, tally: Tally, rng: np.random.Generator) -> dict[str, str]
         "coverage R_N %": f"{100 * np.mean(np.abs(rn[known]) < 1.96 * rn_sigma[known]):.1f}",
         "camera %": f"{100 * np.median(tally.camera):.3f}",
         "camera's bound %": f"{100 * np.median(tally.camera_best):.3f}",
+        "cause named %": f"{100 * np.mean(tally.named):.0f}" if case.wrong.cause else "–",
         "ms per trajectory": f"{1e3 * statistics.median(tally.seconds):.0f}",
         "ratio": "–" if case.pairs.free else f"{reached / least:.2f}",
         "rms / Cramér–Rao": "–" if case.pairs.free else f"{np.sqrt(np.mean((refined / best) ** 2)):.2f}",
@@ -453,7 +413,7 @@ def row_of(case: Case, tally: Tally, rng: np.random.Generator) -> dict[str, str]
     }
 
 
-TABLE = 10
+TABLE = 11
 """So many columns are printed; the file has all."""
 
 
@@ -463,7 +423,7 @@ def compare_speed(surface: Surface, truth: Fall, seed: int) -> None:
     from rockfall.core.reconstruction.refinement.solver import solve
 
     case = Case("two views", 3840, 2160, 30.0, 150.0, 2)
-    footage = film(case, surface, truth, np.random.default_rng(seed))
+    footage = film(case, surface, surface, truth, np.random.default_rng(seed))
     free = frozenset({"camera"})
     views = tuple(replace(view, clock=true.clock) for view, true in zip(footage.views, footage.true_views, strict=True))
     ground = prepare(footage.picks, surface, BLOCK, None, None, SIGMA_TERRAIN)
@@ -491,14 +451,15 @@ def compare_speed(surface: Surface, truth: Fall, seed: int) -> None:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trajectories", type=int, default=200)
+    parser.add_argument("--falls", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--cases", type=int, nargs="*", default=list(range(len(CASES))))
+    parser.add_argument("--case", type=int, nargs="*", default=list(range(len(CASES))), help="their numbers, from 0")
+    parser.add_argument("--speed", action="store_true", help="against scipy's least squares, too")
     parser.add_argument("--out", type=Path, help="CSV file")
     arguments = parser.parse_args()
     rng = np.random.default_rng(arguments.seed)
     surface = rough_slope(rng)
-    falls = [fall(surface, rng) for _ in range(arguments.trajectories)]
+    falls = [fall(surface, rng) for _ in range(arguments.falls)]
     speeds = np.concatenate([np.linalg.norm(one.v1[1:], axis=1) for one in falls])
     flights = np.concatenate([np.diff(one.time_s) for one in falls])
     places = np.concatenate([one.contact for one in falls])
@@ -508,15 +469,18 @@ def main() -> None:
         f"{np.median(speeds):.1f} m/s, normal's spread {np.median(spread):.0f}°\n"
     )
     rows = []
-    for number in arguments.cases:
-        row = row_of(
-            CASES[number], measure(CASES[number], surface, falls, arguments.seed + 1), np.random.default_rng(0)
-        )
+    for number in arguments.case:
+        case, own = CASES[number], falls
+        if case.wrong.air != NONE:
+            drawn = np.random.default_rng(arguments.seed)
+            own = [fall(surface, drawn, case.wrong.air) for _ in falls]
+        row = row_of(case, measure(case, surface, own, arguments.seed + 1), np.random.default_rng(0))
         if not rows:
             print("| " + " | ".join(list(row)[:TABLE]) + " |\n|" + "---|" * TABLE)
         print("| " + " | ".join(list(row.values())[:TABLE]) + " |", flush=True)
         rows.append(row)
-    compare_speed(surface, max(falls, key=lambda one: len(one.time_s)), arguments.seed)
+    if arguments.speed:
+        compare_speed(surface, max(falls, key=lambda one: len(one.time_s)), arguments.seed)
     if arguments.out:
         with arguments.out.open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, rows[0])

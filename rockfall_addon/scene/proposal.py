@@ -96,7 +96,7 @@ def keep(scene: bpy.types.Scene, refined: Refined, cameras: Sequence[bpy.types.O
     changes = 100 * refined.moved_m, 1e3 * refined.later_s, 100 * new.sigma_position_m, 1e3 * new.sigma_time_s
     kept = {
         "names": names,
-        "prints": _prints(scene, names),
+        "prints": prints(scene, names),
         "ids": [obj[store.ID] for obj in objects],
         "ends": fit.reconstruction.ends,
         "free": list(free),
@@ -194,6 +194,12 @@ def apply(scene: bpy.types.Scene) -> int:
     return len(kept["ids"])
 
 
+def prints(scene: bpy.types.Scene, names: Sequence[str]) -> list[str]:
+    """What tells whether the picks of some trajectories are still the same."""
+    known = fingerprints.remembered(scene)
+    return [known.get(name, "").rstrip(fingerprints.COMPLETE) for name in names]
+
+
 def is_applied(scene: bpy.types.Scene) -> bool:
     """Whether all picks but those in the air have the normals that a refinement gives them."""
     grounded = [pick for pick in store.of_role(scene, store.PICK_ROLE) if pick.get(store.KIND) != "pass"]
@@ -212,7 +218,7 @@ def _kept(scene: bpy.types.Scene) -> dict[str, Any] | None:
 
 
 def _is_stale(scene: bpy.types.Scene, kept: dict[str, Any]) -> bool:
-    return _prints(scene, kept["names"]) != kept["prints"]
+    return prints(scene, kept["names"]) != kept["prints"]
 
 
 def _path(fit: Refinement) -> Array:
@@ -223,11 +229,6 @@ def _path(fit: Refinement) -> Array:
         position, _ = flight_states(flights, np.full(len(clock), i), clock)
         parts.append(np.c_[position, np.arange(len(clock)) < len(clock) - 1])
     return np.vstack(parts) if parts else np.zeros((0, 4))
-
-
-def _prints(scene: bpy.types.Scene, names: Sequence[str]) -> list[str]:
-    prints = fingerprints.remembered(scene)
-    return [prints.get(name, "").rstrip(fingerprints.COMPLETE) for name in names]
 
 
 def _apply_shared(scene: bpy.types.Scene, kept: dict[str, Any]) -> None:

@@ -138,6 +138,18 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
     assert not [remark for remark in remarks if "went wrong" in remark.text]
 
 
+def test_picks_that_were_changed_meanwhile_are_not_refined(tracked, part) -> None:
+    """The fit runs beside Blender: a person goes on with the picks it began with."""
+    proposal, fitting = part("rockfall_addon.scene.proposal"), part("rockfall_addon.steps.refinement.fitting")
+    work = fitting.work(tracked, None, [])
+    found = work.compute(lambda *_: None)
+    picks_of(tracked)[2].location.x += 0.5
+    part("rockfall_addon.scene.sync").sync(tracked)
+    with pytest.raises(part("core.errors").RockfallError, match="changed while they were refined"):
+        work.keep(tracked, found)
+    assert proposal.read(tracked) is None
+
+
 def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
     """Refined once more, nothing moves: the scene's picks are those of the core's result."""
     proposal = part("rockfall_addon.scene.proposal")

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene's picks, fitted to what was seen in its videos, as a proposal."""
+"""The scene's picks, fitted to what was seen in its videos, as a proposal.
+
+What is needed is taken from the scene first, then computed without Blender (in a thread), then stored.
+"""
 
 from collections.abc import Collection
 
@@ -7,21 +10,20 @@ import bpy
 
 from ....core.errors import RockfallError
 from ....core.exchange.opening import drag_of
-from ....core.progress import Progress, silent
-from ....core.workflow.refinement import refine_picks
-from ...scene import camera_paths, picks, proposal, reconstruction, sightings, sync, videos
+from ....core.progress import Progress
+from ....core.workflow.refinement import Refined, refine_picks
+from ...scene import camera_paths, picks, proposal, reconstruction, sightings, store, sync, videos
+from ...view import job
 
 
-def propose(
-    scene: bpy.types.Scene, names: Collection[str] | None, free: Collection[str], progress: Progress = silent
-) -> None:
-    """Fit, and keep the result in the scene as a proposal.
+def work(scene: bpy.types.Scene, names: Collection[str] | None, free: Collection[str]) -> job.Work:
+    """What there is to fit, with the result in the scene as a proposal.
 
     names : the trajectories, None for all that were seen.
 
     Raises
     ------
-    RockfallError : something is missing; whatever the core refuses.
+    RockfallError : something is missing.
     """
     lacking = proposal.lacking(scene)
     if lacking:
@@ -35,17 +37,36 @@ def propose(
     if not used:
         raise RockfallError(f"There are no picks of {', '.join(seen)}. Pick them, or propose them from the track.")
     cameras = [camera for camera in videos.cameras(scene) if camera_paths.is_solved(camera)]
+    identifiers = [camera[store.ID] for camera in cameras]
     project = reconstruction.project_settings(scene, [])
-    refined = refine_picks(
-        table,
-        [sightings.seen_video(camera, used) for camera in cameras],
-        surface=reconstruction.ground(scene),
-        block=reconstruction.blocks_of(scene, set(used)),
-        gravity_mps2=project.reconstruction.gravity_mps2,
-        drag=drag_of(project),
-        normal_radius_m=project.reconstruction.normal_radius_m,
-        names=used,
-        free=free,
-        progress=progress,
-    )
-    proposal.keep(scene, refined, cameras, free)
+    views = [sightings.seen_video(camera, used) for camera in cameras]
+    surface, blocks = reconstruction.ground(scene), reconstruction.blocks_of(scene, set(used))
+    prints = proposal.prints(scene, used)
+
+    def compute(progress: Progress) -> Refined:
+        return refine_picks(
+            table,
+            views,
+            surface=surface,
+            block=blocks,
+            gravity_mps2=project.reconstruction.gravity_mps2,
+            drag=drag_of(project),
+            normal_radius_m=project.reconstruction.normal_radius_m,
+            names=used,
+            free=free,
+            progress=progress,
+        )
+
+    def keep(scene: bpy.types.Scene, refined: object) -> str:
+        there = [camera for one in identifiers if (camera := videos.by_id(scene, one)) is not None]
+        if len(there) < len(identifiers) or proposal.prints(scene, used) != prints:
+            raise RockfallError("The picks or videos were changed while they were refined. Refine again.")
+        proposal.keep(scene, refined, there, free)
+        return _summary(proposal.read(scene))
+
+    return job.Work("refinement", compute, keep)
+
+
+def _summary(found: proposal.Proposal) -> str:
+    worries = [remark.text for remark in found.remarks if remark.severity in ("warning", "problem")]
+    return " ".join([*worries[:1], f"{found.before_px:.2f} px before, {found.after_px:.2f} px after."])

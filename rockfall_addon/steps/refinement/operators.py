@@ -9,34 +9,24 @@ from ...view.reporting import possible, reported
 from . import fitting
 
 
-class ROCKFALL_OT_refine(bpy.types.Operator):
+class ROCKFALL_OT_refine(job.InBackground, bpy.types.Operator):
     """Fit places and times of the picks to where the block was seen; the result is shown beside what there is"""
 
     bl_idname = "rockfall.refine"
     bl_label = "Refine"
-    bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         lacking = proposal.lacking(context.scene)
-        if lacking:
-            cls.poll_message_set(lacking)
-        return not lacking
+        return possible(cls, not lacking, lacking) and job.is_free(cls)
 
-    @reported
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def prepare(self, context: bpy.types.Context) -> job.Work:
         scene, settings = context.scene, context.scene.rockfall_picking
         names = None
         if settings.scope == "ACTIVE":
             obj = pointing.active_pick(context)
             names = [places.trajectory(scene) if obj is None else obj[store.TRAJECTORY]]
-        with job.at_the_cursor() as progress:
-            fitting.propose(scene, names, sorted(settings.free), progress)
-        found = proposal.read(scene)
-        worries = [remark.text for remark in found.remarks if remark.severity in ("warning", "problem")]
-        numbers = f"{found.before_px:.2f} px before, {found.after_px:.2f} px after."
-        self.report({"WARNING" if worries else "INFO"}, " ".join([*worries[:1], numbers]))
-        return {"FINISHED"}
+        return fitting.work(scene, names, sorted(settings.free))
 
 
 class _OfProposal:

@@ -5,6 +5,7 @@ import bpy
 
 from ...scene import proposal
 from ...scene.proposal import Proposal
+from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, is_grave, paragraph, show_remarks
 
 MOST_ROWS = 12
@@ -39,6 +40,7 @@ class ROCKFALL_PT_refinement(RockfallPanel, bpy.types.Panel):
         grid = column.grid_flow(columns=2, align=True, even_columns=True)
         grid.prop(settings, "free")
         layout.operator("rockfall.refine", icon="SHADERFX")
+        job.draw(context, layout, "refinement")
         if found is not None:
             _draw_proposal(context, layout, found)
 

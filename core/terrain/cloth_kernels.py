@@ -14,7 +14,7 @@ STILL_M = 0.005
 
 @borrowing
 def settle(cloth, before, held, floor, single, steps):  # type: ignore[no-untyped-def]
-    """Let a cloth (rows, columns) of particles fall until it is at rest; the number of steps that it took.
+    """Let a cloth (rows, columns) of particles fall for some steps, or until it is at rest; whether it is.
 
     ``before`` are the heights a step earlier, ``held`` the particles that lie on the ``floor``: all three are changed.
     ``single`` is the part of the difference to a held neighbour that a particle makes up for in a step; between two
@@ -22,7 +22,7 @@ def settle(cloth, before, held, floor, single, steps):  # type: ignore[no-untype
     """
     rows, columns = cloth.shape
     fall = GRAVITY * STEP * STEP
-    for step in range(steps):
+    for _ in range(steps):
         for i in range(rows):
             for j in range(columns):
                 if not held[i, j]:
@@ -55,5 +55,5 @@ def settle(cloth, before, held, floor, single, steps):  # type: ignore[no-untype
                     else:
                         most = max(most, abs(cloth[i, j] - before[i, j]))
         if most < STILL_M:
-            return step + 1
-    return steps
+            return True
+    return False

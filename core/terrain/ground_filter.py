@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..progress import Progress, silent
 from ..vectors import Array, Mask
 
 CELL_M = 1.0
@@ -19,7 +20,7 @@ DISTANCE_M = 0.2
 STIFFNESS = 3
 """Times per step that a particle moves by `YIELD` of the way to its neighbour, as in the paper."""
 YIELD = 0.3
-MOST_STEPS = 500
+MOST_STEPS, AT_ONCE = 500, 10
 MARGIN = 2
 """Cells around the cloud, so that its border does not hold the cloth up."""
 LOW_M = 5.0
@@ -42,7 +43,9 @@ class GroundFilter:
     notes: tuple[str, ...]
 
 
-def filter_ground(points: Array, cell_m: float = CELL_M, distance_m: float = DISTANCE_M) -> GroundFilter:
+def filter_ground(
+    points: Array, cell_m: float = CELL_M, distance_m: float = DISTANCE_M, progress: Progress = silent
+) -> GroundFilter:
     """Tell the ground from what stands on it.
 
     Parameters
@@ -71,10 +74,11 @@ def filter_ground(points: Array, cell_m: float = CELL_M, distance_m: float = DIS
             f"Cells of {cell_m:g} m on {extent[0]:.0f} by {extent[1]:.0f} m are more than {MOST_CELLS:,}",
             advice="Give a larger cell",
         )
+    progress("Filtering the ground", 0, 0)
     slope = _plane(plan, points[:, 2])
     height = points[:, 2] - plan @ slope
     lowest, false = _lowest(height, (plan / cell_m).astype(np.int64) + MARGIN)
-    cloth = _settled(lowest, cell_m)
+    cloth = _settled(lowest, cell_m, progress)
     ground = _distance(cloth, plan / cell_m + (MARGIN - 0.5), height, slope, cell_m) <= distance_m
     kept = int(ground.sum())
     notes = [
@@ -119,13 +123,17 @@ def _lowest(height: Array, cells: NDArray[np.int64]) -> tuple[Array, int]:
     return lowest[tuple(nearest)], int(false.sum())
 
 
-def _settled(lowest: Array, cell_m: float) -> Array:
+def _settled(lowest: Array, cell_m: float, progress: Progress) -> Array:
     """Heights of the cloth, of the form of `lowest`, the right way up."""
     from .cloth_kernels import settle
 
     floor = np.ascontiguousarray(-lowest)
     cloth = np.full(floor.shape, floor.max() + cell_m)
-    settle(cloth, cloth.copy(), np.zeros(floor.shape, bool), floor, 1 - (1 - YIELD) ** STIFFNESS, MOST_STEPS)
+    before, held = cloth.copy(), np.zeros(floor.shape, bool)
+    for step in range(0, MOST_STEPS, AT_ONCE):
+        progress("Laying a cloth on the ground", step, MOST_STEPS)
+        if settle(cloth, before, held, floor, 1 - (1 - YIELD) ** STIFFNESS, AT_ONCE):
+            break
     return -cloth
 
 

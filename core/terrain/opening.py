@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..georeference import GlobalShift, z_up
 from ..plausibility import GREATEST_M
+from ..progress import Progress, silent
 from ..reading import reader
 from ..vectors import Array
 from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, ptx
@@ -78,17 +79,19 @@ class Opened:
     left_out: Array
 
 
-def open_terrain_file(path: Path, how: HowToRead, shift: GlobalShift | None) -> Opened:
+def open_terrain_file(path: Path, how: HowToRead, shift: GlobalShift | None, progress: Progress = silent) -> Opened:
     """Read a file and put it into local coordinates; a shift is proposed from the data when None.
 
     Raises
     ------
     InputError : anything wrong with the file, with what to do about it.
     """
-    return _localised(read_placed(path, how), path, path.name, how, shift)
+    return _localised(read_placed(path, how), path, path.name, how, shift, progress)
 
 
-def open_terrain_files(paths: Sequence[Path], how: HowToRead, shift: GlobalShift | None) -> tuple[Opened, ...]:
+def open_terrain_files(
+    paths: Sequence[Path], how: HowToRead, shift: GlobalShift | None, progress: Progress = silent
+) -> tuple[Opened, ...]:
     """The same of several files, in one shift; all clouds among them become one, as if they had been one file.
 
     So the ground filter and the meshing reach across the borders of tiles, where no gap is left.
@@ -106,7 +109,7 @@ def open_terrain_files(paths: Sequence[Path], how: HowToRead, shift: GlobalShift
     opened: list[Opened] = []
     while parts:
         path, name, source = parts.pop(0)
-        opened.append(_localised(source, path, name, how, opened[0].shift if opened else shift))
+        opened.append(_localised(source, path, name, how, opened[0].shift if opened else shift, progress))
     return tuple(opened)
 
 
@@ -133,12 +136,14 @@ def _one_cloud(paths: Sequence[Path], sources: Sequence[Source]) -> tuple[Path, 
     )
 
 
-def _localised(source: Source, path: Path, name: str, how: HowToRead, shift: GlobalShift | None) -> Opened:
+def _localised(
+    source: Source, path: Path, name: str, how: HowToRead, shift: GlobalShift | None, progress: Progress
+) -> Opened:
     """A placed source in local coordinates; errors name the path."""
     points, notes = source.points, list(source.notes)
     left_out = points[:0]
     if how.ground_filter_m is not None:
-        points, left_out, filtered = _ground(source, points, how.ground_filter_m, path)
+        points, left_out, filtered = _ground(source, points, how.ground_filter_m, path, progress)
         notes += filtered
     heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
     low, high = box_of(points[heights], path)
@@ -158,14 +163,16 @@ def _localised(source: Source, path: Path, name: str, how: HowToRead, shift: Glo
     return Opened(name, replace(source, points=points - shift.vector), shift, tuple(notes), tuple(said), left_out)
 
 
-def _ground(source: Source, points: Array, cell_m: float, path: Path) -> tuple[Array, Array, tuple[str, ...]]:
+def _ground(
+    source: Source, points: Array, cell_m: float, path: Path, progress: Progress
+) -> tuple[Array, Array, tuple[str, ...]]:
     """The points on the ground, those left out, and what to say of it."""
     if source.kind != "cloud":
         raise InputError(
             f"This is a {source.kind}, and the ground filter works on clouds", file=path, advice="Read it without"
         )
     try:
-        found = filter_ground(points, cell_m)
+        found = filter_ground(points, cell_m, progress=progress)
     except InputError as error:
         raise InputError(error.problem, file=path, advice=error.advice) from error
     return points[found.ground], points[~found.ground], found.notes

@@ -92,7 +92,7 @@ def read_terrain(
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
     how = HowToRead(up, unit_m, ground_only, ground_filter_m)
-    return _surface(open_terrain_file(path, how, shift), max_edge_m, progress)
+    return _surface(open_terrain_file(path, how, shift, progress), max_edge_m, progress)
 
 
 def read_tiles(
@@ -114,7 +114,7 @@ def read_tiles(
     InputError : anything wrong with a file; the files are in different systems.
     """
     progress(f"Reading {_names(paths)}", 0, 2)
-    opened = list(open_terrain_files([Path(path) for path in paths], how, shift))
+    opened = list(open_terrain_files([Path(path) for path in paths], how, shift, progress))
     surfaces = []
     while opened:
         with reading(opened[0].name, "terrain"):
@@ -127,7 +127,7 @@ def read_tile_points(
 ) -> Cloud:
     """Read several files as the points of one cloud; parameters and errors are those of `read_tiles`."""
     progress(f"Reading {_names(paths)}", 0, 1)
-    parts = [_cloud(opened) for opened in open_terrain_files([Path(path) for path in paths], how, shift)]
+    parts = [_cloud(opened) for opened in open_terrain_files([Path(path) for path in paths], how, shift, progress)]
     if len(parts) == 1:
         return parts[0]
     summary = tuple(f"{part.name}: {sentence}" for part in parts for sentence in part.summary)
@@ -155,7 +155,7 @@ def read_points(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 1)
-    return _cloud(open_terrain_file(path, HowToRead(up, unit_m, ground_only, ground_filter_m), shift))
+    return _cloud(open_terrain_file(path, HowToRead(up, unit_m, ground_only, ground_filter_m), shift, progress))
 
 
 @reader("terrain")
@@ -175,7 +175,7 @@ def read_structure(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
-    opened = open_terrain_file(path, HowToRead(up, unit_m, ground_only, ground_filter_m), shift)
+    opened = open_terrain_file(path, HowToRead(up, unit_m, ground_only, ground_filter_m), shift, progress)
     return _cloud(opened) if opened.source.kind == "cloud" else _surface(opened, None, progress)
 
 

@@ -23,8 +23,14 @@ class FirstImport(FromFile):
         if start_up.is_untouched(context.scene) and not workspace.is_open(context):
             layout.prop(self, "open_workspace")
 
-    def begin_file(self, context: bpy.types.Context) -> None:
-        """What the first import does besides importing; after it."""
-        start_up.put_away(context.scene)
-        if self.by_hand and self.open_workspace:
-            arranging.open_workspace(context, arrange=True)
+    @property
+    def opens_workspace(self) -> bool:
+        """Whether the first import is to open it."""
+        return self.by_hand and self.open_workspace
+
+
+def begin_file(context: bpy.types.Context, *, opens_workspace: bool) -> None:
+    """What the first import does besides importing; after it."""
+    start_up.put_away(context.scene)
+    if opens_workspace:
+        arranging.open_workspace(context, arrange=True)

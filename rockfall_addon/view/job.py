@@ -234,16 +234,24 @@ def at_the_cursor() -> Iterator[Progress]:
         manager.progress_end()
 
 
-def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str) -> None:
-    """In a step's panel: where its work is and how to stop it, or why it came to nothing."""
+@contextmanager
+def in_window_of(scene: bpy.types.Scene) -> Iterator[bpy.types.Context]:
+    """For what arranges views when the work is kept: a window that shows the scene, if there is one."""
+    windows = [window for window in bpy.context.window_manager.windows if window.scene == scene]
+    with bpy.context.temp_override(window=bpy.context.window or next(iter(windows), None)):
+        yield bpy.context
+
+
+def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str = "") -> None:
+    """In a step's panel: where its work is and how to stop it, or why it came to nothing. Without a step of any."""
     for job in _running:
-        if job.work.step == step:
+        if step in ("", job.work.step):
             box = layout.box()
             box.progress(factor=job.share, text=job.percent)
             paragraph(context, box, f"{job.line}  Esc stops it.", "TIME")
             box.operator("rockfall.stop_job", text="Stop", icon="CANCEL")
     for other, words in _ended:
-        if other == step:
+        if step in ("", other):
             paragraph(context, layout, words, "ERROR")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
+from rockfall.core.progress import CancelledError
 from rockfall.core.terrain.clouds import read_las
 from rockfall.core.terrain.ground_filter import filter_ground
 from scipy.interpolate import LinearNDInterpolator
@@ -73,3 +74,19 @@ def test_cells_that_cannot_be(cell_m, words):
     points, _ = forest(30, np.random.default_rng(4))
     with pytest.raises(InputError, match=words):
         filter_ground(points, cell_m)
+
+
+def test_it_says_how_far_it_is_and_ends_when_asked():
+    points, _ = forest(20.0, np.random.default_rng(3))
+    told = []
+
+    def progress(text, done, total):
+        told.append((text, done, total))
+        if done >= 20:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        filter_ground(points, progress=progress)
+    steps = [done for text, done, _ in told if "cloth" in text]
+    assert steps == [0, 10, 20]
+    assert all(done <= total for _, done, total in told)

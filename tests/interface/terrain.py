@@ -34,6 +34,30 @@ def case_import_vegetated_tile_after_asking(window):
     window.screenshot("lareunion")
 
 
+def case_the_ground_filter_works_beside_the_window_and_esc_stops_it(window):
+    yield from window.show_sidebar()
+    job, scene = window.part("rockfall_addon.view.job"), bpy.context.scene
+    for stopped, cell_m in ((True, 0.1), (False, 1.0)):
+        objects = len(scene.objects)
+        with window.override():
+            bpy.ops.rockfall.import_terrain(
+                "INVOKE_DEFAULT", filepath=str(DATA / "las_chablais3.laz"), ground="FILTER", filter_m=cell_m
+            )
+        yield 0.5
+        yield from window.press("RET", *window.centre())
+        if stopped:
+            yield from window.wait_for(
+                lambda: job.is_running() and job._running[0].share > 0, what="a cloth that falls"
+            )
+            window.screenshot("at-work")
+            yield from window.press("ESC", *window.centre())
+            assert not job.is_running()
+            assert len(scene.objects) == objects
+        else:
+            yield from window.wait_for(lambda: any("rockfall_role" in o for o in scene.objects), what="imported")
+    window.screenshot("filtered")
+
+
 def case_a_slope_that_stands_upright_asks_whether_y_points_up(window):
     file = Path(tempfile.mkdtemp()) / "upright.obj"
     x, y = (each.ravel() for each in np.meshgrid(np.arange(0, 41, 4.0), np.arange(0, 41, 4.0)))

@@ -62,9 +62,8 @@ def _work(scene: bpy.types.Scene, picks: Picks, turned: tuple[str, ...]) -> job.
         with job.at_the_cursor() as progress:
             reconstruction.show(scene, result, progress)
         sync.follow_spins(scene)
-        windows = [window for window in bpy.context.window_manager.windows if window.scene == scene]
-        with bpy.context.temp_override(window=bpy.context.window or next(iter(windows), None)):
-            look.show_relief(bpy.context, frame_all=True)
+        with job.in_window_of(scene) as context:
+            look.show_relief(context, frame_all=True)
         count = len(set(picks.trajectory.tolist()))
         return " ".join((*turned, f"{len(picks)} picks: {count} trajectories, {len(result.impacts)} impacts."))
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ...scene.next_step import PICK_TOOL, next_step
-from ...view import workspace
+from ...view import job, workspace
 from ...view.panel import RockfallPanel, paragraph
 
 LOOKS = {
@@ -43,6 +43,7 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
         layout = self.layout
         if not workspace.is_open(context):
             layout.operator("rockfall.open_workspace", text="Open Workspace", icon="WORKSPACE")
+        job.draw(context, layout)
         step = next_step(context.scene)
         paragraph(context, layout, step.sentence, "RIGHTARROW")
         column = layout.column(align=True)

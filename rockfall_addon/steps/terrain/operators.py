@@ -8,17 +8,21 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ....core.errors import RockfallError
 from ....core.georeference import GlobalShift
+from ....core.progress import Progress, silent
 from ....core.terrain.advice import sentences
 from ....core.terrain.opening import EXTENSIONS
 from ....core.terrain.readers import inspect_terrain, read_terrain
-from ....core.terrain.shading import shade
+from ....core.terrain.shading import Shading, shade
+from ....core.terrain.surface import Surface
 from ...scene import georeference, materials, start_up, store, sync, terrain, terrain_look
-from ...view import look
-from ...view.first_import import FirstImport
+from ...view import job, look
+from ...view.first_import import FirstImport, begin_file
 from ...view.reporting import possible, reported
 from .removing import tiles_of, what_stays
 
 TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
+LARGE_BYTES = 5_000_000
+"""Larger files, and the ground filter, are read beside Blender."""
 
 
 class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
@@ -130,29 +134,46 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         if self.browsing:
             self.browsing = False
             return self._ask_again()
-        path, first = self.chosen(context), start_up.is_untouched(context.scene)
-        surface = read_terrain(
-            path,
-            shift=None if self._turned_since(context.scene) else self._shift(context.scene),
-            up=self.up,
-            unit_m=float(f"{self.unit_m:.7g}"),
-            max_edge_m=self.max_edge_m or None,
-            ground_only={"AUTO": None, "GROUND": True, "ALL": False, "FILTER": None}[self.ground],
-            ground_filter_m=self.filter_m if self.ground == "FILTER" else None,
-        )
-        shading = shade(surface)
-        old = tiles_of(context.scene, self.replaces) if self.replaces else []
-        old_names, stays = ", ".join(tile.name for tile in old), what_stays(context.scene, old) if old else ""
-        terrain.remove(context.scene, old)
-        terrain.add_terrain(context.scene, surface, shading)
-        sync.recompute(context.scene)
-        look.show_relief(context, frame_all=True)
-        if first:
-            self.begin_file(context)
-        self.report({"INFO"}, " ".join(surface.summary))
-        if stays:
-            self.report({"WARNING"}, f"Replaced {old_names}. {stays}")
+        path, work = self.chosen(context), self._work(context)
+        takes_long = self.ground == "FILTER" or (path.is_file() and path.stat().st_size > LARGE_BYTES)
+        if takes_long and self.by_hand and not bpy.app.background:
+            job.begin(work, self.bl_label, context.scene)
+            return {"INTERFACE"}  # the result is an undo step of its own
+        self.report({"INFO"}, work.keep(context.scene, work.compute(silent)))
         return {"FINISHED"}
+
+    def _work(self, context: bpy.types.Context) -> job.Work:
+        """What there is to read, and how it is shown. Blender may have forgotten the operator by then."""
+        path, replaces, opens_workspace = self.chosen(context), self.replaces, self.opens_workspace
+        told = {
+            "shift": None if self._turned_since(context.scene) else self._shift(context.scene),
+            "up": self.up,
+            "unit_m": float(f"{self.unit_m:.7g}"),
+            "max_edge_m": self.max_edge_m or None,
+            "ground_only": {"AUTO": None, "GROUND": True, "ALL": False, "FILTER": None}[self.ground],
+            "ground_filter_m": self.filter_m if self.ground == "FILTER" else None,
+        }
+
+        def compute(progress: Progress) -> tuple[Surface, Shading]:
+            surface = read_terrain(path, **told, progress=progress)
+            progress("Shading", 0, 0)
+            return surface, shade(surface)
+
+        def keep(scene: bpy.types.Scene, found: object) -> str:
+            surface, shading = found
+            first = start_up.is_untouched(scene)
+            old = tiles_of(scene, replaces) if replaces else []
+            replaced = [f"Replaced {', '.join(tile.name for tile in old)}.", what_stays(scene, old)] if old else []
+            terrain.remove(scene, old)
+            terrain.add_terrain(scene, surface, shading)
+            sync.recompute(scene)
+            with job.in_window_of(scene) as there:
+                look.show_relief(there, frame_all=True)
+                if first:
+                    begin_file(there, opens_workspace=opens_workspace)
+            return " ".join(filter(None, (*replaced, *surface.summary)))
+
+        return job.Work("terrain", compute, keep)
 
     def _ask_again(self) -> set[str]:
         """The dialog after the file browser, whose operator ends with it. An error in an operator that is called by

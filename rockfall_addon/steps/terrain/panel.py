@@ -4,6 +4,7 @@
 import bpy
 
 from ...scene import georeference, store, terrain, terrain_view
+from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 
 
@@ -21,6 +22,7 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
+        job.draw(context, layout, "terrain")
         grounds = store.with_role(scene, store.TERRAIN_ROLE)
         if not grounds:
             if scene.get(store.GROUND):

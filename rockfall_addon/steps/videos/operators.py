@@ -10,7 +10,7 @@ from mathutils import Matrix
 from ....core.errors import RockfallError
 from ...scene import footage, new_videos, start_up, store, video_times, videos
 from ...view import workspace
-from ...view.first_import import FirstImport
+from ...view.first_import import FirstImport, begin_file
 from ...view.from_file import FromFile, remember_folder
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
@@ -67,7 +67,7 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
             raise RockfallError("\n".join(errors))
         _look_through(context, added[0])
         if first:
-            self.begin_file(context)
+            begin_file(context, opens_workspace=self.opens_workspace)
         for error in errors:
             self.report({"WARNING"}, error)
         self.report({"INFO"}, " ".join(videos.summary(camera) for camera in added))

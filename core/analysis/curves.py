@@ -8,6 +8,7 @@ import numpy as np
 
 from ..vectors import Array, Mask
 from .line_fits import LineFit, is_constant, line, line_through_origin, power_law
+from .ranks import shared_ranks
 
 Trend = Literal["auto", "none", "origin", "line", "power", "exponential", "logarithm"]
 """That of the pair of variables (`trend_of`), no curve, y = a·x, a + b·x, a·x^b, a·e^(b·x), a + b·ln x."""
@@ -148,12 +149,10 @@ def fit_curve(
 
 def rank_correlation(x: Array, y: Array) -> float:
     """Spearman's ρ of (n,) values each, ties sharing their ranks; NaN with fewer than three, or of a constant."""
-    from scipy.stats import rankdata
-
     if x.size < 3 or is_constant(x) or is_constant(y):
         return float("nan")
-    one, other = (rankdata(values) - (x.size + 1) / 2 for values in (x, y))
-    return float(one @ other / np.sqrt((one @ one) * (other @ other)))
+    one, other = (shared_ranks(values) - (x.size + 1) / 2 for values in (x, y))
+    return float(np.sum(one * other) / np.sqrt(np.sum(one**2) * np.sum(other**2)))
 
 
 def _placed(trend: Trend, x: Array, y: Array) -> Mask:

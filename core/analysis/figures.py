@@ -18,12 +18,13 @@ from .graphs import Graph
 from .variables import Variable, find_variable
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORMATS = ("png", "svg", "pdf")
 DPI = 300
-COMPRESSION = 4
+COMPRESSION = 1
 """Of PNG files: much quicker than the usual 6 (of 9), and hardly larger."""
 COLUMN_IN, PAGE_IN = 3.54, 7.48
 """Widths of one column (90 mm) and of a page (190 mm)."""
@@ -69,24 +70,40 @@ def model_figure(graphs: Sequence[Graph]) -> "Figure":
     ------
     DependencyError : Matplotlib is not installed.
     """
+    return next(_model_figures([graphs]))
+
+
+def _model_figures(sheet: Iterable[Sequence[Graph]]) -> "Iterator[Figure]":
+    """A figure for each model: the same one with other points, for its axes take longest."""
     demand(FIGURES)
     from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    rows = (len(graphs) + 1) // 2
-    with rc_context(STYLE):
-        places = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06)
-        figure = Figure(figsize=(PAGE_IN, 0.35 + 2.55 * rows), layout=places)
-        axes = figure.subplots(rows, 2, squeeze=False).ravel()
-        for each, graph in zip(axes, graphs, strict=False):
-            _draw(each, graph, size=1.0)
-            _labels(each, graph, x=True, short=False)
-        for each in axes[len(graphs) :]:
-            each.set_axis_off()
-        figure.text(0.012, 0.988, _title(graphs[0]), fontsize=8.5, fontweight="bold", ha="left", va="top")
-        _legend(figure, graphs[0])
-        return _laid_out(figure)
+    figure: Figure | None = None
+    drawn: list[Artist] = []
+    for graphs in sheet:
+        with rc_context(STYLE):
+            if figure is None:
+                rows = (len(graphs) + 1) // 2
+                places = ConstrainedLayoutEngine(w_pad=0.08, h_pad=0.06)
+                figure = Figure(figsize=(PAGE_IN, 0.35 + 2.55 * rows), dpi=DPI, layout=places)
+                FigureCanvasAgg(figure)
+                axes = figure.subplots(rows, 2, squeeze=False).ravel()
+                for each, graph in zip(axes, graphs, strict=False):
+                    _set_up(each, graph, size=1.0)
+                    _labels(each, graph, x=True, short=False)
+                for each in axes[len(graphs) :]:
+                    each.set_axis_off()
+                _legend(figure, graphs[0])
+                _lay_out(figure)
+            for artist in drawn:
+                artist.remove()
+            drawn = [one for each, graph in zip(axes, graphs, strict=False) for one in _draw(each, graph, size=1.0)]
+            title = figure.text(0.012, 0.988, _title(graphs[0]), fontsize=8.5, fontweight="bold", ha="left", va="top")
+            drawn.append(title)
+        yield figure
 
 
 def sheet_figure(sheet: Sequence[Sequence[Graph]]) -> "Figure":
@@ -98,20 +115,26 @@ def sheet_figure(sheet: Sequence[Sequence[Graph]]) -> "Figure":
     """
     demand(FIGURES)
     from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     with rc_context(STYLE):
         places = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.02, hspace=0.02, wspace=0.02)
-        figure = Figure(figsize=(PAGE_IN, 0.5 + 1.52 * len(sheet)), layout=places)
+        figure = Figure(figsize=(PAGE_IN, 0.5 + 1.52 * len(sheet)), dpi=DPI, layout=places)
+        FigureCanvasAgg(figure)
         grid = figure.subplots(len(sheet), len(sheet[0]), squeeze=False, sharex="col", sharey="col")
         for i, (row, graphs) in enumerate(zip(grid, sheet, strict=True)):
             for each, graph in zip(row, graphs, strict=True):
-                _draw(each, graph, size=0.62)
+                _set_up(each, graph, size=0.62)
                 _labels(each, graph, x=i == len(sheet) - 1, short=True)
             row[0].set_title(_title(graphs[0]), fontsize=7.5, fontweight="bold", loc="left", pad=7.0)
         _legend(figure, sheet[0][0])
-        return _laid_out(figure)
+        _lay_out(figure)
+        for row, graphs in zip(grid, sheet, strict=True):
+            for each, graph in zip(row, graphs, strict=True):
+                _draw(each, graph, size=0.62)
+    return figure
 
 
 def save_figures(
@@ -130,8 +153,7 @@ def save_figures(
 
     def figures() -> "Iterator[tuple[str, Figure]]":  # one at a time: clouds fill the memory
         yield "all_models", sheet_figure(sheet)
-        for graphs in sheet:
-            yield graphs[0].model, model_figure(graphs)
+        yield from zip((graphs[0].model for graphs in sheet), _model_figures(sheet), strict=True)
 
     return save_named(figures(), folder, formats, progress, 1 + len(sheet))
 
@@ -160,26 +182,35 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
     from matplotlib import rc_context
 
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
-    with rc_context(STYLE):
-        png: dict[str, Any] = {"pil_kwargs": {"compress_level": COMPRESSION}} if Path(path).suffix == ".png" else {}
-        with output_file(path) as draft:
-            figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated, **png)
+    with rc_context(STYLE), output_file(path) as draft:
+        if Path(path).suffix == ".png":
+            _save_picture(figure, draft)
+        else:
+            figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated)
 
 
-def _laid_out(figure: "Figure") -> "Figure":
-    """The figure with its places fixed, which takes as long as to draw it."""
-    for axes in figure.axes:
-        for artist in (*axes.lines, *axes.collections, *axes.texts):
-            artist.set_in_layout(False)  # it is within the axes
+def _save_picture(figure: "Figure", path: Path) -> None:
+    """As a PNG file: drawn once, without a place for transparency, where Matplotlib's own way draws twice."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    figure.set_dpi(DPI)
+    canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
+    picture.convert("RGB").save(path, format="png", dpi=(DPI, DPI), compress_level=COMPRESSION)
+
+
+def _lay_out(figure: "Figure") -> None:
+    """Fix the places of the axes, which takes as long as to draw the figure; what is drawn in them comes later."""
     layout = figure.get_layout_engine()
     if layout is not None:
         layout.execute(figure)
-    figure.set_layout_engine("none")
-    return figure
+    figure.set_layout_engine(None)
 
 
-def _draw(axes: "Axes", graph: Graph, size: float) -> None:
-    from matplotlib.collections import LineCollection
+def _set_up(axes: "Axes", graph: Graph, size: float) -> None:
+    """Scales, ticks and limits."""
     from matplotlib.ticker import MaxNLocator
 
     axes.set_xscale("log" if graph.spec.x_log else "linear")
@@ -190,31 +221,42 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(7 if size == 1.0 else 5, steps=[1, 2, 5, 10]))
     axes.set_xlim(graph.x_limits)
     axes.set_ylim(graph.y_limits)
+
+
+def _draw(axes: "Axes", graph: Graph, size: float) -> "list[Artist]":
+    """Points, curves and notes of a graph."""
+    from matplotlib.collections import LineCollection
+
+    drawn: list[Artist] = []
     dense = _is_dense(graph)
     if not dense:
         links = LineCollection(list(graph.links), colors=LINK, linewidths=0.6 * size, zorder=1)
-        axes.add_collection(links, autolim=False)
+        drawn.append(axes.add_collection(links, autolim=False))
     part = DENSE / max(graph.row.size, DENSE)
     scale = size**0.5 * max(part**0.25, LEAST_SIZE)
-    common: dict[str, Any] = {
-        "linestyle": "none",
-        "markeredgewidth": 0,
-        "alpha": max(0.85 * part**0.7, LEAST_ALPHA),
-        "rasterized": dense,
-    }
-    axes.plot(*graph.modelled.T, marker="D", markersize=3.5 * scale, color=MODELLED, zorder=3 if dense else 2, **common)
-    axes.plot(*graph.measured.T, marker="o", markersize=3.3 * scale, color=MEASURED, zorder=2 if dense else 3, **common)
+    opacity = max(0.85 * part**0.7, LEAST_ALPHA)
+    if dense:
+        from .drawn_clouds import PointCloud
+
+        drawn += [
+            axes.add_artist(PointCloud(graph.measured, "circle", 3.3 * scale, MEASURED, opacity, zorder=2)),
+            axes.add_artist(PointCloud(graph.modelled, "diamond", 3.5 * scale, MODELLED, opacity, zorder=3)),
+        ]
+    else:
+        common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "alpha": opacity}
+        drawn += axes.plot(*graph.modelled.T, marker="D", markersize=3.5 * scale, color=MODELLED, zorder=2, **common)
+        drawn += axes.plot(*graph.measured.T, marker="o", markersize=3.3 * scale, color=MEASURED, zorder=3, **common)
     notes = []
     for curve, colour in ((graph.measured_curve, MEASURED), (graph.modelled_curve, MODELLED)):
         if curve is not None:
-            axes.plot(curve.x, curve.y, color="white", linewidth=1.9 * size, zorder=4)
-            axes.plot(curve.x, curve.y, color=colour, linewidth=1.2 * size, zorder=5)
+            drawn += axes.plot(curve.x, curve.y, color="white", linewidth=1.9 * size, zorder=4)
+            drawn += axes.plot(curve.x, curve.y, color=colour, linewidth=1.2 * size, zorder=5)
             notes.append((curve_text(curve, graph, full=size == 1.0), colour))
     notes += [(line, MUTED) for line in beyond_lines(graph)]
     font = 6.0 if size == 1.0 else 5.0
     rising = graph.spec.fitted == "origin"  # which leaves the upper left corner free
     for i, (text, colour) in enumerate(notes):
-        axes.annotate(
+        note = axes.annotate(
             text,
             (0.02 if rising else 1.0, 1.0),
             (0.0, (font + 1.8) * (0.35 - i)),
@@ -227,6 +269,8 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> None:
             zorder=6,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
         )
+        drawn.append(note)
+    return drawn
 
 
 def curve_text(curve: Curve, graph: Graph, full: bool = True) -> str:

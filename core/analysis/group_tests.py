@@ -21,7 +21,7 @@ from ..compiled import in_chunks
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
 from .line_fits import FEWEST
-from .ranks import holm
+from .ranks import holm, shared_ranks
 
 Exchanged = Literal["trajectories", "within", "impacts"]
 """Whole trajectories, impacts within their trajectory, or impacts freely."""
@@ -146,7 +146,7 @@ def group_tests(
     items = np.unique(trajectory).size if exchanged == "trajectories" else number.size
     exchanges = EXCHANGES if items * len(values) * EXCHANGES <= WORK else FEWER_EXCHANGES
     progress("Testing whether groups differ", 0, 1)
-    ranked = np.stack([_ranks(column) for column in columns])
+    ranked = np.stack([shared_ranks(column) for column in columns])
     found, p = _exchange_test(ranked, number, len(tested), trajectory, exchanged, exchanges, seed)
     tests = []
     for i, (name, corrected) in enumerate(zip(values, holm(p).tolist(), strict=True)):
@@ -183,7 +183,7 @@ def _pair(
     """For each quantity: the two medians, Cliff's δ and the probability."""
     here = np.isin(number, pair)
     second = (number[here] == pair[1]).astype(np.intp)
-    ranked = np.stack([_ranks(column) for column in columns[:, here]])
+    ranked = np.stack([shared_ranks(column) for column in columns[:, here]])
     exchanged = what_to_exchange(second, trajectory[here])
     _, p = _exchange_test(ranked, second, 2, trajectory[here], exchanged, exchanges, seed)
     results = []
@@ -249,13 +249,6 @@ def _arrangements(group: Indices, start: Indices, groups: int) -> float:
         sizes = np.bincount(np.bincount(group, minlength=groups))
         total -= sum(lgamma(k + 1) for k in sizes.tolist())
     return total
-
-
-def _ranks(values: Array) -> Array:
-    """(n,) ranks from 1; equal values share theirs."""
-    from scipy.stats import rankdata
-
-    return np.asarray(rankdata(values), dtype=np.float64)
 
 
 def _ties(ranks: Array) -> float:

@@ -44,8 +44,9 @@ def line_through_origin(x: Array, y: Array) -> LineFit:
     """Least squares y = slope · x, (n,) each; the interval is Student's with n − 1 degrees of freedom."""
     if x.size < FEWEST or not np.any(x):
         return _no_line(x.size)
-    slope = float(x @ y / (x @ x))
-    error = np.sqrt(np.sum((y - slope * x) ** 2) / (x.size - 1) / (x @ x))
+    squares = np.sum(x * x)
+    slope = float(np.sum(x * y) / squares)
+    error = np.sqrt(np.sum((y - slope * x) ** 2) / (x.size - 1) / squares)
     reach = student(x.size - 1) * float(error)
     return LineFit(slope, slope - reach, slope + reach, 0.0, _r2(y, slope * x), x.size)
 
@@ -55,10 +56,11 @@ def line(x: Array, y: Array) -> LineFit:
     if x.size < FEWEST or is_constant(x):
         return _no_line(x.size)
     centred = x - x.mean()
-    slope = float(centred @ (y - y.mean()) / (centred @ centred))
+    squares = np.sum(centred**2)
+    slope = float(np.sum(centred * (y - y.mean())) / squares)
     intercept = float(y.mean() - slope * x.mean())
     fitted = intercept + slope * x
-    error = np.sqrt(np.sum((y - fitted) ** 2) / (x.size - 2) / (centred @ centred))
+    error = np.sqrt(np.sum((y - fitted) ** 2) / (x.size - 2) / squares)
     reach = student(x.size - 2) * float(error)
     return LineFit(slope, slope - reach, slope + reach, intercept, _r2(y, fitted), x.size)
 

@@ -86,6 +86,17 @@ def reach_test(reached: Mask, stayed: Mask, share: Array) -> float:
     return min(1.0, 2 * min(at_least, at_most))
 
 
+def shared_ranks(values: Array) -> Array:
+    """(n,) ranks from 1, n ≥ 1; equal values share the mean of theirs."""
+    order = np.argsort(values)
+    ordered = values[order]
+    first = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
+    behind = np.r_[first[1:], values.size]
+    ranks = np.empty(values.size)
+    ranks[order] = np.repeat((first + behind + 1) / 2, behind - first)
+    return ranks
+
+
 def holm(p: Array) -> Array:
     """(n,) probabilities corrected for their number (Holm 1979); NaN where they are, and not counted."""
     known = np.flatnonzero(np.isfinite(p))
@@ -97,9 +108,7 @@ def holm(p: Array) -> Array:
 
 def _mid_ranks(values: Array) -> Array:
     """(m,) places of m values among each other, between 0 and 1; equal ones share theirs."""
-    ordered = np.sort(values)
-    low, high = np.searchsorted(ordered, values, "left"), np.searchsorted(ordered, values, "right")
-    return np.asarray((low + high) / (2 * values.size))
+    return (shared_ranks(values) - 0.5) / values.size
 
 
 def _anderson_darling(places: Array) -> Array:

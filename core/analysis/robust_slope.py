@@ -35,7 +35,9 @@ def theil_sen(
     """
     if x.size <= LISTED:
         return _of_all_pairs(x, y, confidence, interval, cluster)
-    order = np.lexsort((y, x))
+    order = np.argsort(x)
+    if (np.diff(x[order]) == 0.0).any():
+        order = np.lexsort((y, x))
     x, y = np.ascontiguousarray(x[order]), np.ascontiguousarray(y[order])
     pairs = x.size * (x.size - 1) // 2 - sum(k * (k - 1) // 2 for k in _repeats(x))
     slope = _slope_of_rank(x, y, pairs / 2, pairs)

@@ -16,6 +16,7 @@ from ..reading import reader
 from ..reconstruction.impact import RUN, Impacts
 from ..vectors import Array
 from .csv_text import TextTable, read_table
+from .tables import Columns, vector_columns, write_tables
 
 V2 = ("v2x_mps", "v2y_mps", "v2z_mps")
 OMEGA2 = ("omega2x_radps", "omega2y_radps", "omega2z_radps")
@@ -27,21 +28,10 @@ INTO_GROUND = "into_ground"
 
 def write_predictions(predictions: Predictions, path: str | Path) -> None:
     """Write predictions.csv, model by model and run by run."""
-    several = len(set(predictions.site.tolist())) > 1
-    last = ({"site": predictions.site} if several else {}) | dict(predictions.runs)
-    places = (predictions.trajectory, predictions.impact, *last.values())
-    names = list(zip(*(column.tolist() for column in places), strict=True))
-    with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow((*PREDICTIONS_COLUMNS, *last))
-        for i, model in enumerate(predictions.models):
-            for run in range(1 + predictions.replicates):
-                columns = _columns(predictions, i, run)
-                flags = [INTO_GROUND if into else "" for into in predictions.into_ground[i, run].tolist()]
-                for (trajectory, impact, *more), cells, flag in zip(
-                    names, zip(*columns, strict=True), flags, strict=True
-                ):
-                    writer.writerow((model, run, trajectory, impact, *cells, flag, *more))
+    last: Columns = {"site": predictions.site} if np.unique(predictions.site).size > 1 else {}
+    last |= predictions.runs
+    models, runs = range(len(predictions.models)), range(1 + predictions.replicates)
+    write_tables(path, (_columns(predictions, i, run) | last for i in models for run in runs))
 
 
 @reader("table of predictions")
@@ -119,12 +109,20 @@ def write_settings(predictions: Predictions, path: str | Path) -> None:
     write_text(path, tomli_w.dumps(content))
 
 
-def _columns(predictions: Predictions, i: int, run: int) -> list[list[str]]:
-    """The number columns of one model and run, as text that reads back as the same number."""
-    vectors = [values[i, run, :, axis] for values in (predictions.v2, predictions.omega2) for axis in range(3)]
-    norms = [getattr(predictions, name)[i, run] for name in ("vn2", "vt2", "rn", "rt", "r")]
-    columns = [*vectors, *norms, np.degrees(predictions.theta_dev[i, run])]
-    return [["" if value != value else repr(value) for value in values.tolist()] for values in columns]
+def _columns(predictions: Predictions, i: int, run: int) -> Columns:
+    """The rows of one model and run."""
+    n = predictions.row.size
+    return {
+        "model": np.broadcast_to(np.array(predictions.models[i]), n),
+        "replicate": np.broadcast_to(np.array(run), n),
+        "trajectory": predictions.trajectory,
+        "impact": predictions.impact,
+        **vector_columns(V2, predictions.v2[i, run]),
+        **vector_columns(OMEGA2, predictions.omega2[i, run]),
+        **{name: getattr(predictions, name.removesuffix("_mps"))[i, run] for name in SCALARS[:-1]},
+        SCALARS[-1]: np.degrees(predictions.theta_dev[i, run]),
+        "flags": np.where(predictions.into_ground[i, run], INTO_GROUND, ""),
+    }
 
 
 def _rows_of_impacts(table: TextTable, impacts: Impacts) -> np.ndarray:

@@ -17,6 +17,7 @@ from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
 from ..vectors import Array, Indices, Mask, Names, dot
 from .csv_text import read_table
+from .number_text import shortest_texts
 
 POSITION = ("x_m", "y_m", "z_m")
 VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
@@ -131,7 +132,7 @@ def write_impacts(impacts: Impacts | Sequence[Impacts], path: str | Path) -> Non
     Several tables stand one below the other; they have the same columns, but for those without a row.
     """
     tables = [impacts] if isinstance(impacts, Impacts) else impacts
-    write_columns(path, *([_impact_cells(table) for table in tables if len(table)] or [_impact_cells(tables[0])]))
+    write_tables(path, map(_impact_cells, [table for table in tables if len(table)] or tables[:1]))
 
 
 def _impact_cells(impacts: Impacts) -> Columns:
@@ -229,7 +230,7 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
 def write_trajectories(samples: TrajectorySamples | Sequence[TrajectorySamples], path: str | Path) -> None:
     """Write trajectories.csv, to the micrometre and microsecond; several tables one below the other."""
     tables = [samples] if isinstance(samples, TrajectorySamples) else samples
-    write_columns(path, *map(_trajectory_cells, tables))
+    write_tables(path, map(_trajectory_cells, tables))
 
 
 def _trajectory_cells(samples: TrajectorySamples) -> Columns:
@@ -284,7 +285,7 @@ def _of(impacts: Impacts, column: Column) -> Array:
 def _texts(cells: Cells) -> list[str]:
     """As they are written: the shortest text that reads back as the same number; empty when undefined."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
-        return ["" if value != value else repr(value) for value in cells.tolist()]
+        return shortest_texts(cells)
     return list(map(str, cells.tolist())) if isinstance(cells, np.ndarray) else list(cells)
 
 
@@ -296,19 +297,32 @@ def vector_columns(names: Iterable[str], values: Array) -> dict[str, Array]:
     return {name: values[:, i] for i, name in enumerate(names)}
 
 
-def write_columns(path: str | Path, *tables: Columns) -> None:
-    """Write tables of the same columns, one below the other: a header, and undefined numbers as empty cells.
+def write_columns(path: str | Path, columns: Columns) -> None:
+    """Write a table: a header, and undefined numbers as empty cells."""
+    write_tables(path, [columns])
+
+
+def write_tables(path: str | Path, tables: Iterable[Columns]) -> None:
+    """Write tables of the same columns, one below the other.
 
     Some rows at a time: their text takes many times the memory of the numbers.
     """
     with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(tables[0])
-        for columns in tables:
+        for i, columns in enumerate(tables):
+            if i == 0:
+                writer.writerow(columns)
             for start in range(0, min(map(len, columns.values())), WRITTEN_ROWS):
-                part = [_texts(cells[start : start + WRITTEN_ROWS]) for cells in columns.values()]
-                lines = zip(*part, strict=True)
-                if any(QUOTED.search("".join(cells)) for cells in part):
+                cells = [values[start : start + WRITTEN_ROWS] for values in columns.values()]
+                lines = zip(*map(_texts, cells), strict=True)
+                if any(map(_must_be_quoted, cells)):
                     writer.writerows(lines)
                 else:  # six times quicker
                     stream.writelines(f"{line}\n" for line in map(",".join, lines))
+
+
+def _must_be_quoted(cells: Cells) -> bool:
+    """Whether one of them must be."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind != "U":
+        return False
+    return QUOTED.search("".join(cells)) is not None

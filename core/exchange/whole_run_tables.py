@@ -13,7 +13,7 @@ from ..reading import reader
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
 from .csv_text import read_table
-from .tables import Columns, write_columns
+from .tables import Columns, write_columns, write_tables
 
 QUANTILE_NAMES = tuple(f"q{round(100 * part):02d}" for part in QUANTILES)
 
@@ -97,7 +97,7 @@ def write_whole_runs(comparison: WholeRuns, path: str | Path) -> None:
 
 def write_whole_values(comparison: WholeRuns, path: str | Path) -> None:
     """Write whole_values.csv: what was observed of each run, with its standard deviation, beside its simulated runs."""
-    write_columns(path, *(_values(comparison, one) for one in comparison.compared))
+    write_tables(path, (_values(comparison, one) for one in comparison.compared))
 
 
 def _values(comparison: WholeRuns, one: Compared) -> Columns:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rockfall.core.analysis.comparison import compare
 from rockfall.core.analysis.courses import find_courses
-from rockfall.core.analysis.scores import ABSCISSA, energy_distance, scores
+from rockfall.core.analysis.scores import ABSCISSA, energy_distance, scores, wasserstein_distance
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.comparison_tables import read_predictions, write_predictions, write_scores
 from rockfall.core.impact_models.machinery.base import Incident
@@ -270,6 +270,15 @@ def test_coverage_of_a_model_that_is_right():
         assert own.coverage90 == pytest.approx(0.9, abs=0.06)
         assert own.energy_distance < 0.25 * other.energy_distance
         assert own.wasserstein < 0.25 * other.wasserstein
+
+
+@pytest.mark.parametrize("draws", [1, 7])
+def test_wasserstein_distance(draws):
+    from scipy.stats import wasserstein_distance as expected
+
+    rng = np.random.default_rng(8)
+    y, drawn = rng.normal(size=50).round(1), rng.gamma(2.0, size=(draws, 50)).round(1)
+    assert wasserstein_distance(y, drawn) == pytest.approx(expected(y, drawn.ravel()), rel=1e-12)
 
 
 def test_energy_distance():

@@ -131,6 +131,42 @@ def test_a_cloud_of_impacts_is_a_picture_within_the_drawing(impacts, predictions
     assert cloud.count("<use") <= few.count("<use")
 
 
+@pytest.mark.parametrize(("shape", "marker"), [("circle", "o"), ("diamond", "D")])
+def test_a_cloud_is_as_dark_as_markers_drawn_one_by_one(shape, marker) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from rockfall.core.analysis.drawn_clouds import PointCloud
+
+    points = np.random.default_rng(2).normal(size=(3000, 2))
+    pictures = []
+    for counted in (True, False):
+        figure = Figure(figsize=(4, 4), dpi=100)
+        canvas = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(-3, 3), ylim=(-3, 3), axisbelow=True)
+        axes.set_axis_off()
+        if counted:
+            axes.add_artist(PointCloud(points, shape, 4.0, "black", 0.2, zorder=2))
+        else:
+            axes.plot(*points.T, marker, markersize=4.0, color="black", alpha=0.2, markeredgewidth=0)
+        canvas.draw()
+        darkness = 255.0 - np.asarray(canvas.buffer_rgba())[:, :, 0]
+        pictures.append(darkness.reshape(20, 20, 20, 20).mean(axis=(1, 3)))
+    counted, drawn = pictures
+    assert drawn.max() > 100.0
+    assert counted.mean() == pytest.approx(drawn.mean(), rel=0.03)
+    np.testing.assert_allclose(counted, drawn, atol=0.06 * drawn.max())
+
+
+def test_every_model_has_its_own_points_and_title(figures, impacts, predictions, tmp_path) -> None:
+    from rockfall.core.analysis.figures import model_figure, save_figure
+
+    for graphs in make_sheet(impacts, predictions):
+        name = graphs[0].model
+        save_figure(model_figure(graphs), tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").read_bytes() == (figures / f"{name}.png").read_bytes()
+
+
 class Links(HTMLParser):
     """What a page would load."""
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rockfall.core.analysis.observed_runs import Observed, observe_runs, observe_stops
 from rockfall.core.analysis.paths import Paths, observed_paths, simulated_paths
-from rockfall.core.analysis.ranks import holm, rank_test, reach_test
+from rockfall.core.analysis.ranks import holm, rank_test, reach_test, shared_ranks
 from rockfall.core.analysis.sections import (
     Axis,
     Section,
@@ -31,7 +31,7 @@ from rockfall.core.simulation.release import make_releases, placed_on
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.whole_runs import compare_whole_runs, released_as_observed
 from scipy.integrate import solve_ivp
-from scipy.stats import binom, kstest
+from scipy.stats import binom, kstest, rankdata
 
 G = 9.81
 EAST = Axis(np.zeros(2), np.array([1.0, 0.0]))
@@ -297,6 +297,11 @@ def test_equal_values_share_their_place() -> None:
     """Above ten of twenty values and equal to the other nine and itself: from 0.5 to 1."""
     found = rank_test(np.array([1.0]), [np.repeat([0.0, 1.0], [10, 9])])
     assert found.place == pytest.approx([0.75])
+
+
+def test_equal_values_share_the_mean_of_their_ranks() -> None:
+    values = np.random.default_rng(6).integers(0, 30, 100).astype(np.float64)
+    np.testing.assert_array_equal(shared_ranks(values), rankdata(values))
 
 
 def test_ranks_see_a_shift_and_a_wrong_scatter() -> None:

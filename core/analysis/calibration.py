@@ -111,7 +111,7 @@ def calibrate(
         settings=found.settings,
         impacts=int(total),
         trajectories=target.trajectories,
-        remarks=tuple(_remarks(target, found, held, chosen.is_random)),
+        remarks=tuple(_remarks(target, found, held, contest.scatters(chosen.numbers(found.settings)))),
         objective=OBJECTIVE,
         default_score=float(found.default_sums.sum()) / total,
         fitted_score=float(found.sums.sum()) / total,

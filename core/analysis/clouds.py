@@ -150,6 +150,13 @@ class Contest:
         points_of(v2, courses.incident.velocity, courses.incident.normal, self.target.scale, points)
         return points
 
+    def scatters(self, numbers: Array) -> bool:
+        """Whether chance has a part in any outcome with these parameters; CRSP without roughness has none."""
+        if len(self.draws) < 2:
+            return False
+        points = self.points(numbers)[:, self.target.counted]
+        return bool((points != points[:1]).any())
+
     def sums(self, numbers: Array) -> Array:
         """(clusters,) sums of the scores of the impacts that count; `HOPELESS` where the model gives no velocity."""
         from .cloud_kernels import energy_scores

@@ -24,6 +24,9 @@ HALF, MOST = (0.25, 0.75), (0.05, 0.95)
 CLOUD_POINTS = 1000
 """Of a larger cloud, this many evenly spaced points enter the energy distance, whose cost grows with the square."""
 
+SEVERAL = 2
+"""Fewer draws have neither a mean nor a range of their own."""
+
 
 @dataclass(frozen=True)
 class Score:
@@ -34,11 +37,11 @@ class Score:
     model, quantity : the latter as a column of predictions.csv, which names its unit.
     n : impacts.
     bias, rmse : mean and root mean square of predicted − measured; predicted is the mean of the replicates, or the
-        model's mean run when there are none.
+        model's mean run when there are fewer than two.
     rmse_low, rmse_high : 95 % interval of the latter, by falls; NaN with fewer than two.
     median_error : median of |predicted − measured|, which a few outliers do not move.
     coverage50, coverage90 : share of the measured values between the 25 and 75 %, the 5 and 95 % quantiles of their
-        replicates; NaN without replicates. 0.5 and 0.9 would be right; a model without chance has 0.
+        replicates; NaN with fewer than two. 0.5 and 0.9 would be right; a model without chance has 0.
     wasserstein : between the measured and the predicted values, replicates pooled, in the quantity's unit.
     energy_distance : between the two clouds in the plane of the graph (`ABSCISSA`), axes divided by the interquartile
         range of the measured values; 0 for the same cloud.
@@ -94,7 +97,7 @@ def predicted(predictions: Predictions, model: int, name: str) -> Array:
 def rmse(impacts: Impacts, predictions: Predictions, model: int, quantity: str, kept: Mask | None = None) -> float:
     """That of a `Score` alone, at once; NaN where nothing is measured. `model` is its place in the predictions."""
     y, runs, _, _, _ = _pairs(model, quantity, impacts, predictions, kept)
-    return float(np.sqrt(np.mean((_drawn(runs).mean(axis=0) - y) ** 2))) if y.size else np.nan
+    return float(np.sqrt(np.mean((_expected(runs) - y) ** 2))) if y.size else np.nan
 
 
 def _pairs(
@@ -141,6 +144,11 @@ def _drawn(runs: Array) -> Array:
     return runs[1:] if len(runs) > 1 else runs
 
 
+def _expected(runs: Array) -> Array:
+    """The mean of the replicates, or the model's mean when they are fewer than `SEVERAL`."""
+    return np.asarray(runs[1:].mean(axis=0) if len(runs) > SEVERAL else runs[0])
+
+
 def _score(
     model: str,
     i: int,
@@ -156,7 +164,7 @@ def _score(
     if not n:
         return Score(model, quantity, 0, *[np.nan] * 9)
     draws, x_draws = _drawn(runs), _drawn(x_runs)
-    error = draws.mean(axis=0) - y
+    error = _expected(runs) - y
     whole = float(np.sqrt(np.mean(error**2)))
     low, high, _ = rmse_interval(error**2, fall[row])
     return Score(
@@ -168,8 +176,8 @@ def _score(
         whole * low,
         whole * high,
         float(np.median(np.abs(error))),
-        _coverage(y, draws, *HALF) if predictions.replicates else np.nan,
-        _coverage(y, draws, *MOST) if predictions.replicates else np.nan,
+        _coverage(y, draws, *HALF) if predictions.replicates >= SEVERAL else np.nan,
+        _coverage(y, draws, *MOST) if predictions.replicates >= SEVERAL else np.nan,
         wasserstein_distance(y, draws) if distances else np.nan,
         energy_distance(np.stack([x, y], axis=1), np.stack([x_draws.ravel(), draws.ravel()], axis=1))
         if distances

@@ -226,7 +226,7 @@ class ImpactStatistics:
                 "r",
                 trend.slope,
                 f"{turn} ({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {_signed(trend.r2, 2)}). "
-                "Published: falls about linearly from 1.",
+                "Published: it falls about linearly; no numbers are printed.",
             ),
         ]
         return [*self._doubtful(), *(Remark(text, "note", about) for about, known, text in texts if known == known)]

@@ -45,7 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_parameter_options(parser)
     add_observed_option(parser, "default: IMPACTS; a trajectory's impacts are always drawn from those of the others")
     parser.add_argument(
-        "--replicates", type=whole, default=0, metavar="N", help="runs with chance, besides the mean (default 0)"
+        "--replicates",
+        type=whole,
+        default=1,
+        metavar="N",
+        help="draws for each impact, besides the mean (default 1, which the figures show; 0: the mean alone)",
     )
     add_incident_options(parser)
     add_figure_options(parser, without="neither figures nor the page")
@@ -162,7 +166,8 @@ def _counts(predictions: "Predictions", impacts: int) -> list[str]:
     from ..analysis.measured_rebounds import beyond_sentence, measured_sentence
 
     n, replicates = predictions.row.size, predictions.replicates
-    chance = f" and {replicates} replicates with seed {predictions.seed}" if replicates else ""
+    draws = "one draw" if replicates == 1 else f"{replicates} replicates"
+    chance = f" and {draws} with seed {predictions.seed}" if replicates else ""
     lines = [f"{n} of {impacts} impacts compared: the mean{chance} of {len(predictions.models)} models."]
     skipped = Counter(reason for _, reason in predictions.skipped)
     lines += [f"Skipped: {number} with {reason}." for reason, number in skipped.items()]

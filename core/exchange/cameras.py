@@ -43,8 +43,10 @@ class CameraFile:
     rmse_px : of the pairs it was solved from; None when unknown.
     sigma : standard deviations by name: those of `INTRINSICS` in their units, x, y, z [m], omega, phi, kappa [rad].
     crs : coordinate reference system of the position, empty when unknown.
-    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path, for the lens as it is; None when
-        unknown.
+    pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path, for the lens as it is: what moves
+        the path and holds the lens needs; None when unknown.
+    pose_covariance_with_lens : (6, 6) the same with what is not known of the lens in it: how well the pose is known;
+        None where it is the same or unknown.
     extra : keys that this version does not know.
     """
 
@@ -53,6 +55,7 @@ class CameraFile:
     sigma: Mapping[str, float] = field(default_factory=dict)
     crs: str = ""
     pose_covariance: Array | None = None
+    pose_covariance_with_lens: Array | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -85,15 +88,14 @@ def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFil
     )
     rmse = top.optional_number("rmse_px", zero_allowed=True)
     sigma = top.table("sigma")
-    covariance = top.numbers("pose_covariance", (6, 6)) if top.has("pose_covariance") else None
-    if covariance is not None and not _is_covariance(covariance):
-        raise top.wrong("pose_covariance", "is not symmetric and positive", "Remove it, or solve the camera again")
+    covariance, with_lens = (_covariance(top, key) for key in ("pose_covariance", "pose_covariance_with_lens"))
     return CameraFile(
         path=_path(top, camera),
         rmse_px=rmse,
         sigma={name: sigma.number(name, 0.0, zero_allowed=True) for name in sigma.rest()},
         crs=crs,
         pose_covariance=covariance,
+        pose_covariance_with_lens=with_lens,
         extra=top.rest(),
     )
 
@@ -106,6 +108,7 @@ def write_camera(
     sigma: Mapping[str, float] | None = None,
     crs: str = "",
     pose_covariance: Array | None = None,
+    pose_covariance_with_lens: Array | None = None,
     extra: Mapping[str, Any] | None = None,
 ) -> None:
     """Write camera.toml, each number so that it reads back as the same double; see `CameraFile`."""
@@ -123,8 +126,8 @@ def write_camera(
         ({"crs": crs or one.shift.crs} if crs or one.shift.crs else {})
         | {key: value for key, value in more.items() if key not in tables}
     ).splitlines()
-    if pose_covariance is not None and np.isfinite(pose_covariance).all():
-        lines.append(_numbers("pose_covariance", pose_covariance))
+    named = {"pose_covariance": pose_covariance, "pose_covariance_with_lens": pose_covariance_with_lens}
+    lines += [_numbers(key, value) for key, value in named.items() if value is not None and np.isfinite(value).all()]
     if known := {name: value for name, value in (sigma or {}).items() if np.isfinite(value)}:
         lines += ["", "[sigma]", *(_numbers(name, value) for name, value in known.items())]
     if tables:
@@ -246,6 +249,15 @@ def _rotation(table: TomlTable) -> Array:
         left, _, right = np.linalg.svd(rows)
         rows = left @ right
     return rows
+
+
+def _covariance(top: TomlTable, key: str) -> Array | None:
+    if not top.has(key):
+        return None
+    matrix = top.numbers(key, (6, 6))
+    if not _is_covariance(matrix):
+        raise top.wrong(key, "is not symmetric and positive", "Remove it, or solve the camera again")
+    return matrix
 
 
 def _is_covariance(matrix: Array) -> bool:

@@ -62,11 +62,15 @@ def read_project_camera(
     """
     read = read_camera(file, shift if surface is None else surface.shift)
     path, notes = turned_path(read.path, surface)
-    if notes and read.pose_covariance is not None:
-        turn = np.eye(6)
-        turn[3:, 3:] = Z_UP
-        read = replace(read, pose_covariance=turn @ read.pose_covariance @ turn.T)
-    return replace(read, path=path), notes
+    if not notes:
+        return read, ()
+    turn = np.eye(6)
+    turn[3:, 3:] = Z_UP
+    own, with_lens = (
+        None if matrix is None else turn @ matrix @ turn.T
+        for matrix in (read.pose_covariance, read.pose_covariance_with_lens)
+    )
+    return replace(read, path=path, pose_covariance=own, pose_covariance_with_lens=with_lens), notes
 
 
 def reconstruct_project(project: Project, surface: Surface | None, picks: Picks | None = None) -> Reconstruction:

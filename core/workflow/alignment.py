@@ -9,7 +9,7 @@ import numpy as np
 from ..camera.model import SIGMA_PX, Camera
 from ..camera.pairs import Pairs
 from ..camera.resection.problem import POSE_PAIRS
-from ..camera.resection.resect import Resection, resect
+from ..camera.resection.resect import POSE, Resection, resect
 from ..errors import InputError, RockfallError
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask
@@ -89,6 +89,11 @@ class Alignment:
         It is for what moves the whole path and holds the lens, as refinement does.
         """
         return self.found.pose_covariance_given_lens
+
+    @property
+    def pose_covariance_with_lens(self) -> Array | None:
+        """(6, 6) the same with what is not known of the lens in it; None where the lens was held."""
+        return self.found.pose_covariance if len(self.found.parameters) > len(POSE) else None
 
 
 def reference_frame(pairs: Pairs) -> int:

@@ -77,6 +77,12 @@ def test_the_camera_is_found_within_its_deviations(pairs, capsys):
     for i, name in enumerate("xyz"):
         assert abs(off[i]) < 4 * found.sigma[name]
     assert norm(off) < 0.5
+    assert found.pose_covariance_with_lens is not None
+    with_lens, given_lens = (
+        np.sqrt(np.diag(matrix))[3:] for matrix in (found.pose_covariance_with_lens, found.pose_covariance)
+    )
+    np.testing.assert_allclose(with_lens, [found.sigma[name] for name in "xyz"], rtol=1e-9)
+    assert (given_lens < with_lens).all()
     assert 0.5 * SIGMA_PX < found.rmse_px / np.sqrt(2) < 1.5 * SIGMA_PX
     assert found.pose_covariance.shape == (6, 6)
     marginal = np.array([found.sigma[name] for name in "xyz"])

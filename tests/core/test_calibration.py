@@ -379,3 +379,11 @@ def test_axes_and_intervals():
     values = np.random.default_rng(0).normal(size=200_000)
     assert interval(values, 10_000) == pytest.approx((-1.96, 1.96), abs=0.03)
     assert interval(values, 14) == pytest.approx((-2.242, 2.242), abs=0.03)  # √(14/13) · t(0.975; 13) = 2.2419
+
+
+@pytest.mark.parametrize(
+    ("roughness", "guess"), [(0.0, "one and the same outcome"), (0.3, "drawing one of the measured outcomes")]
+)
+def test_crsp_without_roughness_is_measured_as_a_model_without_chance(roughness, guess):
+    result = calibrate(slope(), "pfeiffer_bowen_1989", ["rn"], {"roughness": roughness}, QUICK, holdout=False)
+    assert guess in remark_about(result.remarks, "score")[1]

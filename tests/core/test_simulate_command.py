@@ -226,7 +226,7 @@ def test_simulated_impacts_are_read_as_measured_ones_are(terrain: Path, releases
     argv = ["simulate", str(releases), "--terrain", str(terrain), "--model", "pfeiffer_bowen_1989"]
     assert main([*argv, "--record", "impacts", "--out", str(simulated)]) == 0
     table, compared = simulated / "impacts.csv", tmp_path / "compared"
-    chosen = ["--model", "pfeiffer_bowen_1989", "--tables-only", "--spin", "table"]
+    chosen = ["--model", "pfeiffer_bowen_1989", "--tables-only", "--spin", "table", "--replicates", "0"]
     assert main(["compare", str(table), *chosen, "--out", str(compared)]) == 0
     impacts, predicted = rows_of(table), rows_of(compared / "predictions.csv")
     assert len(predicted) == len(impacts) > 50

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...least_squares import damped_step, inverse, scales
-from ...vectors import Array, Mask
+from ...vectors import Array, Mask, norm
 from ..model import Camera, project_with_derivatives, rotation_from_vector, with_intrinsics
 from .problem import Problem, basis_of
 from .starting import Starts
@@ -149,3 +149,25 @@ def spread_of(solution: Solution, problem: Problem, used: Mask) -> tuple[float, 
     scatter = scatter_of(solution, problem, used)
     larger = max(1.0, scatter**2) if np.isfinite(scatter) else 1.0
     return scatter, inverse(solution.normal) * larger
+
+
+def sigma_without(solution: Solution, problem: Problem, used: Mask) -> Array:
+    """(n,) standard deviation of the position in its worst direction without each used pair [m]; 0 for the others.
+
+    Infinite where nothing but the pair determines it; as the errors are stated, like `inverse(solution.normal)`.
+    """
+    trust, sigma = np.linalg.inv(solution.noise), np.zeros(len(used))
+    for i in np.flatnonzero(used):
+        slope = solution.slopes[i]
+        spread = inverse(solution.normal - slope.T @ trust[i] @ slope)[3:6, 3:6]
+        known = np.isfinite(spread).all()
+        sigma[i] = np.sqrt(max(np.linalg.eigvalsh(spread)[-1], 0.0)) if known else np.inf
+    return sigma
+
+
+def moved_with(solution: Solution, problem: Problem, used: Mask, pair: int) -> float:
+    """By how much the position moves when a pair that was left out is used as well [m]; NaN where it has no pixel."""
+    more = used.copy()
+    more[pair] = True
+    found = adjusted(solution.camera, problem, more)
+    return float("nan") if found is None else float(norm(found.camera.position - solution.camera.position))

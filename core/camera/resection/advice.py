@@ -20,6 +20,10 @@ FLAT = 0.03
 SMALL_COVER = 0.1
 POOR_SCATTER = 2.0
 DEPENDENT = 0.98
+FEW = 4
+"""With no more observations to spare a wrong pair can hardly be told."""
+RELIES = 2.5
+"""So many times worse is the position known without one pair when the camera rests on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +36,9 @@ class Geometry:
     parameters, covariance : as in `Resection`.
     scatter, redundancy, rmse_px : as in `Resection`.
     other : a different camera that fits nearly as well, or None.
-    wrong : names and residuals [px] of the pairs that were left out.
+    wrong : names and residuals [px] of the pairs that were left out, and by how much the camera's position moves with
+        them [m], NaN where they have no pixel.
+    relied_on : name of the pair without which the position is known worst, and its standard deviation then [m].
     """
 
     camera: Camera
@@ -45,11 +51,19 @@ class Geometry:
     redundancy: int
     rmse_px: float
     other: Camera | None
-    wrong: tuple[tuple[str, float], ...]
+    wrong: tuple[tuple[str, float, float], ...]
+    relied_on: tuple[str, float]
 
     def sigma(self, name: str) -> float:
         i = self.parameters.index(name)
         return float(np.sqrt(self.covariance[i, i]))
+
+    @property
+    def sigma_position_m(self) -> float:
+        """Of the position, in the direction in which it is known worst [m]."""
+        with np.errstate(invalid="ignore"):
+            values = np.linalg.eigvalsh(np.nan_to_num(self.covariance[3:6, 3:6], posinf=1e12, neginf=-1e12))
+        return float(np.sqrt(max(values[-1], 0.0)))
 
 
 def remarks_on(found: Geometry) -> tuple[Remark, ...]:
@@ -59,6 +73,7 @@ def remarks_on(found: Geometry) -> tuple[Remark, ...]:
         *_on_a_rival(found),
         *_on_focal_length(found),
         *_on_position(found),
+        *_on_the_pair_relied_on(found),
         *_on_lens(found),
         *_on_fit(found),
         *_on_redundancy(found),
@@ -67,8 +82,9 @@ def remarks_on(found: Geometry) -> tuple[Remark, ...]:
 
 
 def _on_wrong_pairs(found: Geometry) -> Iterator[Remark]:
-    for name, residual in found.wrong:
-        off = f"({_pixels(residual)} off) and was left out. Check its pixel and its point."
+    for name, residual, shift in found.wrong:
+        moved = f"; with it the camera would stand {shift:.2g} m from here" if shift > found.sigma_position_m else ""
+        off = f"({_pixels(residual)} off) and was left out{moved}. Check its pixel and its point."
         yield Remark(f"Pair {name} does not fit the others {off}", "warning", about_pair(name))
 
 
@@ -142,9 +158,7 @@ def _field_deg(found: Geometry) -> float:
 
 def _on_position(found: Geometry) -> Iterator[Remark]:
     distance = float(norm(found.points - found.camera.position).mean())
-    with np.errstate(invalid="ignore"):
-        values = np.linalg.eigvalsh(np.nan_to_num(found.covariance[3:6, 3:6], posinf=1e12, neginf=-1e12))
-    worst = float(np.sqrt(max(values[-1], 0.0)))
+    worst = found.sigma_position_m
     if worst <= POOR_POSITION * distance:
         return
     text = (
@@ -152,6 +166,18 @@ def _on_position(found: Geometry) -> Iterator[Remark]:
         "Add pairs that are farther apart, in the image and in depth."
     )
     yield Remark(text, "advice", "position")
+
+
+def _on_the_pair_relied_on(found: Geometry) -> Iterator[Remark]:
+    name, alone = found.relied_on
+    if found.redundancy <= FEW or not alone > RELIES * found.sigma_position_m:
+        return
+    known = f"to {alone:.2g} m" if np.isfinite(alone) else "not at all"
+    text = (
+        f"The camera rests on pair {name}: without it the position is known {known}, with it to "
+        f"{found.sigma_position_m:.2g} m, and the others hardly check it. Add one near it."
+    )
+    yield Remark(text, "advice", about_pair(name))
 
 
 def _on_lens(found: Geometry) -> Iterator[Remark]:
@@ -190,7 +216,7 @@ def _on_fit(found: Geometry) -> Iterator[Remark]:
 
 def _on_redundancy(found: Geometry) -> Iterator[Remark]:
     n = len(found.pixels)
-    if found.redundancy > 4:
+    if found.redundancy > FEW:
         return
     if found.redundancy > 2:
         yield Remark(f"With {n} pairs a wrong one can hardly be told. Add two or more.", "advice", "pairs")

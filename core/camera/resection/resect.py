@@ -16,7 +16,7 @@ from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, distance_to_ray, norm
 from ..model import SIGMA_PX, Camera, rays
-from .adjustment import spread_of
+from .adjustment import moved_with, sigma_without, spread_of
 from .advice import Geometry, remarks_on
 from .pair_choice import choose
 from .problem import basis_of, check_number, checked_pairs, free_columns, starting_camera
@@ -155,6 +155,7 @@ def resect(
     depth = (problem.points - solution.camera.position) @ solution.camera.rotation[2]
     rmse = float(np.sqrt(np.mean(np.einsum("ni,ni->n", solution.residual, solution.residual)[used])))
     redundancy = 2 * int(used.sum()) - problem.unknowns
+    alone = sigma_without(solution, problem, used) * max(1.0, scatter if np.isfinite(scatter) else 1.0)
     geometry = Geometry(
         camera=solution.camera,
         pixels=problem.pixels[used],
@@ -166,7 +167,11 @@ def resect(
         redundancy=redundancy,
         rmse_px=rmse,
         other=other.camera if other is not None else None,
-        wrong=tuple((named[i], float(norm(solution.residual[i]))) for i in np.flatnonzero(~used)),
+        wrong=tuple(
+            (named[i], float(norm(solution.residual[i])), moved_with(solution, problem, used, i))
+            for i in np.flatnonzero(~used).tolist()
+        ),
+        relied_on=(named[int(np.argmax(alone))], float(alone.max())),
     )
     return Resection(
         camera=solution.camera,
@@ -179,5 +184,5 @@ def resect(
         scatter=scatter,
         redundancy=redundancy,
         remarks=remarks_on(geometry),
-        wrong=tuple(name for name, _ in geometry.wrong),
+        wrong=tuple(name for name, *_ in geometry.wrong),
     )

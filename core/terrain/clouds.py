@@ -17,6 +17,8 @@ from .text import number_table, read_text
 DAMAGED = "It is truncated or damaged: copy or export it again"
 GROUND_CLASS = 2
 """ASPRS LAS 1.4 R15, table 17."""
+LOOKED_AT = 500_000
+"""So many points are looked at before a cloud is read."""
 LAS_HEADER_BYTES, RECORD_HEADER_BYTES, EXTENDED_HEADER_BYTES = 227, 54, 60
 """ASPRS LAS 1.4 R15, tables 3, 6 and 7."""
 COMPRESSED, NOT_KNOWN_YET = 0xC0, 2**64 - 1
@@ -66,10 +68,29 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
     return Source(points, crs=crs, geographic=geographic, notes=tuple(notes))
 
 
-def inspect_las(path: Path) -> tuple[Array, int, str, bool]:
-    """Box (2, 3), number of points, CRS and whether it is geographic, from the header alone."""
+def inspect_las(path: Path) -> tuple[Array, int, str, bool, tuple[str, ...]]:
+    """Box (2, 3), number of points, CRS and whether it is geographic, from the header alone; and sentences on the
+    points and, from the first ones, on their classes.
+    """
     header, crs, geographic = _las_header(path)
-    return np.array([header.mins, header.maxs]), int(header.point_count), crs, geographic
+    count = int(header.point_count)
+    said = (f"Cloud of {count:,} points.", _ground_sentence(path, count))
+    return np.array([header.mins, header.maxs]), count, crs, geographic, said
+
+
+def _ground_sentence(path: Path, count: int) -> str:
+    """How much of a cloud is classified as ground, and what that means for what is read of it."""
+    import laspy
+
+    with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
+        some = np.asarray(opened.read_points(LOOKED_AT).classification)
+    ground = int((some == GROUND_CLASS).sum())
+    if not ground:
+        known = "No point" if count <= LOOKED_AT else f"None of the first {LOOKED_AT:,} points"
+        return f"{known} is classified as ground: vegetation, if there is any, becomes part of the surface."
+    share = f"{100 * ground / len(some):.0f} %"
+    of = f"{ground:,} of them ({share})" if count <= LOOKED_AT else f"Of the first {LOOKED_AT:,}, {share}"
+    return f"{of} are classified as ground; only these are used unless others are asked for."
 
 
 def _las_header(path: Path) -> tuple[Any, str, bool]:

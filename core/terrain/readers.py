@@ -209,7 +209,7 @@ def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Su
 
 @reader("terrain")
 def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) -> TerrainInfo:
-    """Box, counts, CRS and proposed shift, without meshing; from the header alone where it tells (LAS, LAZ).
+    """Box, counts, CRS and proposed shift, without meshing; from the header where it tells (LAS, LAZ).
 
     Raises
     ------
@@ -218,8 +218,7 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     path, how = Path(path), HowToRead(up, unit_m)
     if path.suffix.lower() in LAS_EXTENSIONS:
         check_path(path)
-        box, count, crs, geographic = clouds.inspect_las(path)
-        said = (f"Cloud of {count:,} points.",)
+        box, count, crs, geographic, said = clouds.inspect_las(path)
         source = placed(Source(box, crs=crs, geographic=geographic, notes=said), how, path)
     else:
         source = read_placed(path, how)

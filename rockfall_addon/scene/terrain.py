@@ -211,6 +211,12 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
     return said
 
 
+def readings(scene: bpy.types.Scene) -> list[tuple[str, tuple[str, ...]]]:
+    """What was read of each tile, and what was left out, in sentences."""
+    kept = [(tile.name, tile.get(store.TERRAIN_SUMMARY)) for tile in tiles(scene)]
+    return [(name, tuple(map(str, said))) for name, said in kept if isinstance(said, list) and said]
+
+
 def grouped(count: int) -> str:
     """A count with its thousands set apart."""
     return f"{count:,}".replace(",", "\u202f")

@@ -549,3 +549,12 @@ def test_a_cloud_in_which_y_points_up_is_noticed(tmp_path):
         np.savetxt(path, np.stack([column.ravel() for column in columns], axis=1))
         assert any("read it with Y up" in sentence for sentence in read_terrain(path).summary) == noticed
     assert not any("read it with Y up" in sentence for sentence in read_terrain(path, up="y").summary)
+
+
+def test_how_much_of_a_cloud_is_ground_is_said_before_it_is_read() -> None:
+    data = Path(__file__).parents[1] / "data"
+    assert "8,047 of them (9 %) are classified as ground" in " ".join(
+        inspect_terrain(data / "las_chablais3.laz").summary
+    )
+    said = " ".join(inspect_terrain(data / "sample_lareunion_epsg2975.laz").summary)
+    assert "No point is classified as ground" in said

@@ -45,6 +45,10 @@ class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
     bl_idname = "ROCKFALL_PT_picking"
     bl_parent_id = "ROCKFALL_PT_picks"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(videos.cameras(context.scene))
+
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
         settings, camera = scene.rockfall_picking, videos.active_camera(scene)

@@ -67,6 +67,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     y_up: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     proposed: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+    is_cloud: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
@@ -88,10 +89,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
         self.proposed = " ".join((self.shift_x, self.shift_y, self.shift_z))
         self.asked, self.y_up = True, found.y_up
-        self.facts = [
-            f"{found.name}: {found.kind}, {found.point_count:,} points, {found.face_count:,} faces",
-            *found.summary,
-        ]
+        self.is_cloud = found.kind == "cloud"
+        self.facts = [found.name, *found.summary]
         self.facts += [said for said in sentences(found.minimum, found.maximum, shift) if said not in self.facts]
         return context.window_manager.invoke_props_dialog(
             self, width=420, title="Import Terrain", confirm_text="Import"
@@ -119,15 +118,21 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             row = column.row(align=True)
             row.alert = self.up == "auto"
             row.prop(self, "up", expand=True)
-        for name in (
-            *(() if self.y_up else ("up",)),
-            "unit_m",
-            "ground",
-            *(("filter_m",) if self.ground == "FILTER" else ()),
-            "max_edge_m",
-        ):
+        for name in (*(() if self.y_up else ("up",)), "unit_m"):
             layout.prop(self, name)
+        if self.is_cloud:
+            self._draw_meshing(layout)
         self.draw_offer(context, layout)
+
+    def _draw_meshing(self, layout: bpy.types.UILayout) -> None:
+        """How a surface is made of a cloud."""
+        layout.separator()
+        layout.prop(self, "ground")
+        if self.ground == "FILTER":
+            layout.prop(self, "filter_m")
+        layout.prop(self, "max_edge_m")
+        if not self.max_edge_m:
+            layout.column().label(text="0: chosen from the spacing of the points.")
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -171,7 +176,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
                 look.show_relief(there, frame_all=True)
                 if first:
                     begin_file(there, opens_workspace=opens_workspace)
-            return " ".join(filter(None, (*replaced, *surface.summary)))
+            said = f"{surface.name}: {len(surface.faces):,} triangles. Terrain > What Was Read tells the rest."
+            return " ".join((*replaced, said))
 
         return job.Work("terrain", compute, keep)
 

@@ -69,6 +69,23 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
             column.label(text=f"{count} triangles{f' of {file}' if file != ground.name else ''}", icon="BLANK1")
 
 
+class ROCKFALL_PT_terrain_reading(RockfallPanel, bpy.types.Panel):
+    bl_label = "What Was Read"
+    bl_idname = "ROCKFALL_PT_terrain_reading"
+    bl_parent_id = "ROCKFALL_PT_terrain"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(terrain.readings(context.scene))
+
+    def draw(self, context: bpy.types.Context) -> None:
+        for name, sentences in terrain.readings(context.scene):
+            self.layout.label(text=name, icon="MESH_GRID", translate=False)
+            for sentence in sentences:
+                paragraph(context, self.layout, sentence)
+
+
 class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
     bl_label = "Relief"
     bl_idname = "ROCKFALL_PT_relief"
@@ -95,4 +112,4 @@ class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
             column.prop(settings, "view_limit")
 
 
-CLASSES = (ROCKFALL_PT_terrain, ROCKFALL_PT_relief)
+CLASSES = (ROCKFALL_PT_terrain, ROCKFALL_PT_terrain_reading, ROCKFALL_PT_relief)

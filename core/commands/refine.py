@@ -2,6 +2,7 @@
 """``rockfall refine``: picks and times fitted to the pixels of the footage → picks and impacts with deviations."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from ..exchange.project import Project, RefinementSettings
     from ..reconstruction.impact import Impacts
     from ..reconstruction.picks import Picks
+    from ..reconstruction.refinement.what_if import WhatIf
     from ..terrain.surface import Surface
     from ..workflow.refinement import Refined
 
@@ -136,7 +138,7 @@ def _write(
 ) -> list[str]:
     """Write all files; returns their names."""
     from ..exchange.cameras import write_camera
-    from ..exchange.footage_tables import write_refinement_residuals
+    from ..exchange.footage_tables import write_refinement_residuals, write_what_if
     from ..exchange.project import write_project
     from ..exchange.tables import write_impacts, write_picks, write_trajectories
     from ..reconstruction.sampling import sample_trajectories
@@ -156,7 +158,8 @@ def _write(
         residual_px=fit.residual_px,
         outlier=fit.outlier,
     )
-    written = ["picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv"]
+    write_what_if(fit.what_if, folder / "what_if.csv")
+    written = ["picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "what_if.csv"]
     entries = {}
     for i, (video, view) in enumerate(zip(footage.videos, fit.views, strict=True)):
         entry, camera, covariance = video.entry, video.camera, refined.pose_covariance[i]
@@ -221,7 +224,19 @@ def _summary(refined: "Refined") -> list[str]:
             + (f" (median; at most {max(off):.0f} %)." if len(off) > 1 else ".")
         )
     sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in fit.unknowns.items()]
-    return [*sentences, *_impact_lines(fit.reconstruction.impacts), *map(str, refined.remarks)]
+    impacts = _impact_lines(fit.reconstruction.impacts)
+    return [*sentences, *impacts, *_what_if_lines(fit.what_if), *map(str, refined.remarks)]
+
+
+def _what_if_lines(rows: Sequence["WhatIf"]) -> list[str]:
+    """What would change if an input were otherwise, as a table for people: of all trajectories together."""
+    from ..reconstruction.refinement.what_if import gravest
+
+    if not rows:
+        return []
+    cells = [("what if", "speeds, median", "at most", "R, median", "at most"), *(row.cells for row in gravest(rows))]
+    width = max(len(row[0]) for row in cells)
+    return [f"{row[0]:<{width}}" + "".join(f"  {cell:>14}" for cell in row[1:]) for row in cells]
 
 
 def _impact_lines(impacts: "Impacts") -> list[str]:

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of pixels: clicks.csv, track.csv, events.csv, and what a refinement leaves of them (residuals.csv)."""
+"""Tables of pixels (clicks.csv, track.csv, events.csv) and of a refinement (residuals.csv, what_if.csv)."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
 from ..reading import reader
+from ..reconstruction.refinement.what_if import WhatIf
 from ..vectors import Array, Indices, Mask, Names
 from ..workflow.sightings import Events, Sightings
 from .csv_text import TextTable, read_table
@@ -198,6 +199,14 @@ def write_refinement_residuals(
     columns |= {"time_s": time_s} | vector_columns(PIXEL, pixel)
     columns |= vector_columns(("residual_u_px", "residual_v_px"), residual_px)
     write_columns(path, columns | {"outlier": ["1" if one else "0" for one in outlier.tolist()]})
+
+
+def write_what_if(rows: Sequence[WhatIf], path: str | Path) -> None:
+    """Write what_if.csv: a row for each change of an input and each trajectory."""
+    names = [one.name for one in fields(WhatIf)]
+    text, numbers = names[:3], names[3:]
+    columns: Columns = {name: [getattr(row, name) for row in rows] for name in text}
+    write_columns(path, columns | {name: np.array([getattr(row, name) for row in rows]) for name in numbers})
 
 
 def _names(table: TextTable, name: str) -> Names:

@@ -113,6 +113,8 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth) ->
     assert found.before_px > 3.0
     assert found.after_px < 0.6, "0.3 px of noise on each axis are 0.42 px"
     assert len(found.changes) == 5
+    assert [cells[0].split()[0] for cells in found.what_if[:3]] == ["Deviation", "Camera", "Terrain"]
+    assert all(cells[1].endswith(" %") for cells in found.what_if)
     assert not found.stale
     assert [list(obj["rockfall_position_m"]) for obj in picks_of(tracked)] == before
     place, colour, joined = proposal.path(tracked)

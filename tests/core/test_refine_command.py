@@ -177,7 +177,7 @@ def test_refined_picks_and_impacts_are_those_that_were_filmed(site, tmp_path, ca
     out = tmp_path / "runs" / "out"
     assert main(["refine", str(site / "project.toml"), "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    names = {"picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "project.toml"}
+    names = {"picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "what_if.csv", "project.toml"}
     assert {path.name for path in out.iterdir()} == names
     check_picks(out)
     before = read_picks(site / "picks.csv", SHIFT)
@@ -195,7 +195,15 @@ def test_refined_picks_and_impacts_are_those_that_were_filmed(site, tmp_path, ca
     size = np.sqrt(np.nanmean(residuals.numbers("residual_u_px") ** 2))
     assert NOISE_PX * 0.8 < size < NOISE_PX * 1.2
     assert set(residuals.text("video")) == {"left", "right"}
-    for text in ("px off the marked motion", "By video: left 0.4", "The picks moved by", "R_N", "B2", " ± "):
+    for text in (
+        "px off the marked motion",
+        "By video: left 0.4",
+        "The picks moved by",
+        "R_N",
+        "B2",
+        " ± ",
+        "Camera of left 0.3 m",
+    ):
         assert text in said
 
 

@@ -22,6 +22,7 @@ from .deviations import Fit, impact_sigmas, velocity_rows
 from .problem import NODE, evaluate
 from .setup import Ground
 from .views import PixelObservations, View
+from .what_if import WhatIf, what_if
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class Refinement:
         and its standard deviations, in parts of the block's diameter; empty where it was not sought.
     unknowns : fitted values with their standard deviations: gravity_mps2, drag_coefficient, "offset_s NAME",
         "drift NAME".
+    what_if : what would change if an input were otherwise.
     iterations : the most that a trajectory took.
     converged : every search has come to its end.
     remarks : on where it rests on little, and what does not fit; about the trajectory or the clock.
@@ -63,6 +65,7 @@ class Refinement:
     noise_scale: float
     aim: Mapping[tuple[str, str], tuple[Array, Array]]
     unknowns: Mapping[str, tuple[float, float]]
+    what_if: tuple[WhatIf, ...]
     iterations: int
     converged: bool
     remarks: tuple[Remark, ...]
@@ -117,6 +120,7 @@ def summarise(
         noise_scale=max(fit.scale * fit.setup.noise for fit in fits),
         aim={key: value for fit in fits for key, value in _aim(views, fit).items()},
         unknowns=_unknowns(views, fits[0]),
+        what_if=what_if(fits, made.impacts, ground.typical_sigma_m),
         iterations=max(fit.solution.iterations for fit in fits),
         converged=all(fit.solution.settled for fit in fits),
         remarks=remarks_on(ground, views, observations, residual, outlier, fits),

@@ -73,11 +73,24 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
         row.label(text=f"{change.later_ms:+.0f} ± {change.sigma_ms:.0f}")
     if len(found.changes) > MOST_ROWS:
         column.label(text=f"… and {len(found.changes) - MOST_ROWS} more")
+    _draw_what_if(box, found)
     show_remarks(context, box, [remark for remark in found.remarks if remark not in grave])
     paragraph(context, box, "The proposed flights are drawn in light blue.")
     row = box.row(align=True)
     row.operator("rockfall.apply_refinement", text="Apply", icon="CHECKMARK")
     row.operator("rockfall.discard_refinement", text="Discard", icon="X")
+
+
+def _draw_what_if(layout: bpy.types.UILayout, found: Proposal) -> None:
+    """What would change at most, if an input were otherwise."""
+    if not found.what_if:
+        return
+    column = layout.column(align=True)
+    for cells in (("What if: at most", "Speed", "R"), *found.what_if):
+        row = column.split(factor=0.56)
+        row.label(text=cells[0])
+        for text in cells[1:]:
+            row.label(text=text)
 
 
 CLASSES = (ROCKFALL_PT_refinement,)

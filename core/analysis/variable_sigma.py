@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Standard deviations of the measured variables, from those of the picks."""
+"""Standard deviations and intervals of the measured variables, from those of the picks."""
 
 import numpy as np
 
 from ..reconstruction.impact import Impacts
 from ..vectors import Array, Indices, norm
+from .variables import measured_values
+
+NORMAL_95 = 1.96
+"""Half the interval of a normal law, in standard deviations."""
 
 
 def measured_sigma(impacts: Impacts, row: Indices, name: str) -> Array:
@@ -16,6 +20,24 @@ def measured_sigma(impacts: Impacts, row: Indices, name: str) -> Array:
         return np.full(row.size, np.nan)
     sigma = impacts.sigma[attribute][row]
     return np.degrees(sigma) if name.endswith("_deg") else sigma
+
+
+def measured_interval(impacts: Impacts, row: Indices, name: str) -> Array:
+    """(m, 2) ends of the 95 % interval of a variable of some rows, in its unit; NaN where none is known.
+
+    Without an interval of its own it is as wide as the standard deviation says of a normal law.
+    """
+    attribute = name.removesuffix("_deg")
+    if attribute in impacts.intervals:
+        ends = impacts.intervals[attribute][row]
+        ends = np.degrees(ends) if name.endswith("_deg") else ends
+        known = np.isfinite(ends[:, :1])
+        if known.all():
+            return ends
+    else:
+        ends, known = np.full((row.size, 2), np.nan), np.zeros((row.size, 1), np.bool_)
+    reach = NORMAL_95 * measured_sigma(impacts, row, name)
+    return np.where(known, ends, measured_values(impacts, row, name)[:, None] + reach[:, None] * [-1.0, 1.0])
 
 
 def _speed_sigma(impacts: Impacts, velocity: str) -> Array:

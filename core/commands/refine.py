@@ -241,19 +241,24 @@ def _what_if_lines(rows: Sequence["WhatIf"]) -> list[str]:
 
 def _impact_lines(impacts: "Impacts") -> list[str]:
     """The impacts as a table for people."""
+    from ..reconstruction.intervals import in_words
+
     if not len(impacts):
         return ["No impacts."]
-    columns = [
-        (norm(impacts.v1), _speed_sigma(impacts, "kinetic1_j", impacts.v1), 2),
-        (norm(impacts.v2), _speed_sigma(impacts, "kinetic2_j", impacts.v2), 2),
-        (impacts.rn, _sigma(impacts, "rn"), 3),
-        (impacts.r, _sigma(impacts, "r"), 3),
+    speeds = [
+        (norm(impacts.v1), _speed_sigma(impacts, "kinetic1_j", impacts.v1)),
+        (norm(impacts.v2), _speed_sigma(impacts, "kinetic2_j", impacts.v2)),
     ]
     width = max(len("trajectory"), *map(len, impacts.trajectory.tolist()[:MOST_ROWS]))
-    heads = "".join(f"  {name:>14}" for name in ("incident m/s", "restituted m/s", "R_N", "R"))
+    heads = f"  {'incident m/s':>12}  {'restituted m/s':>14}  {'R_N (95 %)':>19}  {'R (95 %)':>19}"
     lines = [f"{'trajectory':<{width}}  impact    time s{heads}"]
     for i in range(min(len(impacts), MOST_ROWS)):
-        cells = "".join(f"  {_with(value[i], sigma[i], digits):>14}" for value, sigma, digits in columns)
+        cells = "".join(
+            f"  {_with(of[i], sigma[i], 2):>{wide}}" for (of, sigma), wide in zip(speeds, (12, 14), strict=True)
+        )
+        for name, value in (("rn", impacts.rn[i]), ("r", impacts.r[i])):
+            low, high = impacts.intervals[name][i] if name in impacts.intervals else (np.nan, np.nan)
+            cells += f"  {in_words(name, value, low, high, 2).replace(' to ', '–') or '–':>19}"
         lines.append(f"{impacts.trajectory[i]:<{width}}  {impacts.impact[i]:>6}  {impacts.time_s[i]:>8.3f}{cells}")
     if len(impacts) > MOST_ROWS:
         lines.append(f"… and {len(impacts) - MOST_ROWS} more impacts, in impacts.csv.")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What every column of impacts.csv means, for people and programs that have never heard of us."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,11 +69,21 @@ FIELDS: dict[str, Field] = {
 """Name → what it is. An empty cell means: not defined."""
 
 
+END = re.compile(r"(rn|rt|r|theta1_deg|theta_dev_deg)(_contact)?_(low|high)")
+"""A column with an end of an interval."""
+
+
 def field_of(name: str) -> Field:
     """What a column is; unknown ones are text."""
     if name in FIELDS:
         return FIELDS[name]
-    of = FIELDS.get(name.removeprefix("sigma_"))
-    if of is not None:
-        return Field("number", of.unit, f"Standard deviation of {name.removeprefix('sigma_')}", 0)
+    if (match := END.fullmatch(name)) is not None:
+        column, contact, end = match.groups()
+        of = FIELDS[column]
+        what = f"{end.capitalize()} end of the 95 % interval of {column}{', roughness included' if contact else ''}"
+        if end == "high":
+            what += "; empty beside a low end: no limit"
+        return Field("number", of.unit, what, of.minimum, of.maximum)
+    if (value := FIELDS.get(name.removeprefix("sigma_"))) is not None:
+        return Field("number", value.unit, f"Standard deviation of {name.removeprefix('sigma_')}", 0)
     return Field("string", "", "As in the table that the row is from")

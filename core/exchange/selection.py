@@ -37,7 +37,7 @@ def rows_of(impacts: Impacts, rows: Indices | Mask | slice) -> Impacts:
     taken: dict[str, Any] = {}
     for one in fields(Impacts):
         value = getattr(impacts, one.name)
-        if one.name in ("flags", "sigma", "extra"):
+        if one.name in ("flags", "sigma", "intervals", "extra"):
             taken[one.name] = {name: column[rows] for name, column in value.items()}
         elif one.name != "shift":
             taken[one.name] = value[rows]
@@ -55,6 +55,9 @@ def joined(tables: Sequence[Impacts]) -> Impacts:
         elif one.name == "sigma":
             names = dict.fromkeys(name for table in tables for name in table.sigma)
             made["sigma"] = {name: np.concatenate([_sigma(table, name) for table in tables]) for name in names}
+        elif one.name == "intervals":
+            names = dict.fromkeys(name for table in tables for name in table.intervals)
+            made["intervals"] = {name: np.concatenate([_interval(table, name) for table in tables]) for name in names}
         elif one.name == "extra":
             names = dict.fromkeys(name for table in tables for name in table.extra)
             made["extra"] = {name: np.concatenate([_extra(table, name) for table in tables]) for name in names}
@@ -186,6 +189,10 @@ def _number(value: str, condition: str) -> float:
 
 def _sigma(table: Impacts, name: str) -> Array:
     return table.sigma[name] if name in table.sigma else np.full_like(getattr(table, name), np.nan)
+
+
+def _interval(table: Impacts, name: str) -> Array:
+    return table.intervals[name] if name in table.intervals else np.full((len(table), 2), np.nan)
 
 
 def _extra(table: Impacts, name: str) -> Names:

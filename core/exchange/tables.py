@@ -13,6 +13,7 @@ from ..georeference import GlobalShift
 from ..output import output_stream
 from ..reading import reader
 from ..reconstruction.impact import FLAGS, Impacts, apparent
+from ..reconstruction.intervals import INTERVALS
 from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
 from ..vectors import Array, Indices, Mask, Names, dot
@@ -70,6 +71,14 @@ _SIMULATED = ("angular_velocity", "kinetic1_j", "kinetic2_j", "rotational1_j", "
 _NUMBERS = (*_BEFORE, *_DERIVED, *_BLOCK)
 _UNCERTAIN = (*_DERIVED, *(column for column in _MORE if column[1] in ("kinetic1_j", "kinetic2_j")))
 """What can have a standard deviation, in a column of its own."""
+_ENDS: tuple[tuple[str, str, int, bool], ...] = tuple(
+    (f"{name}{ground}_{end}", attribute + ground, i, degrees)
+    for ground in ("", "_contact")
+    for name, attribute, _, degrees in _DERIVED
+    if attribute + ground in INTERVALS
+    for i, end in enumerate(("low", "high"))
+)
+"""Ends of intervals: name in the file, name of the interval, which end, whether it is an angle in degrees."""
 IMPACTS_COLUMNS = ("site", "trajectory", "impact", *(column[0] for column in _NUMBERS), "flags")
 """The columns of impacts.csv that are always there, in order."""
 
@@ -127,7 +136,7 @@ def write_picks(picks: Picks, path: str | Path) -> None:
 
 
 def write_impacts(impacts: Impacts | Sequence[Impacts], path: str | Path) -> None:
-    """Write impacts.csv: the fixed columns, then deviations, spin, normal's spread, energies and heights, if any.
+    """Write impacts.csv: the fixed columns, then what else is known: deviations, intervals, spin, energies, heights.
 
     Several tables stand one below the other; they have the same columns, but for those without a row.
     """
@@ -144,6 +153,12 @@ def _impact_cells(impacts: Impacts) -> Columns:
             sigma = impacts.sigma[attribute]
             values = sigma if component is None else sigma[:, component]
             columns[f"sigma_{name}"] = np.degrees(values) if degrees else values
+    for name, interval, end, degrees in _ENDS:
+        if interval in impacts.intervals:
+            values = np.where(
+                np.isinf(impacts.intervals[interval][:, end]), np.nan, impacts.intervals[interval][:, end]
+            )
+            columns[name] = np.degrees(values) if degrees else values
     for column in (*_SPIN, *_MORE):
         values = _of(impacts, column)
         if np.isfinite(values).any():
@@ -173,7 +188,8 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     InputError : anything that is wrong with the table, with the row.
     """
     sigma_names = [f"sigma_{column[0]}" for column in _UNCERTAIN]
-    known = (*IMPACTS_COLUMNS, *sigma_names, *SPIN, *(column[0] for column in _MORE))
+    ends = tuple(column[0] for column in _ENDS)
+    known = (*IMPACTS_COLUMNS, *sigma_names, *ends, *SPIN, *(column[0] for column in _MORE))
     table = read_table(path, ("trajectory", *NORMAL, *V1, *V2), known)
     n = len(table)
     arrays: dict[str, Any] = {}
@@ -193,6 +209,13 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
                 sigma[attribute] = values
             else:
                 sigma.setdefault(attribute, np.full((n, 3), np.nan))[:, component] = values
+    intervals: dict[str, Array] = {}
+    for name, interval, end, degrees in _ENDS:
+        if name in table.columns:
+            values = np.radians(table.numbers(name)) if degrees else table.numbers(name)
+            intervals.setdefault(interval, np.full((n, 2), np.nan))[:, end] = values
+    for values in intervals.values():
+        values[np.isfinite(values[:, 0]) & np.isnan(values[:, 1]), 1] = np.inf
 
     survey = arrays["position"]
     finite = survey[np.isfinite(survey).all(axis=1)]
@@ -221,6 +244,7 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
         impact=np.where(np.isfinite(numbers), numbers, 0).astype(np.intp),
         flags=marks,
         sigma=sigma,
+        intervals=intervals,
         extra=table.rest(known),
         shift=shift,
         **arrays,

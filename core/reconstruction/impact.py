@@ -129,6 +129,7 @@ class Impacts:
     chord_height_m : (n,) greatest distance of the flight that follows from the straight line between its ends, at right
         angles to it, in its vertical plane [m].
     sigma : column → standard deviation of that column, same shape; empty when no pick has one.
+    intervals : name → (n, 2) ends of the 95 % interval, see `intervals.impact_intervals`; empty likewise.
     extra : further columns of a table that was read, as text.
     shift : of the local frame.
     """
@@ -163,6 +164,7 @@ class Impacts:
     bounce_height_m: Array
     chord_height_m: Array
     sigma: Mapping[str, Array] = field(default_factory=dict)
+    intervals: Mapping[str, Array] = field(default_factory=dict)
     extra: Mapping[str, Names] = field(default_factory=dict)
     shift: GlobalShift = field(default_factory=GlobalShift)
 
@@ -232,6 +234,7 @@ def make_impacts(
     bounce_height_m: Array | None = None,
     chord_height_m: Array | None = None,
     sigma: Mapping[str, Array] | None = None,
+    intervals: Mapping[str, Array] | None = None,
     extra: Mapping[str, Names] | None = None,
     shift: GlobalShift,
 ) -> Impacts:
@@ -245,15 +248,16 @@ def make_impacts(
 
     Notes
     -----
-    A departing block has neither coefficients nor angles, nor their deviations.
+    A departing block has neither coefficients nor angles, nor their deviations and intervals.
     """
     n = time_s.size
     nothing, never = np.full(n, np.nan), np.zeros(n, np.bool_)
     departing = values.approach >= 0
     follow = {"departing": departing, "into_ground": values.escape < 0}
-    known = dict(sigma or {})
+    known, ends = dict(sigma or {}), dict(intervals or {})
     leaving = np.flatnonzero(departing)
-    for column in (*(getattr(values, name) for name in JUDGED), *(known[name] for name in JUDGED if known)):
+    uncertain = (*(known[name] for name in JUDGED if known), *ends.values())
+    for column in (*(getattr(values, name) for name in JUDGED), *uncertain):
         column[leaving] = np.nan
     return Impacts(
         site=np.full(n, site),
@@ -286,6 +290,7 @@ def make_impacts(
         bounce_height_m=nothing if bounce_height_m is None else bounce_height_m,
         chord_height_m=nothing if chord_height_m is None else chord_height_m,
         sigma=known,
+        intervals=ends,
         extra=extra or {},
         shift=shift,
     )

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array, Indices, Mask, dot, norm
+from ..vectors import Array, Indices, Mask, dot
 from .block import per_pick
 from .impact import DeviationForm, Impacts, apparent, make_impacts
+from .intervals import ImpactErrors, impact_intervals, impact_sigmas
 from .motion import Motion
 from .picks import Picks
-from .uncertainty import propagate
+from .uncertainty import pick_covariance
 
 
 def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
@@ -48,10 +49,12 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
 
     mass = here(mass)
     sigma: dict[str, Array] = {}
+    intervals: dict[str, Array] = {}
     if np.isfinite(picks.sigma_time_s).any() or np.isfinite(picks.sigma_position_m).any():
-        sigma = propagate(picks, flights, incident, restituted, own, values, normal)
-        sigma["kinetic1_j"] = mass * norm(v1) * sigma.pop("speed1")
-        sigma["kinetic2_j"] = mass * norm(v2) * sigma.pop("speed2")
+        covariance = pick_covariance(picks, flights, incident, restituted, own)
+        errors = ImpactErrors(covariance, ground.by_place, ground.tilt, ground.spread)
+        sigma = impact_sigmas(values, v1, v2, normal, mass, errors)
+        intervals = impact_intervals(values, v1, v2, normal, errors)
 
     spin_energy = np.full(len(picks), np.nan)
     spinning = np.flatnonzero(np.isfinite(picks.angular_velocity[:, 0]))
@@ -79,6 +82,7 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
         bounce_height_m=_value(clearance.above_terrain_m, restituted, np.nan),
         chord_height_m=_value(clearance.above_chord_m, restituted, np.nan),
         sigma=sigma,
+        intervals=intervals,
         shift=picks.shift,
     )
 

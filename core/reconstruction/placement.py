@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Picks on the terrain: do they lie on it, and what is its normal there?"""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..remarks import Remark
-from ..vectors import Array, Mask
+from ..vectors import Array, Mask, perpendicular
 from .picks import Picks
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ NOTICEABLE_M = 1.0
 NOTICEABLE_DIAMETERS = 3.0
 """Picks further than both of these are mentioned."""
 NEAR_BOX_M = 1000.0
+LEAST_STEP = 0.05
+"""Part of the normal's radius over which its change is looked at, at least."""
 
 
 def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tuple[Remark, ...]:
@@ -108,15 +110,34 @@ class GroundNormals:
     normal : (n, 3) unit, out of the ground; NaN where unknown.
     radius_m : (n,) of the sphere in which the terrain normal was fitted [m]; NaN where the normal was given.
     spread : (n,) root mean square angle between the terrain's faces there and the fitted plane [rad]; NaN likewise.
+    tilt : (n,) root mean square angle by which the plane itself may be off [rad]; NaN likewise.
+    by_place : (n, 3, 3) change of the normal with the place [1/m], over the place's standard deviation; zero where the
+        normal or the place is given without error.
     """
 
     normal: Array
     radius_m: Array
     spread: Array
+    tilt: Array
+    by_place: Array
+
+    @classmethod
+    def given(cls, normal: Array) -> "GroundNormals":
+        """Normals (n, 3) that are not the terrain's."""
+        n = len(normal)
+        radius_m, spread, tilt = np.full((3, n), np.nan)
+        return cls(normal.copy(), radius_m, spread, tilt, np.zeros((n, 3, 3)))
 
     def take(self, rows: Any) -> "GroundNormals":
         """Some of them."""
-        return GroundNormals(self.normal[rows], self.radius_m[rows], self.spread[rows])
+        return GroundNormals(*(getattr(self, one.name)[rows] for one in fields(self)))
+
+    def with_rows(self, rows: Any, others: "GroundNormals") -> "GroundNormals":
+        """These with some rows replaced."""
+        made = GroundNormals(*(getattr(self, one.name).copy() for one in fields(self)))
+        for one in fields(self):
+            getattr(made, one.name)[rows] = getattr(others, one.name)
+        return made
 
 
 def pick_normals(
@@ -128,15 +149,17 @@ def pick_normals(
     ----------
     diameter_m, radius_m : see `terrain_normals`.
     """
-    found = GroundNormals(picks.normal.copy(), np.full(len(picks), np.nan), np.full(len(picks), np.nan))
+    found = GroundNormals.given(picks.normal)
     bare = np.flatnonzero(np.isnan(picks.normal[:, 0]) & wanted)
-    if surface is not None and bare.size:
-        fitted = terrain_normals(surface, picks.position[bare], diameter_m[bare], radius_m)
-        found.normal[bare], found.radius_m[bare], found.spread[bare] = fitted.normal, fitted.radius_m, fitted.spread
-    return found
+    if surface is None or not bare.size:
+        return found
+    fitted = terrain_normals(surface, picks.position[bare], diameter_m[bare], radius_m, picks.sigma_position_m[bare])
+    return found.with_rows(bare, fitted)
 
 
-def terrain_normals(surface: "Surface", points: Array, diameter_m: Array, radius_m: float | None) -> GroundNormals:
+def terrain_normals(
+    surface: "Surface", points: Array, diameter_m: Array, radius_m: float | None, sigma_m: Array | None = None
+) -> GroundNormals:
     """Normals of the terrain at block scale.
 
     Parameters
@@ -144,15 +167,16 @@ def terrain_normals(surface: "Surface", points: Array, diameter_m: Array, radius
     points : (n, 3) local [m]; the sphere is set on the closest point of the terrain.
     diameter_m : (n,) of the block [m].
     radius_m : of the sphere; None takes `default_normal_radius` for each block.
+    sigma_m : (n,) standard deviation of the points [m], for `by_place`; NaN or None where it is not known.
     """
     from ..terrain.orientation import block_scale_normals, default_normal_radius
     from ..terrain.raycast import closest_points
 
-    normal = np.full_like(points, np.nan)
-    radius = np.full(len(points), np.nan if radius_m is None else radius_m)
-    spread = np.full(len(points), np.nan)
+    found = GroundNormals.given(np.full_like(points, np.nan))
+    normal, radius = found.normal, found.radius_m
+    radius[:] = np.nan if radius_m is None else radius_m
     if not len(points):
-        return GroundNormals(normal, radius, spread)
+        return found
     on_terrain = closest_points(surface, points).point
     if radius_m is None:
         for diameter in np.unique(diameter_m):
@@ -160,5 +184,25 @@ def terrain_normals(surface: "Surface", points: Array, diameter_m: Array, radius
     for used in np.unique(radius):
         rows = radius == used
         fitted = block_scale_normals(surface, on_terrain[rows], float(used))
-        normal[rows], spread[rows] = fitted.normal, np.radians(fitted.spread_deg)
-    return GroundNormals(normal, radius, spread)
+        normal[rows], found.spread[rows] = fitted.normal, np.radians(fitted.spread_deg)
+        found.tilt[rows] = np.radians(fitted.tilt_deg)
+        if sigma_m is not None:
+            loose = np.flatnonzero(rows & (np.nan_to_num(sigma_m) > 0) & np.isfinite(normal[:, 0]))
+            found.by_place[loose] = _by_place(surface, on_terrain[loose], normal[loose], float(used), sigma_m[loose])
+    return found
+
+
+def _by_place(surface: "Surface", points: Array, normal: Array, radius_m: float, sigma_m: Array) -> Array:
+    """(n, 3, 3) change of the normals with the place along the ground, between one deviation to either side [1/m]."""
+    from ..terrain.orientation import block_scale_normals
+
+    change = np.zeros((len(points), 3, 3))
+    if not len(points):
+        return change
+    step = np.maximum(sigma_m, LEAST_STEP * radius_m)[:, None]
+    for direction in perpendicular(normal):
+        beside = np.concatenate([points + step * direction, points - step * direction])
+        there, back = np.split(block_scale_normals(surface, beside, radius_m).normal, 2)
+        slope = np.nan_to_num((there - back) / (2 * step))
+        change += slope[:, :, None] * direction[:, None, :]
+    return change

@@ -20,6 +20,8 @@ SEED_COSINE = -0.5
 """Faces further than 120° from the closest triangle are another sheet, whatever it is part of."""
 STEEP_FIT = 0.5
 """Least cosine between the fitted plane's normal and the mean face normal; below, the patch is no sheet."""
+PLANE = 3
+"""Unknowns of a plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +32,15 @@ class LocalNormals:
     ----------
     normal : (n, 3) unit, out of the ground; NaN where there is no surface within reach.
     spread_deg : (n,) area-weighted root mean square angle between the faces and the plane [°]; NaN likewise.
+    tilt_deg : (n,) root mean square angle by which the plane is off, since so many points with so much noise tell of
+        it [°]; NaN likewise.
     area_m2 : (n,) surface inside the sphere that was used [m²]; 0 likewise.
     point : (n, 3) centre of the sphere: the closest point of the surface [m]; NaN likewise.
     """
 
     normal: Array
     spread_deg: Array
+    tilt_deg: Array
     area_m2: Array
     point: Array
 
@@ -71,6 +76,11 @@ def block_scale_normals(
     90° from this plane's normal. So a single odd triangle does not decide, and the other side of a plate stays out.
     Where the patch is as deep as wide (a notch), its smallest principal axis lies across it, more than 60° from the
     mean of the face normals; then this mean is the normal.
+
+    The error of the plane is that of a least-squares plane through the patch's vertices, each off by the same standard
+    deviation, independent of the others: of the scan, and of what lies between the points. Two things bound it: how far
+    the surface leaves the plane, and how far its faces lean, since such noise tilts them by 2σ/spacing (root mean
+    square). The smaller one counts, so that waves longer than the spacing, which the points do show, are no noise.
     """
     from . import patch_kernels
 
@@ -96,25 +106,42 @@ def block_scale_normals(
         return sums
 
     seed = normals[closest.face]
-    first = _plane_normals(integrate(seed, seed, SEED_COSINE))
-    normal = _plane_normals(integrate(first, first))
+    first, _ = _planes(integrate(seed, seed, SEED_COSINE))
+    normal, extent = _planes(integrate(first, first))
     sums = integrate(first, normal)
     area = sums[:, 0]
     found = area > 0
     spread = np.sqrt(np.divide(sums[:, 13], area, out=np.full(n, np.nan), where=found))
     normal[~found] = np.nan
-    return LocalNormals(normal, np.degrees(spread), area.copy(), closest.point)
+    tilt = _tilts(extent, area, sums[:, 14] / 2, spread)
+    return LocalNormals(normal, np.degrees(spread), np.degrees(tilt), area.copy(), closest.point)
 
 
-def _plane_normals(sums: Array) -> Array:
-    """(n, 3) normals of the planes of least squares, on the side of the face normals; zero where there is no area."""
+def _tilts(extent: Array, area: Array, points: Array, spread: Array) -> Array:
+    """(n,) root mean square error of the planes' direction [rad].
+
+    Parameters
+    ----------
+    extent : (n, 3) mean squared distance of the surface from the middle along its principal axes, ascending [m²].
+    points : (n,) vertices in each patch; their mean squared distance from the plane is twice that of the surface.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        from_plane = 2 * np.maximum(extent[:, 0], 0.0) * points / np.maximum(points - PLANE, 1.0)
+        from_faces = (spread / 2) ** 2 * area / points
+        variance = np.minimum(from_plane, from_faces) / points * (1 / extent[:, 1] + 1 / extent[:, 2])
+    return np.minimum(np.sqrt(variance), spread)
+
+
+def _planes(sums: Array) -> tuple[Array, Array]:
+    """(n, 3) normals of the planes of least squares, on the side of the face normals, zero where there is no area; and
+    (n, 3) the mean squares along the principal axes, the normal first [m²]."""
     area = np.where(sums[:, 0] > 0, sums[:, 0], 1.0)
     mean = sums[:, 1:4] / area[:, None]
     second = np.empty((len(sums), 3, 3))
     for (i, j), column in zip(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)), range(4, 10), strict=True):
         second[:, i, j] = second[:, j, i] = sums[:, column] / area - mean[:, i] * mean[:, j]
-    _, axes = np.linalg.eigh(second)
+    extent, axes = np.linalg.eigh(second)
     normal, outward = axes[:, :, 0], unit(sums[:, 10:13])
     cosine = dot(normal, outward)
     normal = np.where((np.abs(cosine) < STEEP_FIT)[:, None], outward, normal * np.sign(cosine)[:, None])
-    return np.nan_to_num(normal, nan=0.0)
+    return np.nan_to_num(normal, nan=0.0), extent

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..compiled import kernel
 
-SUMS = 14
+SUMS = 15
 """Sums over a patch: area 0, first moments 1-3, second moments xx yy zz xy yz zx 4-9, area times normal 10-12, area
-times squared angle between normal and axis 13; coordinates from the centre of the sphere."""
+times squared angle between normal and axis 13, faces, each as much as is inside 14; coordinates from the centre of the
+sphere."""
 
 
 @kernel
@@ -116,6 +117,8 @@ def add_face(sums, plane, p, normal, axis, radius):  # type: ignore[no-untyped-d
         b, c = (a + 1) % 3, (a + 2) % 3
         cross2 += (normal[b] * axis[c] - normal[c] * axis[b]) ** 2
     sums[13] += area * np.arctan2(np.sqrt(cross2), cosine) ** 2
+    wx, wy, wz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
+    sums[14] += 2.0 * area / (length * abs(wx * vx + wy * vy + wz * vz))
 
 
 @kernel

@@ -127,7 +127,7 @@ class _Shared:
     maximised: IntProperty(description="The graph that is shown alone; 0 for all", min=0, max=MOST_GRAPHS,
                            update=_changed)  # fmt: skip
     error_bars: EnumProperty(
-        name="Error bars", description="Standard deviations of the measured impacts",
+        name="Error bars", description="95 % intervals of the measured impacts",
         items=[
             ("NEVER", "Never", "No error bars"),
             ("POINTED", "Under the mouse", "Of the point under the mouse"),

@@ -323,6 +323,7 @@ def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -
         columns["sigma_speed2"] = speed_sigma(impacts.v2, sigma["v2"])
         columns["sigma_kinetic1_j"] = impacts.mass_kg * norm(impacts.v1) * columns["sigma_speed1"]
         columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
+    columns |= {f"interval_{name}": ends for name, ends in impacts.intervals.items()}
     rows = {name: (values if values.ndim > 1 else values[:, None]).tolist() for name, values in columns.items()}
     impact_marks.results_written(set(result.picks.trajectory.tolist()))
     i = 0

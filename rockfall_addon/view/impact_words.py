@@ -5,6 +5,7 @@ import math
 
 import bpy
 
+from ...core.reconstruction.intervals import in_words
 from ...core.reconstruction.summary import MEANINGS
 from ..scene import impact_marks, spins, store
 
@@ -32,15 +33,13 @@ def title(pick: bpy.types.Object) -> str:
 
 
 def numbers(pick: bpy.types.Object) -> list[str]:
-    """Speeds, coefficients and energies with their standard deviations; nothing without a result."""
+    """Speeds and energies with standard deviations, coefficients with intervals; nothing without a result."""
     result = pick.get(store.RESULT)
     if result is None:
         return []
     speeds = _pair(result, "incident_mps", "restituted_mps", "sigma_speed1", "sigma_speed2", 1.0, 1)
     energies = _pair(result, "kinetic1_j", "kinetic2_j", "sigma_kinetic1_j", "sigma_kinetic2_j", 1e-3, 2)
-    coefficients = [
-        (name, _number(result, key, f"sigma_{key}", 1.0, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))
-    ]
+    coefficients = [(name, between(result, key, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))]
     coefficient = "   ".join(f"{name} {value}" for name, value in coefficients if value)
     lines = [f"v {speeds} m/s", coefficient, f"E {energies} kJ", _spin(pick)]
     return [line for line in lines if line]
@@ -80,6 +79,14 @@ def measured(value: float, sigma: float, digits: int) -> str:
     if 0 < sigma < 0.5 * 10.0**-digits:
         digits = min(-math.floor(math.log10(sigma)), digits + MORE_DIGITS)
     return f"{value:.{digits}f}" + ("" if math.isnan(sigma) else f" ± {sigma:.{digits}f}")
+
+
+def between(result: dict[str, object], name: str, digits: int) -> str:
+    """A coefficient or an angle, or `…_contact`, with its 95 % interval; empty where it is not defined."""
+    key = name.removesuffix("_contact")
+    value = math.radians(result[f"{key}_deg"][0]) if key.startswith("theta") else result[key][0]
+    low, high = result.get(f"interval_{name}", (math.nan, math.nan))
+    return in_words(name, value, low, high, digits)
 
 
 def _number(result: dict[str, object], key: str, sigma_key: str, factor: float, digits: int) -> str:

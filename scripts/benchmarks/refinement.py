@@ -2,7 +2,8 @@
 """How near refinement comes to the truth, and to the best that the footage allows, on synthetic rockfalls.
 
 Blocks bounce as spheres down a rough slope. A sphere's distance from the terrain at a contact is off by 2 cm (angular
-blocks, errors of the scan), and the normal that R_N is told by is off the block-scale normal by the latter's spread.
+blocks, errors of the scan). R_N is told by the block-scale normal at the true contact; whether its intervals hold where
+the terrain itself is not known is measured in rn_intervals.py.
 Cameras stand opposite; the run fills 70 % of the tighter side of the image. Each is solved (`resect`) from 20 pairs of
 pixels (1 px: marked with the loupe on a still background) and points (2 cm: a terrestrial scan), with the focal length
 known unless said otherwise, and is held by hand, stabilised to 0.2 px. People mark contacts to 3 px in the first view,

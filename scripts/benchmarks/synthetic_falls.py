@@ -171,12 +171,10 @@ def fall(surface: Surface, rng: np.random.Generator, air: Air = NONE) -> Fall:
                 break
             leaving = along / pace * min(rng.uniform(0.6, 0.9) * pace, rng.uniform(3.5, 8))
             leaving = leaving + np.cross(normal, leaving) * rng.normal() * 0.15 + rng.uniform(1.8, 4.0) * normal
-            felt = normal + np.cross(normal, rng.normal(size=3) * ground_normal.spread[0] / np.sqrt(2))
-            felt_rn = -(leaving @ felt) / (arriving @ felt)
             fast = max(np.linalg.norm(arriving), np.linalg.norm(leaving))
             if fast > 17 or centre[0] > 68 or abs(centre[1]) > 18:
                 break
-            rows.append((centre, contact, t, arriving, leaving, felt_rn))
+            rows.append((centre, contact, t, arriving, leaving, -(leaving @ normal) / into))
             turns.append(np.zeros(3))
             velocity = leaving
         if len(rows) == wanted:

@@ -8,7 +8,7 @@ from rockfall.core.reconstruction.trajectory import reconstruct
 
 COLUMNS = ("v1", "v2", "vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev", "kinetic1_j", "kinetic2_j")
 NORMAL = np.array([np.sin(0.7), 0.0, np.cos(0.7)])
-DRAWS = 40_000
+DRAWS = 10_000
 
 
 def propagated_and_drawn(time, position, kind, sigma_time, sigma_position):

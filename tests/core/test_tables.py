@@ -49,7 +49,7 @@ FULL = {
 def assert_equal_impacts(one, other, rtol=1e-14):
     for field in fields(Impacts):
         a, b = getattr(one, field.name), getattr(other, field.name)
-        if field.name in ("flags", "sigma"):
+        if field.name in ("flags", "sigma", "intervals"):
             assert set(a) == set(b)
             for name in a:
                 np.testing.assert_allclose(a[name], b[name], rtol=rtol)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Standard deviations: of a refinement's unknowns, and of the impacts that follow from them."""
+"""The covariance of a refinement's unknowns, and how the velocities follow from them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,16 +8,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from ...least_squares import inverse
-from ...vectors import Array, Indices, dot, perpendicular
-from ..impact import Impacts, apparent
+from ...vectors import Array, Indices
 from ..node_motion import NodeMotion
 from .correlation import TrackNoise, track_noise
 from .problem import NODE, Problem
 from .search import Rival
 from .setup import Setup
 from .solver import UNEXPLAINED, Solution
-
-SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,52 +93,9 @@ def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_
     return result[:, :, :-1]
 
 
-def impact_sigmas(impacts: Impacts, covariance: Array, spread: Array) -> dict[str, Array]:
-    """Standard deviations of n impacts' velocities, coefficients, angles and energies.
-
-    Parameters
-    ----------
-    covariance : (n, 6, 6) of v1 and v2.
-    spread : (n,) root mean square angle by which the block-scale normal is off [rad]; NaN counts as none.
-
-    Returns
-    -------
-    the columns of `uncertainty.propagate`, and kinetic1_j, kinetic2_j; NaN where the column is undefined.
-
-    Notes
-    -----
-    The root mean square deviation from the value over pairs of points √3 standard deviations to either side along each
-    axis of the covariance, with a weight of 1/6 each (Julier & Uhlmann 2004): first-order propagation where a column is
-    linear, but true for R_N at grazing impacts too, where a small tilt of the normal changes it by half. The normal is
-    tilted by spread/√2 about each of two axes at right angles to it, independent of everything else.
-    """
-    usable = np.nan_to_num(covariance)
-    size, axes = np.linalg.eigh(usable)
-    reach = np.sqrt(3 * np.maximum(size, 0.0))
-    tilt = np.sqrt(1.5) * np.nan_to_num(spread)
-    here = _values(impacts, impacts.v1, impacts.v2, impacts.normal)
-    squares = np.zeros_like(here)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for axis in range(6):
-            away = reach[:, axis, None] * axes[:, :, axis]
-            for sign in (-1.0, 1.0):
-                v1, v2 = impacts.v1 + sign * away[:, :3], impacts.v2 + sign * away[:, 3:]
-                squares += np.nan_to_num(_values(impacts, v1, v2, impacts.normal) - here) ** 2 / 6
-        for direction in perpendicular(impacts.normal):
-            for sign in (-1.0, 1.0):
-                normal = np.cos(tilt)[:, None] * impacts.normal + sign * np.sin(tilt)[:, None] * direction
-                squares += np.nan_to_num(_values(impacts, impacts.v1, impacts.v2, normal) - here) ** 2 / 6
-    deviation = np.sqrt(squares)
-    result = {name: deviation[:, i] for i, name in enumerate((*SCALARS, "kinetic1_j", "kinetic2_j"))}
-    diagonal = np.sqrt(np.maximum(np.einsum("nii->ni", covariance), 0.0))
-    result["v1"], result["v2"] = diagonal[:, :3], diagonal[:, 3:]
-    known = np.isfinite(covariance[:, 0, 0])
-    result = {name: np.where(known if sd.ndim == 1 else known[:, None], sd, np.nan) for name, sd in result.items()}
-    return {name: np.where(np.isfinite(getattr(impacts, name)), sd, np.nan) for name, sd in result.items()}
-
-
-def _values(impacts: Impacts, v1: Array, v2: Array, normal: Array) -> Array:
-    """(n, 11) the scalar columns."""
-    found = apparent(v1, v2, normal)
-    energies = [0.5 * impacts.mass_kg * dot(v, v) for v in (v1, v2)]
-    return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
+def centre_rows(problem: Problem, node: Indices) -> Array:
+    """(q, 3, size) derivatives of the nodes' places by the free unknowns."""
+    result = np.zeros((node.size, 3, problem.columns.size))
+    for axis in range(3):
+        result[np.arange(node.size), axis, NODE * node + axis] = 1.0
+    return result

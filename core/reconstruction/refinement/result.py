@@ -13,12 +13,14 @@ from ...vectors import Array, Mask
 from ..block import Block
 from ..choices import FlightEnds
 from ..drag import Drag
+from ..intervals import ImpactErrors, impact_intervals, impact_sigmas
 from ..node_motion import places_at
 from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
 from ..trajectory import Reconstruction, reconstruct
+from ..uncertainty import ERRORS
 from .advice import remarks_on
-from .deviations import Fit, impact_sigmas, velocity_rows
+from .deviations import Fit, centre_rows, velocity_rows
 from .problem import NODE, evaluate
 from .setup import Ground
 from .views import PixelObservations, View
@@ -34,7 +36,7 @@ class Refinement:
     picks : as given, with the refined times, places (a radius below the centre along the normal: on the terrain but
         for its roughness), normals and standard deviations; a pass lies on its flight.
     reconstruction : of these picks, its flights those of the block's centre. The standard deviations of its impacts
-        come from the covariance of the fit and from the spread of the terrain normal.
+        and their intervals come from the covariance of the fit and from what is not known of the terrain's normal.
     views : with the refined poses and clocks.
     residual_px : (m, 2) observed less fitted [px]; NaN for pixels outside of the marked motion.
     outlier : (m,) pixels that do not belong.
@@ -148,12 +150,11 @@ def _refined_picks(ground: Ground, fits: Sequence[Fit], normal_radius_m: float |
 
     known = np.isfinite(ground.normals.normal[:, 0]) & on_node
     anew = known & np.isnan(picks.normal[:, 0])
-    normals = GroundNormals(ground.normals.normal.copy(), ground.normals.radius_m.copy(), ground.normals.spread.copy())
+    normals = ground.normals
     if anew.any() and ground.surface is not None:
-        touching = replace(picks, position=position)
+        touching = replace(picks, position=position, sigma_position_m=sigma_place)
         found = pick_normals(touching, ground.surface, 2 * ground.radius_m, normal_radius_m, anew)
-        for name in ("normal", "radius_m", "spread"):
-            getattr(normals, name)[anew] = getattr(found, name)[anew]
+        normals = normals.with_rows(anew, found.take(anew))
     position[known] -= ground.radius_m[known, None] * normals.normal[known]
     refined = replace(
         picks,
@@ -181,7 +182,7 @@ def _passes_on_flights(fit: Fit, time: Array, position: Array) -> None:
 def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNormals) -> Reconstruction:
     impacts = made.impacts
     own = np.flatnonzero(made.picks.kind == "impact")
-    covariance = np.full((own.size, 6, 6), np.nan)
+    covariance = np.full((own.size, ERRORS, ERRORS), np.nan)
     for fit in fits:
         problem, motion = fit.setup.problem, fit.solution.evaluation.motion
         node = fit.setup.node_of[own]
@@ -193,6 +194,7 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
             [
                 velocity_rows(problem, motion, before[node[mine]], at_end=True),
                 velocity_rows(problem, motion, after[node[mine]], at_end=False),
+                centre_rows(problem, node[mine]),
             ],
             axis=1,
         )
@@ -204,11 +206,16 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
         normal_spread=spread,
         normal_radius_m=np.where(given, normals.radius_m[own], impacts.normal_radius_m),
     )
-    sigma = impact_sigmas(impacts, covariance, spread)
+    ground = normals.take(own)
+    errors = ImpactErrors(covariance, ground.by_place, ground.tilt, spread)
+    v1, v2, normal = impacts.v1, impacts.v2, impacts.normal
+    sigma = impact_sigmas(impacts, v1, v2, normal, impacts.mass_kg, errors)
+    intervals = impact_intervals(impacts, v1, v2, normal, errors)
     fitted = np.isfinite(covariance[:, 0, 0])
-    for name, propagated in impacts.sigma.items():  # of trajectories without pixels
-        sigma[name] = np.where(fitted if propagated.ndim == 1 else fitted[:, None], sigma[name], propagated)
-    return replace(made, impacts=replace(impacts, sigma=sigma))
+    for made_here, propagated in ((sigma, impacts.sigma), (intervals, impacts.intervals)):
+        for name, column in propagated.items():  # of trajectories without pixels
+            made_here[name] = np.where(fitted if column.ndim == 1 else fitted[:, None], made_here[name], column)
+    return replace(made, impacts=replace(impacts, sigma=sigma, intervals=intervals))
 
 
 def _refined_views(views: tuple[View, ...], fit: Fit) -> tuple[View, ...]:

@@ -12,17 +12,21 @@ from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 NUMBERS = (  # what is shown, key of the result, key of its standard deviation, unit, digits
     ("Incident speed", "incident_mps", "sigma_speed1", " m/s", 2),
     ("Restituted speed", "restituted_mps", "sigma_speed2", " m/s", 2),
-    ("R", "r", "sigma_r", "", 2),
-    ("R_N", "rn", "sigma_rn", "", 2),
-    ("R_T", "rt", "sigma_rt", "", 2),
-    ("Impact angle θ₁", "theta1_deg", "sigma_theta1_deg", "°", 1),
-    ("Deviation θ_dev", "theta_dev_deg", "sigma_theta_dev_deg", "°", 1),
     ("Energy before", "kinetic1_j", "sigma_kinetic1_j", " kJ", 2),
     ("Energy after", "kinetic2_j", "sigma_kinetic2_j", " kJ", 2),
     ("Height of bounce", "bounce_height_m", "", " m", 2),
     ("Height over chord", "chord_height_m", "", " m", 2),
     ("Spread of normal", "normal_spread_deg", "", "°", 1),
 )
+JUDGED = (  # with an interval, for the normal at the block's scale: what is shown, name, digits
+    ("R", "r", 2),
+    ("R_N", "rn", 2),
+    ("R_T", "rt", 2),
+    ("Impact angle θ₁", "theta1", 0),
+    ("Deviation θ_dev", "theta_dev", 0),
+)
+OF_CONTACT = (("R_N", "rn_contact", 2), ("R_T", "rt_contact", 2), ("Impact angle θ₁", "theta1_contact", 0))
+"""And with one for the ground that the block met."""
 
 
 class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
@@ -44,7 +48,9 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
         _draw_editable(layout, pick.rockfall_pick)
         if result is None:
             return
-        facts(layout, [*(_fact(result, *how) for how in NUMBERS if how[1] in result), *spins.words(pick)])
+        judged = [(label, impact_words.between(result, *how) or "not defined") for label, *how in JUDGED]
+        facts(layout, [*judged, *(_fact(result, *how) for how in NUMBERS if how[1] in result), *spins.words(pick)])
+        _draw_contact(context, layout, result)
         reasons = impact_words.reasons(pick)
         for reason in reasons:
             paragraph(context, layout, reason, "ERROR")
@@ -53,6 +59,14 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
                 paragraph(context, layout, said, "INFO")
         if "sigma_r" not in result:
             paragraph(context, layout, "Give a confidence, and the numbers get their errors.")
+
+
+def _draw_contact(context: bpy.types.Context, layout: bpy.types.UILayout, result: dict[str, object]) -> None:
+    """The intervals with the ground's roughness, where that is known."""
+    if not math.isfinite(result.get("interval_rn_contact", (math.nan,))[0]):
+        return
+    paragraph(context, layout, "In brackets 95 %, for the normal at the block's scale; with its roughness:", "INFO")
+    facts(layout, [(label, impact_words.between(result, *how)) for label, *how in OF_CONTACT])
 
 
 def _draw_editable(layout: bpy.types.UILayout, editable: bpy.types.PropertyGroup) -> None:

@@ -24,7 +24,7 @@ from ....core.analysis.graph_series import (
     whole_limits,
 )
 from ....core.analysis.graphs import GraphSpec
-from ....core.analysis.variable_sigma import measured_sigma
+from ....core.analysis.variable_sigma import measured_interval
 from ....core.analysis.variables import VARIABLES
 from ....core.impact_models.registry import MODELS
 from ....core.vectors import Array, Mask
@@ -44,6 +44,8 @@ MANY_CHOSEN = 400
 """Rings about more points would hide the graph."""
 MOST_LINKS = 6000
 """Of more links in a graph, which no eye can follow, only those of selected impacts are drawn."""
+OPEN = 10.0
+"""How far beyond the axis, in parts of it, the bar of an interval without an end goes."""
 REACH = 9.0
 """How far from the mouse a point is still hit, at interface scale 1 [px]."""
 
@@ -203,15 +205,14 @@ class ImpactGraph:
         return self.bars
 
     def bar(self, compared: SceneComparison, one: Drawn, which: np.ndarray) -> Array:
-        """(k, 2, 2) along the axes: error bars of some points of measured impacts."""
+        """(k, 2, 2) along the axes: 95 % intervals of some points of measured impacts."""
         series = one.series
         impacts = compared.impacts if series.source == 0 else compared.others[series.source - 1].impacts
         points, found = series.points[which], []
         for i, (axis, name) in enumerate(((self.x, self.spec.x), (self.y, self.spec.y))):
-            sigma = measured_sigma(impacts, series.row[which], name)
+            beyond = axis.limits[1] + OPEN * (axis.limits[1] - axis.limits[0])
             ends = np.stack([points, points], axis=1)
-            ends[:, 0, i] -= sigma
-            ends[:, 1, i] += sigma
+            ends[:, :, i] = np.minimum(measured_interval(impacts, series.row[which], name), beyond)
             if axis.log:
                 ends[:, 0, i] = np.maximum(ends[:, 0, i], axis.limits[0] * 1e-3)
             found.append(np.stack([self.x.places(ends[:, :, 0]), self.y.places(ends[:, :, 1])], axis=2))

@@ -12,9 +12,10 @@ import numpy as np
 
 from ....core.analysis.columns import passing
 from ....core.analysis.graph_layout import Frame, Rectangle, frame, tiles
-from ....core.analysis.variable_sigma import measured_sigma
+from ....core.analysis.variable_sigma import measured_interval
 from ....core.analysis.variables import VARIABLES, known_variables, measured_values
 from ....core.reconstruction.impact import Impacts
+from ....core.reconstruction.intervals import undetermined
 from ....core.vectors import Mask
 from ...scene import comparison, comparison_scores, graph_settings
 from . import drawing, empty, legend, selection
@@ -24,6 +25,7 @@ from .impact_graphs import MANY, Drawn, ImpactGraph, build, curve_text, specs_ke
 from .look import Look, alpha, mixed
 from .point_colours import PointColours, find_colours
 
+NO_ENDS = np.full(2, np.nan)
 LINE = 1.35
 """From one line of text to the next, in heights of the text."""
 FULL_HEIGHT = 16
@@ -341,21 +343,28 @@ def _card_values(impacts: Impacts, drawn: Drawn, graph: ImpactGraph, hit: Hit, s
     for axis, name in ((1, graph.spec.y), (0, graph.spec.x)):
         variable = VARIABLES[name]
         words = symbol(name) if short else variable.title
-        value = float(measured_values(impacts, row, name)[0])
-        found.append(f"{words}: {_quantity(value, float(measured_sigma(impacts, row, name)[0]), variable.unit)}")
+        value, ends = float(measured_values(impacts, row, name)[0]), measured_interval(impacts, row, name)[0]
+        attribute = name.removesuffix("_deg")
+        if attribute in impacts.intervals and undetermined(attribute, impacts.intervals[attribute][row])[0]:
+            found.append(f"{words}: {_quantity(value, NO_ENDS, variable.unit)} (undetermined)")
+        else:
+            found.append(f"{words}: {_quantity(value, ends, variable.unit)}")
         if drawn.series.model and variable.restituted:
             model = float(drawn.series.points[hit.place, axis])
-            found.append(f"    {drawn.series.title}: {_quantity(model, np.nan, variable.unit)}")
+            found.append(f"    {drawn.series.title}: {_quantity(model, NO_ENDS, variable.unit)}")
     return found
 
 
-def _quantity(value: float, sigma: float, unit: str) -> str:
-    """A number for people, with its standard deviation and unit."""
+def _quantity(value: float, ends: np.ndarray, unit: str) -> str:
+    """A number for people, with its 95 % interval (2,) and unit."""
     if not np.isfinite(value):
         return "not defined"
     space = "" if unit in ("", "°") else " "
-    if np.isfinite(sigma) and sigma > 0:
-        digits = max(0, 1 - int(np.floor(np.log10(sigma))))
-        return f"{value:.{digits}f} ± {sigma:.{digits}f}{space}{unit}".replace("-", "−")
+    low, high = ends
+    if low < high:
+        width = 2 * max(value - low, 1e-9) if np.isinf(high) else high - low
+        digits = max(0, 1 - int(np.floor(np.log10(width / 4))))
+        upper = "or more" if np.isinf(high) else f"to {high:.{digits}f}"
+        return f"{value:.{digits}f}{space}{unit} ({low:.{digits}f} {upper})".replace("-", "−")
     text = f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
     return f"{text}{space}{unit}".replace("-", "−")

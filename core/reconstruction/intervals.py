@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Standard deviations and intervals of impacts, from what is not known of their velocities, place and normal."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..vectors import Array, Indices, Mask, dot, norm, perpendicular, unit
+from .impact import Apparent, Impacts, apparent
+from .uncertainty import ERRORS
+
+SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
+JUDGED = ("rn", "rt", "r", "theta1", "theta_dev")
+"""What has an interval,"""
+OF_CONTACT = ("rn_contact", "rt_contact", "theta1_contact")
+"""and these another one, for the ground that the block meets: the normal is off by the roughness, too."""
+INTERVALS = (*JUDGED, *OF_CONTACT)
+COVERAGE = 0.95
+DRAWS_LOG2 = 9
+"""Draws of an interval: 2 to this power."""
+ROWS = 64
+"""Impacts that are drawn at a time: their draws stay in the processor's cache."""
+MOST_DIGITS = 3
+EVERYTHING = {
+    "rn": (0.1, 2.0),
+    "rt": (0.2, 1.5),
+    "r": (0.2, 1.5),
+    "theta1": tuple(np.radians([5.0, 85.0])),
+    "theta_dev": tuple(np.radians([15.0, 165.0])),
+}
+"""An interval over this leaves nothing out that a rebound can have."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImpactErrors:
+    """What is not known of n impacts.
+
+    Attributes
+    ----------
+    covariance : (n, 9, 9) of v1, v2 [m/s] and the place [m]; rows of a velocity that is not known are NaN.
+    by_place : (n, 3, 3) change of the block-scale normal with the place [1/m].
+    tilt : (n,) root mean square angle by which that normal is off, wherever it is [rad]; NaN counts as none.
+    roughness : (n,) root mean square angle between the ground that the block meets and the block-scale plane [rad];
+        NaN or zero where it is not known.
+    """
+
+    covariance: Array
+    by_place: Array
+    tilt: Array
+    roughness: Array
+
+    def known(self) -> tuple[Mask, Mask]:
+        """(n,) something is known of the error of v1, of v2."""
+        return np.isfinite(self.covariance[:, 0, 0]), np.isfinite(self.covariance[:, 3, 3])
+
+    def roots(self) -> Array:
+        """(n, 9, 9) whose columns are one standard deviation along each axis of the covariance."""
+        size, axes = np.linalg.eigh(np.nan_to_num(self.covariance))
+        return axes * np.sqrt(np.maximum(size, 0.0))[:, None, :]
+
+
+def impact_sigmas(
+    values: Apparent | Impacts, v1: Array, v2: Array, normal: Array, mass: Array, errors: ImpactErrors
+) -> dict[str, Array]:
+    """Standard deviations of n impacts' velocities, coefficients, angles and energies.
+
+    Parameters
+    ----------
+    values : eq. 7–10; NaN has no deviation.
+    v1, v2, normal : (n, 3).
+    mass : (n,) [kg].
+
+    Returns
+    -------
+    "v1", "v2" (n, 3); `SCALARS`, "kinetic1_j", "kinetic2_j" (n,); NaN where undefined or not known.
+
+    Notes
+    -----
+    The root mean square deviation from the value over pairs of points √3 standard deviations to either side along each
+    axis of the errors, with a weight of 1/6 each (Julier & Uhlmann 2004): first-order propagation where a column is
+    linear, but true for R_N at grazing impacts too, where a small tilt of the normal changes it by half. The normal is
+    that of the block's scale, without the roughness below it; it goes with the place, and is tilted by tilt/√2 about
+    each of two axes at right angles to it, independent of everything else.
+    """
+    reach = np.sqrt(3.0) * errors.roots()
+    slant = np.sqrt(1.5) * np.nan_to_num(errors.tilt)[:, None]
+    here = _scalars(v1, v2, normal, mass)
+    squares = np.zeros_like(here)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for sign in (-1.0, 1.0):
+            for axis in range(ERRORS):
+                away = sign * reach[:, :, axis]
+                leaning = _leaning(normal, errors.by_place, away[:, 6:])
+                there = _scalars(v1 + away[:, :3], v2 + away[:, 3:6], leaning, mass)
+                squares += np.nan_to_num(there - here) ** 2 / 6
+            for direction in perpendicular(normal):
+                there = _scalars(v1, v2, unit(normal + sign * slant * direction), mass)
+                squares += np.nan_to_num(there - here) ** 2 / 6
+    known1, known2 = errors.known()
+    result = {}
+    for i, name in enumerate((*SCALARS, "kinetic1_j", "kinetic2_j")):
+        uses1, uses2 = not name.endswith("2") and "2_" not in name, not name.endswith("1") and "1_" not in name
+        known = (known1 | (not uses1)) & (known2 | (not uses2)) & np.isfinite(here[:, i])
+        if name in SCALARS:
+            known &= np.isfinite(getattr(values, name))
+        result[name] = np.where(known, np.sqrt(squares[:, i]), np.nan)
+    diagonal = np.sqrt(np.maximum(np.einsum("nii->ni", errors.covariance), 0.0))
+    for name, part, velocity in (("v1", slice(0, 3), v1), ("v2", slice(3, 6), v2)):
+        result[name] = np.where(np.isfinite(velocity), diagonal[:, part], np.nan)
+    return result
+
+
+def _scalars(v1: Array, v2: Array, normal: Array, mass: Array) -> Array:
+    """(n, 11) the scalar columns."""
+    found = apparent(v1, v2, normal)
+    energies = [0.5 * mass * dot(v, v) for v in (v1, v2)]
+    return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
+
+
+def _leaning(normal: Array, by_place: Array, away: Array) -> Array:
+    """(..., 3) the normal beside its place."""
+    return unit(normal + (by_place @ away[..., None])[..., 0])
+
+
+def impact_intervals(
+    values: Apparent | Impacts, v1: Array, v2: Array, normal: Array, errors: ImpactErrors
+) -> dict[str, Array]:
+    """Intervals that hold R_N, R_T, R, θ1 and θ_dev of n impacts with a probability of 95 %, by drawing.
+
+    Parameters
+    ----------
+    As of `impact_sigmas`.
+
+    Returns
+    -------
+    `INTERVALS` → (n, 2) lower and upper end; NaN where undefined or not known, those of the contact also where the
+    roughness is not known. The upper end is infinite where the block may have passed along the ground, since R_N has no
+    limit there.
+
+    Notes
+    -----
+    Always the same draws, evenly spread over the errors (Sobol's points), so that the same impact has the same
+    interval in every table. All errors are normal; coefficients and angles are not.
+    """
+    n = len(v1)
+    result = {name: np.full((n, 2), np.nan) for name in INTERVALS}
+    known1, known2 = errors.known()
+    both = known1 & known2 & np.isfinite(values.r)
+    only1 = known1 & ~both & np.isfinite(values.theta1)
+    rows = np.flatnonzero(both | only1)
+    roots = errors.roots()[rows]
+    for start in range(0, rows.size, ROWS):
+        some = rows[start : start + ROWS]
+        drawn = _drawn(v1[some], v2[some], normal[some], roots[start : start + ROWS], errors, some)
+        ends = _ends(drawn)
+        for i, name in enumerate(INTERVALS):
+            value = getattr(values, name.removesuffix("_contact"))[some]
+            defined = np.isfinite(value) & (both[some] | name.startswith("theta1"))
+            if name in OF_CONTACT:
+                defined &= np.nan_to_num(errors.roughness[some]) > 0
+            low, high = np.minimum(ends[:, i, 0], value), np.maximum(ends[:, i, 1], value)
+            result[name][some] = np.where(defined[:, None], np.stack([low, high], axis=1), np.nan)
+    return result
+
+
+@cache
+def _draws() -> Array:
+    """(m, 13) standard normal draws: of velocities and place, of the normal's tilt, of the roughness."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    return np.asarray(ndtri(qmc.Sobol(ERRORS + 4, rng=np.random.default_rng(0)).random_base2(DRAWS_LOG2)))
+
+
+def _drawn(v1: Array, v2: Array, normal: Array, roots: Array, errors: ImpactErrors, rows: Indices) -> Array:
+    """(k, 8, m) draws of `INTERVALS`; a block that passes along the ground has an infinite R_N."""
+    draws = _draws()
+    away = np.swapaxes(roots @ draws[:, :ERRORS].T, 1, 2)  # (k, m, 9)
+    into, out = v1[:, None, :] + away[:, :, :3], v2[:, None, :] + away[:, :, 3:6]
+    off = away[:, :, 6:] @ np.swapaxes(errors.by_place[rows], 1, 2)
+    axes = np.stack(perpendicular(normal), axis=1)  # (k, 2, 3)
+    tilts = []
+    for angle, column in ((errors.tilt, ERRORS), (errors.roughness, ERRORS + 2)):
+        size = np.nan_to_num(angle[rows])[:, None, None] / np.sqrt(2)
+        tilts.append(size * (draws[:, column : column + 2] @ axes))
+    plane = normal[:, None, :] + off + tilts[0]
+    side = np.where(dot(v2, normal) < 0, -1.0, 1.0)[:, None]
+    speed1, speed2, along = norm(into), norm(out), dot(into, out)
+    columns = {}
+    for suffix, ground in (("", unit(plane)), ("_contact", unit(plane + tilts[1]))):
+        approach, escape = -dot(into, ground), side * dot(out, ground)
+        along1, along2 = (np.sqrt(np.maximum(s**2 - n**2, 0.0)) for s, n in ((speed1, approach), (speed2, escape)))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            columns["rn" + suffix] = np.where(approach > 0, np.maximum(escape, 0.0) / approach, np.inf)
+            columns["rt" + suffix] = along2 / along1
+        columns["theta1" + suffix] = np.arctan2(np.maximum(approach, 0.0), along1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        columns["r"] = speed2 / speed1
+        columns["theta_dev"] = np.arccos(np.clip(along / (speed1 * speed2), -1.0, 1.0))
+    return np.stack([columns[name] for name in INTERVALS], axis=1)
+
+
+def _ends(drawn: Array) -> Array:
+    """(k, c, 2) ends of the middle `COVERAGE` of draws (k, c, m)."""
+    m = drawn.shape[-1]
+    low = int((1 - COVERAGE) / 2 * m)
+    return np.partition(drawn, (low, m - 1 - low), axis=-1)[..., [low, m - 1 - low]]
+
+
+def undetermined(name: str, interval: Array) -> Mask:
+    """(n,) intervals (n, 2) of one of `INTERVALS` that leave nothing out."""
+    low, high = EVERYTHING[name.removesuffix("_contact")]
+    return (interval[:, 0] <= low) & (interval[:, 1] >= high)
+
+
+def in_words(name: str, value: float, low: float, high: float, digits: int) -> str:
+    """A number with its interval, "undetermined" where that leaves nothing out; empty where it is not defined.
+
+    Parameters
+    ----------
+    name : of `INTERVALS`; angles are in radians, and in degrees in the text.
+    digits : after the point, more where the interval is that narrow.
+    """
+    if not np.isfinite(value):
+        return ""
+    scale, unit = (180 / np.pi, "°") if name.startswith("theta") else (1.0, "")
+    if not np.isfinite(low):
+        return f"{scale * value:.{digits}f}{unit}"
+    if undetermined(name, np.array([[low, high]]))[0]:
+        return f"{scale * value:.{digits}f}{unit} (undetermined)"
+    while scale * (high - low) < 2 * 10.0**-digits and digits < MOST_DIGITS:
+        digits += 1
+    ends = f"{scale * low:.{digits}f} " + ("or more" if np.isinf(high) else f"to {scale * high:.{digits}f}")
+    return f"{scale * value:.{digits}f}{unit} ({ends})"

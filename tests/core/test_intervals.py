@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Intervals of R_N, R_T, R and the angles, against draws of the whole reconstruction over ground that is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rockfall.core.exchange.impact_fields import field_of
+from rockfall.core.exchange.selection import joined, rows_of
+from rockfall.core.exchange.tables import read_impacts, write_impacts
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.impact import apparent
+from rockfall.core.reconstruction.intervals import INTERVALS, ImpactErrors, impact_intervals, undetermined
+from rockfall.core.reconstruction.picks import make_picks
+from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.terrain.orientation import block_scale_normals
+from rockfall.core.terrain.surface import Surface
+
+TIME = np.array([0.0, 0.9, 1.7])
+POSITION = np.array([(0, 0, 0), (6, 0.5, -6.5), (13.0, 2.2, -13)])
+NORMAL = np.array([np.sin(0.7), 0.0, np.cos(0.7)])
+
+
+def fall(sigma_time, sigma_position, copies=1, rng=None):
+    """Impacts of copies of a fall, their picks off by what is stated where there is a generator."""
+    times, places = np.tile(TIME, copies), np.tile(POSITION, (copies, 1))
+    if rng is not None:
+        times = times + sigma_time * rng.normal(size=times.size)
+        places = places + sigma_position * rng.normal(size=places.shape)
+    return reconstruct(
+        make_picks(
+            np.repeat(np.arange(copies), 3).astype(str), times, places, normal=np.tile(NORMAL, (times.size, 1)),
+            sigma_time_s=np.full(times.size, sigma_time), sigma_position_m=np.full(times.size, sigma_position),
+        )
+    ).impacts  # fmt: skip
+
+
+def test_intervals_are_those_of_many_reconstructions():
+    one, many = fall(0.01, 0.1), fall(0.01, 0.1, 3000, np.random.default_rng(3))
+    for name in ("rn", "rt", "r", "theta1", "theta_dev"):
+        low, high = np.nanquantile(getattr(many, name)[1::3], (0.025, 0.975))
+        np.testing.assert_allclose(one.intervals[name][1], (low, high), atol=0.12 * (high - low), err_msg=name)
+    assert np.isnan(one.intervals["rn_contact"]).all()  # the normal was given: no roughness is known
+
+
+def test_they_hold_as_often_as_they_say():
+    many = fall(0.01, 0.1, 1000, np.random.default_rng(5))
+    truth = fall(0.0, 0.0)
+    for name in ("rn", "rt", "r", "theta1", "theta_dev"):
+        ends, value = many.intervals[name][1::3], getattr(truth, name)[1]
+        assert 0.93 < np.mean((ends[:, 0] <= value) & (value <= ends[:, 1])) < 0.97, name
+
+
+def grid(step, heights):
+    n = len(heights)
+    x, y = np.meshgrid(np.arange(n) * step, np.arange(n) * step, indexing="ij")
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + n, corner + n + 1], 1), np.stack([corner, corner + n + 1, corner + 1], 1)]
+    )
+    return Surface(np.stack([x, y, heights], axis=-1).reshape(-1, 3), faces.astype(np.int32), GlobalShift(), "grid")
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.04])
+def test_the_tilt_of_a_plane_through_noisy_points_is_known(noise):
+    surface = grid(0.2, noise * np.random.default_rng(1).normal(size=(120, 120)))
+    place = np.stack(np.meshgrid(np.arange(2, 22, 1.5), np.arange(2, 22, 1.5)), axis=-1).reshape(-1, 2)
+    found = block_scale_normals(surface, np.column_stack([place, np.zeros(len(place))]), 0.7)
+    off = np.degrees(np.arccos(found.normal[:, 2]))
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(np.sqrt(np.mean(found.tilt_deg**2)), rel=0.15)
+    assert (found.tilt_deg < found.spread_deg / 2).all()
+
+
+def test_the_normal_changes_with_the_place():
+    x = np.arange(60) * 0.2
+    bowl = grid(0.2, np.add.outer(0.05 * (x - 6) ** 2, 0 * x))
+    made = [
+        reconstruct(make_picks(["a"] * 3, TIME, [(6, 6, 0)] * 3, sigma_position_m=[sigma] * 3), surface=bowl)
+        for sigma in (0.01, 0.3)
+    ]
+    picks = made[1].picks
+    from rockfall.core.reconstruction.placement import pick_normals
+
+    change = pick_normals(picks, bowl, np.full(3, 0.5), 0.8, np.ones(3, np.bool_)).by_place[0]
+    np.testing.assert_allclose(change @ [1.0, 0.0, 0.0], [-0.1, 0.0, 0.0], atol=0.01)
+    np.testing.assert_allclose(change @ [0.0, 1.0, 0.0], 0.0, atol=0.01)
+
+
+def errors(roughness, tilt=0.0):
+    return ImpactErrors(np.zeros((1, 9, 9)), np.zeros((1, 3, 3)), np.array([tilt]), np.array([roughness]))
+
+
+def test_a_grazing_impact_on_rough_ground_says_nothing_of_the_contact():
+    v1, v2, normal = np.array([[8.0, 0, -1.0]]), np.array([[6.0, 0, 1.5]]), np.array([[0.0, 0, 1.0]])
+    ends = impact_intervals(apparent(v1, v2, normal), v1, v2, normal, errors(np.radians(20), np.radians(0.5)))
+    assert not undetermined("rn", ends["rn"])[0]
+    assert undetermined("rn_contact", ends["rn_contact"])[0]
+    assert np.isinf(ends["rn_contact"][0, 1])
+    assert ends["rn"][0] == pytest.approx(1.5 * np.array([1 - 0.11, 1 + 0.13]), abs=0.06)
+
+
+def test_tables_keep_them(tmp_path):
+    impacts = fall(0.01, 0.1, 2)
+    wide = {name: ends.copy() for name, ends in impacts.intervals.items()}
+    wide["rn"][1, 1] = np.inf
+    impacts = replace(impacts, intervals=wide)
+    write_impacts(impacts, tmp_path / "impacts.csv")
+    again = read_impacts(tmp_path / "impacts.csv")
+    assert set(again.intervals) == set(INTERVALS)
+    for name in INTERVALS:
+        np.testing.assert_allclose(again.intervals[name], impacts.intervals[name], rtol=1e-12)
+    bare = replace(impacts, intervals={})
+    both = joined([rows_of(impacts, np.array([1])), bare]).intervals["rn"]
+    assert both[0].tolist() == impacts.intervals["rn"][1].tolist()
+    assert np.isnan(both[1:]).all()
+    assert field_of("theta1_deg_contact_low").unit == "°"
+    assert "no limit" in field_of("rn_high").description

@@ -36,7 +36,7 @@ def rows_of(impacts, rows):
     taken = {}
     for field in fields(Impacts):
         value = getattr(impacts, field.name)
-        if field.name in ("flags", "sigma", "extra"):
+        if field.name in ("flags", "sigma", "intervals", "extra"):
             taken[field.name] = {name: each[rows] for name, each in value.items()}
         elif field.name != "shift":
             taken[field.name] = value[rows]
@@ -192,7 +192,7 @@ def test_predictions_round_trip(tmp_path):
         a, b = getattr(one, field.name), getattr(two, field.name)
         if field.name == "flags":
             merged["flags"] = {name: np.r_[a[name], b[name]] for name in a}
-        elif field.name not in ("sigma", "extra", "shift"):
+        elif field.name not in ("sigma", "intervals", "extra", "shift"):
             merged[field.name] = np.concatenate([a, b])
     for impacts in (one, replace(one, **merged)):
         predictions = compare(impacts, replicates=2, seed=1)

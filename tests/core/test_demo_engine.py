@@ -120,7 +120,7 @@ def test_first_contacts_are_those_of_the_shipped_truth() -> None:
     """Every flight between two impacts of truth.csv, on the terrain as it is stored."""
     source = read_project(DEMO / "project.toml").terrain
     assert source is not None
-    surface = read_terrain(source.file, shift=source.global_shift, up=source.up)
+    surface = read_terrain(source.files[0], shift=source.global_shift, up=source.up)
     table = read_table(DEMO / "truth.csv", ("trajectory",), ())
     trajectory = np.array(table.text("trajectory"))
     before = np.flatnonzero(trajectory[1:] == trajectory[:-1])

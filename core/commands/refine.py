@@ -49,6 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "are the centre's (default: as the project says, else 0.15)",
     )
     parser.add_argument(
+        "--sigma-terrain",
+        type=positive,
+        metavar="M",
+        help="accuracy of the terrain's height [m]: about 0.02 for a terrestrial scan, 0.05 from a drone, 0.2 for an "
+        "airborne one (default: as the project says, else half the point spacing, from 0.02 to 0.2)",
+    )
+    parser.add_argument(
         "--trajectory", action="extend", nargs="+", metavar="NAME", help="only these (default: all of the project)"
     )
     parser.add_argument(
@@ -86,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
             normal_radius_m=project.reconstruction.normal_radius_m,
             names=arguments.trajectory,
             free=how.free,
-            sigma_terrain_m=how.sigma_terrain_m,
+            sigma_terrain_m=how.sigma_terrain_m or (project.terrain.sigma_m if project.terrain else None),
             sigma_aim=how.sigma_aim,
             loss=cast(Loss, how.loss),
             site=project.site.name,
@@ -104,7 +111,8 @@ def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> 
     """As the project says, but for what was typed."""
     free = settings.free if arguments.free is None else known_names(arguments.free, FREE, "--free")
     aim = settings.sigma_aim if arguments.sigma_aim is None else arguments.sigma_aim
-    return replace(settings, free=free, loss=arguments.loss or settings.loss, sigma_aim=aim)
+    terrain = arguments.sigma_terrain or settings.sigma_terrain_m
+    return replace(settings, free=free, loss=arguments.loss or settings.loss, sigma_aim=aim, sigma_terrain_m=terrain)
 
 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:

@@ -52,6 +52,7 @@ class TerrainSource:
     crs : coordinate reference system as the survey states it ("EPSG:2154"), empty when unknown.
     up : the axis that points up in the files, one of `UP_AXES`.
     unit_m : length of the files' unit [m].
+    sigma_m : accuracy of the terrain, as a standard deviation of its height [m]; None: by its point spacing.
     """
 
     files: tuple[Path, ...]
@@ -59,6 +60,7 @@ class TerrainSource:
     crs: str = ""
     up: str = "auto"
     unit_m: float = 1.0
+    sigma_m: float | None = None
     extra: Extra = field(default_factory=dict)
 
     @property
@@ -120,7 +122,7 @@ class VideoEntry:
     spin_marks : spin_marks.csv, one point of the block in two frames or more of a flight, for its spin.
     offset_s, drift, origin_s : of the `Clock`: common time = offset + (1 + drift) · rate · (video time − origin).
     capture_rate_hz : pictures per second when filming; None when the file plays at the speed of the fall.
-    row_time_s : readout time of one row of the image [s]: rolling shutter.
+    row_time_s : readout time of one row of the image [s]: rolling shutter, 0 for a global one; None when not known.
     """
 
     name: str
@@ -133,7 +135,7 @@ class VideoEntry:
     drift: float = 0.0
     origin_s: float = 0.0
     capture_rate_hz: float | None = None
-    row_time_s: float = 0.0
+    row_time_s: float | None = None
     extra: Extra = field(default_factory=dict)
 
 
@@ -144,7 +146,7 @@ class RefinementSettings:
     Attributes
     ----------
     free : what is fitted beside the picks, of `FREE`.
-    sigma_terrain_m : standard deviation of the terrain across itself [m]; None for the default.
+    sigma_terrain_m : accuracy of the terrain [m]; None for that of `TerrainSource`.
     sigma_aim : standard deviation of the tracked spot about the block's centre, in parts of its diameter.
     loss : one of `LOSSES`, how pixels that do not fit count.
     """
@@ -349,6 +351,7 @@ def _terrain(table: TomlTable) -> TerrainSource:
         crs=table.text("crs", ""),
         up=table.choice("up", UP_AXES, "auto"),
         unit_m=table.number("unit_m", 1.0),
+        sigma_m=table.optional_number("sigma_m"),
         extra=table.rest(),
     )
 
@@ -390,7 +393,7 @@ def _video(table: TomlTable) -> VideoEntry:
         drift=table.signed("drift", 0.0),
         origin_s=table.signed("origin_s", 0.0),
         capture_rate_hz=table.optional_number("capture_rate_hz"),
-        row_time_s=table.signed("row_time_s", 0.0),
+        row_time_s=table.optional_number("row_time_s", zero_allowed=True),
         extra=table.rest(),
     )
     if abs(entry.drift) >= 1.0:

@@ -49,7 +49,7 @@ def add_camera(scene: bpy.types.Scene, video: Video) -> bpy.types.Object:
     camera = bpy.data.objects.new(name, data)
     store.link(store.collection(scene, videos.COLLECTION), camera)
     camera[store.ROLE], camera[store.ID] = store.CAMERA_ROLE, uuid.uuid4().hex
-    camera[store.CLOCK], camera[store.CAPTURE_RATE], camera[store.ROW_TIME] = [0.0, 0.0, 0.0, 1.0], 0.0, 0.0
+    camera[store.CLOCK], camera[store.CAPTURE_RATE] = [0.0, 0.0, 0.0, 1.0], 0.0
     camera[store.SOLVED] = False
     video_files.write_video(camera, video)
     focal = GUESSED_FOCAL * video.width

@@ -25,7 +25,7 @@ def common_time(camera: bpy.types.Object, video_s: float, v_px: float | None = N
     """Common time of a picture [s]; of one of its rows where the shutter rolls."""
     late = 0.0
     if v_px is not None:
-        late = videos.row_time_of(camera) * (v_px - videos.size_of(camera)[1] / 2)
+        late = (videos.row_time_of(camera) or 0.0) * (v_px - videos.size_of(camera)[1] / 2)
     return float(clocks.clock_of(camera).to_common(video_s)) + late
 
 

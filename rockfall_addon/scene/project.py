@@ -98,6 +98,8 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         models.keep_parameters(scene, values, which)
     if surface is not None and shading is not None:
         tile = terrain.add_terrain(scene, surface, shading)
+        if project.terrain is not None and project.terrain.sigma_m is not None:
+            scene.rockfall_terrain.accuracy_m = project.terrain.sigma_m
         if zones is not None:
             simulated_zones.keep(scene, zones, tile)
     for name, structure in met.items():
@@ -150,7 +152,9 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
         if stated is not None:
             stated = replace(stated, structures=_write_structures(met, place))
-        source = TerrainSource((place / "terrain.ply",), (shift.x, shift.y, shift.z), shift.crs, up="z")
+        source = TerrainSource(
+            (place / "terrain.ply",), (shift.x, shift.y, shift.z), shift.crs, up="z", sigma_m=terrain.accuracy_m(scene)
+        )
         parameters = {"A": models.parameters_of(scene), "B": fit.second_set(scene)}
         project = Project(
             site=Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, ""))),

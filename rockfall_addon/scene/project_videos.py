@@ -91,7 +91,10 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
         camera.name = read.entry.name
         clocks.set_clock(camera, read.clock)
         camera[store.CAPTURE_RATE] = read.entry.capture_rate_hz or 0.0
-        camera[store.ROW_TIME] = read.entry.row_time_s
+        if read.entry.row_time_s is not None:
+            camera[store.ROW_TIME] = read.entry.row_time_s
+        elif store.ROW_TIME in camera:
+            del camera[store.ROW_TIME]
         if read.entry.events is not None:
             camera[store.EVENTS_FILE] = str(read.entry.events.resolve())
         if first:

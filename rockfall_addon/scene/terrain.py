@@ -151,6 +151,11 @@ def put_back(tile: bpy.types.Object) -> None:
     tile.matrix_world = Matrix.Identity(4)
 
 
+def accuracy_m(scene: bpy.types.Scene) -> float | None:
+    """Standard deviation of the terrain's height, as it was given [m]."""
+    return store.double(scene.rockfall_terrain.accuracy_m) or None
+
+
 def active_terrain(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The first terrain object by name."""
     return next(iter(store.with_role(scene, store.TERRAIN_ROLE)), None)

@@ -74,9 +74,10 @@ def capture_rate_of(camera: bpy.types.Object) -> float | None:
     return float(camera.get(store.CAPTURE_RATE, 0.0)) or None
 
 
-def row_time_of(camera: bpy.types.Object) -> float:
-    """Readout time of one row of the image [s], 0 for a global shutter."""
-    return float(camera.get(store.ROW_TIME, 0.0))
+def row_time_of(camera: bpy.types.Object) -> float | None:
+    """Readout time of one row of the image [s], 0 for a global shutter; None when it is not known."""
+    value = camera.get(store.ROW_TIME)
+    return None if value is None else float(value)
 
 
 def remember(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:

@@ -263,7 +263,7 @@ def _sightings(
     if place in _seen and _seen[place][0] == key:
         return _seen[place][1]
     origin, direction = rays_at(camera_paths.camera_path(camera), seen.pixel, seen.time_s)
-    clock, late = clocks.clock_of(camera), videos.row_time_of(camera)
+    clock, late = clocks.clock_of(camera), videos.row_time_of(camera) or 0.0
     common = clock.to_common(seen.time_s) + late * (seen.pixel[:, 1] - videos.size_of(camera)[1] / 2)
     where = np.full((len(seen), 3), np.nan)
     if path is not None:

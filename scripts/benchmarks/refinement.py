@@ -48,6 +48,8 @@ from synthetic_falls import BLOCK, GRAVITY, GRID, GRID_STEP_M, NONE, RADIUS, SIG
 
 SIGMA_TRACK, SIGMA_PICK, SIGMA_STEADY = 1.5, 3.0, 0.2
 SIGMA_AIM = 0.15
+EXACT_M = 1e-4
+"""Of a terrain that has no errors but those that differ from contact to contact."""
 FILL = 0.7
 TERRAIN, CAMERA, SHUTTER = ("terrain",), ("camera",), ("rolling shutter",)
 AIR = ("drag", "lift", "acceleration")
@@ -93,7 +95,7 @@ class Wrong:
     terrain_m : standard deviation of smooth errors of the terrain [m]; smooth_m over how far they are alike [m].
     raised_m : by how much the terrain is too high everywhere [m].
     lifted_m : by how much the cameras are too high [m]; their poses are given by hand then, without a covariance.
-    readout_s : of the rolling shutter [s].
+    readout_s : of the rolling shutter [s], which the program is not told; None for a global one that it knows.
     air : what acts on the blocks.
     cause : words of the warning that names the cause; any of them will do.
     """
@@ -102,7 +104,7 @@ class Wrong:
     smooth_m: float = 4.0
     raised_m: float = 0.0
     lifted_m: float = 0.0
-    readout_s: float = 0.0
+    readout_s: float | None = None
     air: Air = NONE
     cause: tuple[str, ...] = ()
 
@@ -137,6 +139,7 @@ CASES = (
             ("terrain wrong by 20 cm over 12 m", 1, Wrong(terrain_m=0.2, smooth_m=12.0, cause=TERRAIN)),
             ("terrain 20 cm too high", 1, Wrong(raised_m=0.2, cause=TERRAIN)),
             ("camera 0.3 m too high", 1, Wrong(lifted_m=0.3, cause=CAMERA)),
+            ("global shutter, not said", 1, Wrong(readout_s=0.0, cause=SHUTTER)),
             ("rolling shutter of 10 ms", 1, Wrong(readout_s=0.01, cause=SHUTTER)),
             ("rolling shutter of 20 ms", 1, Wrong(readout_s=0.02, cause=SHUTTER)),
             ("rolling shutter of 30 ms", 1, Wrong(readout_s=0.03, cause=SHUTTER)),
@@ -229,14 +232,15 @@ def film(case: Case, surface: Surface, given: Surface, truth: Fall, rng: np.rand
             np.full(common.size, SIGMA_STEADY / focal),
         )
         guess = offset + (0.0 if number == 0 else float(rng.uniform(-0.05, 0.05)))
-        views.append(View(f"camera {number + 1}", solved, Clock(guess), 0.0, covariance))
+        row_time = 0.0 if case.wrong.readout_s is None else None
+        views.append(View(f"camera {number + 1}", solved, Clock(guess), row_time, covariance))
 
         inside = np.flatnonzero((common > truth.time_s[0]) & (common < truth.time_s[-1]))
         late = np.zeros(inside.size)
         for _ in range(4 if case.wrong.readout_s else 1):
             where = truth.seen_at(common[inside] + late)
             pixel = project(camera, where, rotation=held[inside], position=positions[inside])
-            late = case.wrong.readout_s * (pixel[:, 1] / case.height - 0.5)
+            late = (case.wrong.readout_s or 0.0) * (pixel[:, 1] / case.height - 0.5)
         size = focal * 2 * RADIUS / np.linalg.norm(where - place, axis=1)
         pixel = pixel + np.outer(size, SIGMA_AIM * rng.normal(size=2)) + SIGMA_TRACK * noise_of(case, len(pixel), rng)
         rows.append((np.full(inside.size, number), video[inside], pixel))
@@ -280,11 +284,14 @@ def marked(surface: Surface, truth: Fall, true: View, solved: View, rng: np.rand
 
 def bound(surface: Surface, footage: Footage, free: tuple[str, ...]) -> tuple[np.ndarray, ...]:
     """Cramér–Rao: covariances (n, 3, 3) of v1 and v2 and (v, 3, 3) of the cameras' places, nuisance included."""
-    ground = prepare(footage.picks, surface, BLOCK, None, None, SIGMA_TERRAIN)
+    ground = prepare(footage.picks, surface, BLOCK, None, None, EXACT_M)
+    ground = replace(ground, sigma_m=np.full(len(footage.picks), SIGMA_TERRAIN))
     setup = set_up(ground, footage.true_views, footage.pixels, ["a"], GRAVITY, frozenset(free), SIGMA_AIM)
     zeros, aim = np.zeros((len(footage.views), 3)), np.zeros((len(footage.views), 1, 2))
     truth = footage.truth
-    state = Unknowns(truth.centre, truth.time_s, zeros, zeros, zeros[:, 0], zeros[:, 0], aim, 0.0, GRAVITY)
+    state = Unknowns(
+        truth.centre, truth.time_s, zeros, zeros, zeros[:, 0], zeros[:, 0], aim, 0.0, GRAVITY, np.zeros(len(zeros))
+    )
     problem = replace(setup.problem, sigma_px=np.full(len(footage.pixels), np.hypot(SIGMA_TRACK, SIGMA_STEADY)))
     there = evaluate(problem, state)
     information, _ = normal_equations(problem, there, (there.segment >= 0).astype(float))

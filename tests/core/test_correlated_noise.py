@@ -12,7 +12,7 @@ from rockfall.core.reconstruction.refinement.refine import PixelObservations, Vi
 from rockfall.core.terrain.surface import Surface
 from scipy.signal import lfilter
 
-BLOCK = Block()
+BLOCK = Block(0.05, 0.05, 0.05)
 PLANE = Surface(
     np.array([[-40.0, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]]),
     np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32),
@@ -42,7 +42,7 @@ def seen_with(correlation, rng):
 def fitted(correlation, rng):
     picks = make_picks(["a"] * 4, TIME + 0.01 * rng.normal(size=4), PLACE, sigma_time_s=np.full(4, 0.01))
     seen = seen_with(correlation, rng)
-    view = View("one", fixed(CAMERA))
+    view = View("one", fixed(CAMERA), pose_covariance=1e-12 * np.eye(6))
     return refine(picks, [view], seen, surface=PLANE, block=BLOCK, sigma_terrain_m=1e-4, sigma_aim=0.0)
 
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...constants import GRAVITY_MPS2
 from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, dot, norm, unit
 from ..triangulation import GRAZING_DEG
+from .assumptions import on_assumptions
 from .deviations import Fit
 from .problem import CLOCK_COLUMN, NODE, solve_segments
 from .setup import Ground, Setup
@@ -29,8 +29,6 @@ IN_A_ROW = 5
 MOST_TIMES = 3
 UNLIKELY = 0.05
 """Chance below which another solution is not spoken of."""
-GRAVITY_OFF, GRAVITY_SIGNIFICANCE = 0.1, 5.0
-"""Fitted gravity that is off by more than this part, and by more than so many standard deviations, is no gravity."""
 
 
 def remarks_on(
@@ -42,7 +40,7 @@ def remarks_on(
     fits: Sequence[Fit],
 ) -> tuple[Remark, ...]:
     """Remarks on solved problems, what does not fit first; residual (m, 2) is NaN for pixels that were not used."""
-    remarks = [*_outliers(views, observations, residual, outlier), *_on_gravity(fits[0])]
+    remarks = [*_outliers(views, observations, residual, outlier), *on_assumptions(ground, views, fits)]
     seen = set(observations.trajectory.tolist())
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
         if name not in seen:
@@ -96,22 +94,6 @@ def _outliers(
         yield Remark(text, "warning", name)
 
 
-def _on_gravity(fit: Fit) -> Iterator[Remark]:
-    """A gravity that was fitted, and is none."""
-    column = fit.setup.problem.columns.law[1]
-    if column < 0:
-        return
-    found, sigma = fit.solution.state.gravity, float(np.sqrt(fit.covariance[column, column]))
-    off = abs(found - GRAVITY_MPS2)
-    if found > 0 and off > GRAVITY_OFF * GRAVITY_MPS2 and off > GRAVITY_SIGNIFICANCE * sigma:
-        text = (
-            f"The flights have a gravity of {found:.3g} ± {sigma:.1g} m/s² instead of {GRAVITY_MPS2:g}: lengths should "
-            f"be {GRAVITY_MPS2 / found:.3g} times as large (check the unit of the terrain), or times "
-            f"{np.sqrt(found / GRAVITY_MPS2):.3g} times as long (check the capture rate of the video)."
-        )
-        yield Remark(text, "warning", "gravity")
-
-
 def _second_solutions(fit: Fit) -> Iterator[Remark]:
     """Trajectories whose likeliest motion is not the only one that the pixels and the terrain allow."""
     problem, state = fit.setup.problem, fit.solution.state
@@ -156,7 +138,8 @@ def _alike_from_frame_to_frame(fit: Fit) -> Iterator[Remark]:
     alike = [track for track in fit.tracks if track.correlation > 0]
     if not alike:
         return
-    deviation = np.sqrt(np.diag(fit.covariance) / np.maximum(np.diag(fit.independent), 1e-300))
+    independent = np.diag(fit.independent)
+    deviation = np.sqrt(np.diag(fit.covariance)[: independent.size] / np.maximum(independent, 1e-300))
     times = [float(np.median(deviation[track.columns])) for track in alike]
     least, most = min(track.correlation for track in alike), max(track.correlation for track in alike)
     text = (

@@ -2,7 +2,7 @@
 """The covariance of a refinement's unknowns, and how the velocities follow from them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -10,7 +10,9 @@ from scipy.stats import chi2
 from ...least_squares import inverse
 from ...vectors import Array, Indices
 from ..node_motion import NodeMotion
+from .accelerations import Accelerations, find_accelerations
 from .correlation import TrackNoise, track_noise
+from .held_poses import spread_of_poses
 from .problem import NODE, Problem
 from .search import Rival
 from .setup import Setup
@@ -23,10 +25,12 @@ class Fit:
 
     Attributes
     ----------
-    covariance : of this solution, and of its rivals about it as much as they are likely.
+    covariance : of this solution, and of its rivals about it as much as they are likely; where there are accelerations,
+        (size + 3k, size + 3k) with theirs.
     independent : (size, size) of this solution, were the noise of its pixels independent.
     scale : factor on the stated standard deviations, which the covariance contains.
     tracks : the noise of each track, which the covariance contains where it is correlated.
+    accelerations : of the flights beside gravity, where the pixels ask for them.
     rivals : other solutions within the noise; chance (r,) of each, this one's being the rest of its trajectory's.
     """
 
@@ -38,6 +42,7 @@ class Fit:
     tracks: tuple[TrackNoise, ...] = ()
     rivals: tuple[Rival, ...] = ()
     chance: Array = field(default_factory=lambda: np.zeros(0))
+    accelerations: Accelerations | None = None
 
 
 def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = ()) -> Fit:
@@ -59,6 +64,12 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
     for track in tracks:
         alike[np.ix_(track.columns, track.columns)] += track.excess
     covariance = scale**2 * (independent + independent @ alike @ independent)
+    poses = spread_of_poses(setup.problem, solution, independent)
+    accelerations = find_accelerations(setup.problem, solution, setup.noise)
+    if accelerations is not None:
+        covariance, tracks = accelerations.covariance, accelerations.tracks
+        setup = replace(setup, problem=accelerations.problem)
+    covariance[: len(poses), : len(poses)] += poses @ poses.T
     odds = np.array([np.exp(-rival.worse / scale**2) for rival in rivals])
     of = np.array([rival.trajectory for rival in rivals])
     chance = np.array([one / (1 + odds[of == name].sum()) for one, name in zip(odds, of, strict=True)])
@@ -68,11 +79,14 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
         away[:, 3] = rival.time_s - solution.state.time_s[rival.nodes]
         place = (NODE * rival.nodes[:, None] + np.arange(NODE)).ravel()
         covariance[place[:, None], place] += weight * np.outer(away, away)
-    return Fit(setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance)
+    return Fit(setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance, accelerations)
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:
-    """(q, 3, size) derivatives of the velocities at the ends of segments by the free unknowns; zero for segment −1."""
+    """(q, 3, size) derivatives of the velocities at the ends of segments by the free unknowns; zero for segment −1.
+
+    With columns of accelerations, (q, 3, size + 3k).
+    """
     has = np.flatnonzero(segment >= 0)
     which = segment[has]
     if at_end:
@@ -81,9 +95,12 @@ def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_
     else:
         by_place, by_law = motion.inverse[which], motion.start_by_law[which]
         by_duration = -(by_place @ motion.end_velocity[which][:, :, None])[:, :, 0]
-    result = np.zeros((segment.size, 3, problem.columns.size + 1))
+    push = problem.columns.push
+    result = np.zeros((segment.size, 3, problem.columns.size + int((push >= 0).sum()) + 1))
     first, last = NODE * problem.first[which], NODE * problem.last[which]
+    half = (0.5 if at_end else -0.5) * motion.duration_s[which]
     for axis in range(3):
+        result[has, axis, push[which, axis]] = half
         result[has, :, first + axis] = -by_place[:, :, axis]
         result[has, :, last + axis] = by_place[:, :, axis]
     result[has, :, first + 3] = -by_duration

@@ -10,12 +10,13 @@ from ...terrain.raycast import closest_points
 from ...terrain.surface import Surface
 from ...vectors import Array, Indices, Mask, dot
 from ..node_motion import NodeMotion, Places, join_nodes, places_at
+from .ground_errors import GroundErrors
 from .views import View
 
 NODE = 4
 """Unknowns of a node: x, y, z of the block's centre [m] and the time [s]."""
-CLOCK_COLUMN = 16
-"""Of the pixels' derivatives: by the offset of the view's clock, there even when it is held."""
+LAW_COLUMN, POSE_COLUMNS, CLOCK_COLUMN = 9, slice(10, 16), 16
+"""Of the pixels' derivatives: by gravity, the view's pose and its clock's offset, there even when these are held."""
 SHORTEST_S = 1e-4
 """A segment does not become shorter than this."""
 
@@ -34,6 +35,7 @@ class Unknowns:
         trajectory, in parts of the block's diameter.
     coefficient : of drag [-], relative to what each block's drag per metre is for 1.
     gravity : [m/s²].
+    readout_s : (v,) from the first row of an image to the last (rolling shutter).
     """
 
     centre: Array
@@ -45,6 +47,7 @@ class Unknowns:
     aim: Array
     coefficient: float
     gravity: float
+    readout_s: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,8 @@ class Columns:
 
     Attributes
     ----------
-    pose : (v, 6), clock : (v, 2) offset and drift, law : (2,) drag coefficient and gravity, aim : (v, t, 2).
+    pose : (v, 6), clock : (v, 2) offset and drift, law : (2,) drag coefficient and gravity, aim : (v, t, 2),
+    readout : (v,), push : (k, 3) accelerations of the segments beside gravity, after all others (see `accelerations`).
     size : number of free unknowns.
     """
 
@@ -61,6 +65,8 @@ class Columns:
     clock: Indices
     law: Indices
     aim: Indices
+    readout: Indices
+    push: Indices
     size: int
 
 
@@ -77,17 +83,18 @@ class Problem:
     group, chain : (k,) the trajectory and the chain of the segments, ascending.
     columns : of the unknowns.
     view, obs_group : (m,) of the pixels: the view, the trajectory.
-    video_s : (m,) video time [s]; row_s (m,) readout delay of the pixel's row [s].
+    video_s : (m,) video time [s]; row (m,) how far the pixel's row is from the middle one, in parts of the height.
     pixel : (m, 2); sigma_px (m,) [px].
     block_px : (m,) how large the block appears [px], from the marked motion.
     sigma_aim : standard deviation of the aim, in parts of the block's diameter.
     position, rotation : (m, 3), (m, 3, 3) prior pose of the camera when each pixel was taken.
     time_s, sigma_time_s : (n,) prior times of the nodes.
     centre, sigma_centre_m : (n, 3), (n,) prior places.
-    grounded : (g,) nodes on the ground; radius_m (g,) of the block, sigma_ground_m (g,) of their distance from it.
+    grounded : (g,) nodes on the ground; radius_m (g,) of the block, ground : errors of their distance from it.
     surface : the terrain.
     pass_segment, pass_time_s, pass_position, pass_sigma_m : (p,), (p,), (p, 3), (p,) places marked in flight.
-    pose_whitening : (v, 6, 6) inverse of the Cholesky factor of the poses' covariance.
+    pose_whitening : (v, 6, 6) inverse of the Cholesky factor of the poses' covariance, of held ones too.
+    readout_s : prior of the readout where it is not known [s], sigma_readout_s its standard deviation.
     """
 
     views: tuple[View, ...]
@@ -101,7 +108,7 @@ class Problem:
     view: Indices
     obs_group: Indices
     video_s: Array
-    row_s: Array
+    row: Array
     pixel: Array
     sigma_px: Array
     block_px: Array
@@ -114,13 +121,15 @@ class Problem:
     sigma_centre_m: Array
     grounded: Indices
     radius_m: Array
-    sigma_ground_m: Array
+    ground: GroundErrors
     surface: Surface | None
     pass_segment: Indices
     pass_time_s: Array
     pass_position: Array
     pass_sigma_m: Array
     pose_whitening: Array
+    readout_s: float
+    sigma_readout_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,20 +168,22 @@ class Evaluation:
     motion: NodeMotion
 
 
-def free_columns(nodes: int, free: frozenset[str], posed: Mask, timed: Mask, aimed: Mask) -> Columns:
+def free_columns(
+    nodes: int, segments: int, free: frozenset[str], posed: Mask, timed: Mask, aimed: Mask, unread: Mask
+) -> Columns:
     """Number the free unknowns: nodes first, then what trajectories share.
 
     Parameters
     ----------
-    free : of "camera", "clock", "clock_drift", "drag", "gravity".
-    posed, timed : (v,) the view's pose, and its clock, can be told.
+    free : of "clock", "clock_drift", "drag", "gravity".
+    posed : (v,) the view's pose is sought; timed (v,) its clock can be told.
     aimed : (v, t) the aim at a trajectory is sought in this view.
+    unread : (v,) the readout is sought.
     """
     size, views = NODE * nodes, posed.size
     pose, clock, law = np.full((views, 6), -1), np.full((views, 2), -1), np.full(2, -1)
-    if "camera" in free:
-        pose[posed] = size + np.arange(6 * posed.sum()).reshape(-1, 6)
-        size += 6 * int(posed.sum())
+    pose[posed] = size + np.arange(6 * posed.sum()).reshape(-1, 6)
+    size += 6 * int(posed.sum())
     for column, name in enumerate(("clock", "clock_drift")):
         if name in free:
             clock[timed, column] = size + np.arange(timed.sum())
@@ -183,7 +194,10 @@ def free_columns(nodes: int, free: frozenset[str], posed: Mask, timed: Mask, aim
             size += 1
     aim = np.full((*aimed.shape, 2), -1)
     aim[aimed] = size + np.arange(2 * aimed.sum()).reshape(-1, 2)
-    return Columns(pose, clock, law, aim, size + 2 * int(aimed.sum()))
+    size += 2 * int(aimed.sum())
+    readout = np.full(views, -1)
+    readout[unread] = size + np.arange(unread.sum())
+    return Columns(pose, clock, law, aim, readout, np.full((segments, 3), -1), size + int(unread.sum()))
 
 
 def moved(problem: Problem, state: Unknowns, step: Array) -> Unknowns:
@@ -202,6 +216,7 @@ def moved(problem: Problem, state: Unknowns, step: Array) -> Unknowns:
         aim=state.aim + padded[columns.aim],
         coefficient=state.coefficient + float(law[0]),
         gravity=state.gravity + float(law[1]),
+        readout_s=state.readout_s + padded[columns.readout],
     )
 
 
@@ -222,7 +237,12 @@ def common_times(problem: Problem, state: Unknowns) -> Array:
     elapsed = _clock_times(problem)
     offset = np.array([view.clock.offset_s for view in problem.views]) + state.offset_s
     drift = np.array([view.clock.drift for view in problem.views]) + state.drift
-    return offset[problem.view] + (1 + drift[problem.view]) * elapsed + problem.row_s
+    return offset[problem.view] + (1 + drift[problem.view]) * elapsed + _row_delays(problem, state)
+
+
+def _row_delays(problem: Problem, state: Unknowns) -> Array:
+    """(m,) by how much the pixels' rows were exposed after the middle one [s]."""
+    return np.asarray(state.readout_s[problem.view] * problem.row)
 
 
 def _clock_times(problem: Problem) -> Array:
@@ -284,13 +304,15 @@ def evaluate(problem: Problem, state: Unknowns, chain: Indices | None = None) ->
     pixels = _pixel_rows(problem, state, motion, segment, time)
     others = [_time_rows(problem, state), _centre_rows(problem, state)]
     if problem.surface is not None and problem.grounded.size:
-        others.append(_ground_rows(problem, state))
+        others.append(ground_rows(problem, state))
     if problem.pass_segment.size:
         others.append(_pass_rows(problem, motion))
     if (problem.columns.pose >= 0).any():
         others.append(_pose_rows(problem, state))
     if (problem.columns.aim >= 0).any():
         others.append(_aim_rows(problem, state))
+    if (problem.columns.readout >= 0).any():
+        others.append(_readout_rows(problem, state))
     valid = all(bool(np.isfinite(rows.residual).all()) for rows in (pixels, *others))
     return Evaluation(pixels, tuple(others), segment, valid, motion)
 
@@ -314,14 +336,15 @@ def _by_nodes(places: Places, motion: NodeMotion, problem: Problem, segment: Ind
 
 def _pixel_rows(problem: Problem, state: Unknowns, motion: NodeMotion, segment: Indices, time: Array) -> Rows:
     m = segment.size
-    residual, jacobian = np.zeros((m, 2)), np.zeros((m, 2, 20))
-    columns = np.full((m, 20), -1)
+    residual, jacobian = np.zeros((m, 2)), np.zeros((m, 2, 21))
+    columns = np.full((m, 21), -1)
     rows = np.flatnonzero(segment >= 0)
     places = places_at(motion, segment[rows], time[rows])
     by_nodes, columns[rows, :10] = _by_nodes(places, motion, problem, segment[rows])
     columns[:, 10:16] = problem.columns.pose[problem.view]
     columns[:, 16:18] = problem.columns.clock[problem.view]
-    columns[:, 18:] = problem.columns.aim[problem.view, problem.obs_group]
+    columns[:, 18:20] = problem.columns.aim[problem.view, problem.obs_group]
+    columns[:, 20] = problem.columns.readout[problem.view]
     aim = state.aim[problem.view, problem.obs_group] * problem.block_px[:, None]
     elapsed = _clock_times(problem)
     for number, view in enumerate(problem.views):
@@ -345,7 +368,8 @@ def _pixel_rows(problem: Problem, state: Unknowns, motion: NodeMotion, segment: 
         by_time = -(seen.d_point @ places.velocity[mine][:, :, None])
         jacobian[here, :, 16:17] = by_time
         jacobian[here, :, 17:18] = by_time * elapsed[here, None, None]
-        jacobian[here, :, 18:] = -problem.block_px[here, None, None] * np.eye(2)
+        jacobian[here, :, 18:20] = -problem.block_px[here, None, None] * np.eye(2)
+        jacobian[here, :, 20:] = by_time * problem.row[here, None, None]
     return Rows(residual / problem.sigma_px[:, None], jacobian / problem.sigma_px[:, None, None], columns)
 
 
@@ -383,12 +407,14 @@ def ground_distances(surface: Surface, centre: Array) -> tuple[Array, Array]:
     return side * closest.distance, gradient
 
 
-def _ground_rows(problem: Problem, state: Unknowns) -> Rows:
+def ground_rows(problem: Problem, state: Unknowns) -> Rows:
+    """The distances from the terrain, (1, g): their errors are alike, so that they are one residual."""
     assert problem.surface is not None
-    nodes, weight = problem.grounded, 1 / problem.sigma_ground_m
+    nodes, whitening = problem.grounded, problem.ground.whitening
     distance, gradient = ground_distances(problem.surface, state.centre[nodes])
-    residual = (distance - problem.radius_m) * weight
-    return Rows(residual[:, None], (gradient * weight[:, None])[:, None, :], NODE * nodes[:, None] + np.arange(3))
+    jacobian = (whitening[:, :, None] * gradient).reshape(1, nodes.size, 3 * nodes.size)
+    columns = (NODE * nodes[:, None] + np.arange(3)).reshape(1, -1)
+    return Rows((whitening @ (distance - problem.radius_m))[None], jacobian, columns)
 
 
 def _pass_rows(problem: Problem, motion: NodeMotion) -> Rows:
@@ -410,3 +436,10 @@ def _aim_rows(problem: Problem, state: Unknowns) -> Rows:
     residual = state.aim[free] / problem.sigma_aim
     slope = np.broadcast_to(np.eye(2) / problem.sigma_aim, (len(residual), 2, 2))
     return Rows(residual, slope, problem.columns.aim[free])
+
+
+def _readout_rows(problem: Problem, state: Unknowns) -> Rows:
+    free = np.flatnonzero(problem.columns.readout >= 0)
+    residual = (state.readout_s[free] - problem.readout_s) / problem.sigma_readout_s
+    slope = np.full((free.size, 1, 1), 1 / problem.sigma_readout_s)
+    return Rows(residual[:, None], slope, problem.columns.readout[free, None])

@@ -172,7 +172,7 @@ def _on_the_ground(problem: Problem, state: Unknowns, rays: _Rays, steps: Array)
     off = distance.reshape(nodes.size, -1) - problem.radius_m[:, None]
     later = np.concatenate([off[:, 1:], off[:, -1:]], axis=1)
     nearest = np.where(off * later <= 0, 0.0, np.minimum(np.abs(off), np.abs(later)))
-    sigma = np.hypot(problem.sigma_ground_m, rays.sigma_m[nodes])
+    sigma = np.hypot(problem.ground.sigma_m, rays.sigma_m[nodes])
     cost[nodes] = np.minimum(0.5 * (nearest / sigma[:, None]) ** 2, FARTHEST)
     return cost
 

@@ -58,9 +58,10 @@ def refine(
     block, gravity_mps2, drag, normal_radius_m, site : see `reconstruct`; progress : called at every step.
     free : what else to fit, of `FREE`: the poses of the views that have a covariance, the clocks of all but the first
         view, the drag coefficient, gravity. All trajectories share these.
-    sigma_terrain_m : standard deviation of the centre's distance from the terrain at a contact, about its radius. None
-        takes, for each pick, a tenth of the radius (blocks are no spheres) and a quarter of the point spacing times
-        the spread of the terrain's normals (what lies between the points), as one root of squares.
+    sigma_terrain_m : accuracy of the terrain: the standard deviation of a height common to all of it, and of errors
+        that are alike over some 20 m. None takes half the point spacing, from 2 to 20 cm. From contact to contact the
+        centre's distance from the terrain differs from its radius by a tenth of it (blocks are no spheres) and a
+        quarter of the point spacing times the spread of the terrain's normals (what lies between the points).
     sigma_aim : standard deviation of what all pixels of a trajectory in a view are off the block's centre by, alike, in
         parts of its diameter; 0 takes the pixels for the centre's.
     loss : how pixels that do not fit count; "linear" trusts all of them.
@@ -78,8 +79,12 @@ def refine(
     are found at once, with the residuals: pixels at the time of their row (rolling shutter) against the projected
     centre and what is aimed off it, one part of the block's apparent diameter for each trajectory and view, itself
     against `sigma_aim`; the centre's distance from the terrain against the radius; the marked times, and the places
-    where they have a standard deviation; places marked in flight that have one; the poses against their covariance. A
-    flight thus counts with all its frames, and an impact is where and when two flights meet.
+    where they have a standard deviation; places marked in flight that have one; the poses against their covariance
+    where the cameras are fitted; readouts that are not given against 15 ± 9 ms. What the pixels tell of the errors of
+    the terrain corrects what was stated. The standard deviations contain the errors of poses that are held, by their
+    covariance or, without one, 0.1° and 0.2 % of the distance; and accelerations of the flights beside gravity and
+    drag where the pixels ask for them. A flight thus counts with all its frames, and an impact is where and when two
+    flights meet.
     """
     block = block if block is not None else Block()
     free_set = _check_parameters(free, loss, gravity_mps2, sigma_terrain_m, normal_radius_m)
@@ -112,7 +117,7 @@ def refine(
     fits = [_solve(setup, alone, loss, free_set, own) for setup, own in zip(setups, parts, strict=True)]
     return summarise(
         ground, moved_views, observations, fits,
-        block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, site=site,
+        block=block, drag=drag, gravity_mps2=gravity_mps2, normal_radius_m=normal_radius_m, free=free_set, site=site,
     )  # fmt: skip
 
 

@@ -83,6 +83,7 @@ def summarise(
     drag: Drag | None,
     gravity_mps2: float,
     normal_radius_m: float | None,
+    free: frozenset[str],
     site: str,
 ) -> Refinement:
     """Make the result of the solved problems."""
@@ -113,7 +114,7 @@ def summarise(
     return Refinement(
         picks=picks,
         reconstruction=made,
-        views=_refined_views(views, fits[0]),
+        views=_refined_views(views, fits[0], posed="camera" in free),
         residual_px=residual,
         outlier=outlier,
         rmse_px_before=_rms(before),
@@ -218,7 +219,7 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
     return replace(made, impacts=replace(impacts, sigma=sigma, intervals=intervals))
 
 
-def _refined_views(views: tuple[View, ...], fit: Fit) -> tuple[View, ...]:
+def _refined_views(views: tuple[View, ...], fit: Fit, *, posed: bool) -> tuple[View, ...]:
     """All shared unknowns are in the first problem, which is then the only one."""
     state, columns = fit.solution.state, fit.setup.problem.columns
     refined = []
@@ -229,7 +230,7 @@ def _refined_views(views: tuple[View, ...], fit: Fit) -> tuple[View, ...]:
             offset_s=view.clock.offset_s + float(state.offset_s[i]),
             drift=view.clock.drift + float(state.drift[i]),
         )
-        if pose[0] < 0:
+        if pose[0] < 0 or not posed:
             refined.append(replace(view, clock=clock))
             continue
         reference = path.reference.rotation

@@ -9,15 +9,19 @@ import numpy as np
 from ...progress import Progress, part, silent
 from ...vectors import Array, Indices, norm
 from ..choices import Loss
+from .accelerations import find_accelerations
 from .problem import Problem, Unknowns
 from .ray_starts import SIGMA_FOUND_PX, SIGMA_MARK_PX, states_along_rays
 from .setup import Setup
 from .solver import Solution, objective, pixel_noise, solve
+from .variance_components import terrain_scales
 
 RIVAL = 6.0
 """A solution with half the squares larger by this has a chance of 1 in 400 beside the best one."""
 MOST_MARKED, MOST_FOUND = 2, 4
 """Starts from the marked places, and about the best solution from there."""
+SAME_SCALE = 0.1
+"""Standard deviations whose logarithm changes by less are left as they are."""
 SAME = 0.5
 """Solutions whose nodes are all nearer than this part of the block's diameter are one."""
 
@@ -46,7 +50,7 @@ class Found:
 
     Attributes
     ----------
-    problem : as solved, the pixels' standard deviations enlarged by `noise`.
+    problem : as solved, the pixels' standard deviations enlarged by `noise`, the ground's as the pixels tell.
     rivals : of the best solution, the likeliest first.
     """
 
@@ -57,11 +61,18 @@ class Found:
 
 
 def solve_with_noise(problem: Problem, state: Unknowns, loss: Loss, progress: Progress = silent) -> Found:
-    """Solve, once more with larger standard deviations of the pixels if these scatter more than stated."""
+    """Solve; once more with larger standard deviations of the pixels if these scatter more than stated, and with those
+    of the terrain that the pixels tell."""
     solution = solve(problem, state, loss, progress)
     noise = pixel_noise(problem, solution)
     if noise > 1:
         problem = replace(problem, sigma_px=noise * problem.sigma_px)
+        solution = solve(problem, solution.state, loss, progress)
+    if find_accelerations(problem, solution, noise) is not None:
+        return Found(problem, solution, noise)  # what the flights are off by is not the terrain's
+    contact, terrain = terrain_scales(problem, solution)
+    if max(abs(np.log(contact)), abs(np.log(terrain))) > SAME_SCALE:
+        problem = replace(problem, ground=problem.ground.scaled(contact, terrain))
         solution = solve(problem, solution.state, loss, progress)
     return Found(problem, solution, noise)
 

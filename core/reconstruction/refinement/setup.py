@@ -16,6 +16,7 @@ from ..drag import Drag
 from ..motion import GROUNDED
 from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
+from .ground_errors import ground_errors
 from .problem import Problem, Unknowns, free_columns
 from .views import PixelObservations, View
 
@@ -27,6 +28,13 @@ SIGMA_CENTRE_M = 10.0
 """The same of a marked place [m]: only to hold what nothing else tells."""
 SHAPE, ROUGHNESS = 0.1, 0.25
 """The standard deviation of a block's distance from the terrain, from its radius, and from what the terrain hides."""
+SPACINGS, LEAST_TERRAIN_M, MOST_TERRAIN_M = 0.5, 0.02, 0.2
+"""The accuracy of a terrain for which none is given, in parts of its point spacing, and its limits [m]: those of
+terrestrial scans, which have centimetres between points, and of airborne ones, which have decimetres."""
+SIGMA_POSE_DEG, SIGMA_PLACE = 0.1, 0.002
+"""Of a camera's angles, and of its place in parts of the distance, where its pose is given without a covariance."""
+READOUT_S, SIGMA_READOUT_S = 0.015, 0.009
+"""Mean and standard deviation of the readout of phones and cameras, which is from 0 to 30 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +81,8 @@ class Ground:
     normals : of the picks; NaN in the air, or where nothing gives them.
     grounded : (n,) the pick lies on the terrain.
     surface : the terrain.
-    sigma_m : (n,) standard deviation of the distance of a block that touches it [m].
+    sigma_m : (n,) standard deviation of the distance of a block that touches it, from contact to contact [m].
+    sigma_terrain_m : accuracy of the terrain [m], NaN without one; terrain_stated : it was given.
     reference_drag : (n,) drag per metre for a coefficient of one [1/m].
     coefficient : of drag; 0 without.
     """
@@ -85,6 +94,8 @@ class Ground:
     grounded: Mask
     surface: Surface | None
     sigma_m: Array
+    sigma_terrain_m: float
+    terrain_stated: bool
     reference_drag: Array
     coefficient: float
 
@@ -107,13 +118,14 @@ def prepare(
     on_ground = np.isin(picks.kind, GROUNDED)
     normals = pick_normals(picks, surface, 2 * radius, normal_radius_m, on_ground)
     grounded = on_ground & (picks.status != "discarded") & (surface is not None)
-    sigma = np.full(len(picks), np.nan if sigma_terrain_m is None else sigma_terrain_m)
+    sigma, accuracy = SHAPE * radius, np.nan
     if surface is not None and len(picks):
         far = closest_points(surface, picks.position).distance
         grounded &= (picks.kind != "release") | (far <= np.maximum(IN_THE_AIR_M, IN_THE_AIR_DIAMETERS * 2 * radius))
-        if sigma_terrain_m is None:
-            hidden = ROUGHNESS * surface.mean_spacing_m * np.nan_to_num(normals.spread)
-            sigma = np.hypot(SHAPE * radius, hidden)
+        hidden = ROUGHNESS * surface.mean_spacing_m * np.nan_to_num(normals.spread)
+        sigma = np.hypot(sigma, hidden)
+    if surface is not None:
+        accuracy = default_accuracy(surface) if sigma_terrain_m is None else sigma_terrain_m
     one = Drag(coefficient=1.0) if drag is None else replace(drag, coefficient=1.0)
     return Ground(
         picks=picks,
@@ -123,9 +135,16 @@ def prepare(
         grounded=grounded,
         surface=surface,
         sigma_m=sigma,
+        sigma_terrain_m=accuracy,
+        terrain_stated=sigma_terrain_m is not None,
         reference_drag=per_pick(picks, block, one.per_metre),
         coefficient=0.0 if drag is None else drag.coefficient,
     )
+
+
+def default_accuracy(surface: Surface) -> float:
+    """Standard deviation of a terrain's height where none is given [m], by its point spacing."""
+    return float(np.clip(SPACINGS * surface.mean_spacing_m, LEAST_TERRAIN_M, MOST_TERRAIN_M))
 
 
 def set_up(
@@ -158,13 +177,16 @@ def set_up(
 
     timed = np.bincount(seen.view, minlength=len(views)) > 0
     timed[np.argmax(timed)] = False
-    posed = np.array([view.pose_covariance is not None for view in views])
+    in_use = np.bincount(seen.view, minlength=len(views)) > 0
+    posed = np.array(["camera" in free and view.pose_covariance is not None for view in views])
+    unread = in_use & np.array([view.row_time_s is None for view in views])
     aimed = np.zeros((len(views), len(names)), dtype=np.bool_)
     aimed[seen.view, groups] = sigma_aim > 0
     centre = picks.position[nodes] + np.nan_to_num(ground.radius_m[:, None] * ground.normals.normal)[nodes]
     passes = _passes(picks, segments, chosen)
-    delay = np.array([view.row_time_s for view in views])[seen.view]
-    height = np.array([view.path.reference.height for view in views])[seen.view]
+    height = np.array([view.path.reference.height for view in views])
+    readout = height * np.array([view.row_time_s or 0.0 for view in views])
+    readout[unread] = READOUT_S
     position, rotation = np.empty((rows.size, 3)), np.empty((rows.size, 3, 3))
     for i, view in enumerate(views):
         position[seen.view == i], rotation[seen.view == i] = view.path.poses_at(seen.time_s[seen.view == i])
@@ -178,11 +200,11 @@ def set_up(
         reference_drag=ground.reference_drag[first_pick],
         group=group_of_pick[first_pick],
         chain=segments.chain[first_pick],
-        columns=free_columns(nodes.size, free, posed, timed, aimed),
+        columns=free_columns(nodes.size, chosen.size, free, posed, timed, aimed, unread),
         view=seen.view,
         obs_group=groups,
         video_s=seen.time_s,
-        row_s=delay * (seen.pixel[:, 1] - height / 2),
+        row=seen.pixel[:, 1] / height[seen.view] - 0.5,
         pixel=seen.pixel,
         sigma_px=_pixel_sigmas(views, seen, centre.mean(axis=0)),
         block_px=_block_sizes(ground, views, seen, nodes, centre, position),
@@ -195,13 +217,20 @@ def set_up(
         sigma_centre_m=np.where(given_place > 0, given_place, SIGMA_CENTRE_M),
         grounded=on_ground,
         radius_m=ground.radius_m[nodes[on_ground]],
-        sigma_ground_m=ground.sigma_m[nodes[on_ground]],
+        ground=ground_errors(
+            centre[on_ground],
+            ground.normals.normal[nodes[on_ground]],
+            ground.sigma_m[nodes[on_ground]],
+            ground.sigma_terrain_m,
+        ),
         surface=ground.surface,
         pass_segment=passes[0],
         pass_time_s=picks.time_s[passes[1]],
         pass_position=picks.position[passes[1]],
         pass_sigma_m=picks.sigma_position_m[passes[1]],
-        pose_whitening=_whitening(views),
+        pose_whitening=_whitening(views, centre.mean(axis=0)),
+        readout_s=READOUT_S,
+        sigma_readout_s=SIGMA_READOUT_S,
     )
     v = len(views)
     state = Unknowns(
@@ -214,6 +243,7 @@ def set_up(
         aim=np.zeros((v, len(names), 2)),
         coefficient=ground.coefficient,
         gravity=gravity_mps2,
+        readout_s=readout,
     )
     return Setup(
         problem, state, picks, segments, chosen, nodes, node_of, rows, ground.radius_m, ground.normals, tuple(names)
@@ -230,11 +260,15 @@ def _passes(picks: Picks, segments: Segments, chosen: Indices) -> tuple[Indices,
     return segment[known], pick[known]
 
 
-def _whitening(views: tuple[View, ...]) -> Array:
+def _whitening(views: tuple[View, ...], middle: Array) -> Array:
+    """(v, 6, 6) of the poses' covariances, or of what is usual at such a distance from the motion."""
     result = np.zeros((len(views), 6, 6))
     for i, view in enumerate(views):
-        if view.pose_covariance is not None:
-            result[i] = np.linalg.inv(np.linalg.cholesky(np.asarray(view.pose_covariance, dtype=np.float64)))
+        covariance = view.pose_covariance
+        if covariance is None:
+            place = SIGMA_PLACE * max(float(norm(middle - view.path.reference.position)), 1e-3)
+            covariance = np.diag(np.repeat([np.radians(SIGMA_POSE_DEG) ** 2, place**2], 3))
+        result[i] = np.linalg.inv(np.linalg.cholesky(np.asarray(covariance, dtype=np.float64)))
     return result
 
 

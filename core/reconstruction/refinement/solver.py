@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from ...least_squares import damped_step
+from ...least_squares import damped_step, inverse
 from ...progress import Progress, silent
 from ...vectors import Array, Indices, Mask, norm
 from ..choices import Loss
@@ -128,7 +128,9 @@ def _search(
 def pixel_noise(problem: Problem, solution: Solution) -> float:
     """By how much the pixels scatter more than stated; 1 where chance may explain it."""
     squares = float(solution.weight @ (solution.evaluation.pixels.residual**2).sum(axis=1))
-    spare = 2 * int((solution.weight > 0).sum()) - problem.columns.size
+    of_pixels, _ = normal_equations(problem, replace(solution.evaluation, others=()), solution.weight)
+    told = float((inverse(solution.information, partly=True) * of_pixels).sum())  # unknowns that pixels determine
+    spare = 2 * int((solution.weight > 0).sum()) - told
     return float(np.sqrt(squares / spare)) if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare) else 1.0
 
 

@@ -21,8 +21,8 @@ class View:
     name : for people.
     path : of the camera.
     clock : from video time to the time of the picks.
-    row_time_s : readout time of one row of the image [s], on the common clock; zero for a global shutter. The time of a
-        frame is that of its middle row.
+    row_time_s : readout time of one row of the image [s], on the common clock; zero for a global shutter, None where it
+        is not known. The time of a frame is that of its middle row.
     pose_covariance : (6, 6) of the solved pose, rotation vector [rad] about the axes of the camera in the solved frame
         and position [m]; an error of the solved pose moves and turns the whole path. None when unknown.
     """
@@ -30,7 +30,7 @@ class View:
     name: str
     path: CameraPath
     clock: Clock = field(default_factory=Clock)
-    row_time_s: float = 0.0
+    row_time_s: float | None = 0.0
     pose_covariance: Array | None = None
 
     def __post_init__(self) -> None:
@@ -45,7 +45,7 @@ class View:
 
     def exposed_at(self, time_s: Array, pixel: Array) -> Array:
         """(m,) when the rows of pixels (m, 2) of pictures at video times (m,) were exposed, on the common clock [s]."""
-        return self.clock.to_common(time_s) + self.row_time_s * (pixel[:, 1] - self.path.reference.height / 2)
+        return self.clock.to_common(time_s) + (self.row_time_s or 0.0) * (pixel[:, 1] - self.path.reference.height / 2)
 
     def in_shift(self, shift: GlobalShift) -> "View":
         """The same view in the local frame of another shift."""

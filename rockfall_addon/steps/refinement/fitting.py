@@ -12,7 +12,7 @@ from ....core.errors import RockfallError
 from ....core.exchange.opening import drag_of
 from ....core.progress import Progress
 from ....core.workflow.refinement import Refined, refine_picks
-from ...scene import camera_paths, picks, proposal, reconstruction, sightings, store, sync, videos
+from ...scene import camera_paths, picks, proposal, reconstruction, sightings, store, sync, terrain, videos
 from ...view import job
 
 
@@ -41,7 +41,7 @@ def work(scene: bpy.types.Scene, names: Collection[str] | None, free: Collection
     project = reconstruction.project_settings(scene, [])
     views = [sightings.seen_video(camera, used) for camera in cameras]
     surface, blocks = reconstruction.ground(scene), reconstruction.blocks_of(scene, set(used))
-    prints = proposal.prints(scene, used)
+    prints, accuracy_m = proposal.prints(scene, used), terrain.accuracy_m(scene)
 
     def compute(progress: Progress) -> Refined:
         return refine_picks(
@@ -54,6 +54,7 @@ def work(scene: bpy.types.Scene, names: Collection[str] | None, free: Collection
             normal_radius_m=project.reconstruction.normal_radius_m,
             names=used,
             free=free,
+            sigma_terrain_m=accuracy_m,
             progress=progress,
         )
 

@@ -20,6 +20,8 @@ from ...view.first_import import FirstImport, begin_file
 from ...view.reporting import possible, reported
 from .removing import tiles_of, what_stays
 
+ACCURACY_M = {"TERRESTRIAL": 0.02, "DRONE": 0.05, "AIRBORNE": 0.2}
+"""Standard deviation of a terrain's height by its source."""
 TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
 LARGE_BYTES = 5_000_000
 """Larger files, and the ground filter, are read beside Blender."""
@@ -43,6 +45,15 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     unit_m: FloatProperty(
         name="File unit [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
         default=1.0, min=1e-6, precision=4,
+    )  # fmt: skip
+    source: EnumProperty(
+        name="Source", description="How accurate the terrain's height is: what the refinement's intervals rest on",
+        items=[
+            ("UNKNOWN", "Not said", "Accuracy as the terrain's panel says, else half the point spacing"),
+            ("TERRESTRIAL", "Terrestrial scan, 2 cm", "Laser scan from the ground"),
+            ("DRONE", "Drone, 5 cm", "Pictures or laser scan from a drone"),
+            ("AIRBORNE", "Airborne scan, 20 cm", "Laser scan from an aeroplane or helicopter"),
+        ],
     )  # fmt: skip
     ground: EnumProperty(
         name="Points", description="Which points of a cloud are meshed",
@@ -118,7 +129,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             row = column.row(align=True)
             row.alert = self.up == "auto"
             row.prop(self, "up", expand=True)
-        for name in (*(() if self.y_up else ("up",)), "unit_m"):
+        for name in (*(() if self.y_up else ("up",)), "unit_m", "source"):
             layout.prop(self, name)
         if self.is_cloud:
             self._draw_meshing(layout)
@@ -150,6 +161,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     def _work(self, context: bpy.types.Context) -> job.Work:
         """What there is to read, and how it is shown. Blender may have forgotten the operator by then."""
         path, replaces, opens_workspace = self.chosen(context), self.replaces, self.opens_workspace
+        accuracy_m = ACCURACY_M.get(self.source)
         told = {
             "shift": None if self._turned_since(context.scene) else self._shift(context.scene),
             "up": self.up,
@@ -171,6 +183,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             replaced = [f"Replaced {', '.join(tile.name for tile in old)}.", what_stays(scene, old)] if old else []
             terrain.remove(scene, old)
             terrain.add_terrain(scene, surface, shading)
+            if accuracy_m is not None:
+                scene.rockfall_terrain.accuracy_m = accuracy_m
             sync.recompute(scene)
             with job.in_window_of(scene) as there:
                 look.show_relief(there, frame_all=True)

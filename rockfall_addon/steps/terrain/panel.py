@@ -50,6 +50,9 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
         if store.has_role(scene, store.LEFT_OUT_ROLE):
             layout.operator("rockfall.toggle_left_out", text="Points left out", icon="HIDE_OFF")
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(scene.rockfall_terrain, "accuracy_m")
         shift = georeference.read_shift(scene)
         rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
         facts(layout, [*rows, ("System", shift.crs or "unknown")])

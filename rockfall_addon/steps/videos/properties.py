@@ -53,12 +53,15 @@ def _set_capture(self: bpy.types.PropertyGroup, value: float) -> None:
 def _get_row_time(self: bpy.types.PropertyGroup) -> float:
     from ...scene import videos
 
-    return videos.row_time_of(self.id_data) / MICRO if _is_video(self.id_data) else 0.0
+    known = videos.row_time_of(self.id_data) if _is_video(self.id_data) else None
+    return -1.0 if known is None else known / MICRO
 
 
 def _set_row_time(self: bpy.types.PropertyGroup, value: float) -> None:
-
-    self.id_data[store.ROW_TIME] = store.double(value) * MICRO
+    if value >= 0:
+        self.id_data[store.ROW_TIME] = store.double(value) * MICRO
+    elif store.ROW_TIME in self.id_data:
+        del self.id_data[store.ROW_TIME]
 
 
 def _changed(camera: bpy.types.Object) -> None:
@@ -87,8 +90,8 @@ class VideoProperties(bpy.types.PropertyGroup):
     )  # fmt: skip
     row_time_us: FloatProperty(
         name="Row time [µs]", description="Time between the readout of two rows of the picture [µs]: rolling shutter. "
-        "0 for a global shutter, or when it is not known",
-        min=0.0, soft_max=50.0, precision=2, get=_get_row_time, set=_set_row_time,
+        "0 for a global shutter. -1: not known, so that the refinement fits it, as 0 to 30 ms for a whole picture",
+        min=-1.0, soft_max=50.0, precision=2, get=_get_row_time, set=_set_row_time,
     )  # fmt: skip
 
 

@@ -123,7 +123,7 @@ def summarise(
         noise_scale=max(fit.scale * fit.setup.noise for fit in fits),
         aim={key: value for fit in fits for key, value in _aim(views, fit).items()},
         unknowns=_unknowns(views, fits[0]),
-        what_if=what_if(fits, made.impacts, ground.typical_sigma_m),
+        what_if=what_if(fits, made.impacts, ground.sigma_terrain_m),
         iterations=max(fit.solution.iterations for fit in fits),
         converged=all(fit.solution.settled for fit in fits),
         remarks=remarks_on(ground, views, observations, residual, outlier, fits),

@@ -99,11 +99,6 @@ class Ground:
     reference_drag: Array
     coefficient: float
 
-    @property
-    def typical_sigma_m(self) -> float:
-        """By how much the terrain may be too high or too low [m]; 0 without one."""
-        return float(np.median(self.sigma_m[self.grounded])) if self.grounded.any() else 0.0
-
 
 def prepare(
     picks: Picks,

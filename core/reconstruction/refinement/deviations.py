@@ -96,7 +96,7 @@ def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_
         by_place, by_law = motion.inverse[which], motion.start_by_law[which]
         by_duration = -(by_place @ motion.end_velocity[which][:, :, None])[:, :, 0]
     push = problem.columns.push
-    result = np.zeros((segment.size, 3, problem.columns.size + int((push >= 0).sum()) + 1))
+    result = np.zeros((segment.size, 3, problem.columns.width + 1))
     first, last = NODE * problem.first[which], NODE * problem.last[which]
     half = (0.5 if at_end else -0.5) * motion.duration_s[which]
     for axis in range(3):
@@ -111,8 +111,8 @@ def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_
 
 
 def centre_rows(problem: Problem, node: Indices) -> Array:
-    """(q, 3, size) derivatives of the nodes' places by the free unknowns."""
-    result = np.zeros((node.size, 3, problem.columns.size))
+    """(q, 3, size) derivatives of the nodes' places by the free unknowns; with columns of accelerations, as above."""
+    result = np.zeros((node.size, 3, problem.columns.width))
     for axis in range(3):
         result[np.arange(node.size), axis, NODE * node + axis] = 1.0
     return result

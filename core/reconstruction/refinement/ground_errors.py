@@ -39,6 +39,10 @@ class GroundErrors:
         """(g,) standard deviation of each distance [m]."""
         return np.sqrt((self.contact_scale * self.contact_m) ** 2 + self.terrain_scale**2 * np.diag(self.terrain))
 
+    def with_contact(self, contact_m: Array) -> "GroundErrors":
+        """With other standard deviations of what differs from contact to contact, (g,) [m]."""
+        return replace(self, contact_m=contact_m).scaled(self.contact_scale, self.terrain_scale)
+
     def scaled(self, contact_scale: float, terrain_scale: float) -> "GroundErrors":
         """With other factors."""
         variance = np.diag((contact_scale * self.contact_m) ** 2) + terrain_scale**2 * self.terrain

@@ -69,6 +69,11 @@ class Columns:
     push: Indices
     size: int
 
+    @property
+    def width(self) -> int:
+        """Number of columns with those of the accelerations."""
+        return self.size + int((self.push >= 0).sum())
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:

@@ -13,6 +13,7 @@ from ..impact import Impacts
 from ..node_motion import NodeMotion
 from .deviations import Fit
 from .problem import Problem, Unknowns, common_times, evaluate, moved
+from .setup import SHAPE
 from .solver import Solution, normal_equations
 
 CAMERA_M, READOUT_S, DIAMETER = 0.3, 0.02, 0.2
@@ -186,8 +187,10 @@ def _changes(fit: Fit, sigma_terrain_m: float) -> Iterator[_Change]:
         raised = replace(problem, radius_m=problem.radius_m + sigma_terrain_m)
         yield _Change("terrain", f"Terrain {100 * sigma_terrain_m:.2g} cm higher", raised, state)
     yield _Change("rolling shutter", f"Rolling shutter {1e3 * READOUT_S:g} ms slower", _slower_readout(problem), state)
+    less_round = (SHAPE * problem.radius_m) ** 2 * ((1 + DIAMETER) ** 2 - 1)
     larger = replace(
         problem,
+        ground=problem.ground.with_contact(np.sqrt(problem.ground.contact_m**2 + less_round)),
         radius_m=(1 + DIAMETER) * problem.radius_m,
         block_px=(1 + DIAMETER) * problem.block_px,
         reference_drag=problem.reference_drag / (1 + DIAMETER),

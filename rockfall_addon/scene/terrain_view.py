@@ -15,6 +15,8 @@ from . import materials, store, terrain_look, terrain_mesh
 GROUP = "Rockfall coarse view"
 SHARE = 3
 """A coarse view has this part of the triangles from which on views are coarse."""
+LEAST = 300
+"""Triangles of a coarse view: of fewer nothing might be left. Tiles of not many more are drawn as they are."""
 TOO_FINE = 2.0
 """A coarse mesh is made anew when it has this many times the triangles that it should have."""
 
@@ -28,10 +30,10 @@ def follow(scene: bpy.types.Scene) -> None:
     tiles = [obj for obj in store.with_role(scene, store.TERRAIN_ROLE) if obj.type == "MESH"]
     total = sum(len(tile.data.polygons) for tile in tiles)
     for tile in tiles:
-        if total <= settings.view_limit:
+        if total <= settings.view_limit or len(tile.data.polygons) <= SHARE * LEAST:
             _remove(tile)
             continue
-        wanted = max(1, settings.view_limit // SHARE * len(tile.data.polygons) // total)
+        wanted = max(LEAST, settings.view_limit // SHARE * len(tile.data.polygons) // total)
         if not _fits(tile, wanted):
             _make(tile, wanted)
             terrain_look.paint([terrain_mesh.stand_in(tile).data], terrain_look.look_of(scene))

@@ -117,6 +117,18 @@ def test_coarse_view_draws_a_third_of_the_limit_and_measures_on_all(part, slope)
     assert [mesh.name for mesh in bpy.data.meshes] == [ground.data.name], "nothing is left"
 
 
+def test_a_tile_of_two_triangles_beside_a_large_one_is_drawn_as_it_is(part, slope) -> None:
+    ground, surface, _ = slope
+    bpy.context.scene.rockfall_terrain.view_limit = 1000
+    corners = surface.vertices[[0, 1, 101, 102]]
+    small = part("core.terrain.surface").Surface(corners, np.array([[0, 1, 3], [0, 3, 2]]), surface.shift, "corner.obj")
+    corner = part("rockfall_addon.scene.terrain").add_terrain(
+        bpy.context.scene, small, part("core.terrain.shading").shade(small)
+    )
+    assert drawn(corner) == 2
+    assert 0 < drawn(ground) < 1000
+
+
 def test_coarse_view_follows_the_sliders(part, slope) -> None:
     ground, _, _ = slope
     scene = bpy.context.scene

@@ -169,6 +169,8 @@ def look_again() -> None:
 def of_role(scene: bpy.types.Scene, role: str, trajectory: str | None = None) -> list[bpy.types.Object]:
     """The scene's objects of one role, all or those of a trajectory, in no order."""
     key = scene.session_uid
+    if role == CAMERA_ROLE and _tables.get(key) is None:  # asked at every change: a type is read four times as quickly
+        return [o for o in scene.objects if o.type == "CAMERA" and o.get(ROLE) == role]
     if key not in _tables:
         found = (o for o in scene.objects if o.get(ROLE) == role)
         return [o for o in found if trajectory is None or o.get(TRAJECTORY) == trajectory]
@@ -210,7 +212,7 @@ def link(folder: bpy.types.Collection, obj: bpy.types.Object) -> None:
 
 def has_role(scene: bpy.types.Scene, role: str) -> bool:
     """Whether the scene has an object of a role: quicker than to list them, for what is asked at every redraw."""
-    if scene.session_uid in _tables:
+    if role == CAMERA_ROLE or scene.session_uid in _tables:
         return bool(of_role(scene, role))
     return any(o.get(ROLE) == role for o in scene.objects)
 

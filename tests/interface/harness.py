@@ -177,10 +177,16 @@ def is_preparing() -> bool:
     return bool(preparation.pending(models.ORDER))
 
 
+def draw_quickly() -> None:
+    """Views without smoothed edges: where they are drawn by software, smoothing takes as long as all the rest."""
+    bpy.context.preferences.system.viewport_aa = "OFF"
+
+
 def new_file() -> None:
     """What a person has who has just started Blender."""
     bpy.ops.wm.read_homefile(use_factory_startup=True)
     bpy.context.preferences.view.ui_scale = 1.0
+    draw_quickly()
 
 
 def leave(code: int) -> None:
@@ -193,6 +199,7 @@ def main() -> None:
     seconds, *cases = sys.argv[sys.argv.index("--") + 1 :]
     waiting = deque(zip(cases[::2], cases[1::2], strict=True))
     bpy.context.preferences.view.show_splash = False  # it would eat the first click
+    draw_quickly()
     if EXTENSION not in sys.modules:
         print(f"harness: {EXTENSION} is not enabled in this Blender", file=sys.stderr)
         leave(4)

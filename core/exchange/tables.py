@@ -17,6 +17,7 @@ from ..reconstruction.intervals import INTERVALS
 from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
 from ..vectors import Array, Indices, Mask, Names, dot
+from . import take_offs
 from .csv_text import read_table
 from .number_text import shortest_texts
 
@@ -25,7 +26,16 @@ VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
 NORMAL = ("nx", "ny", "nz")
 SPIN = ("omega1x_radps", "omega1y_radps", "omega1z_radps")
 PICKS_REQUIRED = ("trajectory", "time_s", *POSITION)
-PICKS_KNOWN = (*PICKS_REQUIRED, "kind", "status", *NORMAL, "sigma_time_s", "sigma_position_m", *SPIN)
+PICKS_KNOWN = (
+    *PICKS_REQUIRED,
+    "kind",
+    "status",
+    *NORMAL,
+    "sigma_time_s",
+    "sigma_position_m",
+    *SPIN,
+    *take_offs.COLUMNS,
+)
 
 Cells = Array | Names | Indices | Sequence[str]
 Columns = dict[str, Cells]
@@ -98,25 +108,24 @@ def read_picks(path: str | Path, shift: GlobalShift | None = None) -> Picks:
     table = read_table(path, PICKS_REQUIRED, PICKS_KNOWN)
     survey = table.vectors(POSITION, required=True)
     shift = shift if shift is not None else GlobalShift.proposed(survey.min(axis=0), survey.max(axis=0))
-    return make_picks(
-        table.text("trajectory"),
-        table.numbers("time_s", required=True),
-        shift.to_local(survey),
-        kind=table.text("kind", "impact"),
-        status=table.text("status", "ok"),
-        normal=table.vectors(NORMAL),
-        sigma_time_s=table.numbers("sigma_time_s"),
-        sigma_position_m=table.numbers("sigma_position_m"),
-        angular_velocity=table.vectors(SPIN),
-        row=table.row,
-        extra=table.rest(PICKS_KNOWN),
-        source=str(path),
-        shift=shift,
-    )
+    columns = {
+        "trajectory": table.text("trajectory"),
+        "time_s": table.numbers("time_s", required=True),
+        "position": shift.to_local(survey),
+        "kind": table.text("kind", "impact"),
+        "status": table.text("status", "ok"),
+        "normal": table.vectors(NORMAL),
+        "sigma_time_s": table.numbers("sigma_time_s"),
+        "sigma_position_m": table.numbers("sigma_position_m"),
+        "angular_velocity": table.vectors(SPIN),
+        "row": table.row,
+        "extra": table.rest(PICKS_KNOWN),
+    }
+    return make_picks(**take_offs.with_take_offs(columns, table, shift), source=str(path), shift=shift)
 
 
 def write_picks(picks: Picks, path: str | Path) -> None:
-    """Write picks.csv: optional columns only where one has a value, unknown columns at the end."""
+    """Write picks.csv: optional columns only where one has a value, unknown columns at the end. A take-off is a row."""
     columns: Columns = {
         "trajectory": picks.trajectory.tolist(),
         "time_s": picks.time_s,

@@ -41,11 +41,13 @@ def find_segments(picks: Picks) -> Segments:
     The *nodes* of a chain are its picks other than `pass`, and its two ends whatever they are. A *segment* joins two
     consecutive nodes; the passes between them are observations of it. It is *contact* when the block cannot have flown:
     no pass in it or at its ends, and it begins or ends with a `contact` pick or ends with a `stop` (a block comes to
-    rest on the ground). To make a flight end in a stop, mark a pass in it. Every other segment is a *flight*.
+    rest on the ground). To make a flight end in a stop, mark a pass in it. From an impact to its `takeoff` it is
+    contact as well. Every other segment is a *flight*.
     """
     n = len(picks)
     discarded, shattered = picks.status == "discarded", picks.status == "shattered"
     stop, passing, rolling = picks.kind == "stop", picks.kind == "pass", picks.kind == "contact"
+    leaving = picks.kind == "takeoff"
 
     starts_group = np.zeros(n + 1, dtype=np.bool_)
     starts_group[picks.group_starts] = True
@@ -73,5 +75,5 @@ def find_segments(picks: Picks) -> Segments:
         cut_after=inner_cut[1:],
         first_pick=first,
         last_pick=last,
-        contact=direct & (rolling[first] | rolling[last] | stop[last]),
+        contact=direct & (rolling[first] | rolling[last] | stop[last] | leaving[last]),
     )

@@ -27,7 +27,8 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
     mass = per_pick(picks, motion.block, lambda block: block.mass_kg)
     inertia = per_pick(picks, motion.block, lambda block: block.inertia_kgm2)
 
-    incident, restituted = here(motion.incident), here(motion.restituted)
+    leaving = here(picks.leaves_at)
+    incident, restituted = here(motion.incident), motion.restituted.take(leaving)
     rolls_in, rolls_out = _value(flights.is_contact, incident, False), _value(flights.is_contact, restituted, False)
     incident, restituted = np.where(rolls_in, -1, incident), np.where(rolls_out, -1, restituted)
     v1 = _rows(flights.end_velocity, incident)
@@ -42,7 +43,7 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
         "first": incident < 0,
         "last": restituted < 0,
         "below_terrain": _value(deep, incident, False) | _value(deep, restituted, False),
-        "gap": motion.segments.cut_before[own] | motion.segments.cut_after[own],
+        "gap": motion.segments.cut_before[own] | motion.segments.cut_after[leaving],
         "contact": rolls_in | rolls_out,
         **{name: status == name for name in ("doubtful", "shattered", "discarded")},
     }
@@ -51,7 +52,7 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
     sigma: dict[str, Array] = {}
     intervals: dict[str, Array] = {}
     if np.isfinite(picks.sigma_time_s).any() or np.isfinite(picks.sigma_position_m).any():
-        covariance = pick_covariance(picks, flights, incident, restituted, own)
+        covariance = pick_covariance(picks, flights, incident, restituted, own, leaving)
         errors = ImpactErrors(covariance, ground.by_place, ground.tilt, ground.spread)
         sigma = impact_sigmas(values, v1, v2, normal, mass, errors)
         intervals = impact_intervals(values, v1, v2, normal, errors)

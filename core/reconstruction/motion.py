@@ -20,7 +20,7 @@ from .placement import GroundNormals, pick_normals
 if TYPE_CHECKING:
     from ..terrain.surface import Surface
 
-GROUNDED = ("release", "impact", "contact", "stop")
+GROUNDED = ("release", "impact", "contact", "stop", "takeoff")
 
 
 @dataclass(frozen=True, eq=False)

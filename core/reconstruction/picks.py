@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array, Indices, Mask, Names, norm
 
-KINDS = ("impact", "release", "pass", "contact", "stop")
+KINDS = ("impact", "release", "pass", "contact", "stop", "takeoff")
 STATUSES = ("ok", "doubtful", "shattered", "discarded")
 LONGEST_S = 86_400.0
 """A day: what lasts longer has a wrong time, and would be sampled for ever."""
@@ -30,7 +30,8 @@ class Picks:
     trajectory : (n,) name of the block's run.
     time_s : (n,) on the common clock [s].
     position : (n, 3) local [m].
-    kind : (n,) one of `KINDS`.
+    kind : (n,) one of `KINDS`. An impact whose contact is no point is followed by its `takeoff`: where and when the
+        block leaves the ground again.
     status : (n,) one of `STATUSES`.
     normal : (n, 3) unit, out of the ground; NaN where not given.
     sigma_time_s, sigma_position_m : (n,) standard deviations (of each coordinate); NaN where not given.
@@ -57,6 +58,13 @@ class Picks:
 
     def __len__(self) -> int:
         return self.time_s.size
+
+    @property
+    def leaves_at(self) -> Indices:
+        """(n,) index of the pick at which the block leaves the ground: its own, or the take-off that follows it."""
+        own = np.arange(len(self))
+        own[:-1] += (self.kind[1:] == "takeoff") & (self.status[1:] != "discarded") & (self.kind[:-1] == "impact")
+        return own
 
     @property
     def group_starts(self) -> Indices:
@@ -109,7 +117,8 @@ def make_picks(
     Raises
     ------
     InputError : an unknown kind or status, a value that is not finite, a normal of length zero, a negative standard
-        deviation, times that are not ascending, two picks at one time, a release in mid-run.
+        deviation, times that are not ascending, two picks at one time, a release in mid-run, a take-off without its
+        impact.
     """
     names = np.asarray(trajectory, dtype=np.str_).reshape(-1)
     n = names.size
@@ -139,6 +148,7 @@ def make_picks(
     picks = _in_order(picks, _grouped_order(picks, sort))
     _check_times(picks)
     _check_releases(picks)
+    _check_take_offs(picks)
     return replace(picks, normal=picks.normal / norm(picks.normal)[:, None])
 
 
@@ -213,3 +223,13 @@ def _check_releases(picks: Picks) -> None:
     if (i := _first((picks.kind == "release") & ~allowed)) is not None:
         problem = "A release in the middle of a run: the block is already moving"
         raise picks.error(i, problem, "Give the new run its own trajectory name, or end the run before with a stop")
+
+
+def _check_take_offs(picks: Picks) -> None:
+    ends = (picks.kind == "takeoff") & (picks.status != "discarded")
+    follows = np.zeros(len(picks), dtype=np.bool_)
+    follows[1:] = (picks.kind[:-1] == "impact") & np.isin(picks.status[:-1], STATUSES[:2])
+    follows[picks.group_starts] = False
+    if (i := _first(ends & ~follows)) is not None:
+        problem = f"The take-off at {float(picks.time_s[i]):.3f} s does not follow an impact"
+        raise picks.error(i, problem, "Mark the impact whose contact it ends right before it, or remove it")

@@ -44,7 +44,7 @@ def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tupl
         return ()
     _check_overlap(picks, surface)
     distance = closest_points(surface, picks.position).distance
-    grounded = np.isin(picks.kind, ("impact", "contact", "stop")) & (picks.status != "discarded")
+    grounded = np.isin(picks.kind, ("impact", "contact", "stop", "takeoff")) & (picks.status != "discarded")
     limit = np.where(grounded, FAR_M, FAR_IN_THE_AIR_M)
     far = (distance > limit) & (picks.status != "discarded")
     if far.any():

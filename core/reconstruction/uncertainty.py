@@ -12,13 +12,16 @@ ERRORS = 9
 """Of an impact: those of v1 and of v2 [m/s], and of its place [m]."""
 
 
-def pick_covariance(picks: Picks, flights: Flights, incident: Indices, restituted: Indices, own: Indices) -> Array:
+def pick_covariance(
+    picks: Picks, flights: Flights, incident: Indices, restituted: Indices, landing: Indices, leaving: Indices
+) -> Array:
     """Covariance of v1, v2 and the place of n impacts.
 
     Parameters
     ----------
     incident, restituted : (n,) index of the flight before and after each impact, −1 when there is none.
-    own : (n,) index of the impact's pick.
+    landing, leaving : (n,) index of the pick where the block lands, which is the impact's, and where it leaves the
+        ground; the same but for impacts with a take-off.
 
     Returns
     -------
@@ -28,16 +31,22 @@ def pick_covariance(picks: Picks, flights: Flights, incident: Indices, restitute
     Notes
     -----
     First order. The picks' errors are independent, and the same in x, y and z; v1, v2 and the place share the impact's
-    pick, so they are correlated. With drag, the sensitivities are those of the flight without it.
+    pick, so they are correlated, but for v2 from a take-off. With drag, the sensitivities are those of the flight
+    without it.
     """
-    n = own.size
-    sigma_x, sigma_t = _sigmas(picks, own)
+    n = landing.size
+    sigma_x, sigma_t = _sigmas(picks, landing)
     by_place, by_time = np.zeros((n, ERRORS, 3)), np.zeros((n, ERRORS))
     by_place[:, 6:] = np.eye(3)
     covariance = np.zeros((n, ERRORS, ERRORS))
-    for part, flight in ((slice(0, 3), incident), (slice(3, 6), restituted)):
-        weight, by_time[:, part], covariance[:, part, part] = _velocity(picks, flights, flight, own)
-        by_place[:, part] = weight[:, None, None] * np.eye(3)
+    for part, flight, pick in ((slice(0, 3), incident, landing), (slice(3, 6), restituted, leaving)):
+        weight, timing, covariance[:, part, part] = _velocity(picks, flights, flight, pick)
+        shared = pick == landing
+        own_x, own_t = (np.where(shared, 0.0, sigma) for sigma in _sigmas(picks, pick))
+        covariance[:, part, part] += ((own_x * weight) ** 2)[:, None, None] * np.eye(3)
+        covariance[:, part, part] += (own_t**2)[:, None, None] * (timing[:, :, None] * timing[:, None, :])
+        by_place[:, part] = np.where(shared, weight, 0.0)[:, None, None] * np.eye(3)
+        by_time[:, part] = np.where(shared[:, None], timing, 0.0)
     covariance += (sigma_x**2)[:, None, None] * (by_place @ np.swapaxes(by_place, 1, 2))
     return covariance + (sigma_t**2)[:, None, None] * (by_time[:, :, None] * by_time[:, None, :])
 

@@ -92,7 +92,7 @@ def summarise(
     if columns.law[0] >= 0 and drag is not None:
         drag = replace(drag, coefficient=max(state.coefficient, 0.0))
     fitted_gravity = state.gravity if columns.law[1] >= 0 else gravity_mps2
-    on_ground = np.isfinite(normals.normal[:, 0]) | ~np.isin(picks.kind, ("impact", "contact", "stop"))
+    on_ground = np.isfinite(normals.normal[:, 0]) | ~np.isin(picks.kind, ("impact", "contact", "stop", "takeoff"))
     ends: FlightEnds = "centres" if bool(on_ground[picks.status != "discarded"].all()) else "contacts"
     made = reconstruct(
         picks, surface=ground.surface, block=block, gravity_mps2=fitted_gravity, drag=drag,
@@ -186,7 +186,7 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
     covariance = np.full((own.size, ERRORS, ERRORS), np.nan)
     for fit in fits:
         problem, motion = fit.setup.problem, fit.solution.evaluation.motion
-        node = fit.setup.node_of[own]
+        node, leaving = fit.setup.node_of[own], fit.setup.node_of[made.picks.leaves_at[own]]
         mine = np.flatnonzero(node >= 0)
         before, after = np.full(fit.setup.nodes.size, -1), np.full(fit.setup.nodes.size, -1)
         flying = np.flatnonzero(~problem.contact)
@@ -194,7 +194,7 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
         slope = np.concatenate(
             [
                 velocity_rows(problem, motion, before[node[mine]], at_end=True),
-                velocity_rows(problem, motion, after[node[mine]], at_end=False),
+                velocity_rows(problem, motion, after[leaving[mine]], at_end=False),
                 centre_rows(problem, node[mine]),
             ],
             axis=1,

@@ -50,7 +50,7 @@ def observe_runs(reconstruction: "Reconstruction", ground: Ground, draws: int = 
         raise InputError("There is no flight among the picks", advice="Give picks of blocks that fly")
     picks = reconstruction.picks
     kinds = picks.kind[reconstruction.flights.first_pick[first_flights(reconstruction)]]
-    from_impact = np.asarray(kinds == "impact")
+    from_impact = np.asarray(kinds != "release")
     if not (np.isfinite(picks.sigma_position_m) | np.isfinite(picks.sigma_time_s)).any():
         return Observed(paths, from_impact)
     nodes = _nodes(reconstruction, ground)

@@ -227,12 +227,11 @@ def observed_paths(reconstruction: "Reconstruction") -> Paths:
 
 def first_flights(reconstruction: "Reconstruction") -> Indices:
     """The flight with which each trajectory begins: from its release, or from its first impact that it leaves."""
-    picks, flights, impacts = reconstruction.picks, reconstruction.flights, reconstruction.impacts
-    into = impacts.flags["into_ground"]
-    sunk = set(zip(impacts.trajectory[into].tolist(), impacts.time_s[into].tolist(), strict=True))
-    starts = zip(flights.trajectory.tolist(), flights.start_time_s.tolist(), strict=True)
-    leaves = ~np.array([start in sunk for start in starts], dtype=np.bool_)
-    free = np.flatnonzero(~flights.is_contact & leaves & np.isin(picks.kind[flights.first_pick], ("release", "impact")))
+    picks, flights = reconstruction.picks, reconstruction.flights
+    sunk = np.flatnonzero(picks.kind == "impact")[reconstruction.impacts.flags["into_ground"]]
+    leaves = ~np.isin(flights.first_pick, picks.leaves_at[sunk])
+    starts = np.isin(picks.kind[flights.first_pick], ("release", "impact", "takeoff"))
+    free = np.flatnonzero(~flights.is_contact & leaves & starts)
     names = flights.trajectory[free]
     return free[np.r_[True, names[1:] != names[:-1]][: free.size]]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reading import reader
+from ..reconstruction.picks import KINDS
 from ..reconstruction.refinement.what_if import WhatIf
 from ..vectors import Array, Indices, Mask, Names
 from ..workflow.sightings import Events, Sightings
@@ -21,7 +22,6 @@ TRACK_REQUIRED = ("time_s", *PIXEL)
 TRACK_KNOWN = ("trajectory", "frame", *TRACK_REQUIRED, "sigma_px", "score")
 EVENTS_REQUIRED = TRACK_REQUIRED
 EVENTS_KNOWN = ("trajectory", "frame", *EVENTS_REQUIRED, "sigma_time_s", "kind")
-EVENT_KINDS = ("impact", "release", "contact", "stop", "pass")
 
 Extra = Mapping[str, Names]
 
@@ -152,8 +152,8 @@ def read_events(path: str | Path) -> EventTable:
     table = read_table(path, EVENTS_REQUIRED, EVENTS_KNOWN)
     kinds = table.text("kind", "impact")
     for i, kind in enumerate(kinds):
-        if kind not in EVENT_KINDS:
-            raise table.error(i, f"Unknown kind '{kind}'", f"Use one of {', '.join(EVENT_KINDS)}")
+        if kind not in KINDS:
+            raise table.error(i, f"Unknown kind '{kind}'", f"Use one of {', '.join(KINDS)}")
     return EventTable(
         trajectory=_names(table, "trajectory"),
         frame=frames_of(table),

@@ -27,7 +27,7 @@ def with_take_offs(columns: dict[str, Any], table: TextTable, shift: GlobalShift
     ------
     InputError : with the row: a part of a place, a take-off without a time or before its impact, or of another kind.
     """
-    if not any(table.has_numbers(name) for name in COLUMNS):
+    if not any(name in table.columns for name in COLUMNS):
         return columns
     survey, time = table.vectors(PLACE), table.numbers(TIME)
     placed, timed = np.isfinite(survey), np.isfinite(time)

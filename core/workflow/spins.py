@@ -206,7 +206,7 @@ def _measure(made: Reconstruction, flights: Flights, k: int, marks: Marks) -> Fl
 
 def _impact_number(made: Reconstruction, pick: int) -> int:
     own = np.flatnonzero(made.picks.kind == "impact")
-    return int(made.impacts.impact[own == pick].sum())
+    return int(made.impacts.impact[(own == pick) | (made.picks.leaves_at[own] == pick)].sum())
 
 
 def _axis(kind: Axis, marks: Marks, velocity: Array) -> Array:

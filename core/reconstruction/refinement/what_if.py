@@ -147,6 +147,8 @@ def _flights_at_impacts(fit: Fit) -> tuple[Indices, Indices]:
     before, after = np.full(setup.nodes.size, -1), np.full(setup.nodes.size, -1)
     flying = np.flatnonzero(~problem.contact)
     before[problem.last[flying]] = after[problem.first[flying]] = flying
+    leaving = setup.node_of[setup.picks.leaves_at[setup.nodes]]
+    after = after[leaving]
     chosen = (setup.picks.kind[setup.nodes] == "impact") & ((before >= 0) | (after >= 0))
     return before[chosen], after[chosen]
 

@@ -18,7 +18,14 @@ from .graphs.look import Look, alpha, look, mixed
 SCRUB, SCROLLER, ROW, LEAST_ROW = 30.0, 12.0, 20.0, 3.0  # heights at interface scale 1 [px]
 REACH = 7.0
 """A mark is under the mouse within this, at interface scale 1 [px]."""
-SHAPES = {"impact": "circle", "release": "down", "pass": "plus", "contact": "diamond", "stop": "square"}
+SHAPES = {
+    "impact": "circle",
+    "release": "down",
+    "pass": "plus",
+    "contact": "diamond",
+    "stop": "square",
+    "takeoff": "triangle",
+}
 WARNING = (1.0, 0.55, 0.0)
 
 

@@ -96,6 +96,24 @@ def test_a_moved_pick_moves_the_trajectory(scene: bpy.types.Scene, part) -> None
     np.testing.assert_allclose(scene.objects["A block"].matrix_world.translation, PLACES[1] + [0.5, 0, 0], atol=1e-3)
 
 
+def test_a_take_off_begins_the_next_flight_and_without_its_impact_it_is_said(scene: bpy.types.Scene, part) -> None:
+    picks, sync = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.sync")
+    first = scene.objects["A impact 1"]
+    place = list(first["rockfall_position_m"])
+    off = picks.add_pick(scene, "A", first["rockfall_time_s"] + 0.08, [place[0] + 1, *place[1:]], kind="takeoff")
+    sync.sync(scene, ["A"])
+    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    flies = result.flights.first_pick[~result.flights.is_contact & (result.flights.trajectory == "A")].tolist()
+    assert flies[:2] == [0, 2]
+    words = part("rockfall_addon.steps.impacts.panel")._slide(scene, first)
+    assert words == [("Until the take-off", "1.00 m, 80 ms")]
+    first["rockfall_kind"] = "pass"
+    sync.sync(scene, ["A"])
+    said = part("rockfall_addon.scene.problems").remarks(scene)
+    assert any("does not follow an impact" in remark.text for remark in said)
+    assert off.name.startswith("A takeoff")
+
+
 def test_picks_keep_their_objects_and_selection(scene: bpy.types.Scene) -> None:
     pick = scene.objects["A impact 1"]
     before = {o.name: o["rockfall_id"] for o in scene.objects if o.get("rockfall_role") == "pick"}

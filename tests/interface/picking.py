@@ -167,6 +167,23 @@ def case_pick_impacts_in_the_footage(window):
     frame = scene.frame_current
     yield from window.press("RIGHT_ARROW", x, y)
     assert scene.frame_current == frame + 1
+    yield from window.press("RIGHT_ARROW", x, y)
+
+    # the block leaves the ground two pictures later and a little farther down
+    yield from window.press("SIX", x, y)
+    assert scene.rockfall_picking.kind == "takeoff"
+    with window.override():
+        spot = pointing.on_screen(bpy.context, [list(picks()[-1]["rockfall_position_m"])])[0]
+    yield from window.click(window.region().x + spot[0] + 12, window.region().y + spot[1] - 6)
+    yield 1.0
+    assert [obj["rockfall_kind"] for obj in picks()] == ["impact", "impact", "impact", "takeoff"]
+    assert scene.rockfall_picking.kind == "impact", "an impact has one take-off"
+    no_trouble(window)
+    window.screenshot("take-off")
+    yield from window.press("X", x, y)
+    assert len(picks()) == 3
+    with window.override():
+        window.part("rockfall_addon.view.pointing").select(bpy.context, picks()[-1])
     yield from window.press("X", x, y)
     assert len(picks()) == 2
     window.screenshot("keys")

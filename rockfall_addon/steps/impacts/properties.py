@@ -90,6 +90,7 @@ class PickProperties(bpy.types.PropertyGroup):
             ("pass", "Pass", "A point of the flight, in the air"),
             ("contact", "Contact", "The block rolls or slides"),
             ("stop", "Stop", "The block comes to rest"),
+            ("takeoff", "Take-off", "The block leaves the ground after the impact before: elsewhere, or later"),
         ],
         get=_get_kind, set=_set_kind,
     )  # fmt: skip

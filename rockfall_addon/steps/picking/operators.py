@@ -86,6 +86,8 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
             second = there is not None and camera is not None and clicks.elsewhere(there, camera)
             obj, self._new = editing.make_or_move(scene, camera, place, name, kind)
             scene.rockfall_picking.trajectory = name
+            if kind == "takeoff":
+                scene.rockfall_picking.kind = "impact"  # an impact has one
             if second:
                 pointing.select(context, obj)
                 self.report({"INFO"}, editing.second_view(scene, obj))
@@ -241,7 +243,7 @@ class PickTool(bpy.types.WorkSpaceTool):
         "• Drag a pick: it slides along the terrain (Shift: finely; Ctrl: of another picture).\n"
         "• ← → or Alt wheel: step through the pictures.\n"
         "• [ ]: move the selected pick by a tenth of a frame.\n"
-        "• 1–5: impact, release, block here, contact, stop.\n"
+        "• 1–6: impact, release, block here, contact, stop, take-off.\n"
         "• X: remove.  Enter: done"
     )
     bl_icon, bl_cursor = "ops.curve.draw", "CROSSHAIR"
@@ -257,7 +259,7 @@ class PickTool(bpy.types.WorkSpaceTool):
         ("rockfall.remove_pick", {"type": "X", "value": "PRESS"}, None),
         ("rockfall.remove_pick", {"type": "DEL", "value": "PRESS"}, None),
         *(("rockfall.pick_kind", {"type": key, "value": "PRESS"}, {"properties": [("kind", kind[0])]})
-          for key, kind in zip(("ONE", "TWO", "THREE", "FOUR", "FIVE"), KINDS, strict=True)),
+          for key, kind in zip(("ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX"), KINDS, strict=True)),
         *(("rockfall.step_frame", {"type": key, "value": "PRESS", "repeat": True}, {"properties": [("step", step)]})
           for key, step in (("LEFT_ARROW", -1), ("RIGHT_ARROW", 1))),
         *(("rockfall.step_frame", {"type": key, "value": "PRESS", "alt": True}, {"properties": [("step", step)]})

@@ -10,6 +10,7 @@ KINDS = (
     ("pass", "Block here", "The block in flight: its pixel is kept as an observation for the refinement"),
     ("contact", "Contact", "The block rolls or slides"),
     ("stop", "Stop", "The block comes to rest"),
+    ("takeoff", "Take-off", "The block leaves the ground after the impact before: elsewhere, or later"),
 )
 
 
@@ -26,7 +27,7 @@ class PickingSettings(bpy.types.PropertyGroup):
         name="Trajectory", description="Name of the block's run that is picked; a new name begins a new trajectory",
         search=_names, search_options={"SUGGESTION"},
     )  # fmt: skip
-    kind: EnumProperty(name="Kind", description="What is picked (keys 1–5)", items=KINDS, default="impact")
+    kind: EnumProperty(name="Kind", description="What is picked (keys 1–6)", items=KINDS, default="impact")
     aim: EnumProperty(
         name="Click on", description="What is clicked in the footage",
         items=[

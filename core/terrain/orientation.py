@@ -8,7 +8,7 @@ import numpy as np
 
 from ..compiled import in_chunks
 from ..errors import InputError
-from ..vectors import Array, dot, unit
+from ..vectors import Array, dot, perpendicular, unit
 from .raycast import closest_points
 from .surface import Surface
 
@@ -20,8 +20,12 @@ SEED_COSINE = -0.5
 """Faces further than 120° from the closest triangle are another sheet, whatever it is part of."""
 STEEP_FIT = 0.5
 """Least cosine between the fitted plane's normal and the mean face normal; below, the patch is no sheet."""
-PLANE = 3
-"""Unknowns of a plane."""
+AROUND = 6
+"""Faces around a vertex of a triangle mesh, on the average: so often each is a corner."""
+RIM, LEAST_RIM = 0.93 * float(np.sqrt(np.pi)), 0.3
+"""What the rim of a patch takes off the variance of its plane, over the root of the number of its points; no more."""
+LEAST = 1e-12
+"""Keeps a paraboloid through points on a line from being singular."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +82,8 @@ def block_scale_normals(
     mean of the face normals; then this mean is the normal.
 
     The error of the plane is that of a least-squares plane through the patch's vertices, each off by the same standard
-    deviation, independent of the others: of the scan, and of what lies between the points. Two things bound it: how far
-    the surface leaves the plane, and how far its faces lean, since such noise tilts them by 2σ/spacing (root mean
-    square). The smaller one counts, so that waves longer than the spacing, which the points do show, are no noise.
+    deviation, independent of the others: of the scan, and of what lies between the points. It is told by what is left
+    of a paraboloid through them, so that waves longer than the patch, which the points do show, are no noise.
     """
     from . import patch_kernels
 
@@ -92,14 +95,17 @@ def block_scale_normals(
     closest = closest_points(surface, points, REACH_RADII * radius if reach_m is None else float(reach_m))
     n = len(closest.face)
     vertices, faces, normals, neighbours = surface.vertices, surface.faces, surface.face_normals, surface.neighbours
-    sums = np.zeros((n, patch_kernels.SUMS))
+    sums, terms = np.zeros((n, patch_kernels.SUMS)), patch_kernels.TERMS
+    nothing = np.zeros((0, terms, terms))
 
-    def integrate(facing: Array, axes: Array, least_cosine: float = 0.0) -> Array:
+    def integrate(facing: Array, axes: Array, least_cosine: float = 0.0, products: Array = nothing) -> Array:
+        across = np.stack(perpendicular(axes), axis=1)
+
         def chunk(start: int, stop: int) -> None:
             stamp = np.zeros(len(faces), np.int32)
             patch_kernels.integrate_patches(
                 vertices, faces, normals, neighbours, closest.point, closest.face, facing, least_cosine, axes, radius,
-                stamp, sums, start, stop,
+                across, stamp, sums, products, start, stop,
             )  # fmt: skip
 
         in_chunks(chunk, n)
@@ -108,28 +114,48 @@ def block_scale_normals(
     seed = normals[closest.face]
     first, _ = _planes(integrate(seed, seed, SEED_COSINE))
     normal, extent = _planes(integrate(first, first))
-    sums = integrate(first, normal)
+    products = np.zeros((n, terms, terms))
+    sums = integrate(first, normal, products=products)
     area = sums[:, 0]
     found = area > 0
     spread = np.sqrt(np.divide(sums[:, 13], area, out=np.full(n, np.nan), where=found))
     normal[~found] = np.nan
-    tilt = _tilts(extent, area, sums[:, 14] / 2, spread)
+    tilt = np.minimum(_tilts(extent, radius * np.sqrt(_leftover(products)), products[:, 0, 0] / AROUND), spread)
     return LocalNormals(normal, np.degrees(spread), np.degrees(tilt), area.copy(), closest.point)
 
 
-def _tilts(extent: Array, area: Array, points: Array, spread: Array) -> Array:
+def _leftover(products: Array) -> Array:
+    """(n,) variance of the vertices about their paraboloid; where they are too few for one, about their mean height."""
+    full = products + np.swapaxes(np.tril(products, -1), 1, 2)
+    count, bent = full[:, 0, 0] / AROUND, full.shape[1] - 1
+    variance = np.divide(full[:, -1, -1], full[:, 0, 0], out=np.zeros(len(full)), where=count > 0)
+    enough = np.flatnonzero(count > 2 * bent)
+    if enough.size:
+        normal, right = full[enough, :bent, :bent], full[enough, :bent, -1]
+        fitted = np.einsum(
+            "ni,ni->n", right, np.linalg.solve(normal + LEAST * np.eye(bent), right[:, :, None])[:, :, 0]
+        )
+        left = np.maximum(full[enough, -1, -1] - fitted, 0.0) / AROUND
+        variance[enough] = left / (count[enough] - bent)
+    return variance
+
+
+def _tilts(extent: Array, sigma_m: Array, points: Array) -> Array:
     """(n,) root mean square error of the planes' direction [rad].
 
     Parameters
     ----------
     extent : (n, 3) mean squared distance of the surface from the middle along its principal axes, ascending [m²].
-    points : (n,) vertices in each patch; their mean squared distance from the plane is twice that of the surface.
+    sigma_m : (n,) standard deviation of each of so many `points` (n,).
+
+    Notes
+    -----
+    The surface between the points is part of the patch, so that those about its rim, within and without, count in part.
+    That is as if the rim were blurred by linear interpolation: it takes 0.93 spacings over the radius off the variance.
     """
+    rim = np.maximum(1 - RIM / np.sqrt(np.maximum(points, 1.0)), LEAST_RIM)
     with np.errstate(invalid="ignore", divide="ignore"):
-        from_plane = 2 * np.maximum(extent[:, 0], 0.0) * points / np.maximum(points - PLANE, 1.0)
-        from_faces = (spread / 2) ** 2 * area / points
-        variance = np.minimum(from_plane, from_faces) / points * (1 / extent[:, 1] + 1 / extent[:, 2])
-    return np.minimum(np.sqrt(variance), spread)
+        return sigma_m * np.sqrt(rim * (1 / extent[:, 1] + 1 / extent[:, 2]) / np.maximum(points, 1.0))
 
 
 def _planes(sums: Array) -> tuple[Array, Array]:

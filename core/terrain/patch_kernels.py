@@ -9,10 +9,14 @@ import numpy as np
 
 from ..compiled import kernel
 
-SUMS = 15
+SUMS = 14
 """Sums over a patch: area 0, first moments 1-3, second moments xx yy zz xy yz zx 4-9, area times normal 10-12, area
-times squared angle between normal and axis 13, faces, each as much as is inside 14; coordinates from the centre of the
-sphere."""
+times squared angle between normal and axis 13; coordinates from the centre of the sphere."""
+BENT = 6
+"""Coefficients of a paraboloid: 1, x, y, xx, xy, yy."""
+TERMS = BENT + 1
+"""Of the products that are summed over the corners of a patch's faces: the paraboloid's, and the height; lengths in
+radii."""
 
 
 @kernel
@@ -117,8 +121,21 @@ def add_face(sums, plane, p, normal, axis, radius):  # type: ignore[no-untyped-d
         b, c = (a + 1) % 3, (a + 2) % 3
         cross2 += (normal[b] * axis[c] - normal[c] * axis[b]) ** 2
     sums[13] += area * np.arctan2(np.sqrt(cross2), cosine) ** 2
-    wx, wy, wz = p[2, 0] - p[0, 0], p[2, 1] - p[0, 1], p[2, 2] - p[0, 2]
-    sums[14] += 2.0 * area / (length * abs(wx * vx + wy * vy + wz * vz))
+
+
+@kernel
+def add_corners(products, terms, p, axis, first, second, radius):  # type: ignore[no-untyped-def]
+    """Add the corners of a triangle p (3, 3) that are inside the sphere to the products (7, 7) of their terms (7,)."""
+    for i in range(3):
+        x = (p[i, 0] * first[0] + p[i, 1] * first[1] + p[i, 2] * first[2]) / radius
+        y = (p[i, 0] * second[0] + p[i, 1] * second[1] + p[i, 2] * second[2]) / radius
+        z = (p[i, 0] * axis[0] + p[i, 1] * axis[1] + p[i, 2] * axis[2]) / radius
+        if x * x + y * y + z * z >= 1.0:
+            continue
+        terms[0], terms[1], terms[2], terms[3], terms[4], terms[5], terms[6] = 1.0, x, y, x * x, x * y, y * y, z
+        for j in range(7):
+            for k in range(j + 1):
+                products[j, k] += terms[j] * terms[k]
 
 
 @kernel
@@ -142,8 +159,10 @@ def integrate_patches(  # type: ignore[no-untyped-def]
     least_cosine,
     axes,
     radius,
+    across,
     stamp,
     sums,
+    products,
     start,
     stop,
 ):
@@ -151,10 +170,11 @@ def integrate_patches(  # type: ignore[no-untyped-def]
 
     A face belongs to the patch when the cosine between its normal and ``facing`` exceeds ``least_cosine``; the seed
     always does.
-    ``stamp`` (m,) int32 zeros is private to the call.
+    ``stamp`` (m,) int32 zeros is private to the call. ``products`` (n, 7, 7), of which the lower triangle is filled, or
+    (0, 7, 7) where they are not wanted; ``across`` (n, 2, 3) is at right angles to ``axes``.
     """
     queue = np.empty(64, np.int32)
-    p, plane = np.empty((3, 3)), np.empty(6)
+    p, plane, terms = np.empty((3, 3)), np.empty(6), np.empty(7)
     for row in range(start, stop):
         sums[row] = 0.0
         if seeds[row] < 0:
@@ -169,6 +189,8 @@ def integrate_patches(  # type: ignore[no-untyped-def]
                 for a in range(3):
                     p[i, a] = vertices[faces[f, i], a] - centres[row, a]
             add_face(sums[row], plane, p, normals[f], axes[row], radius)
+            if len(products) > 0:
+                add_corners(products[row], terms, p, axes[row], across[row, 0], across[row, 1], radius)
             for e in range(3):
                 g = neighbours[f, e]
                 if g < 0 or stamp[g] == mark:

@@ -103,14 +103,27 @@ def picked(truth: Fall, rng: np.random.Generator):
     )
 
 
-def impacts_of(views: int, fine: Surface, given: Surface, truth: Fall, rng: np.random.Generator) -> Impacts:
-    """What the program makes of a fall: refined from some views, or reconstructed from picks without one."""
+def impacts_of(
+    views: int, fine: Surface, given: Surface, sigma_m: float, truth: Fall, rng: np.random.Generator
+) -> Impacts:
+    """What the program makes of a fall: refined from some views, or reconstructed from picks without one.
+
+    Parameters
+    ----------
+    sigma_m : noise of the given surface's points, which is what is stated as the terrain's accuracy.
+    """
     if not views:
         return reconstruct(picked(truth, rng), surface=given, block=BLOCK, flights="centres").impacts
     footage = film(Case("", 3840, 2160, 30.0, 150.0, views), fine, given, truth, rng)
     free = ("camera", "clock")[:views]
     return refine(
-        footage.picks, footage.views, footage.pixels, surface=given, block=BLOCK, free=free
+        footage.picks,
+        footage.views,
+        footage.pixels,
+        surface=given,
+        block=BLOCK,
+        free=free,
+        sigma_terrain_m=sigma_m,
     ).reconstruction.impacts
 
 
@@ -145,7 +158,7 @@ def main() -> None:
         radius = default_normal_radius(given, BLOCK.diameter_m)
         true = [truth_of(one, slope, radius) for one in falls]
         for views, name in ((0, "picks"), (1, "one view"), (2, "two views")):
-            found = [impacts_of(views, fine, given, one, rng) for one in falls]
+            found = [impacts_of(views, fine, given, sigma_m, one, rng) for one in falls]
             print("| " + " | ".join(row_of(f"{name}, scan to {1e3 * sigma_m:.0f} mm", found, true)) + " |", flush=True)
 
 

@@ -71,6 +71,18 @@ def test_the_tilt_of_a_plane_through_noisy_points_is_known(noise):
     assert (found.tilt_deg < found.spread_deg / 2).all()
 
 
+def test_a_smooth_curve_is_no_noise():
+    x = np.arange(120) * 0.2
+    noisy = 0.02 * np.random.default_rng(2).normal(size=(120, 120))
+    wave = np.add.outer(0.15 * np.sin(2 * np.pi * x / 5), 0 * x)
+    place = np.column_stack([np.arange(4, 20, 0.9), np.full(18, 12.0), np.zeros(18)])
+    bent, flat, both = (
+        block_scale_normals(grid(0.2, heights), place, 0.7).tilt_deg for heights in (wave, noisy, wave + noisy)
+    )
+    assert bent.max() < 0.15 * np.median(flat)
+    assert np.median(both) == pytest.approx(np.median(flat), rel=0.1)
+
+
 def test_the_normal_changes_with_the_place():
     x = np.arange(60) * 0.2
     bowl = grid(0.2, np.add.outer(0.05 * (x - 6) ** 2, 0 * x))

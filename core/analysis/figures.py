@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 FORMATS = ("png", "svg", "pdf")
 DPI = 300
@@ -32,6 +33,8 @@ MEASURED, MODELLED, LINK = "#20262e", "#d7301f", "#b4b9c1"
 INK, MUTED = "#20262e", "#5b6470"
 LISTED = 3
 """Up to so many points beyond the axes are listed, more are counted."""
+ROOM = 0.97
+"""Notes are no longer than this part of their axes."""
 DENSE = 2000
 """Graphs of more impacts are clouds: smaller, fainter points, as a picture within an SVG or PDF, and no links. The
 model's points are on top, for they are narrower."""
@@ -246,18 +249,18 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> "list[Artist]":
         common: dict[str, Any] = {"linestyle": "none", "markeredgewidth": 0, "alpha": opacity}
         drawn += axes.plot(*graph.modelled.T, marker="D", markersize=3.5 * scale, color=MODELLED, zorder=2, **common)
         drawn += axes.plot(*graph.measured.T, marker="o", markersize=3.3 * scale, color=MEASURED, zorder=3, **common)
-    notes = []
+    notes: list[tuple[tuple[str, ...], str]] = []
     for curve, colour in ((graph.measured_curve, MEASURED), (graph.modelled_curve, MODELLED)):
         if curve is not None:
             drawn += axes.plot(curve.x, curve.y, color="white", linewidth=1.9 * size, zorder=4)
             drawn += axes.plot(curve.x, curve.y, color=colour, linewidth=1.2 * size, zorder=5)
-            notes.append((curve_text(curve, graph, full=size == 1.0), colour))
-    notes += [(line, MUTED) for line in beyond_lines(graph)]
+            notes.append(((curve_text(curve, graph, full=size == 1.0),), colour))
+    notes += [(forms, MUTED) for forms in beyond_lines(graph)]
     font = 6.0 if size == 1.0 else 5.0
     rising = graph.spec.fitted == "origin"  # which leaves the upper left corner free
-    for i, (text, colour) in enumerate(notes):
+    for i, (forms, colour) in enumerate(notes):
         note = axes.annotate(
-            text,
+            forms[0],
             (0.02 if rising else 1.0, 1.0),
             (0.0, (font + 1.8) * (0.35 - i)),
             xycoords="axes fraction",
@@ -269,8 +272,18 @@ def _draw(axes: "Axes", graph: Graph, size: float) -> "list[Artist]":
             zorder=6,
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6},
         )
+        shorten(note, forms, axes)
         drawn.append(note)
     return drawn
+
+
+def shorten(note: "Annotation", forms: Sequence[str], axes: "Axes") -> None:
+    """Let a note have the first of several forms, the longest first, that is no wider than its axes; else the last."""
+    for form in forms[:-1]:
+        note.set_text(form)
+        if note.get_window_extent().width <= ROOM * axes.get_window_extent().width:
+            return
+    note.set_text(forms[-1])
 
 
 def curve_text(curve: Curve, graph: Graph, full: bool = True) -> str:
@@ -280,17 +293,21 @@ def curve_text(curve: Curve, graph: Graph, full: bool = True) -> str:
     return curve.text(y, x, slope, "$^{{{}}}$", full)
 
 
-def beyond_lines(graph: Graph) -> list[str]:
-    """What the axes cut off, for the corner of a graph: a few points, or their number and the farthest."""
+def beyond_lines(graph: Graph) -> list[tuple[str, ...]]:
+    """What the axes cut off, for the corner of a graph: a few points, or their number and the farthest; each line in
+    several forms, the longest first."""
     x, y = find_variable(graph.spec.x), find_variable(graph.spec.y)
     lines = []
     for series, word in (("measured", "measured"), ("model", "model")):
         points = [point for point in graph.beyond if point.series == series]
-        if len(points) > LISTED:
-            lines.append(f"Beyond, {word}: {len(points)} points, {y.tex} up to {number(points[0].y)}")
-        elif points:
+        if not points:
+            continue
+        many = "1 point" if len(points) == 1 else f"{len(points)} points"
+        forms = [f"Beyond, {word}: {many}, {y.tex} up to {number(points[0].y)}", f"Beyond, {word}: {many}"]
+        if len(points) <= LISTED:
             listed = "; ".join(f"{point.y:.3g} at {point.x:.3g}{x.unit if x.unit == '°' else ''}" for point in points)
-            lines.append(f"Beyond, {word}: {y.tex} {listed}")
+            forms.insert(0, f"Beyond, {word}: {y.tex} {listed}")
+        lines.append(tuple(forms))
     return lines
 
 

@@ -11,7 +11,19 @@ import numpy as np
 from ..extras import FIGURES, demand
 from ..reconstruction.impact import Impacts
 from .curves import number
-from .figures import COLUMN_IN, FORMATS, INK, MEASURED, MUTED, PAGE_IN, STYLE, beyond_lines, curve_text, save_named
+from .figures import (
+    COLUMN_IN,
+    FORMATS,
+    INK,
+    MEASURED,
+    MUTED,
+    PAGE_IN,
+    STYLE,
+    beyond_lines,
+    curve_text,
+    save_named,
+    shorten,
+)
 from .graphs import PAPER_GRAPHS, Graph, GraphSpec, make_graph
 from .group_statistics import Grouping
 from .statistics import FEWEST_FOR_LAW, usable
@@ -156,8 +168,8 @@ def _draw(axes: "Axes", series: Sequence[Series]) -> None:
             notes.append((f"95 % of the {what}: {number(curve.fit.low)} to {number(curve.fit.high)}", MUTED))
     if len(notes) > MOST_EQUATIONS:
         notes = []
-    beyond = [line for one in series for line in beyond_lines(one.graph)]
-    _write_above(axes, [*notes, *((line, MUTED) for line in beyond[:1])])
+    beyond = [forms for one in series for forms in beyond_lines(one.graph)]
+    _write_above(axes, [*(((text,), colour) for text, colour in notes), *((forms, MUTED) for forms in beyond[:1])])
     x, y = find_variable(spec.x), find_variable(spec.y)
     axes.set_xlabel(x.tex_label)
     axes.set_ylabel(y.tex_label)
@@ -174,11 +186,11 @@ def _crowd(axes: "Axes", series: Sequence[Series]) -> None:
     axes.scatter(x, y, s=1.5, c=colours[order], alpha=0.3, linewidths=0, rasterized=True, zorder=3)
 
 
-def _write_above(axes: "Axes", notes: Sequence[tuple[str, str]]) -> None:
-    """Lines of text above a graph, where they hide no point."""
-    for i, (text, colour) in enumerate(reversed(notes)):
-        axes.annotate(
-            text,
+def _write_above(axes: "Axes", notes: Sequence[tuple[tuple[str, ...], str]]) -> None:
+    """Lines of text above a graph, where they hide no point; each in several forms, the longest first."""
+    for i, (forms, colour) in enumerate(reversed(notes)):
+        note = axes.annotate(
+            forms[0],
             (1.0, 1.0),
             (0.0, 2.5 + 7.8 * i),
             xycoords="axes fraction",
@@ -188,6 +200,7 @@ def _write_above(axes: "Axes", notes: Sequence[tuple[str, str]]) -> None:
             color=colour,
             fontsize=6.0,
         )
+        shorten(note, forms, axes)
 
 
 def _legend(figure: "Figure", series: Sequence[Series], title: str, columns: int) -> None:

@@ -91,6 +91,33 @@ def test_text_stays_text_with_units_fits_and_outliers(figures) -> None:
     assert "24.4" in text
 
 
+@pytest.mark.parametrize("many", [1, 3, 4])
+def test_no_note_leaves_its_axes(impacts, predictions, many) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from rockfall.core.analysis.figures import model_figure, sheet_figure
+
+    sheet = []
+    for graphs in make_sheet(impacts, predictions):
+        far = []
+        for graph in graphs:
+            points = graph.measured.copy()
+            points[:many, 0] = np.mean(graph.x_limits)
+            points[:many, 1] = -123456.7 * 1.1 ** np.arange(many)
+            far.append(replace(graph, measured=points, modelled=points))
+        sheet.append(far)
+    listed = 0
+    for figure in (model_figure(sheet[0]), sheet_figure(sheet)):
+        figure.canvas.draw()
+        for axes in figure.axes:
+            box = axes.get_window_extent()
+            for note in axes.texts:
+                listed += "Beyond" in note.get_text()
+                extent = note.get_window_extent()
+                assert box.x0 - 1 < extent.x0, note.get_text()
+                assert extent.x1 < box.x1 + 1, note.get_text()
+    assert listed == 2 * 4 * (1 + len(sheet))
+
+
 def test_the_same_figure_is_the_same_file(figures, impacts, predictions, tmp_path) -> None:
     from rockfall.core.analysis.figures import model_figure, save_figure
 

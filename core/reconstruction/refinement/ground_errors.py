@@ -54,6 +54,15 @@ class GroundErrors:
         )
 
 
+def terrain_tilt(sigma_terrain_m: float, across_m: Array) -> Array:
+    """(n,) root mean square angle by which the terrain's smooth errors tilt planes of some extent (n,) [m], in radians.
+
+    Two points so far apart are off by amounts that are alike only so far: their difference tilts the plane.
+    """
+    slope = sigma_terrain_m * np.sqrt(2 * -np.expm1(-across_m / SMOOTH_M)) / across_m
+    return np.asarray(np.sqrt(2.0) * slope)  # about both axes
+
+
 def ground_errors(place: Array, normal: Array, contact_m: Array, sigma_terrain_m: float) -> GroundErrors:
     """Errors at places (g, 3) with terrain normals (g, 3).
 

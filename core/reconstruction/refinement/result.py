@@ -21,6 +21,7 @@ from ..trajectory import Reconstruction, reconstruct
 from ..uncertainty import ERRORS
 from .advice import remarks_on
 from .deviations import Fit, centre_rows, velocity_rows
+from .ground_errors import terrain_tilt
 from .problem import NODE, evaluate
 from .setup import Ground
 from .views import PixelObservations, View
@@ -98,7 +99,7 @@ def summarise(
         picks, surface=ground.surface, block=block, gravity_mps2=fitted_gravity, drag=drag,
         normal_radius_m=normal_radius_m, site=site, flights=ends,
     )  # fmt: skip
-    made = _with_sigmas(made, fits, normals)
+    made = _with_sigmas(made, fits, normals, ground.sigma_terrain_m)
 
     m = len(observations)
     residual, before, outlier = np.full((m, 2), np.nan), np.full((m, 2), np.nan), np.zeros(m, dtype=np.bool_)
@@ -180,10 +181,13 @@ def _passes_on_flights(fit: Fit, time: Array, position: Array) -> None:
         position[between] = places_at(motion, np.full(between.size, segment), time[between]).position
 
 
-def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNormals) -> Reconstruction:
+def _with_sigmas(
+    made: Reconstruction, fits: Sequence[Fit], normals: GroundNormals, sigma_terrain_m: float
+) -> Reconstruction:
     impacts = made.impacts
     own = np.flatnonzero(made.picks.kind == "impact")
     covariance = np.full((own.size, ERRORS, ERRORS), np.nan)
+    tilt = normals.tilt[own]
     for fit in fits:
         problem, motion = fit.setup.problem, fit.solution.evaluation.motion
         node, leaving = fit.setup.node_of[own], fit.setup.node_of[made.picks.leaves_at[own]]
@@ -200,6 +204,8 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
             axis=1,
         )
         covariance[mine] = slope @ fit.covariance @ np.swapaxes(slope, 1, 2)
+        accuracy = problem.ground.terrain_scale * np.nan_to_num(sigma_terrain_m)
+        tilt[mine] = np.hypot(tilt[mine], terrain_tilt(accuracy, 2 * normals.radius_m[own[mine]]))
     given = np.isnan(impacts.normal_spread)
     spread = np.where(given, normals.spread[own], impacts.normal_spread)
     impacts = replace(
@@ -207,8 +213,7 @@ def _with_sigmas(made: Reconstruction, fits: Sequence[Fit], normals: GroundNorma
         normal_spread=spread,
         normal_radius_m=np.where(given, normals.radius_m[own], impacts.normal_radius_m),
     )
-    ground = normals.take(own)
-    errors = ImpactErrors(covariance, ground.by_place, ground.tilt, spread)
+    errors = ImpactErrors(covariance, normals.by_place[own], tilt, spread)
     v1, v2, normal = impacts.v1, impacts.v2, impacts.normal
     sigma = impact_sigmas(impacts, v1, v2, normal, impacts.mass_kg, errors)
     intervals = impact_intervals(impacts, v1, v2, normal, errors)

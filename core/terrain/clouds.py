@@ -63,7 +63,7 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
             "Used all classes, as asked."
             if ground.any()
             else "The cloud has no ground class: vegetation and buildings, if any, are part of the surface. "
-            "The ground filter leaves them out (--ground-filter; in Blender “Use points” of the import dialog)."
+            "The ground filter leaves them out (--ground-filter; in Blender “Points” in the import dialog)."
         )
     return Source(points, crs=crs, geographic=geographic, notes=tuple(notes))
 

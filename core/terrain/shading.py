@@ -75,6 +75,12 @@ def shade(
     return Shading(np.clip(normals @ light, 0.0, 1.0), 0.5 + 0.5 * np.tanh(standing_out), density, thin, roughness)
 
 
+def thin_share(surface: Surface, shading: Shading) -> float:
+    """The share of a surface's area that is shaded as thin data: 0 … 1."""
+    areas = surface.face_areas
+    return float(areas @ shading.thin[surface.faces].mean(axis=1) / max(areas.sum(), 1e-200))
+
+
 def _relief(vertices: Array, normals: Array, mean: Any) -> tuple[Array, Array]:
     """How far vertices stand out over all scales [-], and the residual from the smoothed surface [m]; (n,) each."""
     smooth, orientation = vertices - vertices.mean(axis=0), normals

@@ -87,6 +87,10 @@ def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks
     found = proposal.read(scene)
     if found is not None:
         return _on_proposal(found)
+    if not store.has_role(scene, store.FLIGHTS_ROLE) and not _grave(problems.remarks(scene)):
+        where = "Step to" if camera is not None else "Move the timeline to the time of"
+        sentence = f"{where} the next impact, and click there: a flight is between two picks of a run."
+        return NextStep(sentence, (PICK_TOOL,))
     lacking = camera is None or proposal.lacking(scene)
     refined = proposal.is_applied(scene)
     worries = [*_grave(problems.remarks(scene)), *(() if lacking else _grave(tracks_off(scene)))]

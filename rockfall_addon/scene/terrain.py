@@ -11,7 +11,7 @@ from mathutils import Matrix, Vector
 from ...core.errors import RockfallError
 from ...core.georeference import LARGE_COORDINATE_M
 from ...core.terrain.joining import join, moved
-from ...core.terrain.shading import Shading
+from ...core.terrain.shading import Shading, thin_share
 from ...core.terrain.surface import Surface
 from . import georeference, store, terrain_look, terrain_mesh, terrain_view
 
@@ -39,7 +39,7 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     obj[store.ROLE], obj[store.ID] = store.TERRAIN_ROLE, uuid.uuid4().hex
     obj[store.TERRAIN_SUMMARY], obj[store.TERRAIN_FILE] = list(surface.summary), surface.name
     obj[store.TURNED] = surface.turned
-    obj[store.THIN_SHARE] = float(np.mean(shading.thin))
+    obj[store.THIN_SHARE] = thin_share(surface, shading)
     obj[store.REACH] = float(np.abs(surface.bounds).max())
     set_locked(obj, True)
     store.link(store.collection(scene, "Terrain"), obj)
@@ -72,8 +72,21 @@ def _show_left_out(scene: bpy.types.Scene, surface: Surface) -> None:
     mesh.from_pydata(points.tolist(), [], [])
     obj = bpy.data.objects.new(mesh.name, mesh)
     obj[store.ROLE], obj[store.TERRAIN_FILE] = store.LEFT_OUT_ROLE, surface.name
-    obj.hide_select = obj.hide_render = True
+    obj.hide_select = obj.hide_render = obj.hide_viewport = True  # a forest would hide the slope
     store.link(store.collection(scene, "Terrain"), obj)
+
+
+def show_left_out(scene: bpy.types.Scene, shown: bool) -> None:
+    """Show or hide the points that the ground filter left out."""
+    for points in store.with_role(scene, store.LEFT_OUT_ROLE):
+        points.hide_viewport = not shown
+        if shown:
+            points.hide_set(False)
+
+
+def is_left_out_shown(scene: bpy.types.Scene) -> bool:
+    """Whether some of the points that the ground filter left out are seen."""
+    return any(points.visible_get() for points in store.with_role(scene, store.LEFT_OUT_ROLE))
 
 
 def tiles(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -202,10 +215,12 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
             f"The 3-D view draws {grouped(drawn)} of {grouped(faces)} triangles. "
             "Rays, normals and renders use them all."
         )
-    thin = [(len(tile.data.vertices), float(tile.get(store.THIN_SHARE, 0.0))) for tile in grounds]
-    share = sum(count * part for count, part in thin) / max(1, sum(count for count, _ in thin))
+    thin = [(tile.dimensions.x * tile.dimensions.y, float(tile.get(store.THIN_SHARE, 0.0))) for tile in grounds]
+    share = sum(area * part for area, part in thin) / max(1e-9, sum(area for area, _ in thin))
     if share >= LEAST_THIN:
-        said.append(f"{100 * share:.0f} % of the points have thin data (bluish): the surface is guessed there.")
+        said.append(f"{100 * share:.0f} % of the area has thin data (bluish): the surface is guessed there.")
+    if store.has_role(scene, store.LEFT_OUT_ROLE):
+        said.append("The ground filter took points for vegetation; tops of boulders may be among them. Look at them:")
     away = [tile for tile in grounds if tile.matrix_world != Matrix.Identity(4)]
     moved_by_hand = [tile.name for tile in away if not is_locked(tile)]
     if moved_by_hand:

@@ -274,6 +274,7 @@ def _show_block(
         block = bpy.data.objects.new(f"{name} block", block_mesh())
         block[store.ROLE], block[store.TRAJECTORY] = store.BLOCK_ROLE, name
         store.link(rows.folder, block)
+        held = False  # nobody holds keys that there are not yet
     block.scale = np.array([solid.d1, solid.d2, solid.d3]) * scale / 2
     block.delta_location.z = (scale - 1) * solid.radius_m  # an enlarged block must not sink into the slope
     if held and block_keys.edits_of(block):

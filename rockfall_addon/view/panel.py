@@ -74,8 +74,9 @@ def paragraph(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: 
     """Text broken to the width of the region."""
     characters = max(16, int(context.region.width / context.preferences.system.ui_scale / 7.2) - 7)
     column = layout.column(align=True)
+    below = "NONE" if icon == "NONE" else "BLANK1"
     for number, line in enumerate(textwrap.wrap(sentence, characters)):
-        column.label(text=line, icon=icon if number == 0 else "BLANK1")
+        column.label(text=line, icon=icon if number == 0 else below)
 
 
 def show_remarks(context: bpy.types.Context, layout: bpy.types.UILayout, remarks: Iterable[Remark]) -> None:

@@ -39,6 +39,23 @@ def test_a_moved_pick_stays_on_the_terrain(slope: bpy.types.Scene, part) -> None
     assert pick["rockfall_position_m"][2] > ground(pick["rockfall_position_m"][0]) + 1.9, "a pass is in the air"
 
 
+def test_a_second_pick_that_is_still_held_makes_a_flight_of_which_nothing_is_put_back(
+    slope: bpy.types.Scene, part
+) -> None:
+    picks, sync, following = (part(f"rockfall_addon.scene.{name}") for name in ("picks", "sync", "next_step"))
+    for obj in [one for name in "AB" for one in picks_of(slope, name)]:
+        bpy.data.objects.remove(obj)
+    picks.add_pick(slope, "C", 20.0, [0.0, 0.0, ground(0.0)])
+    sync.sync(slope)
+    assert "next impact" in following.next_step(slope).sentence, "one pick is no flight, and nothing can be played"
+    picks.add_pick(slope, "C", 21.0, [6.0, 0.0, ground(6.0)])
+    sync.sync(slope, ["C"], dragging=True)
+    sync.sync(slope)
+    assert not part("rockfall_addon.scene.problems").remarks(slope)
+    assert following.next_step(slope).sentence.startswith("Play")
+    check_shown(slope, part)
+
+
 def test_a_moved_key_moves_the_time(scene: bpy.types.Scene, part) -> None:
     pick = picks_of(scene, "A")[2]
     place, time = list(pick["rockfall_position_m"]), pick["rockfall_time_s"]

@@ -7,7 +7,7 @@ import trimesh
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.orientation import block_scale_normals, default_normal_radius
-from rockfall.core.terrain.shading import shade
+from rockfall.core.terrain.shading import shade, thin_share
 from rockfall.core.terrain.surface import Surface
 
 
@@ -267,6 +267,8 @@ def test_density_and_thin_data():
     away = (np.abs(points[:, 1]) < 7) & (np.abs(points[:, 0]) < 7)
     assert thin[away & (points[:, 0] < -3)].all()
     assert not thin[away & (points[:, 0] > 3)].any()
+    assert 0.45 < thin_share(half, shade(half)) < 0.65, "half of the area, though few of the points"
+    assert thin.mean() < 0.4
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,7 @@ def _simulate(
 
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     from ....core.terrain.readers import read_terrain
-    from ....core.terrain.shading import shade
+    from ....core.terrain.shading import shade, thin_share
     from ...scene.terrain import add_terrain
 
     surface = read_terrain(job.source, up=job.up, unit_m=job.unit_m)
@@ -144,7 +144,7 @@ def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     size = " × ".join(f"{length:.0f}" for length in surface.bounds[1] - surface.bounds[0])
     facts = f"{len(surface.faces):,}".replace(",", "\u202f") + f" triangles, {size} m"
     if shading.thin.any():
-        facts += f", thin data on {100 * shading.thin.mean():.0f} %"
+        facts += f", thin data on {100 * thin_share(surface, shading):.0f} % of it"
     dressing.set_up_picture(scene, HD, job.engine, title=job.title or job.source.name, subtitle=facts)
 
 

@@ -27,8 +27,11 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
             show_remarks(context, layout, problems.remarks(scene))
             set_aside.draw(layout, scene)
             with_video = store.has_role(scene, store.CAMERA_ROLE)
-            way = "Click the block at its impacts in the footage, or import" if with_video else "Import"
-            advise(context, layout, False, f"{way} a table of timed picks (picks.csv).")
+            on_terrain = "Click the impacts on the terrain, each at its time in the timeline,"
+            way = "Click the block at its impacts in the footage" if with_video else on_terrain
+            advise(context, layout, False, f"{way} or import a table of timed picks (picks.csv).")
+            if store.has_role(scene, store.TERRAIN_ROLE) and not with_video:
+                layout.operator("wm.tool_set_by_id", text="Pick Impacts", icon="CURSOR").name = "rockfall.pick_tool"
             layout.operator("rockfall.import_picks", icon="IMPORT")
             return
         show_remarks(context, layout, problems.remarks(scene))
@@ -100,11 +103,9 @@ class ROCKFALL_PT_tracking(RockfallPanel, bpy.types.Panel):
         row.operator("rockfall.clear_track", text="", icon="X")
 
 
-def _advice(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> tuple[bool, str]:
+def _advice(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[bool, str]:
     if not store.has_role(scene, store.TERRAIN_ROLE):
         return False, "Import the terrain first: picks lie on it."
-    if camera is None:
-        return True, "Without a video, picks go on the terrain in the 3-D view, at the time of the timeline."
     if not camera_paths.is_solved(camera):
         return True, (
             f"{camera.name} is not aligned: clicks are taken as in a free view, at the time of the picture. "

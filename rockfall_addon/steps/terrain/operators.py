@@ -304,10 +304,7 @@ class ROCKFALL_OT_toggle_left_out(bpy.types.Operator):
         return possible(cls, store.has_role(context.scene, store.LEFT_OUT_ROLE), "The ground filter left nothing out")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        every = store.with_role(context.scene, store.LEFT_OUT_ROLE)
-        hidden = all(points.hide_get() for points in every)
-        for points in every:
-            points.hide_set(not hidden)
+        terrain.show_left_out(context.scene, not terrain.is_left_out_shown(context.scene))
         return {"FINISHED"}
 
 

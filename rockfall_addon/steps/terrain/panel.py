@@ -45,11 +45,13 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         self._list_tiles(grounds)
         for sentence in terrain.remarks(scene):
             paragraph(context, layout, sentence, "INFO")
+        if store.has_role(scene, store.LEFT_OUT_ROLE):
+            shown = terrain.is_left_out_shown(scene)
+            text, icon = ("Hide Points Left Out", "HIDE_OFF") if shown else ("Show Points Left Out", "HIDE_ON")
+            layout.operator("rockfall.toggle_left_out", text=text, icon=icon)
         row = layout.row(align=True)
         row.operator("rockfall.show_relief", text="Show relief", icon="SHADING_SOLID")
         row.operator("rockfall.import_terrain", text="Add tile", icon="IMPORT")
-        if store.has_role(scene, store.LEFT_OUT_ROLE):
-            layout.operator("rockfall.toggle_left_out", text="Points left out", icon="HIDE_OFF")
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         column.prop(scene.rockfall_terrain, "accuracy_m")

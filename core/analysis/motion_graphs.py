@@ -80,6 +80,7 @@ class MotionCourse:
     flight : (q,) number of the segment within the trajectory, −1 in gaps.
     values : quantity → (q,) in its unit; NaN where not known.
     impact, impact_time_s, pick : (m,) number of each impact from 1, its time [s], and its row among the picks.
+    leaves_s : (m,) when the block leaves the ground after it, at its take-off or at once [s].
     residuals : of each video in which the block was tracked.
     """
 
@@ -90,6 +91,7 @@ class MotionCourse:
     impact: Indices
     impact_time_s: Array
     pick: Indices
+    leaves_s: Array
     residuals: tuple[VideoResiduals, ...] = field(default=())
 
     def has(self, quantity: Quantity) -> bool:
@@ -234,6 +236,7 @@ def delayed(course: MotionCourse, by_s: float) -> MotionCourse:
         course,
         time_s=course.time_s + by_s,
         impact_time_s=course.impact_time_s + by_s,
+        leaves_s=course.leaves_s + by_s,
         residuals=tuple(replace(one, time_s=one.time_s + by_s) for one in course.residuals),
     )
 
@@ -285,6 +288,7 @@ def _course(
     flight, chain = which[rows], flights.chain[which[rows]]
     gaps = np.flatnonzero(chain[1:] != chain[:-1]) + 1
     mine = impacts.trajectory == name
+    pick = np.flatnonzero((picks.trajectory == name) & (picks.kind == "impact"))
     return MotionCourse(
         trajectory=name,
         time_s=np.insert(time_s[rows], gaps, np.nan),
@@ -292,7 +296,8 @@ def _course(
         values={key: np.insert(column[rows], gaps, np.nan) for key, column in values.items()},
         impact=impacts.impact[mine],
         impact_time_s=impacts.time_s[mine],
-        pick=np.flatnonzero((picks.trajectory == name) & (picks.kind == "impact")),
+        pick=pick,
+        leaves_s=picks.time_s[picks.leaves_at[pick]],
         residuals=residuals,
     )
 

@@ -63,7 +63,8 @@ class Picks:
     def leaves_at(self) -> Indices:
         """(n,) index of the pick at which the block leaves the ground: its own, or the take-off that follows it."""
         own = np.arange(len(self))
-        own[:-1] += (self.kind[1:] == "takeoff") & (self.status[1:] != "discarded") & (self.kind[:-1] == "impact")
+        follows = (self.kind[:-1] == "impact") & (self.trajectory[1:] == self.trajectory[:-1])
+        own[:-1] += (self.kind[1:] == "takeoff") & (self.status[1:] != "discarded") & follows
         return own
 
     @property

@@ -23,12 +23,14 @@ MOST_NOTES = 12
 def summarise(reconstruction: Reconstruction) -> tuple[str, ...]:
     """Sentences: what there is, what is typical, what deserves a look."""
     picks, flights, impacts = reconstruction.picks, reconstruction.flights, reconstruction.impacts
-    contacts = int(flights.is_contact.sum())
+    take_offs = int((picks.kind[flights.last_pick] == "takeoff").sum())
+    contacts = int(flights.is_contact.sum()) - take_offs
+    slides = f" ({take_offs} with a take-off)" if take_offs else ""
     drag = " with air drag" if reconstruction.drag else ""
     sentences = [
         f"{_count(len(picks), 'pick')} of {_count(picks.group_starts.size, 'trajectory', 'trajectories')}: "
-        f"{_count(len(flights) - contacts, 'flight')}{drag}, {_count(contacts, 'contact segment')}, "
-        f"{_count(len(impacts), 'impact')}, {int(np.isfinite(impacts.r).sum())} with R, "
+        f"{_count(int((~flights.is_contact).sum()), 'flight')}{drag}, {_count(contacts, 'contact segment')}, "
+        f"{_count(len(impacts), 'impact')}{slides}, {int(np.isfinite(impacts.r).sum())} with R, "
         f"{int(impacts.complete.sum())} with all coefficients."
     ]
     sentences += _typical(impacts)

@@ -32,7 +32,8 @@ def track_residuals(
 ) -> Array:
     """(m, 2) observed less computed pixels of blocks' centres [px].
 
-    NaN where there is no motion: before, after, in gaps, of trajectories without flights, behind the camera.
+    NaN where no motion is known: before, after, in gaps, between a landing and its take-off, of trajectories without
+    flights, behind the camera.
 
     Parameters
     ----------
@@ -45,13 +46,14 @@ def track_residuals(
     computed for the comparison; without normals on the ground, those of the contact points have to do.
     """
     flights = _flights_of_centres(reconstruction, surface)
+    landed = np.append(reconstruction.picks.kind[flights.last_pick] == "takeoff", False)  # of segment −1: not
     residual = np.full((len(observations), 2), np.nan)
     for number, view in enumerate(views):
         rows = np.flatnonzero(observations.view == number)
         video_s, pixel = observations.time_s[rows], observations.pixel[rows]
         common = view.exposed_at(video_s, pixel)
         which = segments_at(flights, observations.trajectory[rows], common)
-        known = np.flatnonzero(which >= 0)
+        known = np.flatnonzero((which >= 0) & ~landed[which])
         position, _ = flight_states(flights, which[known], common[known])
         path = view.in_shift(reconstruction.picks.shift).path
         residual[rows[known]] = pixel[known] - project_at(path, position, video_s[known])

@@ -15,7 +15,7 @@ from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
 from ..terrain.cloud import Cloud, local_planes, nearest_points
 from ..terrain.raycast import closest_points
-from ..vectors import Array, Mask, Names, cross
+from ..vectors import Array, Indices, Mask, Names, cross
 from .block_shapes import volumes
 from .blocks import Blocks, draw_blocks
 from .ground import Ground
@@ -125,12 +125,12 @@ def from_reconstruction(
 
     Notes
     -----
-    A release that was marked on the terrain touches it, one that was marked in the air starts there. Releases have the
-    names of the trajectories.
+    A release that was marked on the terrain touches it, one that was marked in the air starts there. After an impact
+    with a take-off, blocks start at the take-off. Releases have the names of the trajectories.
     """
     picks, flights, impacts = reconstruction.picks, reconstruction.flights, reconstruction.impacts
     names, position, velocity, omega, reach = [], [], [], [], []
-    after = _spin_after(impacts)
+    after, leaving = _spin_after(impacts), _leaving(reconstruction)
     begun_later = 0
     for trajectory, release, impact in _beginnings(reconstruction):
         names.append(trajectory)
@@ -141,7 +141,7 @@ def from_reconstruction(
             omega.append(np.nan_to_num(turning[0] if np.isfinite(turning[0]).all() else turning[1]))
             reach.append(FAR_IN_THE_AIR_M)
         else:
-            position.append(ground.shift.to_local(impacts.shift.to_survey(impacts.position[impact])))
+            position.append(ground.shift.to_local(picks.shift.to_survey(picks.position[leaving[impact]])))
             velocity.append(impacts.v2[impact])
             omega.append(after[impact])
             reach.append(FAR_M)
@@ -176,11 +176,17 @@ def from_reconstruction(
 
 def start_times(reconstruction: Reconstruction) -> dict[str, float]:
     """Trajectory → when its blocks of `from_reconstruction` start, on the common clock [s]."""
-    picks, impacts = reconstruction.picks, reconstruction.impacts
+    time_s, leaving = reconstruction.picks.time_s, _leaving(reconstruction)
     return {
-        trajectory: float(picks.time_s[release] if release >= 0 else impacts.time_s[impact])
+        trajectory: float(time_s[release if release >= 0 else leaving[impact]])
         for trajectory, release, impact in _beginnings(reconstruction)
     }
+
+
+def _leaving(reconstruction: Reconstruction) -> Indices:
+    """(n,) the pick at which the block leaves the ground, of each impact."""
+    picks = reconstruction.picks
+    return picks.leaves_at[picks.kind == "impact"]
 
 
 def _beginnings(reconstruction: Reconstruction) -> Iterator[tuple[str, int, int]]:

@@ -22,6 +22,11 @@ def name_of(trajectory: str, kind: str, number: int) -> str:
     return f"{trajectory.encode()[:LONGEST].decode(errors='ignore')} {kind} {number}"
 
 
+def word(pick: bpy.types.Object) -> str:
+    """What a pick is, in a sentence."""
+    return "take-off" if pick[store.KIND] == "takeoff" else pick[store.KIND]
+
+
 def follow(picks: Sequence[bpy.types.Object]) -> bool:
     """Name the picks of a trajectory, all of them, anew where kinds or the order in time have changed.
 

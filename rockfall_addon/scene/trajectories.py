@@ -234,10 +234,14 @@ def _below(result: Reconstruction, name: str, position: Array, surface: Surface 
 def _doubt(result: Reconstruction, which: np.ndarray) -> Array:
     """(k,) doubt about flights, 0…1: the relative standard deviation of their speed, and 1 for what is flagged."""
     flights, impacts = result.flights, result.impacts
-    row_of = np.full(len(result.picks), -1)
-    row_of[np.flatnonzero(result.picks.kind == "impact")] = np.arange(len(impacts))
+    lands = np.flatnonzero(result.picks.kind == "impact")
+    leaves = result.picks.leaves_at[lands]
     doubt = np.zeros(which.size)
-    for ends, velocity, name in ((flights.first_pick, impacts.v2, "v2"), (flights.last_pick, impacts.v1, "v1")):
+    for ends, at, velocity, name in (
+        (flights.first_pick, leaves, impacts.v2, "v2"), (flights.last_pick, lands, impacts.v1, "v1"),
+    ):  # fmt: skip
+        row_of = np.full(len(result.picks), -1)
+        row_of[at] = np.arange(len(impacts))
         row = row_of[ends[which]]
         known = row >= 0
         if name in impacts.sigma:

@@ -7,7 +7,7 @@ import bpy
 
 from ...core.reconstruction.intervals import in_words
 from ...core.reconstruction.summary import MEANINGS
-from ..scene import impact_marks, spins, store
+from ..scene import impact_marks, pick_names, spins, store
 
 FLAG_WORDS = {
     "first": "First of its chain: no incident velocity",
@@ -28,7 +28,7 @@ TOO_FAST = "R over 1: faster after the impact than before it"
 def title(pick: bpy.types.Object) -> str:
     """Which pick it is, and when."""
     result = pick.get(store.RESULT)
-    name = f"impact {result['number']}" if result is not None else pick[store.KIND]
+    name = f"impact {result['number']}" if result is not None else pick_names.word(pick)
     return f"{pick[store.TRAJECTORY]}, {name}, {pick[store.TIME]:.3f} s"
 
 

@@ -17,7 +17,7 @@ def course(offset_px):
     offset = np.c_[np.asarray(offset_px, float), np.zeros(len(offset_px))]
     nothing = np.empty(0)
     residuals = VideoResiduals("left", time, time + 2, offset, offset)
-    return MotionCourse("a", nothing, nothing, {}, nothing, nothing, nothing, (residuals,))
+    return MotionCourse("a", nothing, nothing, {}, nothing, nothing, nothing, nothing, (residuals,))
 
 
 def test_a_flight_through_two_is_off_where_the_impact_is_missing():

@@ -11,6 +11,7 @@ from ...remarks import Remark
 from ...vectors import Array, Mask, dot, norm, unit
 from ..triangulation import GRAZING_DEG
 from .assumptions import on_assumptions
+from .contact_pixels import while_landed
 from .deviations import Fit
 from .problem import CLOCK_COLUMN, NODE, solve_segments
 from .setup import Ground, Setup
@@ -45,7 +46,11 @@ def remarks_on(
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
         if name not in seen:
             remarks.append(Remark(f"Trajectory {name} has no pixels: its picks are as they were.", "note", name))
-    outside = int(np.isnan(residual[:, 0]).sum())
+    landed = while_landed(ground.picks, views, observations)
+    if landed.any():
+        text = f"{landed.sum()} pixels between landings and take-offs were not used: there, no block moves evenly."
+        remarks.append(Remark(text, "note"))
+    outside = int((np.isnan(residual[:, 0]) & ~landed).sum())
     if outside:
         text = (
             f"{outside} of {len(residual)} pixels lie outside of the marked motion and were not used: mark one pick "

@@ -16,6 +16,7 @@ from ..drag import Drag
 from ..motion import GROUNDED
 from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
+from .contact_pixels import while_landed
 from .ground_errors import ground_errors
 from .problem import Problem, Unknowns, free_columns
 from .views import PixelObservations, View
@@ -165,7 +166,7 @@ def set_up(
     nodes = np.unique(np.concatenate([first_pick, last_pick]))
     node_of = np.full(len(picks), -1)
     node_of[nodes] = np.arange(nodes.size)
-    rows = np.flatnonzero(np.isin(observations.trajectory, names))
+    rows = np.flatnonzero(np.isin(observations.trajectory, names) & ~while_landed(picks, views, observations))
     seen = observations.take(rows)
     groups = np.array([number[name] for name in seen.trajectory.tolist()], dtype=np.intp)
     _check_overlap(picks, views, seen, set(picks.trajectory[nodes].tolist()))

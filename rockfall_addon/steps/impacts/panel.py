@@ -5,7 +5,7 @@ import math
 
 import bpy
 
-from ...scene import picks, spins, store
+from ...scene import pick_names, picks, spins, store
 from ...view import impact_words, pointing
 from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 
@@ -41,7 +41,7 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, pick = self.layout, pointing.active_pick(context)
         result = pick.get(store.RESULT)
-        name = f"impact {result['number']}" if result is not None else _kind(pick)
+        name = f"impact {result['number']}" if result is not None else pick_names.word(pick)
         row = layout.row(align=True)
         row.label(text=f"{pick[store.TRAJECTORY]}, {name}")
         row.operator("rockfall.show_impact", text="", icon="TIME")
@@ -62,16 +62,11 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
             paragraph(context, layout, "Give a confidence, and the numbers get their errors.")
 
 
-def _kind(pick: bpy.types.Object) -> str:
-    settings = pick.rockfall_pick
-    return settings.bl_rna.properties["kind"].enum_items[settings.kind].name.lower()
-
-
 def _slide(scene: bpy.types.Scene, pick: bpy.types.Object) -> list[tuple[str, str]]:
     """How far and how long an impact with a take-off lasts."""
     run = picks.ordered(scene, picks.objects_of(scene, [pick[store.TRAJECTORY]]))
     later = run[run.index(pick) + 1 :]
-    if not later or later[0][store.KIND] != "takeoff":
+    if not later or later[0][store.KIND] != "takeoff" or later[0].get(store.STATUS) == "discarded":
         return []
     far = math.dist(pick[store.POSITION], later[0][store.POSITION])
     return [("Until the take-off", f"{far:.2f} m, {1e3 * (later[0][store.TIME] - pick[store.TIME]):.0f} ms")]

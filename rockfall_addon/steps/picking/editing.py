@@ -7,7 +7,7 @@ import numpy as np
 from ....core.errors import RockfallError
 from ....core.reconstruction.triangulation import GRAZING_DEG
 from ....core.terrain.raycast import closest_points
-from ...scene import clicks, picks, pictures, places, reconstruction, store, sync, timing, videos
+from ...scene import clicks, pick_names, picks, pictures, places, reconstruction, store, sync, timing, videos
 from ...scene.places import Place
 
 _VECTORS = (store.POSITION, store.NORMAL, store.SIGMA_POSITION, store.SIGMA_TIME)
@@ -129,7 +129,7 @@ def described(obj: bpy.types.Object) -> str:
     """A pick in a sentence."""
     sigma = obj.get(store.SIGMA_POSITION)
     known = "" if sigma is None else f", its place known to {100 * sigma[0]:.0f} cm"
-    return f"{obj[store.TRAJECTORY]}: {obj[store.KIND]} at {obj[store.TIME]:.3f} s{known}."
+    return f"{obj[store.TRAJECTORY]}: {pick_names.word(obj)} at {obj[store.TIME]:.3f} s{known}."
 
 
 def snapshot(obj: bpy.types.Object) -> dict[str, object]:

@@ -6,7 +6,7 @@ from math import floor
 import bpy
 import numpy as np
 
-from ...scene import impact_rows, picks, store, sync, timing
+from ...scene import impact_rows, pick_names, picks, store, sync, timing
 from ...view import strip
 from ...view.reporting import redraw
 
@@ -58,7 +58,7 @@ class ROCKFALL_OT_press_in_strip(bpy.types.Operator):
             self._drag(context, pick, event)
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
             if self.dragged:
-                self.report({"INFO"}, f"{pick[store.TRAJECTORY]}: {pick[store.KIND]} at {pick[store.TIME]:.3f} s.")
+                self.report({"INFO"}, f"{pick[store.TRAJECTORY]}: {pick_names.word(pick)} at {pick[store.TIME]:.3f} s.")
             return self._ended(context, {"FINISHED"})
         return {"RUNNING_MODAL"}
 

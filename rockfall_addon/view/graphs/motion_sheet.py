@@ -370,8 +370,9 @@ def _draw_card(canvas: Canvas, scene: bpy.types.Scene, courses: tuple[MotionCour
     if hit.impact:
         time_s = float(course.impact_time_s[course.impact == hit.impact][0])
     rows = [title, f"{time_s:.3f} s, frame {time_s * timing.frame_rate(scene):.1f}"]
+    leaves_s = float(course.leaves_s[course.impact == hit.impact][0]) if hit.impact else time_s
     for quantity in _kept(scene).shown.quantities:
-        value = course.at(quantity, time_s)
+        value = course.at(quantity, time_s if quantity == RESIDUAL else leaves_s)
         if np.isfinite(value):
             after = " (after)" if hit.impact and quantity != RESIDUAL else ""
             rows.append(f"{quantity.title}: {value:.3g} {quantity.unit}{after}")

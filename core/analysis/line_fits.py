@@ -149,5 +149,7 @@ def _no_line(n: int) -> LineFit:
 
 
 def _r2(y: Array, fitted: Array) -> float:
-    total = float(np.sum((y - y.mean()) ** 2))
-    return 1.0 - float(np.sum((y - fitted) ** 2)) / total if total > 0.0 else float("nan")
+    """NaN for values that are all the same, of which nothing is to be explained."""
+    if is_constant(y):
+        return float("nan")
+    return 1.0 - float(np.sum((y - fitted) ** 2) / np.sum((y - y.mean()) ** 2))

@@ -211,7 +211,7 @@ class ImpactStatistics:
                 "rt",
                 rt.slope,
                 f"R_T = {rt.slope:.3f} ({rt.low:.3f}–{rt.high:.3f}{_together(self.rt_by_trajectory, 3, '–')}), "
-                f"R² {_signed(rt.r2, 3)}: slope of |v_T2| on |v_T1| through the origin. "
+                f"{_explained(rt, 3)}: slope of |v_T2| on |v_T1| through the origin. "
                 f"Published: {PUBLISHED_RT_SLOPE:.2f}, R² {PUBLISHED_RT_R2:.2f}.",
             ),
             (
@@ -225,7 +225,7 @@ class ImpactStatistics:
             (
                 "r",
                 trend.slope,
-                f"{turn} ({_span(trend, 10)}), from {trend.intercept:.2f} at 0° (R² {_signed(trend.r2, 2)}). "
+                f"{turn} ({_span(trend, 10)}), from {trend.intercept:.2f} at 0° ({_explained(trend, 2)}). "
                 "Published: it falls about linearly; no numbers are printed.",
             ),
         ]
@@ -341,6 +341,10 @@ def _spreads(values: Array, of: Indices, groups: int) -> list[Spread]:
 
 def _signed(value: float, digits: int) -> str:
     return f"{value:.{digits}f}".replace("-", "−")
+
+
+def _explained(fit: LineFit, digits: int) -> str:
+    return f"R² {_signed(fit.r2, digits)}" if np.isfinite(fit.r2) else "no R², all values are the same"
 
 
 def _span(fit: LineFit, times: float = 1.0) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import rockyfor3d
 from checks import Check, compared
 from rockfall.core.impact_models.machinery.base import Incident
 from rockfall.core.impact_models.registry import MODELS
@@ -32,6 +33,11 @@ RADIUS, MASS = 0.175, 60.0
 def checks() -> list[Check]:
     """All of this chapter."""
     return [*_formulas(), *_vectors(), *_chance(), *_published()]
+
+
+def remarks() -> list[str]:
+    """What is published and not reproduced."""
+    return rockyfor3d.remarks()
 
 
 def _states(count: int = COUNT) -> tuple[Incident, np.ndarray, np.ndarray, np.ndarray]:

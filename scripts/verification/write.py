@@ -36,6 +36,7 @@ def quick_page(name: str) -> tuple[str, list[Check]]:
     """A chapter of checks as Markdown, and its checks."""
     chapter = QUICK[name]
     made: list[Check] = chapter.checks()
+    remarks = [line for text in getattr(chapter, "remarks", list)() for line in [*_lines(text), ""]]
     lines = [
         f"# {chapter.TITLE}",
         "",
@@ -45,12 +46,18 @@ def quick_page(name: str) -> tuple[str, list[Check]]:
         "",
         *table(made),
         "",
+        *remarks,
         *paragraph(
             f"Written by `scripts/verification/{name}.py`. Differences are the greatest of all numbers compared; "
             "*rounding* is less than 1e-8, *of it* relative to the greatest number."
         ),
     ]
     return "\n".join(lines) + "\n", made
+
+
+def _lines(text: str) -> list[str]:
+    """Those of a heading or a table as they are, those of a paragraph wrapped."""
+    return text.splitlines() if text.startswith(("#", "|")) else paragraph(text)
 
 
 def contents() -> str:

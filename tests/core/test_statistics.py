@@ -242,6 +242,16 @@ def test_no_trend_with_the_deviation_is_said() -> None:
     assert text.startswith("R shows no clear trend with the deviation")
 
 
+def test_what_is_the_same_everywhere_has_no_r2_and_never_the_word_nan() -> None:
+    theta1_deg = np.linspace(10.0, 50.0, 30)
+    speed = 6.0 / np.cos(np.radians(theta1_deg))
+    same = impact_statistics(impacts_with(theta1_deg, np.full(30, 0.5), np.full(30, 0.5), speed))
+    texts = {remark.about: remark.text for remark in same.remarks()}
+    assert "no R², all values are the same: slope of |v_T2| on |v_T1|" in texts["rt"]
+    assert "at 0° (no R², all values are the same)" in texts["r"]
+    assert not any("nan" in text for text in texts.values())
+
+
 def test_rows_and_sentences(exact: ImpactStatistics) -> None:
     rows = exact.as_rows()
     names = [row[0] for row in rows]

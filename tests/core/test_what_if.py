@@ -148,6 +148,8 @@ def test_the_gravest_of_each_kind_over_all_trajectories(tmp_path):
     stated, camera = gravest(rows)
     assert stated.cells == ("Deviation as stated", "0.50 %", "0.90 %", "0.0100", "0.0200")
     assert camera.cells == ("higher", "+0.15 %", "−0.90 %", "+0.0000", "+0.0020")
+    nothing = WhatIf("terrain", "higher", "a", -0.001, 0.001, -1e-6, 1e-6)
+    assert nothing.cells == ("higher", "+0.00 %", "+0.00 %", "+0.0000", "+0.0000")
     write_what_if(rows, tmp_path / "what_if.csv")
     table = read_table(tmp_path / "what_if.csv", ("about", "change", "trajectory"), ())
     assert table.text("trajectory") == ["a", "a", "a", "b", "b"]

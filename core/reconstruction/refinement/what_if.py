@@ -50,8 +50,8 @@ class WhatIf:
     def cells(self) -> tuple[str, str, str, str, str]:
         """The change and what it does, as text for people: of speeds and of R, each the median and the most."""
         sign = "" if self.about == STATED else "+"
-        percent = (f"{value:{sign}.2f} %" for value in (self.speed_percent, self.most_speed_percent))
-        parts = ("–" if np.isnan(value) else f"{value:{sign}.4f}" for value in (self.r, self.most_r))
+        percent = (f"{value:{sign}z.2f} %" for value in (self.speed_percent, self.most_speed_percent))
+        parts = ("–" if np.isnan(value) else f"{value:{sign}z.4f}" for value in (self.r, self.most_r))
         speed, most_speed, r, most_r = (text.replace("-", "−") for text in (*percent, *parts))
         return self.change, speed, most_speed, r, most_r
 

@@ -81,6 +81,8 @@ class Case:
     pairs: Pairs = Pairs()
     azimuth_deg: tuple[float, float] = (45.0, 60.0)
     """Of the first camera, from the fall line."""
+    fill: float = FILL
+    """Part of the tighter side of the image that the run fills: the lens."""
     memory: float = 0.0
     """Correlation of the tracker's noise from one frame to the next."""
     wrong: "Wrong" = field(default_factory=lambda: Wrong())
@@ -200,7 +202,7 @@ def film(case: Case, surface: Surface, given: Surface, truth: Fall, rng: np.rand
         place = middle + case.distance_m * np.array([np.cos(azimuth), np.sin(azimuth), 0.1])
         camera = look_at(case.width, case.height, place, middle, focal_px=1000.0)
         extent = np.ptp(project(camera, truth.centre), axis=0)
-        focal = 1000.0 * float(np.min(FILL * np.array(camera.size) / extent))
+        focal = 1000.0 * float(np.min(case.fill * np.array(camera.size) / extent))
         camera = look_at(case.width, case.height, place, middle, focal_px=focal)
         resected, covariance, least = solve_camera(camera, surface, case.pairs, rng)
 

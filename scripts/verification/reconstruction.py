@@ -64,6 +64,10 @@ GROUPS = (
         _cases(*((f"{far:g} m", {"distance_m": float(far)}) for far in (50, 150, 300, 600))),
     ),
     Group(
+        "Lens", "Part of the picture's tighter side that the fall fills: a longer lens fills more.",
+        _cases(*((f"{100 * fill:.0f} %", {"fill": fill}) for fill in (0.15, 0.3, 0.5, 0.7))),
+    ),
+    Group(
         "Pictures a second", "",
         _cases(*((f"{rate:g} Hz", {"rate_hz": float(rate)}) for rate in (10, 15, 30, 60, 120))),
     ),

@@ -89,6 +89,11 @@ def background_remarks(camera: bpy.types.Object) -> tuple[Remark, ...]:
     return said if said and camera_paths.camera_path(camera).is_fixed else ()
 
 
+def is_taken_for_a_tripod(camera: bpy.types.Object) -> bool:
+    """Whether it has one pose for all frames, and nobody has looked whether the background moves."""
+    return not moves(camera) and store.BACKGROUND not in camera and camera_paths.camera_path(camera).is_fixed
+
+
 def free_of(camera: bpy.types.Object) -> tuple[str, ...]:
     """The parameters of the lens that are to be found."""
     settings = camera.rockfall_alignment

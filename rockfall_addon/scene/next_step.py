@@ -24,15 +24,21 @@ from . import (
     videos,
 )
 
-PICK_TOOL = "rockfall.pick_tool"
+ALIGN_TOOL, PICK_TOOL = "rockfall.align_tool", "rockfall.pick_tool"
 
 
 @dataclass(frozen=True)
 class NextStep:
-    """One sentence, and the identifiers of operators and tools, the likeliest first."""
+    """One sentence, and the identifiers of operators and tools, the likeliest first.
+
+    Attributes
+    ----------
+    video : id of the camera that is to be looked through, where that is an action.
+    """
 
     sentence: str
     actions: tuple[str, ...] = ()
+    video: str = ""
 
 
 def next_step(scene: bpy.types.Scene) -> NextStep:
@@ -65,15 +71,31 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         return NextStep(sentence, ("rockfall.align_views",))
     unset = None if proposal.is_applied(scene) else video_times.never_synchronised(scene)
     if unset is not None and all(map(camera_paths.is_solved, videos.cameras(scene))):
-        sentence = (
-            f"{unset.name} is not synchronised: both videos begin together until it is. Mark the same event in "
-            "each (step 2), and synchronise."
-        )
-        return NextStep(sentence, ("rockfall.mark_event", "rockfall.synchronise_videos"))
+        return _on_clocks(scene, unset, camera)
     for one in videos.cameras(scene):
         for remark in alignment.background_remarks(one):
             return NextStep(remark.text, ("rockfall.align_views",))
     return _with_cameras(scene, camera, picks)
+
+
+def _on_clocks(scene: bpy.types.Scene, unset: bpy.types.Object, active: bpy.types.Object) -> NextStep:
+    """A video whose clock nobody has set: which event is to be marked, and in which video."""
+    pair = (video_times.reference_camera(scene), unset)
+    events = {camera: video_times.events_of(camera) for camera in pair}
+    event = scene.rockfall_videos.event
+    if set(events[pair[0]]) & set(events[unset]):
+        return NextStep("An event is marked in both videos: synchronise them.", ("rockfall.synchronise_videos",))
+    marked = [camera for camera in pair if event in events[camera]]
+    to_do = active if active in pair and active not in marked else next(one for one in pair if one not in marked)
+    what = "an event that both show: a block leaves a ledge, or hits a boulder"
+    sentence = f"{unset.name} is not synchronised: both videos begin together until it is."
+    if marked:
+        what = f"the same event as at {events[marked[0]][event]:.2f} s of {marked[0].name}"
+        sentence = f"Event {event} is marked in {marked[0].name}."
+    if to_do != active:
+        sentence = f"{sentence} Look through {to_do.name}, and find {what}."
+        return NextStep(sentence, ("rockfall.look_through",), str(to_do[store.ID]))
+    return NextStep(f"{sentence} Step to {what}, and press Event Here.", ("rockfall.mark_event",))
 
 
 def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks: list[bpy.types.Object]) -> NextStep:
@@ -83,6 +105,8 @@ def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks
             sentence = "The block is tracked. Propose its impacts, or click the block at each (step with ← →)."
             return NextStep(sentence, ("rockfall.propose_impacts", PICK_TOOL))
         sentence = "Step to an impact with ← →, and click the block there. Each further impact adds a flight."
+        if camera is not None and alignment.is_taken_for_a_tripod(camera):
+            sentence += " Was the camera held by hand? Then follow the background first (step 3, Hand-held)."
         return NextStep(sentence, (PICK_TOOL,))
     found = proposal.read(scene)
     if found is not None:

@@ -34,7 +34,7 @@ def is_waiting() -> bool:
 
 @problems.guarded
 def _arrange() -> None:
-    """Footage to the left, the slope to the right, and the tool of step 4 if it is time."""
+    """Footage to the left, the slope to the right, and the tool of step 3 or 4 if it is time."""
     for window in bpy.context.window_manager.windows:
         if store.WORKSPACE not in window.workspace:
             continue
@@ -44,7 +44,7 @@ def _arrange() -> None:
             if store.has_role(window.scene, store.TERRAIN_ROLE):
                 look.show_relief(bpy.context, frame_all=True)
             workspace.fit_footage(window.scene, window.screen)
-            workspace.take_pick_tool(window.scene, window.screen)
+            workspace.take_tool(window.scene, window.screen)
 
 
 def unregister() -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import RockfallError
-from ..scene import camera_paths, store, videos
-from ..scene.next_step import PICK_TOOL
+from ..scene import camera_paths, footage_blend, store, videos
+from ..scene.next_step import ALIGN_TOOL, PICK_TOOL
 from . import image_view
 
 FILE = Path(__file__).parents[2] / "assets" / "workspace.blend"
@@ -69,14 +69,19 @@ def look_through_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> No
         largest.spaces.active.region_3d.view_perspective = "CAMERA"
 
 
-def take_pick_tool(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
-    """With an aligned camera, the next click is a pick. Needs the window in the context."""
+def take_tool(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
+    """With an aligned camera the next click is a pick, else half a pair. Needs the window in the context."""
     camera, largest = videos.active_camera(scene), _largest_view(screen)
-    if camera is None or largest is None or not camera_paths.is_solved(camera) or bpy.context.mode != "OBJECT":
+    if camera is None or largest is None or bpy.context.mode != "OBJECT":
         return
+    is_solved = camera_paths.is_solved(camera)
+    if not is_solved and not store.has_role(scene, store.TERRAIN_ROLE):
+        return
+    if not is_solved:
+        footage_blend.set_blend(camera, footage_blend.blend_of(camera))  # the terrain would hide it
     region = next(region for region in largest.regions if region.type == "WINDOW")
     with bpy.context.temp_override(area=largest, region=region):
-        bpy.ops.wm.tool_set_by_id(name=PICK_TOOL)
+        bpy.ops.wm.tool_set_by_id(name=PICK_TOOL if is_solved else ALIGN_TOOL)
 
 
 def _largest_view(screen: bpy.types.Screen) -> bpy.types.Area | None:

@@ -407,3 +407,23 @@ def test_the_block_is_tracked(site, part) -> None:
     turned = np.degrees(np.arccos((np.einsum("nij,ij->n", relative, relative[0]) - 1) / 2)).max()
     assert float(said.text.split(" by ")[1].split("°")[0]) == pytest.approx(turned, abs=0.5), "as the demo was filmed"
     assert part("rockfall_addon.scene.next_step").next_step(site).sentence == said.text
+
+
+def test_the_guide_leads_through_the_synchronisation_of_two_videos(site, part) -> None:
+    following, scene = part("rockfall_addon.scene.next_step"), site
+    first = part("rockfall_addon.scene.videos").cameras(scene)[0]
+    second = part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
+    camera_paths = part("rockfall_addon.scene.camera_paths")
+    camera_paths.set_camera_path(scene, second, camera_paths.camera_path(first))
+    scene.camera = first
+    for camera in (first, second):
+        step = following.next_step(scene)
+        assert step.actions == ("rockfall.mark_event",), step.sentence
+        assert bpy.ops.rockfall.mark_event() == {"FINISHED"}
+        if camera == first:
+            step = following.next_step(scene)
+            assert (step.actions, step.video) == (("rockfall.look_through",), second["rockfall_id"])
+            bpy.ops.rockfall.look_through(identifier=step.video)
+    assert following.next_step(scene).actions == ("rockfall.synchronise_videos",)
+    assert bpy.ops.rockfall.synchronise_videos() == {"FINISHED"}
+    assert following.PICK_TOOL in following.next_step(scene).actions

@@ -310,6 +310,16 @@ def test_bad_pairs_are_refused(spoil: object, message: str) -> None:
     assert str(caught.value) == f"pairs.csv{message}"
 
 
+def test_pixels_that_lie_outside_because_u_and_v_are_exchanged() -> None:
+    """As of a phone held upright, whose pixels were read in the picture as it is stored."""
+    _, pixels, points = made(3, 8)
+    pixels[2] = (10.0, max(WIDTH, HEIGHT) - 5.0) if WIDTH > HEIGHT else (max(WIDTH, HEIGHT) - 5.0, 10.0)
+    pixels[:2] %= min(WIDTH, HEIGHT)
+    pixels[3:] %= min(WIDTH, HEIGHT)
+    with pytest.raises(InputError, match="With u and v exchanged all pairs lie inside"):
+        resect(pixels, points, WIDTH, HEIGHT)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ...errors import InputError
 from ...georeference import GlobalShift
-from ...vectors import Array
+from ...vectors import Array, Mask
 from ..model import GUESSED_FOCAL, INTRINSICS, Camera
 
 FREE_LENS = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
@@ -17,6 +17,11 @@ FREE_LENS = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 
 POSE_PAIRS = 4
 """Give the pose of a camera whose lens is known."""
+
+EXCHANGED = (
+    "With u and v exchanged all pairs lie inside: exchange them (u counts to the right, v down), or check whether "
+    "the image is turned"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,19 +84,25 @@ def checked_pairs(
         raise refuse(i, "a coordinate is not a finite number", "Pick it again")
     for i in np.flatnonzero(~((spread_px > 0) & np.isfinite(spread_px) & (spread_m >= 0) & np.isfinite(spread_m))):
         raise refuse(i, "its error is not a positive number", "Give pixels an error above zero, points zero or more")
-    outside = (image < 0).any(axis=1) | (image > [width, height]).any(axis=1)
+    outside = _outside(image, width, height)
     for i in np.flatnonzero(outside):
         u, v = image[i]
+        exchanged = not _outside(image[:, ::-1], width, height).any()
         raise refuse(
             i,
             f"the pixel ({u:g}, {v:g}) lies outside the image of {width} × {height} px",
-            "Check the size of the image, and that v counts down from its top",
+            EXCHANGED if exchanged else "Check the size of the image, and that v counts down from its top",
         )
     for values, least, what in ((image, 1e-6, "pixel"), (world, 1e-9, "point")):
         gap = np.abs(values[:, None] - values[None]).max(axis=2)
         for i, j in np.argwhere(np.triu(gap < least, 1)):
             raise refuse(j, f"the same {what} as pair {named[i]}", "Leave one of the two out")
     return Problem(image, world, spread_px, spread_m, np.zeros((9, 0))), named
+
+
+def _outside(image: Array, width: int, height: int) -> Mask:
+    """(n,) which pixels (n, 2) are not in the image."""
+    return np.asarray(((image < 0) | (image > [width, height])).any(axis=1))
 
 
 def free_columns(free: Sequence[str]) -> tuple[str, ...]:

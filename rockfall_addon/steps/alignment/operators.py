@@ -10,12 +10,12 @@ from mathutils import Vector
 from ....core.camera.resection.problem import POSE_PAIRS
 from ....core.errors import RockfallError
 from ...scene import alignment, camera_paths, clocks, footage_blend, pairs, store, terrain, videos
-from ...view import image_view, job, look
+from ...scene.next_step import ALIGN_TOOL
+from ...view import image_view, job, look, workspace
 from ...view.of_video import OfVideo, has_solved, has_video
 from ...view.reporting import possible, reported
 from . import following, looking, marking, solving
 
-TOOL = "rockfall.align_tool"
 FINE = 0.1
 STILL_PX = 3.0
 NEAR_PX = 11.0
@@ -227,13 +227,16 @@ class ROCKFALL_OT_align_views(OfVideo, bpy.types.Operator):
         footage_blend.set_blend(camera, footage_blend.blend_of(camera))
         if context.window is None or not _views(context):
             return {"FINISHED"}
-        picture = self._split(context) if len(_views(context)) == 1 else self._choose(context)
+        is_new = len(_views(context)) == 1
+        picture = self._split(context) if is_new else self._choose(context)
         with context.temp_override(area=picture, region=_region(picture)):
             if context.mode != "OBJECT" and bpy.ops.object.mode_set.poll():
                 bpy.ops.object.mode_set(mode="OBJECT")
-            bpy.ops.wm.tool_set_by_id(name=TOOL)
-            if bpy.ops.view3d.view_center_camera.poll():
+            bpy.ops.wm.tool_set_by_id(name=ALIGN_TOOL)
+            if is_new and bpy.ops.view3d.view_center_camera.poll():  # it gets its size when it is drawn
                 bpy.ops.view3d.view_center_camera()
+        if not is_new:
+            workspace.fit_footage(scene, context.window.screen)
         return {"FINISHED"}
 
     def _split(self, context: bpy.types.Context) -> bpy.types.Area:
@@ -369,7 +372,7 @@ class AlignTool(bpy.types.WorkSpaceTool):
 
     bl_space_type = "VIEW_3D"
     bl_context_mode = "OBJECT"
-    bl_idname = TOOL
+    bl_idname = ALIGN_TOOL
     bl_label = "Align Camera"
     bl_description = (
         "Mark the same place in the footage and on the terrain, in either order.\n"

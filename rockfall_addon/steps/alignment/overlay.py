@@ -15,10 +15,10 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ...scene import alignment, camera_paths, clocks, pairs, problems, store, video_files, videos
+from ...scene.next_step import ALIGN_TOOL
 from ...view import image_view
 from . import marking
 
-TOOL = "rockfall.align_tool"
 RING, CROSS, TEXT, HINT, GAP = 8.0, 6.0, 14.0, 14.0, 12.0  # in pixels at interface scale 1
 SEGMENTS, OUTLINE = 32, 6
 SHADE = (0.0, 0.0, 0.0, 0.65)
@@ -68,7 +68,7 @@ def _draw() -> None:
 
 
 def _aligning(context: bpy.types.Context) -> bool:
-    return _tool(context) == TOOL
+    return _tool(context) == ALIGN_TOOL
 
 
 def _other_tool(context: bpy.types.Context) -> bool:

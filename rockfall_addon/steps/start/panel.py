@@ -21,6 +21,7 @@ LOOKS = {
     "rockfall.mark_event": ("", "MARKER"),
     "rockfall.synchronise_videos": ("", "UV_SYNC_SELECT"),
     "rockfall.align_views": ("", "SPLIT_VERTICAL"),
+    "rockfall.look_through": ("Look Through the Other Video", "VIEW_CAMERA"),
     "rockfall.propose_impacts": ("", "OUTLINER_OB_LIGHTPROBE"),
     "rockfall.apply_refinement": ("Apply", "CHECKMARK"),
     "rockfall.discard_refinement": ("Discard", "X"),
@@ -54,6 +55,8 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
             button = column.operator(operator, icon=icon, **({"text": text} if text else {}))
             if action == PICK_TOOL:
                 button.name = PICK_TOOL
+            elif action == "rockfall.look_through":
+                button.identifier = step.video
 
 
 CLASSES = (ROCKFALL_PT_start,)

@@ -68,6 +68,8 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
         _look_through(context, added[0])
         if first:
             begin_file(context, opens_workspace=self.opens_workspace)
+        elif self.by_hand and context.screen is not None and workspace.is_open(context):
+            workspace.take_tool(context.scene, context.screen)
         for error in errors:
             self.report({"WARNING"}, error)
         self.report({"INFO"}, " ".join(videos.summary(camera) for camera in added))

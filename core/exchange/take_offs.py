@@ -31,10 +31,12 @@ def with_take_offs(columns: dict[str, Any], table: TextTable, shift: GlobalShift
         return columns
     survey, time = table.vectors(PLACE), table.numbers(TIME)
     placed, timed = np.isfinite(survey), np.isfinite(time)
+    doubted = np.isfinite(table.numbers(SIGMA_TIME)) | np.isfinite(table.numbers(SIGMA_PLACE))
     kind = np.asarray(columns["kind"])
     for wrong, problem, advice in (
         (placed.any(axis=1) & ~placed.all(axis=1), "Only a part of the take-off's place is given", ADVICE),
         (placed.any(axis=1) & ~timed, "The take-off has a place and no time", ADVICE),
+        (doubted & ~timed, "The take-off has a standard deviation and no time", ADVICE),
         (timed & (time <= columns["time_s"]), "The block takes off before it lands, or at once", "Correct time2_s"),
         (timed & (kind != "impact"), "A take-off belongs to an impact", "Empty its columns in the rows of other kinds"),
     ):

@@ -161,6 +161,24 @@ def test_bad_columns_are_refused_with_their_row(tmp_path, row, problem):
     assert caught.value.row in (3, 4)
 
 
+def test_a_take_off_has_the_deviations_of_its_own_or_those_of_its_impact(tmp_path):
+    table = tmp_path / "picks.csv"
+    names = "trajectory,time_ms,x_ft,y_ft,z_ft,sigma_time_s,sigma_position_m,x2_ft,y2_ft,z2_ft,time2_ms,sigma_time2_s\n"
+    table.write_text(
+        names + "a,0,0,0,10,0.01,0.1,,,,,\na,1000,0,0,0,0.01,0.2,10,0,0,1080,0.03\na,2000,9,0,0,0.01,0.1,,,,,\n"
+    )
+    picks = read_picks(table)
+    assert picks.kind.tolist() == ["impact", "impact", "takeoff", "impact"]
+    np.testing.assert_allclose(picks.time_s, [0, 1, 1.08, 2])
+    np.testing.assert_allclose(picks.position[2] - picks.position[1], [3.048, 0, 0])
+    assert (picks.sigma_time_s[2], picks.sigma_position_m[2]) == (0.03, 0.2)
+    text = table.read_text()
+    table.write_text(text.replace(",1080,", ",,").replace(",10,0,0,,", ",,,,,"))
+    with pytest.raises(InputError, match="The take-off has a standard deviation and no time") as caught:
+        read_picks(table)
+    assert caught.value.row == 3
+
+
 def test_refinement_finds_landings_and_take_offs():
     """From picks that are a decimetre and a frame off, with the pixels of a block that slides and leaves."""
     place, time, kind, incident, restituted = fall()

@@ -194,15 +194,15 @@ def terrain_normals(
 
 def _by_place(surface: "Surface", points: Array, normal: Array, radius_m: float, sigma_m: Array) -> Array:
     """(n, 3, 3) change of the normals with the place along the ground, between one deviation to either side [1/m]."""
-    from ..terrain.orientation import block_scale_normals
+    from ..terrain.orientation import normals_beside
 
     change = np.zeros((len(points), 3, 3))
     if not len(points):
         return change
     step = np.maximum(sigma_m, LEAST_STEP * radius_m)[:, None]
     for direction in perpendicular(normal):
-        beside = np.concatenate([points + step * direction, points - step * direction])
-        there, back = np.split(block_scale_normals(surface, beside, radius_m).normal, 2)
+        beside, facing = np.concatenate([points + step * direction, points - step * direction]), np.tile(normal, (2, 1))
+        there, back = np.split(normals_beside(surface, beside, radius_m, facing), 2)
         slope = np.nan_to_num((there - back) / (2 * step))
         change += slope[:, :, None] * direction[:, None, :]
     return change

@@ -9,7 +9,7 @@ import numpy as np
 from ..compiled import in_chunks
 from ..errors import InputError
 from ..vectors import Array, dot, perpendicular, unit
-from .raycast import closest_points
+from .raycast import ClosestPoints, closest_points
 from .surface import Surface
 
 LEAST_SPACINGS = 3.0
@@ -85,43 +85,62 @@ def block_scale_normals(
     deviation, independent of the others: of the scan, and of what lies between the points. It is told by what is left
     of a paraboloid through them, so that waves longer than the patch, which the points do show, are no noise.
     """
-    from . import patch_kernels
-
     radius = float(radius_m)
     if not (np.isfinite(radius) and radius > 0):
         raise InputError(
             f"The normal's radius is {radius_m} m", advice="Give a positive radius, such as the block's diameter"
         )
     closest = closest_points(surface, points, REACH_RADII * radius if reach_m is None else float(reach_m))
-    n = len(closest.face)
-    vertices, faces, normals, neighbours = surface.vertices, surface.faces, surface.face_normals, surface.neighbours
-    sums, terms = np.zeros((n, patch_kernels.SUMS)), patch_kernels.TERMS
-    nothing = np.zeros((0, terms, terms))
-
-    def integrate(facing: Array, axes: Array, least_cosine: float = 0.0, products: Array = nothing) -> Array:
-        across = np.stack(perpendicular(axes), axis=1)
-
-        def chunk(start: int, stop: int) -> None:
-            stamp = np.zeros(len(faces), np.int32)
-            patch_kernels.integrate_patches(
-                vertices, faces, normals, neighbours, closest.point, closest.face, facing, least_cosine, axes, radius,
-                across, stamp, sums, products, start, stop,
-            )  # fmt: skip
-
-        in_chunks(chunk, n)
-        return sums
-
-    seed = normals[closest.face]
-    first, _ = _planes(integrate(seed, seed, SEED_COSINE))
-    normal, extent = _planes(integrate(first, first))
-    products = np.zeros((n, terms, terms))
-    sums = integrate(first, normal, products=products)
+    seed = surface.face_normals[closest.face]
+    first, _ = _planes(_integrated(surface, closest, radius, seed, seed, SEED_COSINE)[0])
+    normal, extent = _planes(_integrated(surface, closest, radius, first, first)[0])
+    sums, products = _integrated(surface, closest, radius, first, normal, with_products=True)
     area = sums[:, 0]
     found = area > 0
-    spread = np.sqrt(np.divide(sums[:, 13], area, out=np.full(n, np.nan), where=found))
+    spread = np.sqrt(np.divide(sums[:, 13], area, out=np.full(len(area), np.nan), where=found))
     normal[~found] = np.nan
     tilt = np.minimum(_tilts(extent, radius * np.sqrt(_leftover(products)), products[:, 0, 0] / AROUND), spread)
     return LocalNormals(normal, np.degrees(spread), np.degrees(tilt), area.copy(), closest.point)
+
+
+def normals_beside(surface: Surface, points: Array, radius_m: float, facing: Array) -> Array:
+    """(n, 3) normals as of `block_scale_normals`, of points beside others whose normals `facing` (n, 3) are known.
+
+    A third of the work: the patch is of the faces less than 90° from that normal. NaN where there is no surface.
+    """
+    closest = closest_points(surface, points, REACH_RADII * radius_m)
+    sums, _ = _integrated(surface, closest, radius_m, facing, facing)
+    normal, _ = _planes(sums)
+    normal[sums[:, 0] == 0] = np.nan
+    return normal
+
+
+def _integrated(
+    surface: Surface,
+    closest: ClosestPoints,
+    radius: float,
+    facing: Array,
+    axes: Array,
+    least_cosine: float = 0.0,
+    with_products: bool = False,
+) -> tuple[Array, Array]:
+    """Sums over the patches, and products of their corners' terms, (0, 7, 7) unless wanted; see `patch_kernels`."""
+    from . import patch_kernels
+
+    n, terms = len(closest.face), patch_kernels.TERMS
+    sums = np.zeros((n, patch_kernels.SUMS))
+    products = np.zeros((n if with_products else 0, terms, terms))
+    across = np.stack(perpendicular(axes), axis=1)
+
+    def chunk(start: int, stop: int) -> None:
+        stamp = np.zeros(len(surface.faces), np.int32)
+        patch_kernels.integrate_patches(
+            surface.vertices, surface.faces, surface.face_normals, surface.neighbours, closest.point, closest.face,
+            facing, least_cosine, axes, radius, across, stamp, sums, products, start, stop,
+        )  # fmt: skip
+
+    in_chunks(chunk, n)
+    return sums, products
 
 
 def _leftover(products: Array) -> Array:

@@ -13,7 +13,7 @@ from rockfall.core.reconstruction.impact import apparent
 from rockfall.core.reconstruction.intervals import INTERVALS, ImpactErrors, impact_intervals, undetermined
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
-from rockfall.core.terrain.orientation import block_scale_normals
+from rockfall.core.terrain.orientation import block_scale_normals, normals_beside
 from rockfall.core.terrain.surface import Surface
 
 TIME = np.array([0.0, 0.9, 1.7])
@@ -81,6 +81,15 @@ def test_a_smooth_curve_is_no_noise():
     )
     assert bent.max() < 0.15 * np.median(flat)
     assert np.median(both) == pytest.approx(np.median(flat), rel=0.1)
+
+
+def test_normals_beside_known_ones_are_those_of_the_places_themselves():
+    rng = np.random.default_rng(5)
+    rough = grid(0.2, 0.03 * rng.normal(size=(60, 60)))
+    place = np.column_stack([rng.uniform(3, 9, (50, 2)), np.zeros(50)])
+    beside = place + np.array([0.05, -0.03, 0.0])
+    found = normals_beside(rough, beside, 0.8, block_scale_normals(rough, place, 0.8).normal)
+    np.testing.assert_allclose(found, block_scale_normals(rough, beside, 0.8).normal, atol=1e-9)
 
 
 def test_the_normal_changes_with_the_place():

@@ -15,7 +15,9 @@ from dataclasses import dataclass
 
 from .errors import DependencyError
 
-PACKAGES = ("numpy", "scipy", "trimesh", "numba", "llvmlite", "laspy", "lazrs", "tifffile", "tomli_w", "cv2")
+PACKAGES = (
+    "numpy", "scipy", "trimesh", "numba", "llvmlite", "laspy", "lazrs", "startinpy", "tifffile", "tomli_w", "cv2",
+)  # fmt: skip
 """Import names of the Python packages that Rockfall needs; all but NumPy travel in the extension as wheels."""
 DISTRIBUTIONS = {"cv2": "opencv_python_headless"}
 """Under which name a package is to be had, where it is another than that for importing."""

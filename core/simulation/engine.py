@@ -20,6 +20,7 @@ from ..impact_models.registry import find_model
 from ..memory import available_bytes
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.drag import Drag
+from ..terrain.ordering import along_curve
 from ..vectors import Array, Indices, Mask
 from .ground import Ground
 from .memory import check_records
@@ -252,7 +253,7 @@ def simulate(
     progress("Simulating", 0, n)
     cores = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
-        whole = _take_turns(pool, cores, batch, _along_curve(releases.position[:, :2]), told)
+        whole = _take_turns(pool, cores, batch, along_curve(releases.position[:, :2]), told)
         begin = np.cumsum(count) - count
         rows = np.empty((int(count.sum()), COLUMNS))
         # Each batch is given up for its place among all, so that memory lasts.
@@ -346,19 +347,6 @@ def _compiled_runs(tree: Any, facets: Any) -> Any:
 
     typeof: Any = numba.typeof
     return _compiled_for(typeof(tree), typeof(facets))
-
-
-def _along_curve(places: Array) -> NDArray[np.uint32]:
-    """(n,) where places (n, 2) are on a curve that keeps near ones together.
-
-    That is Morton's order: the bits of both coordinates, one after the other.
-    """
-    low = places.min(axis=0)
-    cell = ((places - low) * (0xFFFF / max(float((places - low).max()), 1e-9))).astype(np.uint32)
-    for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
-        cell = (cell | (cell << np.uint32(shift))) & np.uint32(mask)
-    curve: NDArray[np.uint32] = cell[:, 0] | (cell[:, 1] << np.uint32(1))
-    return curve
 
 
 def _take_turns(

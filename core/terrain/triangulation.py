@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..vectors import Array, Mask
+from .ordering import along_curve
 
 MAX_EDGE_SPACINGS = 10.0
 """Longest edge of a meshed cloud by default, in multiples of its mean point spacing: longer ones bridge holes."""
+SNAPPED_M = 1e-9
+"""Points of a cloud that are nearer in plan are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +93,6 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
     ------
     InputError : fewer than three points, or all on a line in plan.
     """
-    from scipy.spatial import Delaunay, QhullError
-
     total = len(points)
     origin = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
     if total:
@@ -106,10 +107,9 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
     spread = np.linalg.svd(plan.T @ plan, compute_uv=False)
     if spread[1] <= 1e-14 * spread[0]:
         raise _on_a_line()
-    try:
-        faces = Delaunay(plan).simplices
-    except QhullError as error:
-        raise _on_a_line() from error
+    faces = _delaunay(plan)
+    if not len(faces):
+        raise _on_a_line()
     a, b, c = (plan[faces[:, k]] for k in range(3))
     twice_area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     faces = np.where((twice_area < 0)[:, None], faces[:, ::-1], faces)
@@ -128,6 +128,19 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
         + (f"; the maximum is {MAX_EDGE_SPACINGS:g} times the spacing." if max_edge_m is None else "."),
     ]
     return Meshed(points, np.ascontiguousarray(faces[short], dtype=np.int32), tuple(notes), origin)
+
+
+def _delaunay(plan: Array) -> NDArray[np.int64]:
+    """(m, 3) Delaunay triangles of points in plan (n, 2)."""
+    import startinpy
+
+    order = np.argsort(along_curve(plan), kind="stable")  # each point is sought from the one before
+    made = startinpy.DT()
+    made.snap_tolerance = SNAPPED_M
+    made.insert(np.column_stack([plan[order], order]))  # heights are not looked at: they carry the points' numbers
+    number = made.points[:, 2]
+    number[0] = 0.0  # the first point is at infinity
+    return np.asarray(number.astype(np.int64)[made.triangles])
 
 
 def _on_a_line() -> InputError:

@@ -64,6 +64,8 @@ FIELDS: dict[str, Field] = {
     "rotational2_J": Field("number", "J", "Rotational energy after the impact", 0),
     "bounce_height_m": Field("number", "m", "Greatest height above the terrain of the flight that follows"),
     "chord_height_m": Field("number", "m", "Greatest distance of the flight that follows from its chord"),
+    **{f"{a}2_m": Field("number", "m", f"Where the block takes off, {a}; empty: where it lands") for a in "xyz"},
+    "time2_s": Field("number", "s", "When the block takes off; empty: when it lands"),
     "source": Field("integer", "", "Number, from 1, of the entry of 'sources' that the row is from", 1, required=True),
 }
 """Name → what it is. An empty cell means: not defined."""

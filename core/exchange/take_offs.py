@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from ..georeference import GlobalShift
+from ..reconstruction.impact import TAKE_OFF
 from ..vectors import Array, Names
 from .csv_text import TextTable
 
-PLACE = ("x2_m", "y2_m", "z2_m")
-TIME, SIGMA_TIME, SIGMA_PLACE = "time2_s", "sigma_time2_s", "sigma_position2_m"
+*PLACE, TIME = TAKE_OFF
+SIGMA_TIME, SIGMA_PLACE = "sigma_time2_s", "sigma_position2_m"
 COLUMNS = (*PLACE, TIME, SIGMA_TIME, SIGMA_PLACE)
 ADVICE = "Give time2_s, and x2_m, y2_m, z2_m where the block leaves the ground elsewhere"
 

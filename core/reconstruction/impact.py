@@ -32,6 +32,8 @@ undefined, as at the first and the last impact, there are no coefficients, and n
 DeviationForm = Literal["signed", "as_printed"]
 RUN = ("run", "source", "simulated_with", "seed")
 """Further columns of a table with simulated blocks: the run, its model, in a database simulated_with, and its seed."""
+TAKE_OFF = ("x2_m", "y2_m", "z2_m", "time2_s")
+"""Further columns of impacts whose contact is no point: where and when the block leaves the ground [m, s]."""
 
 CACHED_ROWS = 4096
 """Rows whose intermediate results stay in the processor's cache."""

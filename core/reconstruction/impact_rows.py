@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array, Indices, Mask, dot
+from ..vectors import Array, Indices, Mask, Names, dot
 from .block import per_pick
-from .impact import DeviationForm, Impacts, apparent, make_impacts
+from .impact import TAKE_OFF, DeviationForm, Impacts, apparent, make_impacts
 from .intervals import ImpactErrors, impact_intervals, impact_sigmas
 from .motion import Motion
 from .picks import Picks
@@ -84,8 +84,21 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
         chord_height_m=_value(clearance.above_chord_m, restituted, np.nan),
         sigma=sigma,
         intervals=intervals,
+        extra=_take_offs(picks, own, leaving),
         shift=picks.shift,
     )
+
+
+def _take_offs(picks: Picks, own: Indices, leaving: Indices) -> dict[str, Names]:
+    """The columns `TAKE_OFF` in survey coordinates, empty where the contact is a point; none where each is one."""
+    elsewhere = leaving != own
+    if not elsewhere.any():
+        return {}
+    columns = (*picks.shift.to_survey(picks.position[leaving]).T, picks.time_s[leaving])
+    return {
+        name: np.array([repr(value) if off else "" for value, off in zip(values.tolist(), elsewhere, strict=True)])
+        for name, values in zip(TAKE_OFF, columns, strict=True)
+    }
 
 
 def _value[T: (Array, Indices, Mask)](values: T, which: Indices, otherwise: float) -> T:

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Impacts whose contact is no point: where and when the block lands, and where and when it takes off."""
 
+import csv
+
 import numpy as np
 import pytest
 from rockfall.core.analysis.motion_graphs import SPEED, motion_courses
 from rockfall.core.camera.model import look_at, project
 from rockfall.core.camera.path import fixed
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.tables import read_picks, write_picks
+from rockfall.core.exchange.tables import read_impacts, read_picks, write_impacts, write_picks
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
@@ -141,6 +143,21 @@ def test_both_forms_of_the_table_are_the_same_picks(tmp_path):
         np.testing.assert_allclose(picks.time_s, time, atol=1e-9)
     assert beside.extra["note"].tolist() == ["from above", "", "", "", "", ""]
     assert "x2_m" not in (tmp_path / "rows.csv").read_text()
+
+
+def test_the_table_of_impacts_says_where_and_when_blocks_take_off(tmp_path):
+    place, time, kind, _, _ = fall()
+    write_impacts(reconstruct(picks_of(place, time, kind), surface=SURFACE).impacts, tmp_path / "impacts.csv")
+    with (tmp_path / "impacts.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row, i in zip(rows[:2], (2, 4), strict=True):
+        assert [float(row[name]) for name in ("x2_m", "y2_m", "z2_m", "time2_s")] == [*place[i], time[i]]
+    assert (rows[2]["x2_m"], rows[2]["time2_s"]) == ("", "")
+    again = read_impacts(tmp_path / "impacts.csv")
+    assert again.extra["time2_s"].tolist() == [row["time2_s"] for row in rows]
+    points = np.isin(kind, ("release", "impact"))
+    at_once = picks_of(place[points], time[points], np.array(kind)[points])
+    assert "x2_m" not in reconstruct(at_once, surface=SURFACE).impacts.extra
 
 
 @pytest.mark.parametrize(

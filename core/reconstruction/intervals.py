@@ -19,6 +19,8 @@ INTERVALS = (*JUDGED, *OF_CONTACT)
 COVERAGE = 0.95
 DRAWS_LOG2 = 9
 """Draws of an interval: 2 to this power."""
+SIGMA_ROWS = 256
+"""Impacts whose deviations are computed at a time: their points stay in the processor's cache."""
 ROWS = 64
 """Impacts that are drawn at a time: their draws stay in the processor's cache."""
 MOST_DIGITS = 3
@@ -83,20 +85,12 @@ def impact_sigmas(
     that of the block's scale, without the roughness below it; it goes with the place, and is tilted by tilt/√2 about
     each of two axes at right angles to it, independent of everything else.
     """
-    reach = np.sqrt(3.0) * errors.roots()
-    slant = np.sqrt(1.5) * np.nan_to_num(errors.tilt)[:, None]
     here = _scalars(v1, v2, normal, mass)
-    squares = np.zeros_like(here)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        for sign in (-1.0, 1.0):
-            for axis in range(ERRORS):
-                away = sign * reach[:, :, axis]
-                leaning = _leaning(normal, errors.by_place, away[:, 6:])
-                there = _scalars(v1 + away[:, :3], v2 + away[:, 3:6], leaning, mass)
-                squares += np.nan_to_num(there - here) ** 2 / 6
-            for direction in perpendicular(normal):
-                there = _scalars(v1, v2, unit(normal + sign * slant * direction), mass)
-                squares += np.nan_to_num(there - here) ** 2 / 6
+    roots, squares = errors.roots(), np.empty_like(here)
+    for start in range(0, len(v1), SIGMA_ROWS):
+        some = slice(start, start + SIGMA_ROWS)
+        columns = _beside(v1[some], v2[some], normal[some], mass[some], roots[some], errors, some)
+        squares[some] = np.sum(np.nan_to_num(columns - here[some, None]) ** 2, axis=1) / 6
     known1, known2 = errors.known()
     result = {}
     for i, name in enumerate((*SCALARS, "kinetic1_j", "kinetic2_j")):
@@ -118,9 +112,18 @@ def _scalars(v1: Array, v2: Array, normal: Array, mass: Array) -> Array:
     return np.stack([getattr(found, name) for name in SCALARS] + energies, axis=1)
 
 
-def _leaning(normal: Array, by_place: Array, away: Array) -> Array:
-    """(..., 3) the normal beside its place."""
-    return unit(normal + (by_place @ away[..., None])[..., 0])
+def _beside(v1: Array, v2: Array, normal: Array, mass: Array, roots: Array, errors: ImpactErrors, rows: slice) -> Array:
+    """(k, 22, 11) the scalar columns at the pairs of points, of some rows."""
+    axes = np.sqrt(3.0) * np.swapaxes(roots, 1, 2)
+    away = np.concatenate([axes, -axes], axis=1)  # (k, 18, 9)
+    slant = np.sqrt(1.5) * np.nan_to_num(errors.tilt[rows])[:, None, None] * np.stack(perpendicular(normal), axis=1)
+    leaning = np.concatenate([away[:, :, 6:] @ np.swapaxes(errors.by_place[rows], 1, 2), slant, -slant], axis=1)
+    away = np.pad(away, ((0, 0), (0, 4), (0, 0)))
+    into, out, ground = v1[:, None] + away[:, :, :3], v2[:, None] + away[:, :, 3:6], unit(normal[:, None] + leaning)
+    count = leaning.shape[1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        flat = _scalars(into.reshape(-1, 3), out.reshape(-1, 3), ground.reshape(-1, 3), np.repeat(mass, count))
+    return flat.reshape(len(v1), count, -1)
 
 
 def impact_intervals(

@@ -200,9 +200,10 @@ def _by_place(surface: "Surface", points: Array, normal: Array, radius_m: float,
     if not len(points):
         return change
     step = np.maximum(sigma_m, LEAST_STEP * radius_m)[:, None]
-    for direction in perpendicular(normal):
-        beside, facing = np.concatenate([points + step * direction, points - step * direction]), np.tile(normal, (2, 1))
-        there, back = np.split(normals_beside(surface, beside, radius_m, facing), 2)
+    directions = perpendicular(normal)
+    beside = np.concatenate([points + sign * step * direction for direction in directions for sign in (1, -1)])
+    found = np.split(normals_beside(surface, beside, radius_m, np.tile(normal, (4, 1))), 4)
+    for direction, there, back in zip(directions, found[::2], found[1::2], strict=True):
         slope = np.nan_to_num((there - back) / (2 * step))
         change += slope[:, :, None] * direction[:, None, :]
     return change

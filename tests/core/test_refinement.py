@@ -181,6 +181,8 @@ def test_a_clock_is_found_from_far_off():
     held = run([views[0], replace(views[1], clock=Clock(1.35))], pixels)
     (late,) = [remark for remark in held.remarks if "fit the clocks" in remark.text]
     assert (late.severity, late.about) == ("advice", "clock from -20°")
+    unset = run([views[0], replace(views[1], clock=Clock(1.3 + 0.41))], pixels).remarks[0]
+    assert (unset.severity, unset.about) == ("warning", "clock from -20°"), "no impact is missing"
     assert float(late.text.split("about ")[1].split(" ms")[0]) == pytest.approx(-50, abs=10)
 
 

@@ -23,6 +23,8 @@ PULLED = 3.0
 HELD = 0.7
 """A time whose standard deviation stays above this part of the marked one rests on the mark for the most part."""
 CLOCK_SIGNIFICANCE = 6.0
+NOT_SYNCHRONISED_S = 0.1
+"""A clock that is off by more has not been set by events, however these were marked."""
 MANY = 0.1
 """Outliers above this part of the pixels are more than slips of a tracker."""
 IN_A_ROW = 5
@@ -41,7 +43,9 @@ def remarks_on(
     fits: Sequence[Fit],
 ) -> tuple[Remark, ...]:
     """Remarks on solved problems, what does not fit first; residual (m, 2) is NaN for pixels that were not used."""
-    remarks = [*_outliers(views, observations, residual, outlier), *on_assumptions(ground, views, fits)]
+    late = [remark for fit in fits for remark in _late_views(fit)]
+    remarks = [remark for remark in late if remark.severity == "warning"]  # which is what the pixels then do not fit by
+    remarks += [*_outliers(views, observations, residual, outlier), *on_assumptions(ground, views, fits)]
     seen = set(observations.trajectory.tolist())
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
         if name not in seen:
@@ -67,9 +71,8 @@ def remarks_on(
             *_open_ends(fit),
             *_off_centre(fit),
             *_grazing(fit),
-            *_late_views(fit),
         ]
-    return tuple(remarks)
+    return (*remarks, *(remark for remark in late if remark.severity != "warning"))
 
 
 def _outliers(
@@ -240,8 +243,12 @@ def _late_views(fit: Fit) -> Iterator[Remark]:
         late = -float(covariance[-1] @ gradient)
         if abs(late) > CLOCK_SIGNIFICANCE * fit.scale * float(np.sqrt(covariance[-1, -1])):
             name = problem.views[i].name
-            text = f"the clock of view {name} seems to be off by about {1e3 * late:+.0f} ms: fit the clocks too."
-            yield Remark(f"{_who(fit.setup)}: {text}", "advice", f"clock {name}")
+            text = f"{_who(fit.setup)}: the clock of view {name} seems to be off by about {1e3 * late:+.0f} ms: "
+            if abs(late) > NOT_SYNCHRONISED_S:
+                text += "synchronise it by the same event in each view, and refine again."
+                yield Remark(text, "warning", f"clock {name}")
+            else:
+                yield Remark(f"{text}fit the clocks too.", "advice", f"clock {name}")
 
 
 def _who(setup: Setup) -> str:

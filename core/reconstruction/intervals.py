@@ -218,7 +218,7 @@ def undetermined(name: str, interval: Array) -> Mask:
 
 
 def in_words(name: str, value: float, low: float, high: float, digits: int) -> str:
-    """A number with its interval, "undetermined" where that leaves nothing out; empty where it is not defined.
+    """A number with its interval, "undetermined" alone where that leaves nothing out; empty where it is not defined.
 
     Parameters
     ----------
@@ -231,8 +231,9 @@ def in_words(name: str, value: float, low: float, high: float, digits: int) -> s
     if not np.isfinite(low):
         return f"{scale * value:.{digits}f}{unit}"
     if undetermined(name, np.array([[low, high]]))[0]:
-        return f"{scale * value:.{digits}f}{unit} (undetermined)"
+        return "undetermined"
     while scale * (high - low) < 2 * 10.0**-digits and digits < MOST_DIGITS:
         digits += 1
-    ends = f"{scale * low:.{digits}f} " + ("or more" if np.isinf(high) else f"to {scale * high:.{digits}f}")
+    least = f"{scale * low:.{digits}f}"
+    ends = f"from {least}" if np.isinf(high) else f"{least} to {scale * high:.{digits}f}"
     return f"{scale * value:.{digits}f}{unit} ({ends})"

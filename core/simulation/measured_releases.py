@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..reconstruction.block import Block
-from ..reconstruction.impact import Impacts
+from ..reconstruction.impact import TAKE_OFF, Impacts
 from ..reconstruction.placement import FAR_IN_THE_AIR_M, FAR_M
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
@@ -63,13 +63,14 @@ def from_impacts(
 
     Raises
     ------
-    InputError : no impact can be used; without `blocks`, an impact without diameter or mass; one far from the terrain.
+    InputError : no impact can be used; without `blocks`, an impact without diameter or mass; one far from the terrain;
+        a take-off whose place is no number.
 
     Notes
     -----
     ω2 is known where the spin at the next impact of the same trajectory was measured, since free flight keeps it. The
     block touches the terrain at the point that is nearest to the measured one. Releases have the names of trajectory
-    and impact.
+    and impact. Where the table says that a block takes off elsewhere, it starts there.
     """
     known = _known(impacts.position) & _known(impacts.v2) & ~impacts.flags["into_ground"]
     rows = np.flatnonzero(known)
@@ -82,7 +83,7 @@ def from_impacts(
     name = np.array(
         [f"{trajectory} {impact}" for trajectory, impact in zip(impacts.trajectory, impacts.impact, strict=True)]
     )
-    position = ground.shift.to_local(impacts.shift.to_survey(impacts.position[rows]))
+    position = ground.shift.to_local(_take_off_places(impacts)[rows])
     start = _Start(name[rows], position, impacts.v2[rows], _spin_after(impacts)[rows], np.full(rows.size, FAR_M))
     sizes = None
     if blocks is None:
@@ -181,6 +182,22 @@ def start_times(reconstruction: Reconstruction) -> dict[str, float]:
         trajectory: float(time_s[release if release >= 0 else leaving[impact]])
         for trajectory, release, impact in _beginnings(reconstruction)
     }
+
+
+def _take_off_places(impacts: Impacts) -> Array:
+    """(n, 3) where blocks leave the ground, survey coordinates [m]: at the impact, but for those with a take-off."""
+    landing = impacts.shift.to_survey(impacts.position)
+    names = TAKE_OFF[:3]
+    if not all(name in impacts.extra for name in names):
+        return landing
+    try:
+        columns = [[float(cell or "nan") for cell in impacts.extra[name].tolist()] for name in names]
+    except ValueError as error:
+        raise InputError(
+            f"The place of a take-off is no number: {error}", advice=f"Correct {', '.join(names)}"
+        ) from None
+    place = np.array(columns).T
+    return np.where(np.isfinite(place).all(axis=1)[:, None], place, landing)
 
 
 def _leaving(reconstruction: Reconstruction) -> Indices:

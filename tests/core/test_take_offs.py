@@ -2,6 +2,7 @@
 """Impacts whose contact is no point: where and when the block lands, and where and when it takes off."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from rockfall.core.reconstruction.refinement.refine import PixelObservations, Vi
 from rockfall.core.reconstruction.track_residuals import track_residuals
 from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.simulation.ground import make_ground
-from rockfall.core.simulation.measured_releases import from_reconstruction, start_times
+from rockfall.core.simulation.measured_releases import from_impacts, from_reconstruction, start_times
 from rockfall.core.terrain.surface import Surface
 from scipy.interpolate import CubicHermiteSpline
 
@@ -91,6 +92,11 @@ def test_blocks_that_are_released_as_measured_start_at_the_take_off():
     np.testing.assert_allclose(releases.position[0], place[2] + radius * OUT, atol=1e-6)
     np.testing.assert_allclose(releases.velocity[0], restituted[0], rtol=1e-9)
     assert start_times(made) == {"a": time[2]}
+    after = from_impacts(make_ground(SURFACE), made.impacts)
+    np.testing.assert_allclose(after.position, place[[2, 4]] + after.radius_m[:, None] * OUT, atol=1e-6)
+    wrong = replace(made.impacts, extra={**made.impacts.extra, "x2_m": np.array(["far"] * 3)})
+    with pytest.raises(InputError, match="The place of a take-off is no number"):
+        from_impacts(make_ground(SURFACE), wrong)
 
 
 def test_graphs_over_time_know_when_a_block_leaves_an_impact():

@@ -30,7 +30,7 @@ type Reading = Callable[[Array, Array, tuple[int, int]], tuple[Array, Array]]
 READINGS: tuple[tuple[str, str, Reading], ...] = (
     (
         "v_px counted from the bottom",
-        "Count v_px from the top row; are z_m heights, not depths?",
+        "Count v_px from the top row, or give z_m as heights, not depths",
         lambda pixel, point, size: (_columns(pixel[:, 0], size[1] - pixel[:, 1]), point),
     ),
     (

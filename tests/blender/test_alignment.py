@@ -457,3 +457,23 @@ def _true_rotations() -> np.ndarray:
     columns = [names.index(f"r{i}{j}") for i in (1, 2, 3) for j in (1, 2, 3)]
     rows = [[float(line.split(",")[c]) for c in columns] for line in lines[1:]]
     return np.array(rows).reshape(-1, 3, 3)
+
+
+def test_pairs_that_were_read_wrongly_are_told_what_they_are(part, scene, aligned, camera, tmp_path) -> None:
+    """Of a table with u and v exchanged nothing is taken; one that counts v from below solves no camera."""
+    head, *rows = PAIRS.read_text(encoding="utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    path = tmp_path / "pairs.csv"
+    path.write_text("\n".join([head, *(",".join([v, u, *rest]) for u, v, *rest in cells)]), encoding="utf-8")
+    with pytest.raises(RuntimeError, match="With u and v exchanged all pairs lie inside"):
+        bpy.ops.rockfall.import_pairs(filepath=str(path))
+    upside_down = [",".join([u, str(720 - float(v)), *rest]) for u, v, *rest in cells]
+    path.write_text("\n".join([head, *upside_down]), encoding="utf-8")
+    bpy.ops.rockfall.import_pairs(filepath=str(path))
+    problem = aligned.solution_of(camera).problem
+    assert problem
+    assert "from the bottom" in problem
+    corners = "".join(f"v {x} {y} 1500\n" for x, y in ((988000, 6375000), (989000, 6375000), (988000, 6376000)))
+    (tmp_path / "plane.obj").write_text(f"{corners}f 1 2 3\n", encoding="utf-8")
+    bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "plane.obj"))
+    assert part("rockfall_addon.scene.next_step").next_step(scene).sentence == problem

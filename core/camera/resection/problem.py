@@ -18,6 +18,7 @@ FREE_LENS = ("f", "fx", "fy", "c", "cx", "cy", "k1", "k2", "k3", "p1", "p2")
 POSE_PAIRS = 4
 """Give the pose of a camera whose lens is known."""
 
+OUTSIDE = "Check the size of the image, and that v counts down from its top"
 EXCHANGED = (
     "With u and v exchanged all pairs lie inside: exchange them (u counts to the right, v down), or check whether "
     "the image is turned"
@@ -87,17 +88,21 @@ def checked_pairs(
     outside = _outside(image, width, height)
     for i in np.flatnonzero(outside):
         u, v = image[i]
-        exchanged = not _outside(image[:, ::-1], width, height).any()
         raise refuse(
             i,
             f"the pixel ({u:g}, {v:g}) lies outside the image of {width} × {height} px",
-            EXCHANGED if exchanged else "Check the size of the image, and that v counts down from its top",
+            EXCHANGED if are_exchanged(image, width, height) else OUTSIDE,
         )
     for values, least, what in ((image, 1e-6, "pixel"), (world, 1e-9, "point")):
         gap = np.abs(values[:, None] - values[None]).max(axis=2)
         for i, j in np.argwhere(np.triu(gap < least, 1)):
             raise refuse(j, f"the same {what} as pair {named[i]}", "Leave one of the two out")
     return Problem(image, world, spread_px, spread_m, np.zeros((9, 0))), named
+
+
+def are_exchanged(image: Array, width: int, height: int) -> bool:
+    """Whether pixels (n, 2) of which some are outside of the image all lie inside with u and v exchanged."""
+    return not _outside(image[:, ::-1], width, height).any()
 
 
 def _outside(image: Array, width: int, height: int) -> Mask:

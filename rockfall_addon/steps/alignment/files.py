@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 
 from ....core.camera.pairs import pair_residuals
+from ....core.camera.resection.problem import EXCHANGED, are_exchanged
 from ....core.errors import InputError
 from ....core.exchange.cameras import read_camera, read_pairs, write_camera, write_pair_residuals
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
@@ -16,6 +17,7 @@ from ....core.workflow.uprightness import turned_pairs
 from ...scene import alignment, camera_paths, clocks, georeference, pairs, store, terrain, videos
 from . import solving
 
+OTHER_VIDEO = "Choose the table of this video, in pixels of this size"
 RESIDUALS = "pairs_residuals.csv"
 """Beside a camera: what is left of its pairs."""
 
@@ -37,7 +39,7 @@ def import_pairs(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | P
             raise table.error(
                 i,
                 f"The pixel ({pixel[0]:g}, {pixel[1]:g}) is outside of the video's {width} × {height} px",
-                "Is the table of another video, or of another size of it?",
+                EXCHANGED if are_exchanged(table.pixel, width, height) else OTHER_VIDEO,
             )
         if table.frame[i] >= frames:
             raise table.error(i, f"There is no frame {table.frame[i]}", f"The video has the frames 0 to {frames - 1}")

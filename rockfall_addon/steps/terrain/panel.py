@@ -55,6 +55,8 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
         column.prop(scene.rockfall_terrain, "accuracy_m")
+        if not scene.rockfall_terrain.accuracy_m:
+            column.label(text="0: half the spacing of the points.")
         shift = georeference.read_shift(scene)
         rows = [(f"Shift {axis.upper()}", f"{getattr(shift, axis):.2f} m") for axis in "xyz"]
         facts(layout, [*rows, ("System", shift.crs or "unknown")])

@@ -26,7 +26,7 @@ SECTIONS = (
         "A table tennis ball in two cameras",
         "45 throws. Known: the table's height, the ball's radius, gravity. What one camera tells is compared with the "
         "other one, which it has not seen. Drag and lift of a light ball that spins are the largest of what is not "
-        "modelled: g comes out 1.5 to 2.7 % low, beyond its own deviation.",
+        "modelled: g comes out 1.5 to 2.7 % low, one to two of its deviations.",
     ),
     (
         "chant_sura",

@@ -131,6 +131,18 @@ def test_what_spin_would_change_is_what_it_hides_where_blocks_spin():
     assert (said.speed_percent, said.most_speed_percent) == pytest.approx((np.nanmedian(hidden), most), abs=0.1 * most)
 
 
+def test_drag_that_matters_is_advised():
+    light = replace(BLOCK, density=100.0)
+    seen, _ = pixels(TWO)
+
+    def said(block, drag=None):
+        return [one for one in refined(TWO, seen, block=block, drag=drag).remarks if one.about == "drag"]
+
+    (advice,) = said(light)
+    assert "Air drag is left out" in advice.text
+    assert said(replace(BLOCK, density=20000.0)) == said(light, Drag()) == []
+
+
 def test_drag_that_is_on_is_taken_off_and_drag_that_is_fitted_is_no_question():
     seen, _ = pixels(ONE)
     assert "Without air drag" in {row.change for row in refined(ONE, seen, drag=Drag()).what_if}

@@ -75,6 +75,17 @@ def remarks_on(
     return (*remarks, *(remark for remark in late if remark.severity != "warning"))
 
 
+def _joined(spans: Sequence[Array]) -> list[tuple[float, float]]:
+    """Spans of time in their order, those that overlap as one."""
+    joined: list[tuple[float, float]] = []
+    for first, last in sorted((float(span[0]), float(span[1])) for span in spans):
+        if joined and first <= joined[-1][1]:
+            joined[-1] = (joined[-1][0], max(joined[-1][1], last))
+        else:
+            joined.append((first, last))
+    return joined
+
+
 def _outliers(
     views: Sequence[View], observations: PixelObservations, residual: Array, outlier: Mask
 ) -> Iterator[Remark]:
@@ -95,7 +106,7 @@ def _outliers(
             continue
         text = f"{count} of the {int(own.sum())} pixels of trajectory {name} do not fit its motion"
         if runs:
-            times = [f"{first:.2f} to {last:.2f} s" for first, last in sorted(map(tuple, runs))[:MOST_TIMES]]
+            times = [f"{first:.2f} to {last:.2f} s" for first, last in _joined(runs)[:MOST_TIMES]]
             text += f", all of those from {' and '.join(times)}: is an impact missing there? Pick it and refine again."
         else:
             text += ": look at the track and at the picks."

@@ -25,7 +25,7 @@ from .ground_errors import terrain_tilt
 from .problem import NODE, evaluate
 from .setup import Ground
 from .views import PixelObservations, View
-from .what_if import WhatIf, what_if
+from .what_if import WhatIf, on_drag, what_if
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +111,7 @@ def summarise(
             target[fit.setup.rows[used]] = (found.pixels.residual * problem.sigma_px[:, None])[used]
         outlier[fit.setup.rows] = fit.solution.outlier
     good = ~outlier
+    what = what_if(fits, made.impacts, ground.sigma_terrain_m)
     by_view = [_rms(residual[good & (observations.view == i)]) for i in range(len(views))]
     return Refinement(
         picks=picks,
@@ -124,10 +125,10 @@ def summarise(
         noise_scale=max(fit.scale * fit.setup.noise for fit in fits),
         aim={key: value for fit in fits for key, value in _aim(views, fit).items()},
         unknowns=_unknowns(views, fits[0]),
-        what_if=what_if(fits, made.impacts, ground.sigma_terrain_m),
+        what_if=what,
         iterations=max(fit.solution.iterations for fit in fits),
         converged=all(fit.solution.settled for fit in fits),
-        remarks=remarks_on(ground, views, observations, residual, outlier, fits),
+        remarks=(*remarks_on(ground, views, observations, residual, outlier, fits), *on_drag(what)),
     )
 
 

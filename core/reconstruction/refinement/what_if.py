@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...least_squares import damped_step
+from ...remarks import Remark
 from ...vectors import Array, Indices, cross, dot, norm, unit
 from ..drag import Drag
 from ..impact import Impacts
@@ -22,6 +23,9 @@ LIFT = 0.35
 """Coefficient of lift of a ball whose surface turns about as fast as it flies, as one that rolls (Nathan 2008)."""
 STATED = "stated deviation"
 """What the rows are about that hold the standard deviations of the impacts, to compare the others with."""
+WITH_DRAG = "With air drag"
+MATTERS = 0.5
+"""What changes speeds by this part of their deviation makes 95 % intervals hold in 92 % of the cases, and is said."""
 STEPS = 2
 """Of Gauss and Newton from the fit: the first is what its derivatives tell, the second what is not linear."""
 
@@ -119,6 +123,26 @@ def gravest(rows: Sequence[WhatIf]) -> list[WhatIf]:
     return found
 
 
+def on_drag(rows: Sequence[WhatIf]) -> Iterator[Remark]:
+    """Advice where air drag was left out and would matter beside the stated deviations."""
+    found = {row.about: row for row in gravest(rows)}
+    drag, stated = found.get("drag"), found.get(STATED)
+    if drag is None or stated is None or drag.change != WITH_DRAG:
+        return
+    pairs = (
+        (drag.speed_percent, stated.speed_percent),
+        (drag.most_speed_percent, stated.most_speed_percent),
+        (drag.r, stated.r),
+    )
+    if any(abs(change) > MATTERS * deviation for change, deviation in pairs):
+        text = (
+            f"Air drag is left out: with it speeds would change by {drag.cells[2]} at most and R by {drag.cells[3]} "
+            f"(median), where their deviations are {stated.cells[2]} and {stated.cells[3]}. Switch it on where "
+            "the block is known."
+        )
+        yield Remark(text, "advice", "drag")
+
+
 def _stated(impacts: Impacts, name: str) -> WhatIf:
     """The deviations of the speeds, from those of the energies ½mv², and of R."""
     own, none = impacts.trajectory == name, np.full(len(impacts), np.nan)
@@ -201,7 +225,7 @@ def _changes(fit: Fit, sigma_terrain_m: float) -> Iterator[_Change]:
     if problem.columns.law[0] < 0:
         with_drag = state.coefficient > 0
         other = replace(state, coefficient=0.0 if with_drag else Drag().coefficient)
-        yield _Change("drag", "Without air drag" if with_drag else "With air drag", problem, other)
+        yield _Change("drag", "Without air drag" if with_drag else WITH_DRAG, problem, other)
     yield _spinning(problem, fit.solution)
 
 

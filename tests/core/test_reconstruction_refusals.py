@@ -60,7 +60,7 @@ def test_the_radius_of_normals_is_positive(value: float) -> None:
 
 NOT_FINITE = "The time or the position is not a finite number. Give time_s, x_m, y_m and z_m."
 NO_DEVIATION = "is not a standard deviation. Give a number of zero or more, or nothing."
-KINDS = "Use one of impact, release, pass, contact, stop."
+KINDS = "Use one of impact, release, pass, contact, stop, takeoff."
 
 
 @pytest.mark.parametrize(

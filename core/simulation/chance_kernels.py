@@ -16,9 +16,9 @@ HALF = np.uint64(32)
 TOP, BOTTOM = np.uint64(5), np.uint64(6)
 SCALE = 1.0 / 9007199254740992.0
 
-BLOCK, ATTITUDE, PLACE = 0xFFFF0000, 0xFFFF0001, 0xFFFF1000
+BLOCK, ATTITUDE, PARAMETERS, PLACE = 0xFFFF0000, 0xFFFF0001, 0xFFFF0002, 0xFFFF1000
 """In place of the number of an impact, which never reaches them: chance of a run before it begins. Of its block, of its
-attitude, and of its place at the first, second, … attempt."""
+attitude, of its parameters where these are drawn, and of its place at the first, second, … attempt."""
 
 
 @borrowing

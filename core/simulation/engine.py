@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
+from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
 from ..memory import available_bytes
@@ -24,6 +25,7 @@ from ..terrain.ordering import along_curve
 from ..vectors import Array, Indices, Mask
 from .ground import Ground
 from .memory import check_records
+from .parameter_draws import FRICTION_NAME, ParameterDraws, check_draws
 from .release import Releases
 from .structures import held_by
 
@@ -62,6 +64,7 @@ class Settings:
     zones : zone → parameters of its own there.
     rolling : how a block moves on the ground: Azzoni et al. 1995, Coulomb's sliding, or none, which stops it there.
     friction : coefficient μ of either; `zone_friction` where a zone has its own.
+    draws : sets of which each run has one, in place of `parameters` and `friction`; what a zone has of its own stays.
     drag : in flight and on the ground; None for none.
     seed : of all random numbers.
     most_impacts, most_s : a run that is longer ends with "limit".
@@ -74,6 +77,7 @@ class Settings:
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     zone_friction: Mapping[str, float] = field(default_factory=dict)
+    draws: ParameterDraws | None = None
     gravity_mps2: float = GRAVITY_MPS2
     drag: Drag | None = None
     seed: int = 0
@@ -229,14 +233,15 @@ def simulate(
         releases.inertia, releases.principal_kgm2, releases.drag_per_m(settings.drag),
     )  # fmt: skip
     blocks = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
+    own = _own_rows(settings, len(ground.zones), first_run, n)
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
     def batch(part: NDArray[np.int64]) -> tuple[int, int]:
         ended = np.empty((part.size, 5))
         rows = run_blocks(
-            tree, facets, zone, model.compiled, numbers, friction, model.draws, first_run + part, settings.seed,
-            *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts, settings.most_s,
-            level, ended,
+            tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, first_run + part,
+            settings.seed, *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts,
+            settings.most_s, level, ended,
         )  # fmt: skip
         results[part] = ended
         count[part] = np.diff(np.flatnonzero(rows[:, 1] == RELEASED), append=len(rows))
@@ -291,7 +296,7 @@ def joined(parts: Sequence[Simulation], releases: Releases) -> Simulation:
 
 
 def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
-    """(z, k) the model's numbers in each zone, and (z,) the friction.
+    """(s·z, k) the model's numbers in each of z zones, and (s·z,) the friction, for each of s sets of drawn parameters.
 
     Raises
     ------
@@ -317,7 +322,33 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     friction = np.array([settings.zone_friction.get(name, settings.friction) for name in ground.zones])
     if not (np.isfinite(friction) & (friction >= 0)).all():
         raise InputError(f"The friction is {friction.min()}", advice="Give a number of zero or more")
-    return np.array(rows), friction
+    if settings.draws is None:
+        return np.array(rows), friction
+    return _drawn(settings, model, settings.draws, list(ground.zones), np.array(rows), friction)
+
+
+def _drawn(
+    settings: Settings, model: ImpactModel, draws: ParameterDraws, zones: list[str], rows: Array, friction: Array
+) -> tuple[Array, Array]:
+    """The rows of all sets: those of the zones, with what is drawn where a zone has none of its own."""
+    check_draws(draws, model)
+    all_rows, all_friction = np.tile(rows, (len(draws), 1, 1)), np.tile(friction, (len(draws), 1))
+    place = {spec.name: i for i, spec in enumerate(model.parameters)}
+    for name, column in zip(draws.names, draws.values.T, strict=True):
+        for z, zone in enumerate(zones):
+            if name == FRICTION_NAME:
+                if zone not in settings.zone_friction:
+                    all_friction[:, z] = column
+            elif name not in settings.zones.get(zone, {}):
+                all_rows[:, z, place[name]] = column
+    return all_rows.reshape(-1, rows.shape[1]), all_friction.ravel()
+
+
+def _own_rows(settings: Settings, zones: int, first: int, number: int) -> NDArray[np.intp]:
+    """(number,) where the rows of each run begin among those of `check_settings`."""
+    if settings.draws is None:
+        return np.zeros(number, dtype=np.intp)
+    return settings.draws.set_of(settings.seed, first, number) * zones
 
 
 @cache
@@ -334,8 +365,8 @@ def _compiled_for(tree_type: Any, facets_type: Any) -> Any:
     run_blocks.disable_compile(False)
     run_blocks.compile(
         numba_types.Array(types.float64, 2, "C")(
-            tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, whole, types.int64[::1], whole,
-            *block, number, whole, whole, number, whole, lines,
+            tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, types.intp[::1], whole,
+            types.int64[::1], whole, *block, number, whole, whole, number, whole, lines,
         )
     )  # fmt: skip
     run_blocks.disable_compile()

@@ -270,14 +270,16 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
 
 @kernel
 def run_block(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, close, rows, count,
+    tree, facets, zone, rebound, parameters, friction, own, draws, stack, times, nearby, close, rows, count,
     run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record,
 ):  # fmt: skip
     """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
 
     Parameters
     ----------
-    zone : (m,) of each triangle in the order of the leaves: its row in `parameters` (z, k) and `friction` (z,).
+    zone : (m,) of each triangle in the order of the leaves.
+    parameters, friction : (s·z, k), (s·z,) of each zone, in one set after the other.
+    own : the row of the first zone in this run's set.
     rebound : a model's compiled function.
     draws : (d,) work space for the uniform numbers of one impact.
     inertia : c of c m r², for rolling. moments : three, of inertia, for flight. drag : ½ρC_D A/m [1/m].
@@ -353,7 +355,7 @@ def run_block(  # type: ignore[no-untyped-def]
             v1, w1 = v, w
             v_max = max(v_max, sqrt(_dot(v, v)))
             if _dot(v, n) < 0.0 and at_once < MOST_AT_ONCE:
-                z = zone[place]
+                z = own + zone[place]
                 fill_uniform(seed, run, impacts, draws)
                 v, w = rebound(v1, n, w1, radius, mass, parameters[z], draws)
                 impacts += 1
@@ -372,7 +374,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 v = _along(v, n)  # a model that sends a block into the ground, or an overhang: it slides off
             continue
 
-        mu = friction[zone[place]]
+        mu = friction[own + zone[place]]
         dt = shortest
         if speed > 0.0:
             dt = min(dt, STEP * radius / speed)
@@ -450,7 +452,7 @@ def run_block(  # type: ignore[no-untyped-def]
             if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(against, n) < SHARP:
                 fill_uniform(seed, run, impacts, draws)
                 v1, w1 = v, w
-                v, w = rebound(v1, against, w1, radius, mass, parameters[zone[other]], draws)
+                v, w = rebound(v1, against, w1, radius, mass, parameters[own + zone[other]], draws)
                 impacts += 1
                 if record >= IMPACTS:
                     _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
@@ -511,10 +513,12 @@ def run_block(  # type: ignore[no-untyped-def]
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, draw_count, runs, seed, place, velocity, spin, radius, mass,
+    tree, facets, zone, rebound, parameters, friction, own, draw_count, runs, seed, place, velocity, spin, radius, mass,
     inertia, moments, drag, gravity, law, most_impacts, most_s, record, results,
 ):  # fmt: skip
-    """Simulate n blocks; fills `results` (n, 5): end, time, impacts, length, v_max; returns the records."""
+    """Simulate n blocks, `own` (n,) their sets; fills `results` (n, 5): end, time, impacts, length, v_max; returns the
+    records.
+    """
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
@@ -522,7 +526,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
     rows, count = np.empty((64 * len(runs), COLUMNS)), np.int64(0)
     for i in range(len(runs)):
         rows, count, end, time, impacts, length, v_max = run_block(
-            tree, facets, zone, rebound, parameters, friction, draws, stack, times, nearby, close, rows, count,
+            tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows, count,
             runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
             (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
             (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],

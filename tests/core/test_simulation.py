@@ -13,6 +13,7 @@ from rockfall.core.simulation.chance_kernels import fill_uniform, philox
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.pairs import make_pairs
+from rockfall.core.simulation.parameter_draws import ParameterDraws, check_draws
 from rockfall.core.simulation.release import make_releases, placed_on
 from rockfall.core.terrain.kernels import STACK_SIZE
 from rockfall.core.terrain.raycast import closest_points
@@ -366,3 +367,64 @@ def test_bad_releases_are_named() -> None:
         make_releases(place[:1], density_kgpm3=0.0)
     with pytest.raises(InputError, match="0 blocks"):
         make_releases(place[:1], number=0)
+
+
+def drawn(**values: list[float]) -> ParameterDraws:
+    table = np.array(list(values.values()), dtype=np.float64).T
+    return ParameterDraws(tuple(values), table, np.arange(1.0, len(table) + 1.0))
+
+
+def test_each_run_has_the_parameters_that_it_drew() -> None:
+    """As if each had been simulated with them alone; which ones, its number and the seed say."""
+    ground, releases = drops(rough(), 120)
+    sets = [{"rn": 0.2, "rt": 0.9}, {"rn": 0.5, "rt": 0.7}, {"rn": 0.35, "rt": 0.8}]
+    mu = [0.3, 0.5, 0.7]
+    draws = drawn(rn=[one["rn"] for one in sets], friction=mu, rt=[one["rt"] for one in sets])
+    settings = Settings("pfeiffer_bowen_1989", draws=draws, seed=5)
+    together = simulate(ground, releases, settings)
+    chosen = draws.set_of(5, 0, 120)
+    assert set(chosen.tolist()) == {0, 1, 2}
+    for place, one in enumerate(sets):
+        alone = simulate(ground, releases, Settings(settings.model, one, friction=mu[place], seed=5))
+        own = chosen == place
+        np.testing.assert_array_equal(together.position[own], alone.position[own])
+        assert (together.position[~own] != alone.position[~own]).any()
+    part = simulate(ground, releases.take(slice(70, 120)), settings, first_run=70, threads=1)
+    np.testing.assert_array_equal(part.position, together.position[70:])
+
+
+def test_parameters_are_drawn_by_their_weights() -> None:
+    draws = ParameterDraws(("rn",), np.array([[0.1], [0.2], [0.3], [0.4]]), np.array([0.0, 1.0, 3.0, 0.0]))
+    counts = np.bincount(draws.set_of(3, 1000, 20_000), minlength=4)
+    assert counts[0] == counts[3] == 0
+    assert counts[2] / 20_000 == pytest.approx(0.75, abs=4 * np.sqrt(0.75 * 0.25 / 20_000))
+    assert draws.mean() == pytest.approx({"rn": 0.275})
+    in_turn = ParameterDraws(draws.names, draws.values, draws.weight, runs_each=3)
+    assert in_turn.set_of(3, 4, 12).tolist() == [1, 1, 2, 2, 2, 3, 3, 3, 0, 0, 0, 1]
+
+
+def test_what_a_zone_has_of_its_own_is_not_drawn() -> None:
+    surface = slope(37.0)
+    west = surface.vertices[surface.faces].mean(axis=1)[:, 0] < 60
+    ground = make_ground(surface, {}, west.astype(np.int32), ("east", "west"))
+    draws = drawn(rn=[0.2, 0.3], friction=[0.4, 0.6])
+    settings = Settings("pfeiffer_bowen_1989", zones={"west": {"rn": 0.7}}, zone_friction={"east": 0.1}, draws=draws)
+    rows, friction = engine.check_settings(ground, settings)
+    rn = [spec.name for spec in MODELS["pfeiffer_bowen_1989"].parameters].index("rn")
+    assert rows[:, rn].tolist() == [0.2, 0.7, 0.3, 0.7]
+    assert friction.tolist() == [0.1, 0.4, 0.1, 0.6]
+
+
+@pytest.mark.parametrize(
+    ("model", "draws", "problem"),
+    [
+        ("pfeiffer_bowen_1989", {"rx": [0.1]}, "has no parameter 'rx'"),
+        ("pfeiffer_bowen_1989", {"rn": [0.1, 1.7]}, "rn is 1.7 among the drawn"),
+        ("pfeiffer_bowen_1989", {"friction": [-0.1]}, "friction is -0.1 among the drawn"),
+        ("azimi_desvarreux_1977", {"definition": [0.0]}, "is a choice"),
+        ("observed", {"friction": [0.1]}, "draws from measured impacts"),
+    ],
+)
+def test_draws_that_cannot_be(model: str, draws: dict, problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        check_draws(drawn(**draws), MODELS[model])

@@ -8,7 +8,7 @@ makes it the pick's state.
 
 import uuid
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import bpy
@@ -45,12 +45,13 @@ UNCHANGED = Change()
 def objects_of(scene: bpy.types.Scene, trajectories: Iterable[str] | None = None) -> list[bpy.types.Object]:
     """The objects of the picks, all or those of some trajectories, in no order."""
     names = (None,) if trajectories is None else set(trajectories)
-    return [
-        obj
-        for name in names
-        for obj in store.of_role(scene, store.PICK_ROLE, name)
-        if store.TRAJECTORY in obj and store.TIME in obj and store.POSITION in obj
-    ]
+    with store.looking(scene):
+        return [
+            obj
+            for name in names
+            for obj in store.of_role(scene, store.PICK_ROLE, name)
+            if store.TRAJECTORY in obj and store.TIME in obj and store.POSITION in obj
+        ]
 
 
 def with_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
@@ -60,11 +61,15 @@ def with_id(scene: bpy.types.Scene, identifier: str) -> bpy.types.Object | None:
 
 def show_picks(
     scene: bpy.types.Scene, picks: Picks, normals: np.ndarray, offsets: dict[str, float], radius_m: float
-) -> list[bpy.types.Object]:
+) -> Generator[tuple[str, int, int], None, list[bpy.types.Object]]:
     """Bring the picks' objects in line; a pick that is there already (by trajectory and time) keeps its object and id.
 
     normals : (n, 3) directions of the discs, NaN rows lie flat.
     offsets : from `timing.offsets_of`.
+
+    Yields
+    ------
+    Its progress: what it does, done, total.
 
     Returns
     -------
@@ -76,6 +81,7 @@ def show_picks(
     folders = store.collections(scene, "Trajectories", dict.fromkeys(picks.trajectory.tolist()))
     numbers, like = Counter[tuple[str, str]](), None
     for i in range(len(picks.time_s)):
+        yield "Showing picks", i, len(picks.time_s)
         trajectory, kind, time = str(picks.trajectory[i]), str(picks.kind[i]), float(picks.time_s[i])
         numbers[trajectory, kind] += 1
         obj = there.pop((trajectory, time), None)

@@ -11,7 +11,6 @@ from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
 from ...core.errors import InputError, RockfallError
 from ...core.exchange.opening import block_of
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
-from ...core.progress import Progress, silent
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
 from ...core.reconstruction.picks import Picks
@@ -137,15 +136,21 @@ def _own_block(name: str, values: list[float]) -> Block:
     return Block(*values)
 
 
-def show(scene: bpy.types.Scene, result: Reconstruction, progress: Progress = silent) -> None:
+def show(scene: bpy.types.Scene, result: Reconstruction) -> None:
     """Bring everything that is shown in line with a reconstruction, the models' twins included.
 
     Raises
     ------
     RockfallError : the twins that were shown cannot be had any more; they are gone, the rest is shown.
     """
+    for _ in show_in_steps(scene, result):
+        pass
+
+
+def show_in_steps(scene: bpy.types.Scene, result: Reconstruction) -> trajectories.Steps:
+    """The same, with pauses; until it goes on nothing may change what is shown."""
     scene[store.SCHEMA] = migration.SCHEMA
-    trajectories.show_reconstruction(scene, result, ground(scene), progress)
+    yield from trajectories.show_reconstruction(scene, result, ground(scene))
     fingerprints.remember_all(scene)
     problems.keep_trajectories(scene, problems.of_result(scene, result))
     problems.update(scene)

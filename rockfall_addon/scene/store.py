@@ -243,6 +243,27 @@ def collections(scene: bpy.types.Scene, folder: str, names: Iterable[str]) -> di
     return {name: there.get(name) or _new_collection(parent, name) for name in names}
 
 
+@contextmanager
+def out_of_view(scene: bpy.types.Scene, name: str) -> Iterator[None]:
+    """Take a collection below "Rockfall" out of the views while many objects come into it: Blender need not follow."""
+    ours, folder = collection(scene), collection(scene, name)
+    layers = [
+        layer
+        for view_layer in scene.view_layers
+        for parent in view_layer.layer_collection.children
+        if parent.collection == ours
+        for layer in parent.children
+        if layer.collection == folder and not layer.exclude
+    ]
+    for layer in layers:
+        layer.exclude = True
+    try:
+        yield
+    finally:
+        for layer in layers:
+            layer.exclude = False
+
+
 def _new_collection(parent: bpy.types.Collection, name: str) -> bpy.types.Collection:
     child = bpy.data.collections.new(name)
     child[COLLECTION_NAME] = name

@@ -7,7 +7,8 @@ While a person drags, picks are read where they are dragged to; what was done is
 """
 
 import uuid
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -51,7 +52,7 @@ POLL_S = 0.015
 
 _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajectories to look at, None for all
 
-
+_resting: list[bool] = []
 _recomputing: set[int] = set()  # session_uid of scenes
 
 
@@ -119,9 +120,21 @@ def _moved_by(scene: bpy.types.Scene, actions: set[str]) -> set[str]:
     }
 
 
+@contextmanager
+def at_rest() -> Iterator[None]:
+    """While a reconstruction is shown bit by bit: what changes is looked at afterwards."""
+    _resting.append(True)
+    try:
+        yield
+    finally:
+        _resting.pop()
+
+
 @problems.guarded
 def work() -> float | None:
     """Do what is waiting; as a timer, come again while a person still drags."""
+    if _resting:
+        return POLL_S
     waiting = dict(_waiting)
     _waiting.clear()
     dragging = is_dragging()

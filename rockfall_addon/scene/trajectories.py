@@ -5,14 +5,13 @@ Of each trajectory: its picks, one polyline of its flights with colours, its blo
 numbers of its impacts. What is there already is brought in line, not made anew.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ...core.colours import MEASURED_COLOUR
-from ...core.progress import Progress, silent
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.flight import flight_states
 from ...core.reconstruction.trajectory import Reconstruction
@@ -59,13 +58,18 @@ def rows_of(names: Names) -> dict[str, Indices]:
     return {name: np.array(rows) for name, rows in found.items()}
 
 
-def show_reconstruction(
-    scene: bpy.types.Scene, result: Reconstruction, surface: Surface | None = None, progress: Progress = silent
-) -> None:
+type Steps = Generator[tuple[str, int, int]]
+"""Work on the scene that can pause, with its progress: what it does, done, total."""
+
+
+def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface: Surface | None = None) -> Steps:
     """Bring the scene's picks, flights, blocks and impact table in line with a reconstruction.
 
     surface : the terrain, to tell what passes below it.
-    progress : hears of the trajectories; to stop here would leave half of them.
+
+    Yields
+    ------
+    Its progress; to stop there leaves half of the trajectories.
     """
     settings = scene.rockfall
     timing.follow_frame_rate(scene)
@@ -74,7 +78,8 @@ def show_reconstruction(
     if first:
         _choose_sizes(settings, result)
     offsets = timing.offsets_of(scene, result.picks)
-    objects = picks.show_picks(scene, result.picks, normals_of(result), offsets, settings.marker_radius_m)
+    radius_m = settings.marker_radius_m
+    objects = yield from picks.show_picks(scene, result.picks, normals_of(result), offsets, radius_m)
     timing.keep_offsets(scene, offsets)
     store_results(objects, result)
     parts, flown = parts_of(scene), rows_of(result.flights.trajectory)
@@ -82,7 +87,7 @@ def show_reconstruction(
     store.remove_objects([obj for (_, name), obj in parts.items() if name not in flown])
     doubt, last, like = _doubt(result, np.arange(len(result.flights.start_time_s))), 1.0, None
     for number, name in enumerate(name for name in offsets if name in flown):
-        progress("Showing trajectories", number, len(flown))
+        yield "Showing trajectories", number, len(flown)
         rows = Rows(flown[name], picked[name], folders[name], doubt[flown[name]], like)
         show_trajectory(scene, name, result, objects, offsets[name], surface, parts, rows=rows)
         last = max(last, float(result.flights.end_time_s[rows.flights].max()) - offsets[name])
@@ -107,7 +112,9 @@ def parts_of(scene: bpy.types.Scene, trajectories: Collection[str] | None = None
     trajectories : None for all.
     """
     found: dict[tuple[str, str], bpy.types.Object] = {}
-    for role, obj in _shown(scene, trajectories):
+    with store.looking(scene):
+        shown = list(_shown(scene, trajectories))
+    for role, obj in shown:
         name = obj.get(store.TRAJECTORY)
         if name is None:
             continue

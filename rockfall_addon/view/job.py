@@ -5,8 +5,9 @@ A person goes on meanwhile: undoes, changes the scene, opens another file. So th
 result goes to the scene in which it began, or nowhere.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from threading import Event, Thread
 
@@ -18,7 +19,12 @@ from ..scene import problems, sync
 from .panel import paragraph
 from .reporting import redraw, reported
 
+type Showing = Generator[tuple[str, int, int], None, str]
+"""Keeping a result bit by bit: yields its progress, and returns the sentence."""
+
 TICK_S = 0.15
+SHOWING_S = 1.0
+"""So long a result is shown before Blender looks at the keys; it redraws then, which takes its time too."""
 LINGER_S = 8.0
 """How long the status bar says what came out."""
 
@@ -32,7 +38,7 @@ class Work:
     step : folder of the step whose panel shows it.
     compute : runs in a thread, without Blender; CancelledError raised in its progress ends it.
     keep : stores what was computed in the scene in which the work began, and says so in a sentence; RockfallError where
-        that cannot be done any more.
+        that cannot be done any more. Where it takes seconds, bit by bit, so that Esc can stop it.
     keeps_part : when it is stopped, `compute` gives what is finished, which is kept.
     changes : what is computed changes the scene: an undo step.
     unchanged : what is true when it was stopped.
@@ -40,7 +46,7 @@ class Work:
 
     step: str
     compute: Callable[[Progress], object]
-    keep: Callable[[bpy.types.Scene, object], str]
+    keep: Callable[[bpy.types.Scene, object], str | Showing]
     keeps_part: bool = False
     changes: bool = True
     unchanged: str = "Nothing has changed."
@@ -55,6 +61,8 @@ class Job:
         self.problem = ""
         self.found: object = None
         self.came_to_nothing = False
+        self.showing: Showing | None = None
+        self.at_rest = ExitStack()
         self._stop = Event()
         self._thread = Thread(target=self._run, name=f"rockfall {work.step}", daemon=True)
         self._thread.start()
@@ -75,6 +83,17 @@ class Job:
         if self._stop.is_set():
             return "Stopping: what is finished is kept …"
         return f"{self.text}: {self.done} of {self.total}." if self.total else f"{self.text} …"
+
+    def show(self) -> str | None:
+        """Go on showing the result for `SHOWING_S`; the sentence when it is all there."""
+        until = time.perf_counter() + SHOWING_S
+        while True:
+            try:
+                self.text, self.done, self.total = next(self.showing)
+            except StopIteration as end:
+                return str(end.value)
+            if time.perf_counter() >= until:
+                return None
 
     @property
     def share(self) -> float:
@@ -127,8 +146,49 @@ class InBackground:
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         work = self.prepare(context)
-        self.report({"INFO"}, work.keep(context.scene, work.compute(silent)))
+        self.report({"INFO"}, kept(work.keep(context.scene, work.compute(silent))))
         return {"FINISHED"}
+
+
+def kept(result: str | Showing) -> str:
+    """The sentence of a result, which is kept without a pause."""
+    while not isinstance(result, str):
+        try:
+            next(result)
+        except StopIteration as end:
+            result = str(end.value)
+    return result
+
+
+class ROCKFALL_OT_show_result(bpy.types.Operator):
+    """Show what was computed bit by bit; Esc takes back what is shown so far"""
+
+    bl_idname = "rockfall.show_result"
+    bl_label = "Show Result"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return any(job.showing is not None for job in _running)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self._timer = context.window_manager.event_timer_add(0.01, window=context.window)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        job = next((job for job in _running if job.showing is not None), None)
+        if job is not None and event.type == "TIMER":
+            _go_on_showing(job)
+        elif job is not None and event.type == "ESC" and event.value == "PRESS":
+            _take_back(job)
+        if job is not None and job.showing is not None:
+            return {"RUNNING_MODAL"}  # nothing else may change the scene
+        self.cancel(context)
+        return {"FINISHED"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        context.window_manager.event_timer_remove(self._timer)
 
 
 class ROCKFALL_OT_stop_job(bpy.types.Operator):
@@ -184,6 +244,9 @@ def begin(work: Work, label: str, scene: bpy.types.Scene) -> None:
 def cancel() -> None:
     """Stop the work; nothing changes, or what is finished is kept as soon as it has stopped."""
     for job in tuple(_running):
+        if job.showing is not None:
+            _take_back(job)
+            continue
         job.stop()
         if not job.work.keeps_part:
             _end(job, _stopped(job))
@@ -202,6 +265,8 @@ def tick() -> float | None:
     if not _running:
         return None
     job = _running[0]
+    if job.showing is not None:
+        return TICK_S
     if job.scene is None:
         job.stop()
         _end(job, f"{job.label} was stopped, because its scene was deleted.", is_problem=True)
@@ -214,24 +279,6 @@ def tick() -> float | None:
     elif not sync.is_dragging():  # a person's drag is a step of its own
         _keep(job)
     return TICK_S if _running else None
-
-
-@contextmanager
-def at_the_cursor() -> Iterator[Progress]:
-    """For what keeps Blender busy: the share that is done, at the mouse, in per cent."""
-    manager, shown = bpy.context.window_manager, [-1]
-
-    def progress(text: str, done: int, total: int) -> None:
-        percent = 100 * done // total if total else 0
-        if percent != shown[0]:  # to set the cursor takes longer than a step
-            shown[0] = percent
-            manager.progress_update(percent)
-
-    manager.progress_begin(0, 100)
-    try:
-        yield progress
-    finally:
-        manager.progress_end()
 
 
 @contextmanager
@@ -264,13 +311,57 @@ def _busy() -> str:
 
 
 def _keep(job: Job) -> None:
+    def keep() -> str | None:
+        found = job.work.keep(job.scene, job.found)
+        if isinstance(found, str) or not bpy.context.window_manager.windows:
+            return kept(found)
+        job.showing = found
+        job.at_rest.enter_context(sync.at_rest())
+        _in_window(lambda window: bpy.ops.rockfall.show_result("INVOKE_DEFAULT"))
+        return None
+
+    _told(job, keep)
+
+
+def _go_on_showing(job: Job) -> None:
+    _told(job, job.show)
+    if job.showing is not None:
+        _in_window(_show_progress)
+
+
+def _take_back(job: Job) -> None:
+    """What was shown so far goes with Blender's own undo, which brings back all that was there."""
+    if not bpy.context.preferences.edit.use_global_undo:
+        return
+    job.showing.close()
+    job.showing = None
+
+    def undo(window: bpy.types.Window) -> None:
+        bpy.ops.ed.undo_push(message=job.label)
+        bpy.ops.ed.undo()
+
+    def later() -> None:  # not while the operator that showed it is still there
+        _in_window(undo)
+        job.at_rest.close()
+        if job in _running:
+            _end(job, _stopped(job))
+
+    bpy.app.timers.register(later, first_interval=0.0, persistent=True)
+
+
+def _told(job: Job, keep: Callable[[], str | None]) -> None:
+    """Keep a result, or a bit of it; when all is there, or nothing more can be, the job is over and says so."""
     try:
-        words, is_problem = job.work.keep(job.scene, job.found), False
+        words, is_problem = keep(), False
     except RockfallError as error:
         words, is_problem = str(error), True
     except Exception as error:  # noqa: BLE001 - a timer that fails is called no more
         problems.failed(job.label, error)
         words, is_problem = f"Something went wrong in Rockfall ({job.label}): {type(error).__name__}: {error}", True
+    if words is None:
+        return
+    job.showing = None
+    job.at_rest.close()
     if not is_problem and job.work.changes:
         _in_window(lambda window: bpy.ops.ed.undo_push(message=job.label))
     _end(job, words, is_problem=is_problem)
@@ -278,6 +369,8 @@ def _keep(job: Job) -> None:
 
 def _end(job: Job, words: str, *, is_problem: bool = False) -> None:
     _running.remove(job)
+    job.showing = None
+    job.at_rest.close()
     if is_problem:
         _ended.append((job.work.step, words))
         print(f"Rockfall: {words}")
@@ -344,4 +437,4 @@ def unregister() -> None:
         keymap.keymap_items.remove(item)
 
 
-CLASSES = (ROCKFALL_OT_stop_job,)
+CLASSES = (ROCKFALL_OT_show_result, ROCKFALL_OT_stop_job)

@@ -35,10 +35,12 @@ def case_many_picks(window):
     yield 1.0
     assert not store.has_role(scene, store.PICK_ROLE)
     assert store.SHOWN not in scene
+    yield from stopped_while_shown(window, path)
     with window.override():
         assert bpy.ops.rockfall.import_picks(filepath=str(path)) == {"INTERFACE"}
     yield from window.wait_for(lambda: not job.is_running(), 60, "imported")
     yield 1.0
+    scene = bpy.context.scene
     assert len(store.of_role(scene, store.PICK_ROLE)) == 9 * TRAJECTORIES
     assert len(store.of_role(scene, store.FLIGHTS_ROLE)) == TRAJECTORIES
     window.screenshot("1-imported")
@@ -46,3 +48,20 @@ def case_many_picks(window):
         bpy.ops.ed.undo()
     yield 0.5
     assert not store.has_role(bpy.context.scene, store.PICK_ROLE)
+
+
+def stopped_while_shown(window, path):
+    """Esc while the trajectories are shown takes back those that are there already."""
+    job, store = (window.part(name) for name in ("rockfall_addon.view.job", "rockfall_addon.scene.store"))
+    job.SHOWING_S = 0.0
+    with window.override():
+        assert bpy.ops.rockfall.import_picks(filepath=str(path)) == {"INTERFACE"}
+    shown = lambda: store.has_role(bpy.context.scene, store.PICK_ROLE)  # noqa: E731
+    yield from window.wait_for(shown, 60, "shown")
+    yield from window.press("ESC", *window.centre())
+    yield from window.wait_for(lambda: not job.is_running(), 20, "stopped")
+    yield 1.0
+    assert not shown()
+    assert not any(obj.name.startswith("run ") for obj in bpy.data.objects)
+    assert store.SHOWN not in bpy.context.scene
+    job.SHOWING_S = 1.0

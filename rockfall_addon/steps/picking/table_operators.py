@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 4: timed picks from a table, and the trajectories between them."""
 
+from contextlib import nullcontext
+
 import bpy
 from bpy.props import StringProperty
 
@@ -40,7 +42,7 @@ class ROCKFALL_OT_import_picks(FromFile, bpy.types.Operator):
         if len(picks) > MANY_PICKS and not bpy.app.background:
             job.begin(work, self.bl_label, scene)
             return {"INTERFACE"}  # the result is an undo step of its own
-        self.report({"INFO"}, work.keep(scene, work.compute(silent)))
+        self.report({"INFO"}, job.kept(work.keep(scene, work.compute(silent))))
         return {"FINISHED"}
 
 
@@ -50,17 +52,15 @@ def _work(scene: bpy.types.Scene, picks: Picks, turned: tuple[str, ...]) -> job.
 
     def compute(progress: Progress) -> Reconstruction:
         progress("Computing the trajectories", 0, 0)
-        result = reconstruct()
-        progress("Showing the trajectories", 0, 0)
-        return result
+        return reconstruct()
 
-    def keep(scene: bpy.types.Scene, result: object) -> str:
+    def keep(scene: bpy.types.Scene, result: object) -> job.Showing:
         if not georeference.has_shift(scene):
             georeference.write_shift(scene, picks.shift)
         elif georeference.read_shift(scene) != picks.shift:
             raise RockfallError("The scene got another origin while the picks were computed. Import them again.")
-        with job.at_the_cursor() as progress:
-            reconstruction.show(scene, result, progress)
+        with nullcontext() if bpy.app.background else store.out_of_view(scene, "Trajectories"):
+            yield from reconstruction.show_in_steps(scene, result)
         sync.follow_spins(scene)
         with job.in_window_of(scene) as context:
             look.show_relief(context, frame_all=True)

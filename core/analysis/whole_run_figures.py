@@ -15,8 +15,9 @@ from ..simulation.ground import Ground
 from ..vectors import Array, norm
 from .figures import FORMATS, MEASURED, MUTED, PAGE_IN, STYLE, save_named
 from .paths import Paths
+from .run_measures import AT_SECTIONS, OF_RUNS, Quantity
 from .sections import Axis
-from .whole_runs import AT_SECTIONS, OF_RUNS, Compared, Quantity, WholeRuns
+from .whole_runs import Compared, WholeRuns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,51 +13,16 @@ import numpy as np
 
 from ..remarks import Remark
 from ..simulation.ground import Ground
-from ..vectors import Array, Indices, Mask, Names, dot
+from ..vectors import Array, Indices, Names
 from .observed_runs import Observed
 from .paths import Paths
 from .ranks import FEWEST, RankTest, holm, rank_test, reach_test
-from .sections import Axis, Section, axis_of, crossings, extremes, heights_at, impacts_apart, impacts_per_metre
+from .run_measures import QUANTITIES, REACH, Limits, Quantity, errors_of, measure_runs
+from .sections import Axis, Section, axis_of, crossings
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 SIGNIFICANT = 0.05
 """Of the probability that is corrected for the number of tests of a model."""
-SHORTEST_S = 0.2
-"""Between two impacts that a person tells apart, where no observed ones say."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What is compared.
-
-    Attributes
-    ----------
-    name : in tables. title, unit : in figures and sentences. tested : else it says the same as another.
-    """
-
-    name: str
-    title: str
-    unit: str
-    tested: bool = True
-
-
-AT_SECTIONS = (
-    Quantity("time_s", "time since the start", "s"),
-    Quantity("along_m", "place along the section", "m"),
-    Quantity("speed_mps", "speed", "m/s"),
-    Quantity("height_m", "height", "m"),
-    Quantity("kinetic_J", "kinetic energy", "J", tested=False),
-)
-OF_RUNS = (
-    Quantity("impacts_per_m", "impacts per metre", "1/m"),
-    Quantity("v_max_mps", "greatest speed", "m/s"),
-    Quantity("height_max_m", "greatest height", "m"),
-    Quantity("runout_m", "run-out", "m"),
-    Quantity("energy_line_deg", "energy line", "°"),
-    Quantity("stop_aside_m", "stop, left of the mean way", "m"),
-)
-REACH = Quantity("reach", "blocks that reach it", "")
-QUANTITIES = {one.name: one for one in (*AT_SECTIONS, *OF_RUNS, REACH)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,16 +168,19 @@ def compare_runs(
     """
     paths = observed.paths
     axis = axis or axis_of(paths)
-    shortest = _shortest(paths)
-    limits = _Limits(np.bincount(paths.run[paths.impact_piece], minlength=len(paths)), paths.length_m, shortest)
-    values = _measure(paths, sections, axis, ground, limits)
-    sigma = _sigma(observed, values, sections, axis, ground, limits)
+    limits = Limits.of(paths)
+
+    def measure(these: Paths) -> dict[tuple[str, str], Array]:
+        return measure_runs(these, sections, axis, ground, limits)
+
+    values = measure(paths)
+    sigma = errors_of(observed, values, measure)
     compared: list[Compared] = []
     for model, runs in simulated.items():
         own = [np.flatnonzero(runs.name == name) for name in paths.name]
         place = np.repeat(np.arange(len(paths)), [part.size for part in own])
         runs = runs.take(np.concatenate(own))
-        their = _measure(runs, sections, axis, ground, limits.take(place))
+        their = measure_runs(runs, sections, axis, ground, limits.take(place))
         reach = [_reach(model, section, paths, runs, axis, place) for section in sections]
         found = [
             _compare(model, section, quantity, values[section, quantity], sigma[section, quantity], part, place, seed)
@@ -221,70 +189,7 @@ def compare_runs(
         corrected = holm(np.array([one.p for one in (*reach, *found)]))
         pairs = zip((*reach, *found), corrected.tolist(), strict=True)
         compared += [replace(one, p_holm=p) for one, p in pairs]
-    return WholeRuns(paths.name, paths, dict(simulated), tuple(sections), axis, shortest, tuple(compared))
-
-
-@dataclass(frozen=True, eq=False)
-class _Limits:
-    """(n,) impacts and metres in plan up to which runs were observed."""
-
-    impacts: Indices
-    length_m: Array
-    shortest_s: float
-
-    def take(self, rows: Indices) -> "_Limits":
-        return _Limits(self.impacts[rows], self.length_m[rows], self.shortest_s)
-
-
-def _measure(
-    paths: Paths, sections: Sequence[Section], axis: Axis, ground: Ground, limits: _Limits
-) -> dict[tuple[str, str], Array]:
-    """Everything that is compared: (section, quantity) → (n,), NaN where there is none."""
-    crossed = [crossings(paths, section, axis) for section in sections]
-    heights = heights_at(ground, [one.position for one in crossed])
-    values: dict[tuple[str, str], Array] = {}
-    for section, one, height in zip(sections, crossed, heights, strict=True):
-        square = dot(one.velocity, one.velocity)
-        columns = (one.time_s, one.along_m, np.sqrt(square), height, 0.5 * paths.mass_kg * square)
-        for quantity, column in zip(AT_SECTIONS, columns, strict=True):
-            values[section.name, quantity.name] = column
-    greatest = extremes(paths, limits.length_m, ground)
-    seen: Mask = limits.impacts > 0
-    way = paths.stop - paths.start[paths.first_piece[:-1]]
-    flat = np.hypot(*way[:, :2].T)
-    aside = np.where(paths.beyond, np.nan, axis.aside(paths.stop))
-    columns_of_runs = (
-        impacts_per_metre(paths, limits.impacts, limits.shortest_s),
-        np.where(seen, greatest.v_max_mps, np.nan),
-        np.where(seen, greatest.height_max_m, np.nan),
-        flat,
-        np.where(flat > 0, np.degrees(np.arctan2(-way[:, 2], flat)), np.nan),
-        aside,
-    )
-    for quantity, column in zip(OF_RUNS, columns_of_runs, strict=True):
-        values["", quantity.name] = column
-    return values
-
-
-def _sigma(
-    observed: Observed,
-    values: Mapping[tuple[str, str], Array],
-    sections: Sequence[Section],
-    axis: Axis,
-    ground: Ground,
-    limits: _Limits,
-) -> dict[tuple[str, str], Array]:
-    """(n,) standard deviations of the observed values, NaN where less than half of the moved runs have one."""
-    if not observed.moved:
-        return {key: np.full(column.size, np.nan) for key, column in values.items()}
-    draws = [_measure(paths, sections, axis, ground, limits) for paths in observed.moved]
-    sigma = {}
-    for key, column in values.items():
-        drawn = np.stack([draw[key] for draw in draws])
-        enough = np.isfinite(column) & (2 * np.isfinite(drawn).sum(axis=0) >= len(draws))
-        sigma[key] = np.full(column.size, np.nan)
-        sigma[key][enough] = np.nanstd(drawn[:, enough], axis=0, ddof=1)
-    return sigma
+    return WholeRuns(paths.name, paths, dict(simulated), tuple(sections), axis, limits.shortest_s, tuple(compared))
 
 
 def _compare(
@@ -329,12 +234,3 @@ def _reach(model: str, section: Section, paths: Paths, runs: Paths, axis: Axis, 
 
 def _quantiles(values: Array) -> Array:
     return np.asarray(np.quantile(values, QUANTILES)) if values.size else np.full(len(QUANTILES), np.nan)
-
-
-def _shortest(paths: Paths) -> float:
-    """The shortest time between impacts that were told apart [s]."""
-    piece = paths.impact_piece
-    apart = impacts_apart(paths, 0.0)
-    run, time = paths.run[piece][apart], (paths.time_s + paths.duration_s)[piece][apart]
-    gaps = np.diff(time)[run[1:] == run[:-1]]
-    return float(gaps.min()) if gaps.size else SHORTEST_S

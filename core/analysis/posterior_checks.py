@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a posterior is worth: intervals, whether the model gives what was observed, runs held out, and words."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..remarks import Remark
+from ..vectors import Array, Indices
+from .likelihood_free import Posterior, SimulatedSets, find_posterior, weighted_quantiles
+from .priors import Prior
+from .ranks import FEWEST, holm
+from .run_statistics import ObservedValues, Scales, crps, find_scales, plain_means, statistics_of, tails
+from .verdicts import TOGETHER
+
+INTERVAL = np.array([0.025, 0.25, 0.5, 0.75, 0.975])
+FLAT = 0.75
+"""Of the prior: an interval that keeps more of it says nothing."""
+WIDE = 0.5
+"""One that keeps more says little."""
+EDGE, PILED = 0.05, 4.0
+"""The posterior piles up at an end of the range where the outermost part has so many times its prior probability."""
+UNLIKELY = 0.05
+"""Of the corrected probability of what was observed."""
+FOLDS = 5
+FEWEST_COVERED = 0.85
+"""Of known parameters within their 95 % intervals; with fewer the intervals are said to be too narrow."""
+NINETY = np.array([0.05, 0.95])
+
+
+@dataclass(frozen=True)
+class PosteriorEstimate:
+    """One parameter.
+
+    Attributes
+    ----------
+    name, unit, default : of the parameter. prior : in words.
+    median, low, high : 95 % interval. half_low, half_high : 50 % interval.
+    kept : how much of the prior the 95 % interval keeps, 0…1; that of the prior itself is 1.
+    covered : of simulated data sets like the observed one with known parameters, the share whose parameter lies in its
+        95 % interval.
+    remarks : how far it can be trusted.
+    """
+
+    name: str
+    unit: str
+    default: float
+    prior: str
+    median: float
+    low: float
+    high: float
+    half_low: float
+    half_high: float
+    kept: float
+    covered: float
+    remarks: tuple[Remark, ...]
+
+    @property
+    def verdict(self) -> str:
+        """The remarks as one text."""
+        return " ".join(map(str, self.remarks))
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether the runs tell it."""
+        return all(remark.severity != "problem" for remark in self.remarks)
+
+
+@dataclass(frozen=True)
+class PredictiveCheck:
+    """One quantity, averaged over the observed runs, beside the same of data sets simulated with posterior draws.
+
+    Attributes
+    ----------
+    title, unit, section, quantity : what. n : runs that have it.
+    observed, low, median, high : means over the runs; the last three are 5, 50 and 95 % of the simulated ones.
+    share, low_share, high_share : of the runs that have it, among those of which that is known.
+    p, p_holm : of a mean as far out as the observed one; corrected for the number of quantities.
+    """
+
+    title: str
+    unit: str
+    section: str
+    quantity: str
+    n: int
+    observed: float
+    low: float
+    median: float
+    high: float
+    share: float
+    low_share: float
+    high_share: float
+    p: float
+    p_holm: float
+
+    @property
+    def fits(self) -> bool:
+        """Whether the model can give it."""
+        return not self.p_holm < UNLIKELY
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Runs that were predicted from the others.
+
+    Attributes
+    ----------
+    names : of the runs. values : how many of theirs were predicted.
+    fitted, default, prior : mean scores (CRPS in robust standard deviations, 0 is perfect) with the posterior of the
+        others, with the parameters as they were set, with parameters drawn from the prior.
+    inside : of the values within the predicted 90 % interval.
+    """
+
+    names: tuple[str, ...]
+    values: int
+    fitted: float
+    default: float
+    prior: float
+    inside: int
+
+
+def estimates_of(priors: Sequence[Prior], found: Posterior, places: Array) -> tuple[PosteriorEstimate, ...]:
+    """One for each parameter.
+
+    Parameters
+    ----------
+    places : (q, k) of known parameters in the posteriors of their own data, see `places_of_truth`.
+    """
+    at = found.quantiles(INTERVAL)
+    correlation = correlations(priors, found)
+    made = []
+    for j, prior in enumerate(priors):
+        values = prior.values(at[:, j])
+        covered = float(((places[:, j] > 0.025) & (places[:, j] < 0.975)).mean())
+        kept = min(float(at[-1, j] - at[0, j]) / 0.95, 1.0)
+        others = [(one.name, float(correlation[j, i])) for i, one in enumerate(priors) if i != j]
+        remarks = tuple(_about(prior, found, j, values, kept, covered, others))
+        low, half_low, median, half_high, high = values.tolist()
+        made.append(
+            PosteriorEstimate(
+                prior.name, prior.unit, prior.default, prior.text, median, low, high, half_low, half_high, kept,
+                covered, remarks,
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def correlations(priors: Sequence[Prior], found: Posterior) -> Array:
+    """(k, k) of the values."""
+    values = np.column_stack([prior.values(column) for prior, column in zip(priors, found.place.T, strict=True)])
+    covariance = np.atleast_2d(np.cov(values, rowvar=False, aweights=found.weight))
+    sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return np.asarray(covariance / np.outer(sd, sd))
+
+
+def _about(
+    prior: Prior,
+    found: Posterior,
+    j: int,
+    values: Array,
+    kept: float,
+    covered: float,
+    others: Sequence[tuple[str, float]],
+) -> Iterator[Remark]:
+    name, place = prior.name, found.place[:, j]
+    low, _, _, _, high = values.tolist()
+    if kept > FLAT:
+        text = f"The runs cannot tell: the 95 % interval keeps {100 * kept:.0f} % of what was thought possible before."
+        yield Remark(text, "problem", name)
+    elif kept > WIDE:
+        text = f"The runs say little: the 95 % interval keeps {100 * kept:.0f} % of what was thought possible before."
+        yield Remark(text, "warning", name)
+    else:
+        yield Remark(f"The runs tell it: {100 * kept:.0f} % of what was thought possible is left.", "note", name)
+    for which, part in (("lower", place < EDGE), ("upper", place > 1 - EDGE)):
+        if kept <= FLAT and float(found.weight[part].sum()) > PILED * EDGE:
+            limit = prior.axis.low if which == "lower" else prior.axis.high
+            text = f"It piles up at the {which} end of its range, {limit:g}: the true value may lie beyond."
+            yield Remark(text, "warning", name)
+    for other, value in others:
+        if abs(value) >= TOGETHER:
+            text = f"It moves with {other} (correlation {value:+.2f}): only the pair is determined."
+            yield Remark(text, "warning", name)
+    if kept <= FLAT:
+        same = low <= prior.default <= high
+        text = "is among what fits" if same else "does not fit"
+        yield Remark(f"The default {prior.default:g} {text}.", "note", name)
+    if covered < FEWEST_COVERED:
+        text = (
+            f"Of simulated data sets with known parameters {100 * covered:.0f} % have theirs in the 95 % interval: "
+            "it is too narrow. Simulate more sets."
+        )
+        yield Remark(text, "warning", name)
+
+
+def predictive_checks(observed: ObservedValues, simulated: Array, scales: Scales) -> tuple[PredictiveCheck, ...]:
+    """Each quantity of the observed runs beside data sets (S, n, Q) simulated with draws of the posterior."""
+    seen = observed.seen
+    q = len(observed.keys)
+    own = statistics_of(observed.value, scales, seen)
+    their = statistics_of(simulated, scales, seen)
+    counted = np.isfinite(simulated).any(axis=-2)
+    p = tails(np.where(counted, their[:, :q], np.nan), own[:q])
+    p = np.where(np.isfinite(observed.value).any(axis=0), p, np.nan)
+    share_p = tails(their[:, q : 2 * q], own[q : 2 * q])
+    at_section = np.array([bool(section) for section, _ in observed.keys])
+    both = np.where(at_section, np.fmin(1.0, 2 * np.fmin(p, share_p)), p)
+    corrected = holm(both)
+    means, own_means = plain_means(simulated, seen), plain_means(observed.value, seen)
+    made = []
+    for i, (section, quantity) in enumerate(observed.keys):
+        known = means[np.isfinite(means[:, i]), i]
+        low, middle, high = np.quantile(known, [0.05, 0.5, 0.95]).tolist() if known.size else [np.nan] * 3
+        low_share, high_share = np.quantile(their[:, q + i], [0.05, 0.95]).tolist()
+        made.append(
+            PredictiveCheck(
+                observed.title(i), observed.quantity(i).unit, section, quantity,
+                int(np.isfinite(observed.value[:, i]).sum()), float(own_means[i]), low, middle, high,
+                float(own[q + i]), low_share, high_share, float(both[i]), float(corrected[i]),
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def hold_out(
+    observed: ObservedValues, table: SimulatedSets, values: Array, prior_sets: int, default: Array, seed: int
+) -> tuple[HeldOut, ...]:
+    """Each part of the runs predicted from the posterior of the others.
+
+    Parameters
+    ----------
+    values : (N, n, Q) of the sets in the table, the first `prior_sets` of them from the prior.
+    default : (S, n, Q) simulated with the parameters as they were set.
+    """
+    n = len(observed)
+    if n < 2:
+        return ()
+    parts = np.array_split(np.random.default_rng([seed, 20]).permutation(n), min(FOLDS, n))
+    scales = find_scales(values[:prior_sets])
+    made = []
+    for part in parts:
+        others = np.setdiff1d(np.arange(n), part)
+        seen = observed.seen[others]
+        if not np.isfinite(observed.value[others]).any() or not np.isfinite(observed.value[part]).any():
+            continue
+        own = Scales(scales.centre[others], scales.spread[others])
+        statistics = statistics_of(values[:, others], own, seen)
+        reduced = SimulatedSets(table.place, table.weight, statistics)
+        found = find_posterior(reduced, statistics_of(observed.value[others], own, seen))
+        made.append(_predicted(observed, part, values, found, prior_sets, default, scales))
+    return tuple(made)
+
+
+def _predicted(
+    observed: ObservedValues,
+    part: Indices,
+    values: Array,
+    found: Posterior,
+    prior_sets: int,
+    default: Array,
+    scales: Scales,
+) -> HeldOut:
+    """The score of the runs `part`, from the sets that the posterior of the others took."""
+    scores, inside = [], 0
+    for run in part.tolist():
+        for column in np.flatnonzero(np.isfinite(observed.value[run])).tolist():
+            seen, spread = float(observed.value[run, column]), float(scales.spread[run, column])
+            samples = (
+                (values[found.source, run, column], found.weight),
+                (default[:, run, column], np.ones(len(default))),
+                (values[:prior_sets, run, column], np.ones(prior_sets)),
+            )
+            known = [np.isfinite(sample) for sample, _ in samples]
+            if any(there.sum() < FEWEST for there in known):
+                continue
+            scores.append(
+                [
+                    crps(sample[there], weight[there], seen) / spread
+                    for (sample, weight), there in zip(samples, known, strict=True)
+                ]
+            )
+            low, high = weighted_quantiles(samples[0][0][known[0]], found.weight[known[0]], NINETY)
+            inside += int(low <= seen <= high)
+    means = np.mean(scores, axis=0).tolist() if scores else [np.nan] * 3
+    names = tuple(observed.names[part].tolist())
+    return HeldOut(names, len(scores), means[0], means[1], means[2], inside)
+
+
+def posterior_remarks(
+    model: str, runs: int, estimates: Sequence[PosteriorEstimate], checks: Sequence[PredictiveCheck],
+    folds: Sequence[HeldOut], effective: float,
+) -> Iterator[Remark]:  # fmt: skip
+    """What the result is worth, the bad news first."""
+    wrong = [one for one in checks if not one.fits]
+    if wrong:
+        named = ", ".join(
+            f"{one.title} (observed {one.observed:.3g} {one.unit}, simulated {one.low:.3g}…{one.high:.3g})"
+            for one in sorted(wrong, key=lambda one: one.p)[:3]
+        )
+        text = (
+            f"No parameters within these ranges make {model} give what was observed in {len(wrong)} of {len(checks)} "
+            f"quantities: {named}. The intervals are those of a model that does not fit; do not design with them."
+        )
+        yield Remark(text, "warning", "fit")
+    unsure = [one.name for one in estimates if not one.is_determined]
+    if unsure:
+        text = f"These runs cannot tell {', '.join(unsure)}: what was thought possible before is still possible."
+        yield Remark(text, "warning", "parameters")
+    if runs < FEWEST:
+        text = (
+            f"Only {runs} run{'s were' if runs > 1 else ' was'} observed: intervals rest on what these happened to do."
+        )
+        yield Remark(text, "warning", "runs")
+    if effective < 100:
+        text = f"The posterior rests on {effective:.0f} sets of parameters: simulate more (--sets, --rounds)."
+        yield Remark(text, "warning", "sets")
+    if not wrong and checks:
+        yield Remark(f"{model} can give what was observed in all {len(checks)} quantities.", "note", "fit")
+    yield from _about_held_out(model, folds)
+
+
+def _about_held_out(model: str, folds: Sequence[HeldOut]) -> Iterator[Remark]:
+    values = sum(fold.values for fold in folds)
+    if not values:
+        return
+    fitted, default, prior = (
+        sum(getattr(fold, name) * fold.values for fold in folds if fold.values) / values
+        for name in ("fitted", "default", "prior")
+    )
+    inside = sum(fold.inside for fold in folds)
+    text = (
+        f"Runs held out: {100 * inside / values:.0f} % of {values} values lie in the predicted 90 % interval; score "
+        f"{fitted:.3f} fitted, {default:.3f} with {model} as it was set, {prior:.3f} with anything thought possible "
+        "(0 is perfect)."
+    )
+    yield Remark(text, "note" if fitted <= default else "warning", "hold-out")
+    if fitted > default:
+        text = "The fit predicts runs that it has not seen no better than the parameters as they were set."
+        yield Remark(text, "warning", "hold-out")

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Back-analysis: parameters that runs were made with are found again, and what the runs cannot tell is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rockfall.core.analysis.fitting import Axis
+from rockfall.core.analysis.observed_runs import Observed, observe_stops
+from rockfall.core.analysis.paths import Paths, simulated_paths
+from rockfall.core.analysis.priors import Prior, make_priors
+from rockfall.core.analysis.run_measures import Limits, measure_rebounds
+from rockfall.core.analysis.run_statistics import (
+    ObservedValues,
+    Scales,
+    crps,
+    find_scales,
+    plain_means,
+    statistics_of,
+    tails,
+    with_errors,
+)
+from rockfall.core.errors import InputError
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.impact_models.registry import find_model
+from rockfall.core.progress import CancelledError
+from rockfall.core.simulation.engine import Settings, simulate
+from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.release import Releases, make_releases, placed_on
+from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.back_analysis import BackAnalysis, back_analyse, observe_values, posterior_settings
+from scipy.stats import norm
+
+MODEL = "pfeiffer_bowen_1989"
+TRUTH = {"rn": 0.45, "rt": 0.78}
+BLOCKS = 10
+
+
+@pytest.fixture(scope="module")
+def ground() -> Ground:
+    line = np.arange(70) * 2.0
+    x, y = np.meshgrid(line, line)
+    z = -0.75 * np.minimum(x, 80) - 0.1 * np.maximum(x - 80, 0) + 0.3 * np.sin(x / 2.3) * np.cos(y / 3.1)
+    i = np.arange(line.size**2).reshape(line.size, -1)
+    lower = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:]], axis=-1).reshape(-1, 3)
+    upper = np.stack([i[:-1, :-1], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 3)
+    vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    return make_ground(Surface(vertices, np.concatenate([lower, upper]).astype(np.int32), GlobalShift(), "slope"))
+
+
+@pytest.fixture(scope="module")
+def releases(ground: Ground) -> Releases:
+    xy = np.column_stack([np.full(BLOCKS, 5.0), 25.0 + 9.0 * np.arange(BLOCKS)])
+    place = placed_on(ground, xy, np.full(BLOCKS, 0.4)) + np.array([0.0, 0.0, 2.0])
+    names = np.array([f"B{i}" for i in range(BLOCKS)])
+    return make_releases(place, name=names, velocity=np.tile([3.0, 0.0, 0.0], (BLOCKS, 1)))
+
+
+def observed_with(ground: Ground, releases: Releases, parameters: dict[str, object], seed: int = 5) -> Observed:
+    paths = simulated_paths(simulate(ground, releases, Settings(MODEL, parameters, seed=seed)))
+    return Observed(paths, np.zeros(len(paths), dtype=np.bool_))
+
+
+@pytest.fixture(scope="module")
+def analysis(ground: Ground, releases: Releases) -> BackAnalysis:
+    priors = make_priors(find_model(MODEL), ["rn", "rt"], {})
+    observed = observed_with(ground, releases, TRUTH)
+    return back_analyse(ground, observed, releases, Settings(MODEL), priors, sets=400, rounds=2)
+
+
+def test_known_parameters_are_found_again(analysis: BackAnalysis) -> None:
+    for one in analysis.estimates:
+        assert one.low < TRUTH[one.name] < one.high
+        assert one.kept < 0.5
+        assert one.low < one.half_low < one.median < one.half_high < one.high
+        assert one.is_determined
+    assert all(check.fits for check in analysis.checks)
+    assert analysis.runs == BLOCKS * (2 * 400 + 2 * 500)
+    assert analysis.draws.names == ("rn", "rt")
+    medians, friction = posterior_settings(analysis)
+    assert medians == pytest.approx({one.name: one.median for one in analysis.estimates})
+    assert friction == Settings.friction
+
+
+def test_fitted_parameters_predict_runs_that_were_held_out(analysis: BackAnalysis) -> None:
+    assert sorted(name for fold in analysis.folds for name in fold.names) == [f"B{i}" for i in range(BLOCKS)]
+    values = sum(fold.values for fold in analysis.folds)
+    assert sum(fold.fitted * fold.values for fold in analysis.folds) < sum(
+        fold.prior * fold.values for fold in analysis.folds
+    )
+    assert 0.8 < sum(fold.inside for fold in analysis.folds) / values <= 1.0
+
+
+def test_what_has_no_effect_is_not_told(ground: Ground, releases: Releases) -> None:
+    """Where a block stops at its first contact with the ground, friction is not felt."""
+    priors = make_priors(find_model(MODEL), ["rn", "friction"], {"friction": "0.2..0.8"})
+    observed = observed_with(ground, releases, TRUTH)
+    found = back_analyse(ground, observed, releases, Settings(MODEL, {"rt": 0.78}, rolling="none"), priors, sets=300)
+    rn, friction = found.estimates
+    assert not friction.is_determined
+    assert "cannot tell" in friction.verdict
+    assert friction.kept > 0.8
+    assert friction.kept > rn.kept
+    assert any("cannot tell friction" in str(remark) for remark in found.remarks)
+
+
+def test_a_model_that_cannot_give_what_was_observed_is_named(ground: Ground, releases: Releases) -> None:
+    """Stops twice as far away as any parameters within the prior allow."""
+    start, far = releases.position, np.tile([115.0, 0.0, 0.0], (BLOCKS, 1))
+    observed = observe_stops(releases.name, start, start + far, releases.mass_kg)
+    priors = make_priors(find_model(MODEL), ["rn"], {"rn": "0.05..0.3"})
+    found = back_analyse(ground, observed, releases, Settings(MODEL, {"rt": 0.3}), priors, sets=300, rounds=1)
+    assert not all(check.fits for check in found.checks)
+    assert found.remarks[0].severity == "warning"
+    assert "make pfeiffer_bowen_1989 give" in str(found.remarks[0])
+
+
+def test_the_same_seed_gives_the_same_posterior(ground: Ground, releases: Releases) -> None:
+    start = releases.position
+    observed = observe_stops(releases.name, start, start + [80.0, 2.0, -50.0], releases.mass_kg)
+    priors = make_priors(find_model(MODEL), ["rn"], {})
+    once, again = (
+        back_analyse(ground, observed, releases, Settings(MODEL, seed=3), priors, sets=250, rounds=2, threads=threads)
+        for threads in (1, 2)
+    )
+    np.testing.assert_array_equal(again.draws.values, once.draws.values)
+    np.testing.assert_array_equal(again.predicted, once.predicted)
+
+
+def test_cancelling_ends_it(ground: Ground, releases: Releases) -> None:
+    def stop(text: str, done: int = 0, total: int = 0) -> None:
+        if done > 100:
+            raise CancelledError
+
+    priors = make_priors(find_model(MODEL), ["rn"], {})
+    with pytest.raises(CancelledError):
+        back_analyse(
+            ground, observed_with(ground, releases, TRUTH), releases, Settings(MODEL), priors, sets=300, progress=stop
+        )
+
+
+def test_runs_that_say_nothing_are_refused(ground: Ground, releases: Releases) -> None:
+    observed = observed_with(ground, releases, TRUTH)
+    paths = observed.paths
+    unseen = replace(
+        paths, impact_piece=np.zeros(0, dtype=np.intp), stop=np.full((len(paths), 3), np.nan),
+        whole=np.zeros(len(paths), dtype=np.bool_),
+    )  # fmt: skip
+    with pytest.raises(InputError, match="No observed run says anything"):
+        observe_values(Observed(unseen, observed.from_impact), (), ground)
+    priors = make_priors(find_model(MODEL), ["rn"], {})
+    with pytest.raises(InputError, match="No block is released"):
+        back_analyse(ground, observed, releases.take(slice(0, 3)), Settings(MODEL), priors, sets=300)
+
+
+# --- priors ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("names", "asked", "problem"),
+    [
+        (["rx"], {}, "has no parameter 'rx'"),
+        ([], {}, "No parameter"),
+        (["rn"], {"rt": "0.1..0.2"}, "prior is given for rt"),
+        (["rn"], {"rn": "0.5..0.1"}, "no part of its range"),
+        (["rn"], {"rn": "0.5..1.7"}, "no part of its range"),
+        (["rn"], {"rn": "half"}, "is no law"),
+        (["rn"], {"rn": "normal:0.5,0"}, "is no law"),
+        (["rn"], {"rn": "normal:3,0.5"}, "outside the range"),
+    ],
+)
+def test_priors_that_cannot_be(names: list[str], asked: dict[str, str], problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        make_priors(find_model(MODEL), names, asked)
+
+
+def test_choices_and_measured_rebounds_are_not_fitted() -> None:
+    with pytest.raises(InputError, match="is a choice"):
+        make_priors(find_model("azimi_desvarreux_1977"), ["definition"], {})
+    with pytest.raises(InputError, match="no coefficients to fit"):
+        make_priors(find_model("observed"), ["friction"], {})
+
+
+def test_priors_have_the_law_that_was_asked_for() -> None:
+    model = find_model(MODEL)
+    place = (np.arange(20_000) + 0.5) / 20_000
+    even, normal = make_priors(model, ["rn", "rt"], {"rn": "0.2..0.6", "rt": "normal:0.8,0.1"})
+    assert even.values(place) == pytest.approx(0.2 + 0.4 * place)
+    drawn = normal.values(place)
+    cut = norm.cdf([-8.0, 2.0])
+    assert np.searchsorted(drawn, 0.8) / drawn.size == pytest.approx((0.5 - cut[0]) / (cut[1] - cut[0]), abs=1e-3)
+    assert drawn.max() <= 1.0
+    friction = make_priors(model, ["pfeiffer_bowen_1989.rn", "friction"], {})[1]
+    assert friction.values(np.array([0.0, 1.0])).tolist() == [0.0, 1.5]
+    wide = Prior("x", "", 1.0, Axis(0.0, 1000.0, 1.0))
+    assert wide.values(place) == pytest.approx([wide.axis.value(one) for one in place.tolist()])
+
+
+# --- statistics of data sets ---------------------------------------------------------------------------------------------
+
+
+def test_statistics_are_means_shares_and_spreads_in_robust_units() -> None:
+    scales = Scales(np.full((4, 1), 10.0), np.full((4, 1), 2.0))
+    values = np.array([[12.0], [8.0], [np.nan], [1000.0]])
+    seen = np.ones((4, 1), dtype=np.bool_)
+    mean = (1 - 1 + 4) / 3
+    spread = (abs(1 - mean) + abs(-1 - mean) + abs(4 - mean)) / 3
+    assert statistics_of(values, scales, seen) == pytest.approx([mean, 0.75, spread])
+    seen[3] = False
+    assert statistics_of(values, scales, seen) == pytest.approx([0.0, 2 / 3, 1.0])
+    assert plain_means(values, seen) == pytest.approx([10.0])
+
+
+def test_scales_are_robust() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.normal(5.0, 2.0, (4001, 1, 1))
+    values[:200] = 1e6
+    values[200:300] = np.nan
+    found = find_scales(values)
+    assert found.centre[0, 0] == pytest.approx(5.0, abs=0.3)
+    assert found.spread[0, 0] == pytest.approx(2.0, rel=0.15)
+    still = find_scales(np.full((9, 1, 1), 3.0))
+    assert (still.centre[0, 0], still.spread[0, 0]) == (3.0, 1.0)
+
+
+def test_errors_are_added_where_runs_count() -> None:
+    seen = np.array([[True], [False]])
+    observed = ObservedValues(
+        np.array(["a", "b"]), (("", "runout_m"),), np.zeros((2, 1)), np.array([[0.5], [0.5]]), seen
+    )
+    values = with_errors(observed, np.zeros((4000, 2, 1)), np.random.default_rng(2))
+    assert values[:, 0].std() == pytest.approx(0.5, rel=0.06)
+    assert np.isnan(values[:, 1]).all()
+
+
+def test_the_score_is_that_of_its_definition() -> None:
+    rng = np.random.default_rng(3)
+    values, weight = rng.normal(size=40), rng.random(40)
+    w = weight / weight.sum()
+    apart = np.abs(values[:, None] - values)
+    assert crps(values, weight, 0.3) == pytest.approx(w @ np.abs(values - 0.3) - 0.5 * w @ apart @ w)
+
+
+def test_tails_are_two_sided() -> None:
+    simulated = np.column_stack([np.arange(99.0), np.arange(99.0), np.full(99, np.nan)])
+    p = tails(simulated, np.array([49.0, -1.0, 1.0]))
+    assert p[:2] == pytest.approx([1.0, 2 * 0.5 / 100])
+    assert np.isnan(p[2])
+
+
+def test_rebounds_are_read_without_the_normal() -> None:
+    """A flight that ends level at 4 m/s and goes on at 3 m/s, 60° to the left and half of it upwards; then another."""
+    paths = Paths(
+        np.array(["A"]), np.ones(1), np.full((1, 3), np.nan), np.zeros(1, np.bool_), np.zeros(1, np.bool_),
+        np.zeros(3, np.intp), np.ones(3, np.bool_), np.array([0.0, 1.0, 2.0]), np.ones(3), np.zeros((3, 3)),
+        np.zeros((3, 3)), np.array([[0.0, 0.0, 0.0], [0.75, 1.299038, 1.5], [5.0, 0.0, 0.0]]),
+        np.array([[4.0, 0.0, 0.0], [5.0, 0.0, 0.0], [9.0, 0.0, 0.0]]), np.zeros(3), np.array([0, 1]), 9.81,
+    )  # fmt: skip
+    size = np.hypot(1.5, 1.5) / 4
+    one = measure_rebounds(paths, Limits(np.array([1]), np.array([9.0]), 0.2))
+    assert one["", "rebound_r"] == pytest.approx([size], abs=1e-6)
+    assert one["", "rebound_rise"] == pytest.approx([1.5 / 4], abs=1e-6)
+    assert one["", "rebound_turn_deg"] == pytest.approx([60.0], abs=1e-4)
+    both = measure_rebounds(paths, Limits(np.array([2]), np.array([9.0]), 0.2))
+    assert both["", "rebound_r"] == pytest.approx([(size + 1.0) / 2], abs=1e-6)
+    together = measure_rebounds(paths, Limits(np.array([2]), np.array([9.0]), 1.5))  # nearer than that: one impact
+    assert together["", "rebound_r"] == pytest.approx([5.0 / 4], abs=1e-6)

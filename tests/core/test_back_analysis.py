@@ -117,7 +117,7 @@ def test_a_model_that_cannot_give_what_was_observed_is_named(ground: Ground, rel
 
 def test_the_same_seed_gives_the_same_posterior(ground: Ground, releases: Releases) -> None:
     start = releases.position
-    observed = observe_stops(releases.name, start, start + [80.0, 2.0, -50.0], releases.mass_kg)
+    observed = observe_stops(releases.name, start, start + np.array([80.0, 2.0, -50.0]), releases.mass_kg)
     priors = make_priors(find_model(MODEL), ["rn"], {})
     once, again = (
         back_analyse(ground, observed, releases, Settings(MODEL, seed=3), priors, sets=250, rounds=2, threads=threads)
@@ -196,7 +196,7 @@ def test_priors_have_the_law_that_was_asked_for() -> None:
     assert wide.values(place) == pytest.approx([wide.axis.value(one) for one in place.tolist()])
 
 
-# --- statistics of data sets ---------------------------------------------------------------------------------------------
+# --- statistics of data sets ------------------------------------------------------------------------------------------
 
 
 def test_statistics_are_means_shares_and_spreads_in_robust_units() -> None:

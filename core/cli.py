@@ -15,6 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from traceback import extract_tb
 
+from .children import end_with_parent_if_asked
 from .errors import InputError, RockfallError
 from .interrupts import Interrupt, handled, interrupt
 
@@ -43,6 +44,7 @@ COMMANDS = {
     "merge": "impact tables of several sites → one table with its sources, impacts.csv and datapackage.json",
     "simulate": "whole rockfalls on the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv, summary.json",
     "compare-runs": "whole observed falls beside simulated ones → whole_runs.csv, whole_values.csv, runs.csv, figures",
+    "batch": "a command for each project of a folder, or each combination of a sweep → a folder each, summary.json",
     "render": "the animation of a project, through Blender",
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
 }
@@ -59,6 +61,7 @@ examples:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted, 141 output closed."""
+    end_with_parent_if_asked()
     try:
         with handled(interrupt):
             status = _run(list(sys.argv[1:] if argv is None else argv))

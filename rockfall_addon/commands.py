@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import bpy
 
 from ..core import cli
+from ..core.children import rockfall_command
 from ..core.film.job import FilmJob
 from ..core.film.maker import FilmMaker, inside_blender
 from ..core.progress import Progress
@@ -28,9 +29,13 @@ def unregister() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
     token = inside_blender.set(FilmMaker(_make, _probe_command()))
+    blender = bpy.app.binary_path  # none where Blender is a module: there Python itself runs the command line
+    again = (blender, "--background", "--command", "rockfall") if blender else rockfall_command.get()
+    told = rockfall_command.set(again)
     try:
         return cli.main(arguments)
     finally:
+        rockfall_command.reset(told)
         inside_blender.reset(token)
 
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from tempfile import TemporaryFile
 
+from ..children import child
 from ..errors import DependencyError
-from .children import child
 
 ENGINES = ("auto", "cycles", "workbench", "eevee")
 PROBE_LIMIT_S = 180.0  # EEVEE compiles its shaders when it is first used

@@ -12,10 +12,10 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import IO
 
+from ..children import child
 from ..dependencies import require_blender_libraries
 from ..errors import DependencyError, RockfallError
 from ..progress import Progress, silent
-from .children import child
 from .engines import choose_engine
 from .job import AS_SET_UP, FilmJob
 

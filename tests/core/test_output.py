@@ -219,9 +219,9 @@ def test_a_command_that_is_asked_to_end_ends_as_after_an_interrupt(monkeypatch, 
 
 
 def test_a_child_ends_with_its_parent_however_that_ends():
-    child = "import time; from rockfall.core.film.children import end_with_parent; end_with_parent(); time.sleep(100)"
+    child = "import time; from rockfall.core.children import end_with_parent; end_with_parent(); time.sleep(100)"
     parent = (
-        "import sys, time; from rockfall.core.film.children import child\n"
+        "import sys, time; from rockfall.core.children import child\n"
         "with child([sys.executable, '-c', sys.argv[1]], stdout=None, stderr=None): print(flush=True); time.sleep(100)"
     )
     with subprocess.Popen([sys.executable, "-c", parent, child], stdout=subprocess.PIPE) as process:

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The classes and colours in which maps are shown: in GIS, in figures and in Blender."""
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite
 
 import numpy as np
 
@@ -15,15 +14,26 @@ from .maps import LAYERS
 
 MOST_LIMITS = 6
 """So many colours more than one are still told apart."""
+LOW = 0.05
+"""Share of the cells that may all be in the lowest class."""
 POWERS = tuple(10.0**power for power in range(-3, 9))
-SERIES: Mapping[str, tuple[float, ...]] = {
-    "kJ": tuple(step * power for power in POWERS for step in (1.0, 3.0)),
-    "m": tuple(step * power for power in POWERS for step in (1.0, 2.0, 5.0)),
-    "m/s": (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 75.0, 100.0),
-    "%": (0.1, 1.0, 5.0, 10.0, 25.0, 50.0, 75.0),
-    "": tuple(step * power for power in POWERS if power >= 1 for step in (1.0, 3.0)),
+
+
+def _steps(*steps: float, least: float = 0.0) -> tuple[float, ...]:
+    return tuple(step * power for power in POWERS for step in steps if step * power >= least)
+
+
+SERIES: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
+    "kJ": (_steps(1, 2, 3, 5), _steps(1, 3)),
+    "m": (_steps(1, 1.5, 2, 3, 5, 7), _steps(1, 2, 5)),
+    "m/s": (
+        (0.1, 0.2, 0.5, 1, 2, 4, 6, 8, *range(10, 100, 5)),
+        (0.1, 0.5, 1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 75, 100),
+    ),
+    "%": ((0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 50, 70, 90), (0.1, 1, 5, 10, 25, 50, 75)),
+    "": (_steps(1, 2, 3, 5, least=2), _steps(1, 3, least=3)),
 }
-"""Unit → limits to choose from; those of energies have the Swiss ones, 30 and 300 kJ, in them."""
+"""Unit → limits to choose from, fine and coarse; those of energies have the Swiss ones, 30 and 300 kJ, in both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,21 +61,25 @@ class Classes:
         return found
 
 
-def classes_of(name: str, greatest: float) -> Classes:
-    """The classes of a map.
+def classes_of(name: str, values: Array) -> Classes:
+    """The classes of a map: fine where its values are near to each other, and no empty ones above them.
 
     Parameters
     ----------
     name : of the map, see `LAYERS`.
-    greatest : its greatest value; limits above it would be empty classes.
+    values : in any shape; NaN, or 0, where nothing passes.
 
     Raises
     ------
     KeyError : there is no such map.
     """
-    series = SERIES[LAYERS[name].unit]
-    top = bisect_right(series, greatest) if isfinite(greatest) else 1
-    limits = series[max(top - MOST_LIMITS, 0) : top] or series[:1]
+    shown = values[np.isfinite(values) & (values > 0)]
+    least, greatest = np.quantile(shown, [LOW, 1.0]).tolist() if shown.size else (0.0, 0.0)
+    series = [one[bisect_left(one, least) : bisect_right(one, greatest)] for one in SERIES[LAYERS[name].unit]]
+    fine, coarse = series
+    limits = (fine if len(fine) <= MOST_LIMITS else coarse)[-MOST_LIMITS:]
+    if not limits:
+        limits = SERIES[LAYERS[name].unit][0][:1]
     colours = scale_colours(np.linspace(0.0, 1.0, len(limits) + 1), 0.0, 1.0)
     words = [f"{limit:,.10g}".replace(",", "\u202f") for limit in limits]
     between = [f"{low} – {high}" for low, high in pairwise(words)]

@@ -122,31 +122,37 @@ def test_a_map_of_other_cells_is_refused(tmp_path, values):
 
 def test_every_map_has_classes_in_ascending_order():
     for name, layer in LAYERS.items():
-        for greatest in (0.0, 0.02, 7.0, 314.0, 1e6, np.nan):
-            classes = classes_of(name, greatest)
-            assert list(classes.limits) == sorted(set(classes.limits))
-            assert len(classes.colours) == len(classes.labels) == len(classes.limits) + 1 <= 7
+        for greatest in (0.0, 0.02, 7.0, 314.0, 1e6):
+            for spread in (1.1, 20.0, 1e5):
+                values = np.array(
+                    [np.nan, 0.0, *np.geomspace(greatest / spread, greatest, 50)] if greatest else [np.nan]
+                )
+                classes = classes_of(name, values)
+                assert list(classes.limits) == sorted(set(classes.limits))
+                assert len(classes.colours) == len(classes.labels) == len(classes.limits) + 1 <= 7
+                assert classes.limits[-1] <= greatest or len(classes.limits) == 1
         assert ElementTree.fromstring(raster_style(classes, layer.unit).partition("\n")[2]) is not None
 
 
+ENERGIES = np.geomspace(1.0, 2500.0, 100)
+
+
 def test_the_classes_of_energy_have_the_swiss_limits():
-    assert {30.0, 300.0} <= set(classes_of("E_95CI", 2500.0).limits)
+    assert {30.0, 300.0} <= set(classes_of("E_95CI", ENERGIES).limits)
+    assert {30.0, 300.0} <= set(classes_of("E_95CI", np.geomspace(25.0, 310.0, 20)).limits)
     values = np.array([29.9, 30.0, 299.0, 300.0, 0.0, np.nan])
-    colours = classes_of("E_95CI", 2500.0).colours_of(values)
+    colours = classes_of("E_95CI", ENERGIES).colours_of(values)
     assert len(np.unique(colours[:4, :3], axis=0)) == 4
     assert colours[:, 3].tolist() == [1, 1, 1, 1, 0, 0]
-    np.testing.assert_array_equal(colours[1], colours_between(30.0, 2500.0))
+    for value, colour in zip((29.9, 299.0, 2000.0), colours[[0, 2]], strict=False):
+        np.testing.assert_allclose(colour_in_qgis(value), colour[:3], atol=0.5 / 255)
 
 
-def colours_between(value: float, greatest: float) -> np.ndarray:
+def colour_in_qgis(value: float) -> list[float]:
     """The colour of a value, as QGIS finds it in the style: that of the first entry above."""
-    style = ElementTree.fromstring(raster_style(classes_of("E_95CI", greatest), "kJ").partition("\n")[2])
+    style = ElementTree.fromstring(raster_style(classes_of("E_95CI", ENERGIES), "kJ").partition("\n")[2])
     entry = next(item for item in style.iter("item") if value < float(item.attrib["value"]))
-    code = entry.attrib["color"]
-    shown = classes_of("E_95CI", greatest).colours
-    bytes_ = np.array([int(code[i : i + 2], 16) for i in (1, 3, 5)])
-    nearest = int(np.abs(shown * 255 - bytes_).max(axis=1).argmin())
-    return np.array([*shown[nearest], 1.0])
+    return [int(entry.attrib["color"][i : i + 2], 16) / 255 for i in (1, 3, 5)]
 
 
 def test_styles_of_lines_and_points_are_well_formed():

@@ -61,7 +61,7 @@ def test_a_figure_says_what_it_is_conditional_on(maps: Maps) -> None:
         "cells of 2 m",
         "EPSG:2056",
         "N",
-        "7 m",
+        "8 m",
     ):
         assert said in words
     legend = [text.get_text() for text in axes.get_legend().get_texts()]

@@ -4,7 +4,7 @@
 Approximate Bayesian computation (Beaumont et al. 2002, 2009). Parameters are places in the unit cube, where the prior
 is even. Sets of them are simulated in rounds: the first from the prior, each later one around the posterior so far;
 weights 1/q make up for how they were proposed. The statistics, which may be many, are projected to one for each
-parameter, its estimate by a linear regression (Fearnhead & Prangle 2012); the sets whose projections are nearest to the
+parameter, its estimate by a regression (Fearnhead & Prangle 2012); the sets whose projections are nearest to the
 observed ones are taken, and what is left of the difference is taken out by a local linear regression of the normal
 quantile of the place, so that no draw leaves the range.
 """
@@ -21,11 +21,16 @@ DEFENSIVE = 0.2
 """This part of later rounds is from the prior, so that no weight is larger than its inverse."""
 WIDENED = 2.0
 """Proposals are around the draws with so many times their covariance (Beaumont et al. 2009)."""
-ACCEPTED = 0.1
-"""This part of all sets is taken, the nearest ones; `FEWEST_ACCEPTED` at least."""
-FEWEST_ACCEPTED = 200
-RIDGE = 1e-3
-"""Of the variance of each statistic, added to it: statistics that say the same share what they say."""
+ACCEPTED = (0.1, 0.05, 0.025)
+"""One of these parts of all sets is taken, the nearest ones, that from which most draws count; `FEWEST_ACCEPTED` at
+least. Where the posterior is narrow, the first reaches sets far away whose weights are large."""
+FEWEST_ACCEPTED = 150
+NEARER = 0.35
+"""Of the sets, those among which the nearest are looked for once more."""
+RIDGES = (1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0)
+"""That are tried, beside the variance 1 of each statistic."""
+IDLE = 1e-9
+"""A statistic that spreads less, beside its size, is always the same."""
 INSIDE = 1e-6
 """Places keep so far from the ends of the range, whose normal quantile is infinite."""
 CONFIDENCE = 0.95
@@ -56,20 +61,23 @@ class Projection:
 
     Attributes
     ----------
-    centre, spread : (D,) of the statistics. low, high : (D,) beyond which they say no more.
-    coefficients : (D + 1, k).
+    centre, spread : (D,) of the statistics; infinite for one that is always the same.
+    low, high : (D,) beyond which they say no more.
+    squares : whether those of the statistics count too.
+    coefficients : of the statistics, of their squares, and a constant, for each of the k.
     """
 
     centre: Array
     spread: Array
     low: Array
     high: Array
+    squares: bool
     coefficients: Array
 
     def __call__(self, statistics: Array) -> Array:
         """(..., D) → (..., k)."""
         scaled = (np.clip(statistics, self.low, self.high) - self.centre) / self.spread
-        return np.asarray(scaled @ self.coefficients[:-1] + self.coefficients[-1])
+        return np.asarray(_features(scaled, self.squares) @ self.coefficients[:-1] + self.coefficients[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +89,14 @@ class Posterior:
     place : (m, k) draws in the unit cube.
     weight : (m,) their sum is 1.
     source : (m,) of each the simulated set that it is from.
-    projection : of the statistics.
+    rough, fine : projections of the statistics, over all sets and over the nearer ones.
     """
 
     place: Array
     weight: Array
     source: Indices
-    projection: Projection
+    rough: Projection
+    fine: Projection
 
     @property
     def effective(self) -> float:
@@ -241,15 +250,26 @@ def find_posterior(table: SimulatedSets, observed: Array) -> Posterior:
     ----------
     observed : (D,) statistics, all finite.
     """
-    rough = project(table, table.weight)
-    near, _ = _nearest(table, rough(table.statistics), rough(observed), max(3 * ACCEPTED, 0.3))
+    rough = project(table, table.weight, squares=True)
+    near = _nearest(rough(table.statistics), table.weight, rough(observed), NEARER)[0]
     weight = np.zeros(len(table))
     weight[near] = table.weight[near]
-    return draw_with(table, project(table, weight), observed)
+    return draw_with(table, rough, project(table, weight, squares=False), observed)
 
 
-def project(table: SimulatedSets, weight: Array) -> Projection:
-    """The linear regression of the normal quantiles of the places on the statistics, with weights (N,)."""
+def project(table: SimulatedSets, weight: Array, *, squares: bool) -> Projection:
+    """The ridge regression of the normal quantiles of the places on the statistics.
+
+    Parameters
+    ----------
+    weight : (N,) of the sets.
+    squares : whether on their squares too, which bends; beyond the sets that count it is wrong soon.
+
+    Notes
+    -----
+    The ridge of each parameter is that with the least error by generalised cross-validation (Golub et al. 1979): with
+    few sets and many statistics the sets would else look nearer to the truth than new data can be.
+    """
     from scipy.special import ndtri
 
     some = weight > 0
@@ -258,18 +278,37 @@ def project(table: SimulatedSets, weight: Array) -> Projection:
     clipped = np.clip(statistics, low, high)
     centre = w @ clipped
     spread = np.sqrt(w @ (clipped - centre) ** 2)
-    idle = ~(spread > 0)
-    spread = np.where(idle, 1.0, spread)
-    scaled = (clipped - centre) / spread
+    spread = np.where(spread > IDLE * np.maximum(np.abs(centre), 1.0), spread, np.inf)
+    features = _features((clipped - centre) / spread, squares)
+    mean = w @ features
+    root = np.sqrt(w)[:, None]
     wanted = ndtri(table.place[some])
     middle = w @ wanted
-    square = scaled.T @ (w[:, None] * scaled) + RIDGE * np.eye(centre.size)
-    slope = np.linalg.solve(square, scaled.T @ (w[:, None] * (wanted - middle)))
-    return Projection(centre, spread, low, high, np.vstack([slope, middle]))
+    left, singular, right = np.linalg.svd(root * (features - mean), full_matrices=False)
+    aim = root * (wanted - middle)
+    turned = left.T @ aim
+    number = 1.0 / float(w @ w)
+    slopes = []
+    for j in range(wanted.shape[1]):
+        errors = []
+        for ridge in RIDGES:
+            kept = singular**2 / (singular**2 + ridge)
+            rest = float(aim[:, j] @ aim[:, j] - (turned[:, j] ** 2) @ (1 - (1 - kept) ** 2))
+            errors.append(rest / max(1.0 - float(kept.sum()) / number, 1e-6) ** 2)
+        ridge = RIDGES[int(np.argmin(errors))]
+        slopes.append(right.T @ (singular / (singular**2 + ridge) * turned[:, j]))
+    slope = np.stack(slopes, axis=1)
+    return Projection(centre, spread, low, high, squares, np.vstack([slope, middle - mean @ slope]))
 
 
-def draw_with(table: SimulatedSets, projection: Projection, observed: Array, without: int = -1) -> Posterior:
-    """The nearest sets by a projection, moved to the observed statistics.
+def _features(scaled: Array, squares: bool) -> Array:
+    return np.concatenate([scaled, scaled**2], axis=-1) if squares else scaled
+
+
+def draw_with(
+    table: SimulatedSets, rough: Projection, fine: Projection, observed: Array, without: int = -1
+) -> Posterior:
+    """The nearest sets by two projections, moved to the observed statistics.
 
     Parameters
     ----------
@@ -277,33 +316,34 @@ def draw_with(table: SimulatedSets, projection: Projection, observed: Array, wit
     """
     from scipy.special import ndtr, ndtri
 
-    projected, aim = projection(table.statistics), projection(observed)
-    near, kernel = _nearest(table, projected, aim, ACCEPTED, without)
-    weight = table.weight[near] * kernel
-    weight = weight / weight.sum()
+    region, _ = _nearest(rough(table.statistics), table.weight, rough(observed), NEARER)
+    region = region[region != without]
+    projected, aim = fine(table.statistics[region]), fine(observed)
+    taken = [
+        (near, weight / weight.sum())
+        for part in ACCEPTED
+        for near, kernel in [_nearest(projected, table.weight[region], aim, part * len(table) / region.size)]
+        for weight in [table.weight[region[near]] * kernel]
+    ]
+    near, weight = min(taken, key=lambda one: float((one[1] ** 2).sum()))
+    source = region[near]
     design = np.column_stack([np.ones(near.size), projected[near] - aim])
-    wanted = ndtri(table.place[near])
+    wanted = ndtri(table.place[source])
     weighted = design * weight[:, None]
     square = weighted.T @ design
     slope = np.linalg.solve(square + 1e-9 * np.trace(square) * np.eye(len(square)), weighted.T @ wanted)
     moved = wanted - design[:, 1:] @ slope[1:]
-    return Posterior(np.clip(ndtr(moved), INSIDE, 1.0 - INSIDE), weight, near, projection)
+    return Posterior(np.clip(ndtr(moved), INSIDE, 1.0 - INSIDE), weight, source, rough, fine)
 
 
-def _nearest(
-    table: SimulatedSets, projected: Array, aim: Array, part: float, without: int = -1
-) -> tuple[Indices, Array]:
-    """The nearest sets, and Epanechnikov's weight of each."""
-    spread = np.atleast_2d(np.cov(projected, rowvar=False, aweights=table.weight))
-    k = len(spread)
-    inverse = np.linalg.inv(spread + (1e-9 * np.trace(spread) + 1e-300) * np.eye(k))
+def _nearest(projected: Array, weight: Array, aim: Array, part: float) -> tuple[Indices, Array]:
+    """The nearest part of (N, k) projections, and Epanechnikov's weight of each."""
+    spread = np.atleast_2d(np.cov(projected, rowvar=False, aweights=weight))
+    inverse = np.linalg.inv(spread + (1e-9 * np.trace(spread) + 1e-300) * np.eye(len(spread)))
     apart = projected - aim
     square = np.einsum("ni,ij,nj->n", apart, inverse, apart)
-    if without >= 0:
-        square[without] = np.inf
-    number = min(max(FEWEST_ACCEPTED, round(part * len(table))), len(table) - 1)
-    near = np.argpartition(square, number)[: number + 1]
-    near = near[np.argsort(square[near], kind="stable")]
+    number = min(max(FEWEST_ACCEPTED, round(part * len(projected))), len(projected) - 1)
+    near = np.argsort(square, kind="stable")[: number + 1]
     limit = square[near[-1]]
     return near[:-1], np.asarray(1.0 - square[near[:-1]] / limit if limit > 0 else np.ones(number))
 
@@ -319,7 +359,7 @@ def places_of_truth(table: SimulatedSets, found: Posterior, number: int, seed: i
     chosen = found.source[rng.choice(found.source.size, size=number, p=weight / weight.sum())]
     places = np.empty((number, table.place.shape[1]))
     for row, i in enumerate(chosen.tolist()):
-        own = draw_with(table, found.projection, table.statistics[i], i)
+        own = draw_with(table, found.rough, found.fine, table.statistics[i], i)
         places[row] = own.weight @ (own.place < table.place[i])
     return places
 

@@ -135,27 +135,32 @@ def shortest_between(paths: Paths) -> float:
 
 
 def measure_rebounds(paths: Paths, limits: Limits) -> dict[tuple[str, str], Array]:
-    """The mean rebound of each run at its first impacts, as many as were observed: ("", quantity) → (n,).
+    """The mean rebound of each run between its first impacts, as many as were observed: ("", quantity) → (n,).
 
-    Impacts that a person does not tell apart are one, from the velocity before the first to that after the last. All
-    three quantities are without the normal of the terrain, which is not known in the same way on both sides.
+    Velocities are those of parabolas from one impact to the next that a person tells apart, on both sides: where blocks
+    skip between two of them, so they do in what was observed. All three quantities are without the normal of the
+    terrain, which is not known in the same way on both sides.
     """
-    n, piece = len(paths), paths.impact_piece
+    n, piece = len(paths), paths.impact_piece[impacts_apart(paths, limits.shortest_s)]
     run = paths.run[piece]
-    begins = np.zeros(piece.size, dtype=np.bool_)
-    begins[impacts_apart(paths, limits.shortest_s)] = True
-    begins |= np.r_[True, run[1:] != run[:-1]][: piece.size]
-    first = np.flatnonzero(begins)
-    last = np.r_[first[1:], piece.size][: first.size] - 1
-    order = np.arange(first.size) - np.searchsorted(run[first], run[first])
-    after = piece[last] + 1
-    goes_on = (order < limits.impacts[run[first]]) & (after < paths.run.size)
-    goes_on[goes_on] = paths.run[after[goes_on]] == run[first][goes_on]
-    own = run[first][goes_on]
-    v1, v2 = paths.end_velocity[piece[first[goes_on]]], paths.start_velocity[after[goes_on]]
+    order = np.arange(piece.size) - np.searchsorted(run, run)
+    piece = piece[order < limits.impacts[run]]
+    run = paths.run[piece]
+    first = paths.first_piece[:-1]
+    before = np.r_[True, run[1:] != run[:-1]][: piece.size]
+    time, place = (paths.time_s + paths.duration_s)[piece], paths.end[piece]
+    last = np.where(before, first[run] - 1, np.roll(piece, 1))  # the piece with which the one before ends
+    since = np.where(before, 0.0, np.roll(time, 1))
+    origin = np.where(before[:, None], paths.start[first[run]], np.roll(place, 1, axis=0))
+    grounded = np.r_[0, np.cumsum(~paths.flies)]
+    flew = (grounded[piece + 1] == grounded[last + 1]) & (time > since)
+    lasted = np.where(flew, time - since, np.nan)[:, None]
+    mean, fall = (place - origin) / lasted, 0.5 * paths.gravity_mps2 * lasted * [0.0, 0.0, 1.0]
+    here = np.flatnonzero(~before[1:])  # rows that are followed by one of the same run
+    v1, v2 = (mean - fall)[here], (mean + fall)[here + 1]
     speed = norm(v1)
-    moves = speed > 0
-    own, v1, v2, speed = own[moves], v1[moves], v2[moves], speed[moves]
+    known = np.isfinite(v2[:, 0]) & (speed > 0)
+    own, v1, v2, speed = run[here][known], v1[known], v2[known], speed[known]
     cross = v1[:, 0] * v2[:, 1] - v1[:, 1] * v2[:, 0]
     turn = np.degrees(np.abs(np.arctan2(cross, (v1[:, :2] * v2[:, :2]).sum(axis=1))))
     count = np.bincount(own, minlength=n)

@@ -19,6 +19,11 @@ from .run_measures import QUANTITIES, Quantity
 
 MOST = 4.0
 """Robust standard deviations."""
+OF_TAILS, NINETY_PER_SD = 0.25, 3.29
+"""Where half of the simulations agree, the spread is this part of that of nine tenths of them."""
+ROUNDING = 1e-6
+LEAST_ERROR = 0.05
+"""Of the spread of the simulations."""
 FEWEST_SPREAD = 4
 """With fewer runs no spread is looked at."""
 
@@ -61,12 +66,6 @@ class ObservedValues:
         return self.quantity(column).title + (f", {section}" if section else "")
 
 
-def with_errors(observed: ObservedValues, values: Array, rng: np.random.Generator) -> Array:
-    """Simulated values (S, n, Q) with the random errors of the observed ones, NaN where a run cannot count."""
-    sigma = np.nan_to_num(observed.sigma)
-    return np.where(observed.seen, values + sigma * rng.standard_normal(values.shape), np.nan)
-
-
 @dataclass(frozen=True, eq=False)
 class Scales:
     """(n, Q) centre and robust standard deviation of the values of each run over many simulations."""
@@ -79,19 +78,29 @@ class Scales:
         return np.clip((values - self.centre) / self.spread, -MOST, MOST)
 
 
+def with_errors(observed: ObservedValues, scales: Scales, values: Array, rng: np.random.Generator) -> Array:
+    """Simulated values (S, n, Q) with random errors as of the observed ones, NaN where a run cannot count.
+
+    No value is taken to be known better than `LEAST_ERROR` of how far all simulations spread: a model is never exact.
+    """
+    sigma = np.maximum(np.nan_to_num(observed.sigma), LEAST_ERROR * scales.spread)
+    return np.where(observed.seen, values + sigma * rng.standard_normal(values.shape), np.nan)
+
+
 def find_scales(values: Array) -> Scales:
-    """From simulated values (S, n, Q); where none is finite, or all are the same, the centre is 0 and the spread 1."""
-    low, centre, high = _quantiles(values)
-    spread = (high - low) / IQR_PER_SD
-    return Scales(np.nan_to_num(centre), np.where(spread > 0, spread, 1.0))
+    """From simulated values (S, n, Q); where all are the same but for rounding, or none is finite, the spread is 1."""
+    lowest, low, centre, high, highest = _quantiles(values, (0.05, 0.25, 0.5, 0.75, 0.95))
+    spread = np.maximum((high - low) / IQR_PER_SD, OF_TAILS * (highest - lowest) / NINETY_PER_SD)
+    alike = ~(spread > ROUNDING * np.maximum(np.abs(centre), 1.0))
+    return Scales(np.nan_to_num(centre), np.where(alike, 1.0, spread))
 
 
-def _quantiles(values: Array) -> Array:
-    """(3, n, Q) quartiles of what is finite, NaN where nothing is."""
+def _quantiles(values: Array, parts: tuple[float, ...]) -> Array:
+    """(len(parts), n, Q) quantiles of what is finite, NaN where nothing is."""
     ordered = np.sort(values, axis=0)  # NaN come last
     count = np.isfinite(values).sum(axis=0)
-    result = np.full((3, *values.shape[1:]), np.nan)
-    for row, part in enumerate((0.25, 0.5, 0.75)):
+    result = np.full((len(parts), *values.shape[1:]), np.nan)
+    for row, part in enumerate(parts):
         place = np.maximum(np.round(part * (count - 1)).astype(np.intp), 0)
         result[row] = np.take_along_axis(ordered, place[None], axis=0)[0]
     return result

@@ -67,7 +67,7 @@ def profile_figure(comparison: WholeRuns, ground: Ground) -> "Figure":
         figure = Figure(figsize=(PAGE_IN, 0.55 + 1.35 * len(models)), layout="constrained")
         grid = figure.subplots(len(models), 2, squeeze=False, sharex=True, sharey="col")
         for row, model in zip(grid, models, strict=True):
-            colour, envelope = _colour(model), envelopes[model]
+            colour, envelope = model_colour(model), envelopes[model]
             for axes, quantiles, lines in zip(row, (envelope.speed, envelope.height), observed.lines, strict=True):
                 for (low, high), shade in (((0, 4), 0.22), ((1, 3), 0.33)):
                     axes.fill_between(
@@ -126,7 +126,7 @@ def _curves(
             axes_row[0].set_ylabel("share of the blocks below")
             if titles is not None:
                 axes_row[0].set_title(titles[i], fontsize=7.5, fontweight="bold", loc="left", pad=6.0)
-        lines = [(find_model(model).title, {"color": _colour(model), "linewidth": 1.4}) for model in models]
+        lines = [(find_model(model).title, {"color": model_colour(model), "linewidth": 1.4}) for model in models]
         observed = {"color": MEASURED, "linewidth": 1.0, "marker": "o", "markersize": 2.4}
         _legend(figure, [("observed", observed), *lines])
         return figure
@@ -142,7 +142,7 @@ def _curve(axes: "Axes", parts: Sequence[Compared]) -> None:
     for one in drawn:
         values = np.sort(one.simulated)
         share = (np.arange(values.size) + 0.5) / values.size
-        axes.plot(values, share, color=_colour(one.model), linewidth=1.3, zorder=2)
+        axes.plot(values, share, color=model_colour(one.model), linewidth=1.3, zorder=2)
     if observed.size:
         share = np.arange(observed.size + 1) / observed.size
         axes.plot(np.repeat(observed, 2), np.repeat(share, 2)[1:-1], color=MEASURED, linewidth=0.9, zorder=3)
@@ -214,7 +214,7 @@ def _envelope(paths: Paths, axis: Axis, ground: Ground, observed: _Observed) -> 
     return _Envelope(x, speed, height)
 
 
-def _colour(model: str) -> tuple[float, float, float]:
+def model_colour(model: str) -> tuple[float, float, float]:
     """The model's colour, dark enough for a line on white."""
     colour = np.array(find_model(model).colour)
     light = float(colour @ [0.2126, 0.7152, 0.0722])

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.likelihood_free import weighted_quantiles
 from ..errors import InputError
 from ..impact_models.registry import find_model
 from ..output import write_text
@@ -21,6 +22,7 @@ from ..simulation.convergence import Convergence, convergence
 from ..simulation.engine import Simulation
 from ..simulation.ground import Ground
 from ..simulation.hits import hits_of
+from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.release import Releases, make_releases, overlapping, placed_on
 from ..simulation.release_sources import check_number, check_size
 from ..simulation.results import fell_through, release_names, run_figures
@@ -186,7 +188,7 @@ def summary(
     settings = first.settings
     return {
         "version": str(import_module((__package__ or "").partition(".core")[0]).__version__),
-        "inputs": {name: {"file": path.name, "sha256": _digest(path)} for name, path in inputs.items()},
+        "inputs": inputs_with_digests(inputs),
         "rolling": settings.rolling,
         "friction": settings.friction,
         "gravity_mps2": settings.gravity_mps2,
@@ -211,6 +213,7 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
     drawn = {} if measured is None else {"measured_impacts": len(measured), "left_out": dict(measured.left_out)}
     return {
         "parameters": dict(settings.parameters),
+        **({} if settings.draws is None else {"drawn_parameters": _drawn_summary(settings.draws)}),
         **drawn,
         "zones": {name: dict(values) for name, values in settings.zones.items()},
         "zone_friction": dict(settings.zone_friction),
@@ -225,6 +228,16 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
     }
 
 
+def _drawn_summary(draws: ParameterDraws) -> dict[str, dict[str, float]]:
+    """Of each parameter that blocks draw: how many sets, the mean, and where 95 % of the draws are."""
+    ends = np.array([0.025, 0.975])
+    return {
+        name: {"sets": len(draws), "mean": round(draws.mean()[name], 6), "low": round(low, 6), "high": round(high, 6)}
+        for i, name in enumerate(draws.names)
+        for low, high in [weighted_quantiles(draws.values[:, i], draws.weight, ends).tolist()]
+    }
+
+
 def _known(values: Convergence) -> dict[str, float | None]:
     """For JSON, which has no NaN."""
     return {name: None if np.isnan(value) else round(value, 6) for name, value in asdict(values).items()}
@@ -233,6 +246,11 @@ def _known(values: Convergence) -> dict[str, float | None]:
 def write_summary(values: dict[str, Any], path: str | Path) -> None:
     """Write summary.json."""
     write_text(path, json.dumps(values, indent=2, ensure_ascii=False) + "\n")
+
+
+def inputs_with_digests(inputs: Mapping[str, Path]) -> dict[str, dict[str, str]]:
+    """The files that decided a result, by what they are."""
+    return {name: {"file": path.name, "sha256": _digest(path)} for name, path in inputs.items()}
 
 
 def _digest(path: Path) -> str:

@@ -133,8 +133,10 @@ def back_analyse(
     table, found, simulated, scales = _sampled(work, sets, rounds, total)
     progress("Checking the posterior", rounds * sets, total)
     chosen = found.place[_by_weight(found.weight, CHECKED, settings.seed)]
-    predicted = work.simulated(_values_at(priors, chosen), len(table), total)
-    plain = work.simulated(None, len(table) + CHECKED, total)
+    predicted, plain = (
+        work.seen(work.simulated(asked, first, total), scales, first)
+        for asked, first in ((_values_at(priors, chosen), len(table)), (None, len(table) + CHECKED))
+    )
     progress("Predicting runs that are held out", total, total)
     places = places_of_truth(table, found, TRUTHS, settings.seed)
     estimates = estimates_of(priors, found, places)
@@ -163,6 +165,7 @@ def observe_values(observed: Observed, sections: Sequence[Section], ground: Grou
         return _measured(these, sections, axis, ground, limits)
 
     found = measure(paths)
+    found["", "impacts_per_m"][limits.impacts < 2] = np.nan  # the way to the first impact is that of the release
     sigma = errors_of(observed, found, measure)
     seen = {key: np.isfinite(column) for key, column in found.items()}
     for section in sections:
@@ -214,7 +217,10 @@ class _Work:
     progress: Progress
 
     def simulated(self, sets: Array | None, first: int, total: int) -> Array:
-        """(S, n, Q) values of sets (S, k), the first of which has the number `first`; None for `CHECKED` plain ones."""
+        """(S, n, Q) values of sets (S, k), the first of which has the number `first`; None for `CHECKED` plain ones.
+
+        They are without the errors of the observed ones.
+        """
         number = CHECKED if sets is None else len(sets)
         at_once = max(1, RUNS_AT_ONCE // len(self.values))
         parts = [
@@ -223,6 +229,10 @@ class _Work:
             if (size := min(at_once, number - start))
         ]
         return np.concatenate(parts)
+
+    def seen(self, values: Array, scales: Scales, first: int) -> Array:
+        """(S, n, Q) values as they would have been observed, of sets from the number `first` on."""
+        return with_errors(self.values, scales, values, np.random.default_rng([self.settings.seed, 19, first]))
 
     def _chunk(self, sets: Array | None, first: int, size: int, total: int) -> Array:
         n = len(self.values)
@@ -245,8 +255,7 @@ class _Work:
         paths = self.observed.paths
         limits, axis = Limits.of(paths).take(np.tile(np.arange(n), size)), axis_of(paths)
         found = _measured(simulated_paths(simulation), self.sections, axis, self.ground, limits)
-        values = columns_of(self.values.keys, found).reshape(size, n, -1)
-        return with_errors(self.values, values, np.random.default_rng([settings.seed, 19, first]))
+        return columns_of(self.values.keys, found).reshape(size, n, -1)
 
     def _rows(self, first: int, size: int) -> Indices:
         """(size · n,) releases of the sets from the number `first` on, run by run."""
@@ -266,9 +275,10 @@ def _sampled(work: _Work, sets: int, rounds: int, total: int) -> tuple[Simulated
 
     def simulated(place: Array, first: int) -> Array:
         values = work.simulated(_values_at(work.priors, place), first, total)
-        kept.append(values)
         if not scales:
             scales.append(find_scales(values))
+        values = work.seen(values, scales[0], first)
+        kept.append(values)
         return statistics_of(values, scales[0], work.values.seen)
 
     def seen() -> Array:

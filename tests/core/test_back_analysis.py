@@ -11,6 +11,7 @@ from rockfall.core.analysis.paths import Paths, simulated_paths
 from rockfall.core.analysis.priors import Prior, make_priors
 from rockfall.core.analysis.run_measures import Limits, measure_rebounds
 from rockfall.core.analysis.run_statistics import (
+    LEAST_ERROR,
     ObservedValues,
     Scales,
     crps,
@@ -214,8 +215,8 @@ def test_statistics_are_means_shares_and_spreads_in_robust_units() -> None:
 def test_scales_are_robust() -> None:
     rng = np.random.default_rng(1)
     values = rng.normal(5.0, 2.0, (4001, 1, 1))
-    values[:200] = 1e6
-    values[200:300] = np.nan
+    values[:100] = 1e6
+    values[100:200] = np.nan
     found = find_scales(values)
     assert found.centre[0, 0] == pytest.approx(5.0, abs=0.3)
     assert found.spread[0, 0] == pytest.approx(2.0, rel=0.15)
@@ -228,9 +229,13 @@ def test_errors_are_added_where_runs_count() -> None:
     observed = ObservedValues(
         np.array(["a", "b"]), (("", "runout_m"),), np.zeros((2, 1)), np.array([[0.5], [0.5]]), seen
     )
-    values = with_errors(observed, np.zeros((4000, 2, 1)), np.random.default_rng(2))
+    scales = Scales(np.zeros((2, 1)), np.ones((2, 1)))
+    values = with_errors(observed, scales, np.zeros((4000, 2, 1)), np.random.default_rng(2))
     assert values[:, 0].std() == pytest.approx(0.5, rel=0.06)
     assert np.isnan(values[:, 1]).all()
+    wide = Scales(np.zeros((2, 1)), np.full((2, 1), 40.0))
+    values = with_errors(observed, wide, np.zeros((4000, 2, 1)), np.random.default_rng(2))
+    assert values[:, 0].std() == pytest.approx(40 * LEAST_ERROR, rel=0.06)
 
 
 def test_the_score_is_that_of_its_definition() -> None:
@@ -248,20 +253,40 @@ def test_tails_are_two_sided() -> None:
     assert np.isnan(p[2])
 
 
-def test_rebounds_are_read_without_the_normal() -> None:
-    """A flight that ends level at 4 m/s and goes on at 3 m/s, 60° to the left and half of it upwards; then another."""
-    paths = Paths(
+def hops(times: list[float], velocities: list[list[float]]) -> Paths:
+    """Flights one after the other from the origin."""
+    k, lasted = len(times), np.array(times)
+    start_velocity = np.array(velocities)
+    fall = np.array([0.0, 0.0, 9.81])
+    end = np.cumsum(start_velocity * lasted[:, None] - fall * lasted[:, None] ** 2 / 2, axis=0)
+    start = np.vstack([np.zeros(3), end[:-1]])
+    return Paths(
         np.array(["A"]), np.ones(1), np.full((1, 3), np.nan), np.zeros(1, np.bool_), np.zeros(1, np.bool_),
-        np.zeros(3, np.intp), np.ones(3, np.bool_), np.array([0.0, 1.0, 2.0]), np.ones(3), np.zeros((3, 3)),
-        np.zeros((3, 3)), np.array([[0.0, 0.0, 0.0], [0.75, 1.299038, 1.5], [5.0, 0.0, 0.0]]),
-        np.array([[4.0, 0.0, 0.0], [5.0, 0.0, 0.0], [9.0, 0.0, 0.0]]), np.zeros(3), np.array([0, 1]), 9.81,
+        np.zeros(k, np.intp), np.ones(k, np.bool_), np.cumsum(lasted) - lasted, lasted, start, end, start_velocity,
+        start_velocity - fall * lasted[:, None], np.zeros(k), np.arange(k), 9.81,
     )  # fmt: skip
-    size = np.hypot(1.5, 1.5) / 4
-    one = measure_rebounds(paths, Limits(np.array([1]), np.array([9.0]), 0.2))
-    assert one["", "rebound_r"] == pytest.approx([size], abs=1e-6)
-    assert one["", "rebound_rise"] == pytest.approx([1.5 / 4], abs=1e-6)
+
+
+def test_rebounds_are_read_without_the_normal() -> None:
+    """It arrives at 4 m/s along x and 9.81 m/s down; it goes on at 3 m/s in plan, 60° to the left, and 1 m/s up."""
+    paths = hops([1.0, 0.5, 0.5], [[4.0, 0.0, 0.0], [1.5, 2.598076, 1.0], [1.5, 2.598076, 0.0]])
+    before = np.hypot(4.0, 9.81)
+    one = measure_rebounds(paths, Limits(np.array([2]), np.array([9.0]), 0.2))
+    assert one["", "rebound_r"] == pytest.approx([np.hypot(3.0, 1.0) / before], abs=1e-6)
+    assert one["", "rebound_rise"] == pytest.approx([1.0 / before], abs=1e-6)
     assert one["", "rebound_turn_deg"] == pytest.approx([60.0], abs=1e-4)
-    both = measure_rebounds(paths, Limits(np.array([2]), np.array([9.0]), 0.2))
-    assert both["", "rebound_r"] == pytest.approx([(size + 1.0) / 2], abs=1e-6)
-    together = measure_rebounds(paths, Limits(np.array([2]), np.array([9.0]), 1.5))  # nearer than that: one impact
-    assert together["", "rebound_r"] == pytest.approx([5.0 / 4], abs=1e-6)
+    both = measure_rebounds(paths, Limits(np.array([3]), np.array([9.0]), 0.2))
+    assert both["", "rebound_turn_deg"] == pytest.approx([30.0], abs=1e-4)
+    assert np.isnan(measure_rebounds(paths, Limits(np.array([1]), np.array([9.0]), 0.2))["", "rebound_r"]).all()
+    rolled = replace(paths, flies=np.array([True, True, False]))
+    flown = measure_rebounds(rolled, Limits(np.array([3]), np.array([9.0]), 0.2))
+    assert flown["", "rebound_r"] == pytest.approx(one["", "rebound_r"])
+
+
+def test_impacts_that_are_not_told_apart_are_one() -> None:
+    """Skipped over, the way between the others is that of one parabola, as a person would see it."""
+    paths = hops([1.0, 0.1, 0.9], [[4.0, 0.0, 0.0], [3.0, 0.0, 1.0], [2.0, 0.0, 3.0]])
+    found = measure_rebounds(paths, Limits(np.array([3]), np.array([9.0]), 0.2))
+    way = paths.end[2] - paths.end[0]
+    after = way / 1.0 + [0.0, 0.0, 9.81 / 2]
+    assert found["", "rebound_r"] == pytest.approx([np.linalg.norm(after) / np.hypot(4.0, 9.81)])

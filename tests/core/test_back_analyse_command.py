@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall back-analyse``: from stops and picks to a posterior that ``simulate`` takes, and bad input."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rockfall.core.cli import main
+from rockfall.core.exchange.posterior_tables import read_posterior, write_posterior
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.simulation.engine import IMPACT, ON_GROUND, Settings, simulate
+from rockfall.core.simulation.ground import make_ground
+from rockfall.core.simulation.parameter_draws import ParameterDraws
+from rockfall.core.simulation.release import make_releases, placed_on
+from rockfall.core.terrain.surface import Surface
+from rockfall.core.terrain.writers import write_ply
+
+EAST, NORTH = 2_600_000.0, 1_200_000.0
+SHIFT = GlobalShift(EAST, NORTH, 0.0)
+MODEL = "stevens_1998"
+TRUTH = {"rn": 0.6, "rt": 0.8}
+RUNS = 6
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A slope that runs out, and blocks that fell down it with known parameters: picks of flights, starts, stops."""
+    folder = tmp_path_factory.mktemp("site")
+    line = np.arange(0.0, 121.0, 2.0)
+    x, y = np.meshgrid(line, line)
+    z = 500 - 0.75 * np.minimum(x, 70) + 0.3 * np.sin(x / 2) * np.cos(y / 3)
+    vertices = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    i = np.arange(line.size**2).reshape(line.size, -1)
+    lower = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:]], axis=-1).reshape(-1, 3)
+    upper = np.stack([i[:-1, :-1], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 3)
+    surface = Surface(vertices, np.concatenate([lower, upper]).astype(np.int32), SHIFT, "slope")
+    write_ply(surface, folder / "slope.ply")
+    ground = make_ground(surface)
+    place = placed_on(ground, np.column_stack([np.full(RUNS, 6.0), 20.0 + 15 * np.arange(RUNS)]), np.full(RUNS, 0.5))
+    releases = make_releases(place, velocity=np.tile([4.0, 0.0, 2.0], (RUNS, 1)), diameter_m=0.5)
+    run = simulate(ground, releases, Settings(MODEL, TRUTH, seed=11))
+    records = run.records
+    picks, stops = ["trajectory,time_s,x_m,y_m,z_m,kind"], ["release,x_m,y_m"]
+    for block in range(RUNS):
+        rolls = records.time_s[(records.run == block) & (records.what == ON_GROUND)].min(initial=run.time_s[block])
+        own = np.flatnonzero((records.run == block) & (records.what == IMPACT) & (records.time_s < rolls))
+        marks = [(0.0, place[block] - [0.0, 0.0, 0.25], "release")]
+        for row in own.tolist():
+            if records.time_s[row] - marks[-1][0] > 0.15:
+                marks.append((records.time_s[row], records.position[row] - 0.25 * records.normal[row], "impact"))
+        end = run.position[block] - [0.0, 0.0, 0.25]
+        for time, where, kind in marks:
+            px, py, pz = SHIFT.to_survey(where).tolist()
+            picks.append(f"B{block},{time:.4f},{px:.4f},{py:.4f},{pz:.4f},{kind}")
+        stops.append(f"B{block},{EAST + end[0]:.3f},{NORTH + end[1]:.3f}")
+    starts = [f"B{i},{EAST + 6},{NORTH + 20 + 15 * i},4,0,2" for i in range(RUNS)]
+    (folder / "picks.csv").write_text("\n".join(picks) + "\n", encoding="utf-8")
+    (folder / "stops.csv").write_text("\n".join(stops) + "\n", encoding="utf-8")
+    table = "release,x_m,y_m,vx_mps,vy_mps,vz_mps\n" + "\n".join(starts) + "\n"
+    (folder / "releases.csv").write_text(table, encoding="utf-8")
+    return folder
+
+
+def asked(site: Path, out: Path, *more: str, observed: str = "picks.csv") -> list[str]:
+    terrain = ["--terrain", str(site / "slope.ply"), "--diameter", "0.5", "--out", str(out)]
+    return ["back-analyse", str(site / observed), *terrain, "--model", MODEL, *more]
+
+
+@pytest.fixture(scope="module")
+def analysed(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("analysed") / "out"
+    assert main(asked(site, out, "--fit", "rn", f"{MODEL}.rt", "--sets", "900", "--rounds", "2")) == 0
+    return out
+
+
+def test_what_is_written_agrees(analysed: Path) -> None:
+    content = json.loads((analysed / "back_analysis.json").read_text(encoding="utf-8"))
+    model, draws = read_posterior(analysed / "posterior.csv")
+    assert model == content["model"] == MODEL
+    assert draws.names == ("rn", "rt")
+    assert len(draws) == content["draws"]
+    assert content["simulated_runs"] == RUNS * (2 * 900 + 1000)
+    assert content["observed_runs"] == [f"B{i}" for i in range(RUNS)]
+    assert set(content["inputs"]) >= {"observed", "terrain"}
+    for one in content["estimates"]:
+        assert one["low"] < TRUTH[one["name"]] < one["high"]
+        assert draws.mean()[one["name"]] == pytest.approx(one["median"], abs=(one["high"] - one["low"]) / 4)
+    assert content["correlation"]["rn"]["rn"] == 1.0
+    assert {one["quantity"] for one in content["predictive"]} >= {"speed_mps", "rebound_r", "impacts_per_m"}
+    assert "runout_m" not in {one["quantity"] for one in content["predictive"]}  # no stop was seen
+    assert sorted(name for fold in content["held_out"] for name in fold["names"]) == content["observed_runs"]
+    parameters = (analysed / "parameters.toml").read_text(encoding="utf-8")
+    assert f"[models.{MODEL}]" in parameters
+    figures = {path.name for path in (analysed / "figures").iterdir()}
+    assert figures == {"parameters.png", "pairs.png", "predictive.png"}
+
+
+def test_stops_alone(site: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "out"
+    more = ["--stops", str(site / "stops.csv"), "--fit", "rt", "friction", "--prior", "friction=0.3..0.7"]
+    argv = asked(site, out, *more, "--sets", "200", "--rounds", "1", "--tables-only", observed="releases.csv")
+    assert main(argv) == 0
+    said = capsys.readouterr().out
+    assert "6 observed runs, 7200 simulated" in said
+    assert "even in 0.3…0.7" in said
+    content = json.loads((out / "back_analysis.json").read_text(encoding="utf-8"))
+    assert {one["quantity"] for one in content["predictive"]} == {"runout_m", "energy_line_deg", "stop_aside_m"}
+    assert content["friction_set"] is None
+    assert not (out / "figures").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        (["--fit", "rx"], "has no parameter 'rx'. Did you mean"),
+        (["--fit", "rn", "--prior", "rn"], "gives no law. Write"),
+        (["--fit", "rn", "--prior", "rn=0.9..2"], "is no part of its range 0…1. Give"),
+        (["--fit", "rn", "--set", f"{MODEL}.rn=0.4"], "rn is both fitted and set. Leave"),
+        (["--fit", "friction", "--friction", "0.4"], "friction is both fitted and set. Leave"),
+        (["--fit", "rn", "--sets", "10"], "are too few. Give"),
+    ],
+)
+def test_bad_input(site: Path, tmp_path: Path, capsys, more: list[str], problem: str) -> None:
+    assert main(asked(site, tmp_path / "out", *more)) == 1
+    assert problem in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_flight_says_nothing(site: Path, tmp_path: Path, capsys) -> None:
+    lines = (site / "picks.csv").read_text(encoding="utf-8").splitlines()
+    picks = tmp_path / "picks.csv"
+    picks.write_text("\n".join(lines[:3]) + "\n", encoding="utf-8")
+    argv = ["back-analyse", str(picks), "--terrain", str(site / "slope.ply"), "--model", MODEL, "--fit", "rn"]
+    assert main([*argv, "--out", str(tmp_path / "out")]) == 1
+    assert "No observed run says anything" in capsys.readouterr().err
+
+
+# --- tables of a posterior --------------------------------------------------------------------------------------------
+
+
+def test_a_posterior_is_read_as_it_was_written(tmp_path: Path) -> None:
+    draws = ParameterDraws(("rn", "friction"), np.array([[0.25, 0.5], [1 / 3, 0.7]]), np.array([0.9, 0.1]))
+    write_posterior(MODEL, draws, tmp_path / "posterior.csv")
+    model, again = read_posterior(tmp_path / "posterior.csv")
+    assert (model, again.names) == (MODEL, draws.names)
+    np.testing.assert_array_equal(again.values, draws.values)
+    np.testing.assert_array_equal(again.weight, draws.weight)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("model,weight,rn\nnoel_2018,1,0.3\n", "noel_2017"),
+        (f"model,weight\n{MODEL},1\n", "has no parameter"),
+        (f"model,weight,rx\n{MODEL},1,0.3\n", "has no parameter 'rx'"),
+        (f"model,weight,rn\n{MODEL},-1,0.3\n", "row 2: The weight is -1"),
+        (f"model,weight,rn\n{MODEL},1,1.3\n", "outside its range"),
+        (f"model,weight,rn\n{MODEL},1,\n", "row 2"),
+        (f"model,weight,rn\n{MODEL},1,0.3\nnoel_2017,1,0.3\n", "row 3: The row is of 'noel_2017'"),
+        (f"model,weight,rn\n{MODEL},0,0.3\n", "no weights"),
+    ],
+)
+def test_bad_posteriors(tmp_path: Path, text: str, problem: str) -> None:
+    from rockfall.core.errors import InputError
+
+    path = tmp_path / "posterior.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(problem)):
+        read_posterior(path)

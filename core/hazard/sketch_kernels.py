@@ -2,7 +2,7 @@
 """Values under whole-number keys, kept as they are while they are few, then as logarithmic bins: compiled kernels.
 
 All of it is in one `pool` of blocks (b, 16) of 32 bits. A slot, that of one key, has either a `raw` run of blocks with
-its rows of q single-precision values, or for each of the q columns a run of blocks with the counts of `WIDTH` bins each.
+its rows of q single-precision values, or for each of the q columns a run of blocks with the counts of as many bins.
 Runs that a slot has outgrown are given to the next that needs as many blocks: `state` has, for each number of blocks,
 the first free run, whose first number is the next one; then how many blocks of the pool, and how many slots, are used.
 
@@ -313,7 +313,7 @@ def _in_bins(pool, run, edge, rank, spread):  # type: ignore[no-untyped-def]
     below, low, wanted = 0, nan, np.int64(rank)
     for b in range(run[2]):
         for k in range(WIDTH):
-            count = np.int64(pool[run[0] + b, k])
+            count = int(pool[run[0] + b, k])
             if not count:
                 continue
             i = WIDTH * (run[1] + b) + k
@@ -359,7 +359,7 @@ def figures(  # type: ignore[no-untyped-def]
             else:
                 for b in range(runs[slot, c, 2]):
                     for k in range(WIDTH):
-                        n += np.int64(pool[runs[slot, c, 0] + b, k])
+                        n += int(pool[runs[slot, c, 0] + b, k])
             mean[i, c], error[i, c] = nan, nan
             quantiles[i, c, :] = nan
             if not n:

@@ -26,6 +26,8 @@ Contact = Literal["mesh", "points"]
 CONTACTS: tuple[Contact, ...] = ("mesh", "points")
 """What of the terrain blocks meet: its triangles, where a cloud is meshed in plan; or points alone."""
 
+MOST_BINS = 4000
+"""Along one side, in which triangles that lie on top of each other are looked for."""
 TERRAIN = 0
 """The owner of the terrain's elements; structures follow from 1."""
 FEWEST = 2.0
@@ -123,6 +125,30 @@ class Ground:
         """
         index = self.surface.index
         return (*index.tree, *(self.pairs if index is self.index else make_pairs(index)))
+
+    @cached_property
+    def plan(self) -> Array:
+        """(m, 12) the terrain's triangles in plan, without structures: see `plan_kernels`.
+
+        Raises
+        ------
+        InputError : the terrain is a cloud of points.
+        """
+        from ..terrain.kernels import edge_neighbours
+        from .plan_kernels import fill_plan, mark_layers
+
+        surface, index = self.surface, self.surface.index
+        m = len(surface.faces)
+        place = np.empty(m, np.int32)
+        place[index.face] = np.arange(m, dtype=np.int32)
+        plan = np.empty((m, 12))
+        neighbours = edge_neighbours(surface.faces, len(surface.vertices))
+        fill_plan(index.corners, index.face, neighbours, place, plan)
+        low, high = surface.bounds[:, :2]
+        size = max(2.0 * float(np.sqrt(np.prod(high - low) / m)), float((high - low).max()) / MOST_BINS)
+        columns, rows = (np.floor((high - low) / size).astype(np.intp) + 1).tolist()
+        mark_layers(plan, size, low[0], low[1], np.zeros((rows, columns)), np.zeros((rows, columns), np.int64))
+        return plan
 
     @cached_property
     def facets(self) -> Any:

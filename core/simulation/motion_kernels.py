@@ -86,22 +86,22 @@ def _at(p, v, a, t):  # type: ignore[no-untyped-def]
 
 
 @borrowing
-def _slowed(v, drag, gravity):  # type: ignore[no-untyped-def]
+def slowed(v, drag, gravity):  # type: ignore[no-untyped-def]
     """The acceleration by gravity and drag."""
     k = drag * sqrt(_dot(v, v))
     return -k * v[0], -k * v[1], -k * v[2] - gravity
 
 
 @borrowing
-def _with_drag(v, drag, gravity, h):  # type: ignore[no-untyped-def]
+def with_drag(v, drag, gravity, h):  # type: ignore[no-untyped-def]
     """Displacement and velocity after a time h, by a step of Runge and Kutta's fourth order."""
-    a = _slowed(v, drag, gravity)
+    a = slowed(v, drag, gravity)
     v2 = (v[0] + 0.5 * h * a[0], v[1] + 0.5 * h * a[1], v[2] + 0.5 * h * a[2])
-    b = _slowed(v2, drag, gravity)
+    b = slowed(v2, drag, gravity)
     v3 = (v[0] + 0.5 * h * b[0], v[1] + 0.5 * h * b[1], v[2] + 0.5 * h * b[2])
-    c = _slowed(v3, drag, gravity)
+    c = slowed(v3, drag, gravity)
     v4 = (v[0] + h * c[0], v[1] + h * c[1], v[2] + h * c[2])
-    d = _slowed(v4, drag, gravity)
+    d = slowed(v4, drag, gravity)
     s = h / 6.0
     return (
         (
@@ -317,7 +317,7 @@ def run_block(  # type: ignore[no-untyped-def]
             a, horizon, then = (0.0, 0.0, -gravity), inf, zero
             if drag > 0.0:
                 horizon = DRAG_CHANGE / (drag * speed + 1e-3)
-                moved, then = _with_drag(v, drag, gravity, horizon)
+                moved, then = with_drag(v, drag, gravity, horizon)
                 f = 2.0 / (horizon * horizon)
                 a = (
                     f * (moved[0] - v[0] * horizon),
@@ -344,7 +344,7 @@ def run_block(  # type: ignore[no-untyped-def]
             before, start = p, v
             p, v = _at(p, v, a, t)
             if drag > 0.0:
-                v = _with_drag(start, drag, gravity, t)[1]
+                v = with_drag(start, drag, gravity, t)[1]
             time += t
             chord = (p[0] - before[0], p[1] - before[1], p[2] - before[2])
             length += sqrt(_dot(chord, chord))

@@ -7,10 +7,13 @@ number of threads.
 
 import os
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import pairwise
+from threading import Event
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +26,10 @@ from ..simulation.engine import Settings, Simulation, check_settings, simulate
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
 
-CHUNK = 2048
-"""Runs that are simulated and counted at once."""
+CHUNK = 1024
+"""Runs that are simulated and counted at once: of more, the records would take fresh memory each time."""
+LOOK_S = 0.1
+"""How often progress is told, and a cancel noticed."""
 
 type Enough = Callable[[int], bool]
 """Whether so many blocks, which the tallies have counted, are enough."""
@@ -56,6 +61,18 @@ class Counted:
         return self.blocks / self.seconds if self.seconds > 0 else np.nan
 
 
+class _Chunk(NamedTuple):
+    """What is left of a chunk: its runs, all of them where that is asked for, and its tallies."""
+
+    blocks: int
+    wanted: int
+    ends: tuple[str, ...]
+    ended: NDArray[np.intp]
+    impacts: int
+    whole: Simulation | None
+    tallies: list[Tally]
+
+
 def run_chunks(
     ground: Ground,
     releases: Releases,
@@ -67,6 +84,7 @@ def run_chunks(
     first_run: int = 0,
     threads: int | None = None,
     enough: Enough | None = None,
+    take: Callable[[Simulation], None] | None = None,
     progress: Progress = silent,
 ) -> Counted:
     """Simulate releases and add them to tallies.
@@ -78,12 +96,14 @@ def run_chunks(
     first_run : see `simulate`.
     threads : None takes all cores.
     enough : asked when 1, 2, 4, 8 … chunks are counted, whatever the number of threads; the first yes ends it.
-    progress : called with the number of finished blocks; a `CancelledError` raised in it ends it with the chunks that
-        are begun, which are the first without a gap.
+    take : gets each chunk, with all that it recorded and without what `barriers` do, in the order of the runs.
+    progress : called with the number of finished blocks; a `CancelledError` raised in it ends it with the blocks that
+        are finished, from the first on without a gap.
 
     Raises
     ------
     InputError : settings, barriers or blocks that cannot be.
+    CancelledError : the work was ended before the first blocks were finished.
     """
     check_settings(ground, settings)
     check_screens(barriers, ground)
@@ -94,9 +114,17 @@ def run_chunks(
     progress("Compiling where needed, then simulating", 0, n)
     simulate(ground, releases.take(slice(0, 1)), settings, first_run=first_run, threads=1)
 
-    def chunk(start: int) -> tuple[Simulation, list[Tally], list[Tally]]:
+    stopping = Event()
+
+    def until_stopped(*_: object) -> None:
+        if stopping.is_set():
+            raise CancelledError
+
+    def chunk(start: int) -> _Chunk:
         part = releases.take(slice(start, min(start + CHUNK, n)))
-        simulation = simulate(ground, part, settings, record="all", first_run=first_run + start, threads=1)
+        simulation = simulate(
+            ground, part, settings, record="all", first_run=first_run + start, threads=1, progress=until_stopped
+        )
         own, later = [each.empty() for each in tallies], [each.empty() for each in behind]
         for each in own:
             each.add(simulation)
@@ -104,56 +132,75 @@ def run_chunks(
             held = with_barriers(simulation, hits_at(simulation, barriers)) if barriers else simulation
             for each in later:
                 each.add(held)
-        return simulation, own, later
+        ended = np.bincount(simulation.end, minlength=len(simulation.ends))
+        return _Chunk(
+            len(simulation), len(part), simulation.ends, ended, int(simulation.impacts.sum()),
+            simulation if take is not None else None, [*own, *later],
+        )  # fmt: skip
 
-    def take(done: tuple[Simulation, list[Tally], list[Tally]]) -> None:
+    def add(done: _Chunk) -> None:
         nonlocal ends, counted, impacts, names
-        simulation, own, later = done
-        names = simulation.ends
-        ends = _padded(ends, len(names)) + np.bincount(simulation.end, minlength=len(names))
-        counted, impacts = counted + len(simulation), impacts + int(simulation.impacts.sum())
-        for whole, part in zip((*tallies, *behind), (*own, *later), strict=True):
+        names = done.ends
+        ends = _padded(ends, len(names)) + done.ended
+        counted, impacts = counted + done.blocks, impacts + done.impacts
+        if take is not None and done.whole is not None:
+            take(done.whole)
+        for whole, part in zip((*tallies, *behind), done.tallies, strict=True):
             whole.merge(part)
+
+    def tell() -> None:
+        try:
+            progress("Simulating", counted, n)
+        except CancelledError:
+            stopping.set()
 
     cores = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
         for begin, end in _rounds(n) if enough is not None else [(0, n)]:
-            goes_on = _do(
-                pool, cores, range(begin, end, CHUNK), chunk, take, lambda: progress("Simulating", counted, n)
-            )
+            goes_on = _do(pool, cores, range(begin, end, CHUNK), chunk, add, tell, stopping)
             if not goes_on or (enough is not None and enough(counted)):
                 break
+    if not counted:
+        raise CancelledError
     told = dict(zip(names, ends.tolist(), strict=True))
     return Counted(settings, counted, n, told, impacts, time.perf_counter() - started)
 
 
-def _do[T](
+def _do(
     pool: ThreadPoolExecutor,
     cores: int,
     starts: range,
-    chunk: Callable[[int], T],
-    take: Callable[[T], None],
-    told: Callable[[], None],
+    chunk: Callable[[int], _Chunk],
+    add: Callable[[_Chunk], None],
+    tell: Callable[[], None],
+    stopping: Event,
 ) -> bool:
-    """Do chunks, a few at a time; False where it was cancelled: those that had begun are done all the same."""
-    waiting, left, goes_on = set[Future[T]](), iter(starts), True
+    """Do chunks, a few at a time, and add them in their order; False where it was stopped.
+
+    Then those that are at work end early; what is finished behind a gap is left out.
+    """
+    waiting, left = deque[Future[_Chunk]](), iter(starts)
     try:
         while True:
-            while goes_on and len(waiting) < cores + 1 and (start := next(left, None)) is not None:
-                waiting.add(pool.submit(chunk, start))
+            while not stopping.is_set() and len(waiting) < cores + 2 and (start := next(left, None)) is not None:
+                waiting.append(pool.submit(chunk, start))
             if not waiting:
-                return goes_on
-            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for one in ready:
-                take(one.result())
-            if goes_on:
-                try:
-                    told()
-                except CancelledError:
-                    goes_on = False
+                return not stopping.is_set()
+            wait((waiting[0],), LOOK_S)
+            while waiting and waiting[0].done():
+                done = waiting.popleft().result()
+                add(done)
+                if done.blocks < done.wanted:
+                    return False
+            if not stopping.is_set():
+                tell()
+    except CancelledError:
+        return False
     finally:
-        for one in waiting:
-            one.cancel()
+        if waiting:
+            stopping.set()
+            for one in waiting:
+                one.cancel()
 
 
 def _rounds(n: int) -> list[tuple[int, int]]:

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The passages of runs through cells, along their exact parabolas: compiled kernels.
+
+A run is followed from piece to piece: a flight is a parabola, with drag the chain of parabolas that the simulation
+followed, a step on the ground has a constant acceleration. In plan a piece is straight (steps on the ground are cut
+until they are so to `STRAIGHT_M`). Along it the cell changes at borders of cells, and the plane of the terrain at edges
+of triangles (`plan_kernels`): between two such places the height above the terrain is a parabola in time, whose
+greatest value is known, and the greatest speed is at one of the two. Nothing is sampled. Where triangles lie on top of
+each other the index is asked instead (`height_kernels`).
+"""
+
+from math import ceil, floor, inf, isnan, nan, sqrt
+
+import numpy as np
+
+from ..compiled import borrowing, kernel
+from ..simulation.height_kernels import flight_height
+from ..simulation.motion_kernels import DRAG_CHANGE, FLIES_OFF, IMPACT, ON_GROUND, RELEASED, with_drag
+from ..simulation.plan_kernels import triangle_below
+from ..terrain.kernels import STACK_SIZE
+
+STRAIGHT_M = 0.001
+"""A step on the ground is nowhere farther than this from the straight line in plan that it is taken for."""
+MOST_CUTS = 100
+BEYOND_M = 1e-6
+"""Behind a border of the terrain, what is below is looked for so far on."""
+MOST_AT_ONCE = 64
+"""Triangles around one place; after so many the path is lost, and found again in the next cell."""
+COLUMNS = 4
+"""Of values: speed, kinetic energy, that of translation, height; NaN where there is no terrain below."""
+
+
+@kernel
+def _longer(keys, values):  # type: ignore[no-untyped-def]
+    more_keys, more_values = np.empty(2 * len(keys), np.int32), np.empty((2 * len(keys), COLUMNS), np.float32)
+    more_keys[: len(keys)], more_values[: len(keys)] = keys, values
+    return more_keys, more_values
+
+
+@borrowing
+def _square(v, a, k, gravity, t):  # type: ignore[no-untyped-def]
+    """The square of the speed, in a flight with drag that of the simulation."""
+    if k > 0.0:
+        v, t = with_drag(v, k, gravity, t)[1], 0.0
+    x, y, z = v[0] + a[0] * t, v[1] + a[1] * t, v[2] + a[2] * t
+    return x * x + y * y + z * z
+
+
+@borrowing
+def _moment(part, length, speed, gain, duration):  # type: ignore[no-untyped-def]
+    """When a part of the way in plan is done: at a speed that changes by `gain` in a second."""
+    if gain == 0.0:
+        return part * duration
+    way = part * length
+    root = sqrt(max(speed * speed + 2.0 * gain * way, 0.0))
+    below = speed + root
+    return min(2.0 * way / below, duration) if below > 0.0 else 0.0
+
+
+@borrowing
+def _exit(plan, tri, p, dx, dy, now):  # type: ignore[no-untyped-def]
+    """When a straight way in plan leaves a triangle, as a part of it, and over which edge."""
+    best, edge = inf, 0
+    for e in range(3):
+        f = 2 * e + 2 if e < 2 else 0
+        ax, ay = plan[tri, 2 * e], plan[tri, 2 * e + 1]
+        ex, ey = plan[tri, f] - ax, plan[tri, f + 1] - ay
+        rate = ex * dy - ey * dx
+        if rate < 0.0:
+            there = (ey * (p[0] - ax) - ex * (p[1] - ay)) / rate
+            if there < best:
+                best, edge = there, e
+    return max(best, now), edge
+
+
+@borrowing
+def _border(p, d, low, size, cell):  # type: ignore[no-untyped-def]
+    """When a straight way leaves a row or column of cells, as a part of it."""
+    if d > 0.0:
+        return max((low + (cell + 1) * size - p) / d, 0.0)
+    if d < 0.0:
+        return max((low + cell * size - p) / d, 0.0)
+    return inf
+
+
+@borrowing
+def _among_layers(tree, stack, bounds, below, p, v, a, start, stop, best):  # type: ignore[no-untyped-def]
+    """The greatest height of a part of a piece where triangles lie on top of each other, or there are none."""
+    fall = max(-a[2], 1e-9)  # a way that bends upwards is on the ground, and short
+    t = stop - start
+    here = (
+        p[0] + (v[0] + 0.5 * a[0] * start) * start,
+        p[1] + (v[1] + 0.5 * a[1] * start) * start,
+        p[2] + (v[2] + 0.5 * a[2] * start) * start,
+    )
+    middle = 0.5 * (start + stop)
+    speed = (v[0] + a[0] * middle, v[1] + a[1] * middle, v[2] + a[2] * middle + 0.5 * fall * t)
+    return flight_height(tree, stack, bounds, below, here, speed, fall, t, best)
+
+
+@kernel
+def walk(  # type: ignore[no-untyped-def]
+    west, south, size, columns, rows, plan, tree, order, begin, what, time, position, v2, omega2, v1, omega1,
+    half_mass, half_inertia, drag, gravity, seen, keys, values,
+):  # fmt: skip
+    """All passages of runs; returns (keys, values, how many).
+
+    Parameters
+    ----------
+    west, south, size, columns, rows : of the cells.
+    plan, tree : the terrain's triangles in plan, and its index.
+    order : (n,) of the runs; begin : (n + 1,) where the records of each begin.
+    what … omega1 : (k, …) the records.
+    half_mass, half_inertia, drag : (n,) of the runs: energies are these times squares; ½ρC_D A/m [1/m].
+    seen : (cells,) zeros, work space.
+    keys, values : to be filled, and made longer: (p,) the cell, row · columns + column, −1 − cell for the first
+        passage of a run; (p, 4) see `COLUMNS`.
+    """
+    stack, bounds, below = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE), np.empty(STACK_SIZE, np.int64)
+    count = 0
+    for number in range(len(order)):
+        run = order[number]
+        first, last = begin[run], begin[run + 1] - 1
+        if last < first:
+            continue
+        p = (position[first, 0], position[first, 1], position[first, 2])
+        column, row = np.int64(floor((p[0] - west) / size)), np.int64(floor((p[1] - south) / size))
+        tri = triangle_below(tree, stack, p[0], p[1], p[2])
+        mass, inertia, k = half_mass[run], half_inertia[run], drag[run]
+        square, energy, height = 0.0, 0.0, -inf
+        if tri >= 0:
+            height = p[2] - plan[tri, 8] - plan[tri, 6] * p[0] - plan[tri, 7] * p[1]
+            if isnan(height):
+                height = _among_layers(tree, stack, bounds, below, p, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0, -inf)
+        for i in range(first, last + 1):
+            p, v = (position[i, 0], position[i, 1], position[i, 2]), (v2[i, 0], v2[i, 1], v2[i, 2])
+            spin = inertia * (omega2[i, 0] ** 2 + omega2[i, 1] ** 2 + omega2[i, 2] ** 2)
+            s = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+            square, energy = max(square, s), max(energy, mass * s + spin)
+            left = time[i + 1] - time[i] if i < last else 0.0
+            if not left > 0.0:
+                continue
+            flies = (what[i] == RELEASED or what[i] == IMPACT or what[i] == FLIES_OFF) and what[i + 1] != ON_GROUND
+            a, part, gain_of_spin, air = (0.0, 0.0, -gravity), left, 0.0, k
+            if not flies:
+                air = 0.0
+                a = ((v1[i + 1, 0] - v[0]) / left, (v1[i + 1, 1] - v[1]) / left, (v1[i + 1, 2] - v[2]) / left)
+                v = (
+                    (position[i + 1, 0] - p[0]) / left - 0.5 * a[0] * left,
+                    (position[i + 1, 1] - p[1]) / left - 0.5 * a[1] * left,
+                    (position[i + 1, 2] - p[2]) / left - 0.5 * a[2] * left,
+                )
+                then = inertia * (omega1[i + 1, 0] ** 2 + omega1[i + 1, 1] ** 2 + omega1[i + 1, 2] ** 2)
+                gain_of_spin = (then - spin) / left
+                way_x, way_y = position[i + 1, 0] - p[0], position[i + 1, 1] - p[1]
+                way = sqrt(way_x * way_x + way_y * way_y)
+                bend = abs(a[0] * way_y - a[1] * way_x) / way if way > 0.0 else 0.0
+                cuts = sqrt(bend * left * left / (8.0 * STRAIGHT_M))
+                if cuts > 1.0:
+                    part = left / min(ceil(cuts), MOST_CUTS)
+            while left > 0.0:
+                duration, then_v = min(part, left), v
+                if air > 0.0:
+                    horizon = DRAG_CHANGE / (k * sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + 1e-3)
+                    moved, then_v = with_drag(v, k, gravity, horizon)
+                    f = 2.0 / (horizon * horizon)
+                    a = (
+                        f * (moved[0] - v[0] * horizon),
+                        f * (moved[1] - v[1] * horizon),
+                        f * (moved[2] - v[2] * horizon),
+                    )
+                    duration = min(horizon, left)
+                left = left - duration if duration < left * (1.0 - 1e-9) else 0.0
+                half = 0.5 * duration
+                dx, dy = (v[0] + a[0] * half) * duration, (v[1] + a[1] * half) * duration
+                length, speed, gain = sqrt(dx * dx + dy * dy), 0.0, 0.0
+                if (a[0] != 0.0 or a[1] != 0.0) and length > 0.0:
+                    speed = max((v[0] * dx + v[1] * dy) / length, 0.0)
+                    gain = 2.0 * (length / duration - speed) / duration
+                at_x, at_y = _border(p[0], dx, west, size, column), _border(p[1], dy, south, size, row)
+                now, start, at_once = 0.0, 0.0, 0
+                if tri < 0:
+                    tri = triangle_below(tree, stack, p[0], p[1], p[2])
+                at_edge, edge = (inf, 0) if tri < 0 else _exit(plan, tri, p, dx, dy, now)
+                c, b, f = nan, 0.0, 0.0
+                if tri >= 0:
+                    gx, gy = plan[tri, 6], plan[tri, 7]
+                    c, b = p[2] - plan[tri, 8] - gx * p[0] - gy * p[1], v[2] - gx * v[0] - gy * v[1]
+                    f = a[2] - gx * a[0] - gy * a[1]
+                while True:
+                    border = min(at_x, at_y)
+                    then = min(border, at_edge, 1.0)
+                    stop = duration if then >= 1.0 else _moment(then, length, speed, gain, duration)
+                    if not isnan(c):
+                        height = max(height, c + (b + 0.5 * f * start) * start, c + (b + 0.5 * f * stop) * stop)
+                        if b + f * start > 0.0 > b + f * stop:
+                            height = max(height, c - 0.5 * b * b / f)
+                    else:
+                        height = _among_layers(tree, stack, bounds, below, p, v, a, start, stop, height)
+                    now, start = then, stop
+                    if then >= 1.0:
+                        break
+                    if at_edge < border:
+                        there = np.int64(plan[tri, 9 + edge])
+                        at_once = at_once + 1 if at_edge <= now else 0
+                        if there < 0 and length > 0.0:
+                            beyond = now + BEYOND_M / length
+                            t = _moment(min(beyond, 1.0), length, speed, gain, duration)
+                            there = triangle_below(
+                                tree, stack, p[0] + beyond * dx, p[1] + beyond * dy, p[2] + (v[2] + 0.5 * a[2] * t) * t
+                            )
+                        tri = np.int64(-1) if there == tri or at_once > MOST_AT_ONCE else there
+                    else:
+                        s = _square(v, a, air, gravity, stop)
+                        now_spin = spin + gain_of_spin * stop
+                        square, energy = max(square, s), max(energy, mass * s + now_spin)
+                        if 0 <= column < columns and 0 <= row < rows:
+                            if count == len(keys):
+                                keys, values = _longer(keys, values)
+                            cell = row * columns + column
+                            keys[count] = cell if seen[cell] == run + 1 else -1 - cell
+                            seen[cell] = run + 1
+                            values[count, 0], values[count, 1] = sqrt(square), energy
+                            values[count, 2], values[count, 3] = mass * square, height if height > -inf else nan
+                            count += 1
+                        square, energy, height = s, mass * s + now_spin, -inf
+                        if at_x <= border + 1e-12:
+                            column += 1 if dx > 0.0 else -1
+                            at_x = _border(p[0], dx, west, size, column)
+                        if at_y <= border + 1e-12:
+                            row += 1 if dy > 0.0 else -1
+                            at_y = _border(p[1], dy, south, size, row)
+                        if tri < 0:
+                            place = (
+                                p[0] + now * dx, p[1] + now * dy, p[2] + (v[2] + 0.5 * a[2] * stop) * stop
+                            )  # fmt: skip
+                            tri = triangle_below(tree, stack, place[0], place[1], place[2])
+                        elif at_edge > now:
+                            continue
+                    at_edge, edge = (inf, 0) if tri < 0 else _exit(plan, tri, p, dx, dy, now)
+                    c = nan
+                    if tri >= 0:
+                        gx, gy = plan[tri, 6], plan[tri, 7]
+                        c, b = p[2] - plan[tri, 8] - gx * p[0] - gy * p[1], v[2] - gx * v[0] - gy * v[1]
+                        f = a[2] - gx * a[0] - gy * a[1]
+                s, spin = _square(v, a, air, gravity, duration), spin + gain_of_spin * duration
+                square, energy = max(square, s), max(energy, mass * s + spin)
+                p = (p[0] + dx, p[1] + dy, p[2] + (v[2] + a[2] * half) * duration)
+                v = then_v if flies else (v[0] + a[0] * duration, v[1] + a[1] * duration, v[2] + a[2] * duration)
+        if 0 <= column < columns and 0 <= row < rows:
+            if count == len(keys):
+                keys, values = _longer(keys, values)
+            cell = row * columns + column
+            keys[count] = cell if seen[cell] == run + 1 else -1 - cell
+            seen[cell] = run + 1
+            values[count, 0], values[count, 1] = sqrt(square), energy
+            values[count, 2], values[count, 3] = mass * square, height if height > -inf else nan
+            count += 1
+    return keys, values, count

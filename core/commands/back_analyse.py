@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     priors = make_priors(model, arguments.fit, _laws(arguments.prior))
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         case = case_as_asked(arguments, (model.name,), VARIANTS, progress, "centres")
-        settings = replace(case.scenario.settings[0], seed=case.scenario.seed)
+        settings = replace(case.scenario.settings[0], draws=None)
         for prior in priors:
             if any(text.partition("=")[0] == f"{model.name}.{prior.name}" for text in arguments.set):
                 raise InputError(f"{prior.name} is both fitted and set", advice="Leave out one of the two")

@@ -2,6 +2,7 @@
 """``rockfall simulate``: blocks that fall down the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -37,6 +38,7 @@ from .release_options import (
 )
 
 if TYPE_CHECKING:
+    from ..simulation.parameter_draws import ParameterDraws
     from ..simulation.release import Releases
     from ..terrain.cloud import Cloud
     from ..terrain.surface import Surface
@@ -57,6 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_model_option(parser, "impact models, each of which gets the same blocks")
     add_parameter_options(parser)
     add_observed_option(parser, "needed by that model; a project can give its own")
+    parser.add_argument(
+        "--posterior",
+        action="extend",
+        nargs="+",
+        default=[],
+        metavar="FILE",
+        help="posterior.csv of a back-analysis: each block draws its parameters, so results show what is not known",
+    )
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
     add_release_options(parser)
     motion = parser.add_argument_group("motion")
@@ -148,6 +158,7 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
             raise InputError(f"--{option} is missing", advice="Only a project, project.toml, can do without it")
     models = models_as_asked(arguments.model)
     parameters = model_parameters(arguments, models)
+    draws = _posteriors(arguments, models)
     measured = measured_as_asked(arguments, models, needed=True)
     files = _structures(arguments.structure)
     given = {
@@ -174,9 +185,15 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
         structures={name: read_structure(file, progress=progress, **asdict(reading)) for name, file in files.items()},
         zones=zones,
         drag=Drag() if arguments.drag else None,
+        draws=draws,
         **given,
     )
-    inputs = {**release_files, **zone_files, **terrain_inputs(arguments.terrain)}
+    inputs = {
+        **_posterior_inputs(arguments.posterior),
+        **release_files,
+        **zone_files,
+        **terrain_inputs(arguments.terrain),
+    }
     if measured is not None:
         inputs["observed"] = Path(arguments.observed)
     return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()})
@@ -223,7 +240,29 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
     models = {name: known.get(name, {}) for name in scenario.models}
     zones, zone_files = zones_as_asked(arguments, scenario.terrain, list(models))
     scenario = replace(scenario, models=models, zones=scenario.zones if zones is None else zones)
-    return _Asked(scenario, entry.record, inputs | zone_files)
+    if arguments.posterior:
+        scenario = replace(scenario, draws=_posteriors(arguments, list(models)))
+        inputs = {name: file for name, file in inputs.items() if name != "posterior"}
+    return _Asked(scenario, entry.record, inputs | zone_files | _posterior_inputs(arguments.posterior))
+
+
+def _posteriors(arguments: argparse.Namespace, models: Sequence[str]) -> "dict[str, ParameterDraws]":
+    """What ``--posterior`` says, by model; not together with options that set the same."""
+    from ..exchange.posterior_tables import posteriors_of
+
+    found = posteriors_of([Path(file) for file in arguments.posterior], models)
+    for model, draws in found.items():
+        for name in draws.names:
+            typed = any(text.partition("=")[0].strip() == f"{model}.{name}" for text in arguments.set)
+            if typed or (name == "friction" and arguments.friction is not None):
+                raise InputError(f"{name} is both drawn from --posterior and set", advice="Leave out one of the two")
+    return found
+
+
+def _posterior_inputs(files: Sequence[str]) -> dict[str, Path]:
+    """The files of ``--posterior`` by what they are."""
+    several = len(files) > 1
+    return {f"posterior {i}" if several else "posterior": Path(file) for i, file in enumerate(files, 1)}
 
 
 def _asked_runs(releases: "Releases", runs: tuple[int, int] | None) -> tuple["Releases", int]:

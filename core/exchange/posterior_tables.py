@@ -2,6 +2,7 @@
 """posterior.csv and back_analysis.json: what observed runs say of the parameters of a model."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import import_module
 from math import isfinite
@@ -58,6 +59,26 @@ def read_posterior(path: str | Path) -> tuple[str, ParameterDraws]:
     draws = ParameterDraws(tuple(names), values, weight)
     check_draws(draws, model)
     return model.name, draws
+
+
+def posteriors_of(files: Sequence[Path], models: Sequence[str]) -> dict[str, ParameterDraws]:
+    """What the blocks of each model draw their parameters from, by model.
+
+    Raises
+    ------
+    InputError : see `read_posterior`; a posterior of a model that is not among them, or two of one.
+    """
+    found: dict[str, ParameterDraws] = {}
+    for file in files:
+        model, draws = read_posterior(file)
+        if model not in models:
+            raise InputError(
+                f"The posterior is of {model}, which is not simulated", file=file, advice=f"Simulate with {model}"
+            )
+        if model in found:
+            raise InputError(f"There are two posteriors of {model}", file=file, advice="Leave out one of them")
+        found[model] = draws
+    return found
 
 
 def back_analysis_content(analysis: BackAnalysis, inputs: dict[str, Path]) -> dict[str, Any]:

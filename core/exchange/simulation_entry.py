@@ -8,6 +8,7 @@
     contact = "mesh"                 # points: blocks meet the points of a cloud instead of its meshed surface
     friction = 0.5
     drag = true
+    posterior = "posterior.csv"      # of a back-analysis: each block draws its parameters
     record = ["impacts"]             # trajectories; without it the number of blocks decides
 
     [simulation.releases]
@@ -122,6 +123,7 @@ class SimulationEntry:
     releases, structures, zones, rolling, friction, seed : see `workflow.simulation.Scenario`.
     contact : what of the terrain blocks meet, see `simulation.ground.CONTACTS`.
     observed : impacts.csv that the model observed draws from; None takes what the project has measured.
+    posterior : posterior.csv of a back-analysis, from which each block of its model draws its parameters.
     drag : of the air, with the coefficient and density of the project's reconstruction.
     record : of `RECORDS`, the tables beside runs.csv; None lets the number of blocks decide.
     """
@@ -135,6 +137,7 @@ class SimulationEntry:
     friction: float = FRICTION
     drag: bool = False
     observed: Path | None = None
+    posterior: Path | None = None
     seed: int = 0
     record: tuple[str, ...] | None = None
     extra: Extra = field(default_factory=dict)
@@ -163,6 +166,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         friction=table.number("friction", FRICTION, zero_allowed=True),
         drag=table.flag("drag", False),
         observed=table.path("observed") if table.has("observed") else None,
+        posterior=table.path("posterior") if table.has("posterior") else None,
         seed=table.whole("seed", 0, zero_allowed=True),
         record=table.choices("record", RECORDS) if table.has("record") else None,
         extra=table.rest(),
@@ -181,6 +185,8 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
     }
     if entry.observed is not None:
         content["observed"] = relative(entry.observed)
+    if entry.posterior is not None:
+        content["posterior"] = relative(entry.posterior)
     if entry.record is not None:
         content["record"] = list(entry.record)
     content["releases"] = _release_content(entry.releases, relative)

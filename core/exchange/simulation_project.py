@@ -28,6 +28,7 @@ from ..terrain.surface import Surface
 from ..workflow.simulation import ReleaseSource, Scenario
 from .opening import open_terrain, read_project_picks, reconstruct_project
 from .parameters import checked_parameters
+from .posterior_tables import posteriors_of
 from .project import BlockEntry, Project
 from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry, SimulationEntry
 from .simulation_output import recorded_for
@@ -71,6 +72,10 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         inputs["picks"] = project.picks
     if entry.releases.source == TABLE and entry.releases.file is not None:
         inputs["releases"] = entry.releases.file
+    draws = {}
+    if entry.posterior is not None:
+        draws = posteriors_of([entry.posterior], models)
+        inputs["posterior"] = entry.posterior
     structures: dict[str, Surface | Cloud] = {}
     for structure in entry.structures:
         progress(f"Reading {structure.file.name}", 0, 0)
@@ -101,6 +106,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
         record="all" if entry.record is None else recorded_for(entry.record, bool(structures)),
+        draws=draws,
     )
     return scenario, inputs
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.measured_rebounds import beyond_measured, beyond_sentence, measured_sentence
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
@@ -31,6 +32,7 @@ from ..simulation.engine import (
 )
 from ..simulation.ground import Ground, make_ground
 from ..simulation.hits import hits_of
+from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.release import Releases
 from ..simulation.results import fell_through
 from ..terrain.cloud import Cloud
@@ -82,6 +84,7 @@ class Scenario:
     terrain : the surface, or the cloud whose points the blocks meet.
     releases : puts the blocks on the ground, with their sizes, densities, number and velocities.
     models : name → the parameters that are not to have their default, for all zones; in the order in which they run.
+    draws : name → what each block of this model draws its parameters from, and friction.
     measured : what the model observed draws from; None where it does not run.
     structures : name → walls, fences, roads, houses that stand on the terrain.
     zones : None for one that is everywhere.
@@ -103,6 +106,7 @@ class Scenario:
     most_impacts: int = Settings.most_impacts
     most_s: float = Settings.most_s
     record: Recorded = "all"
+    draws: Mapping[str, ParameterDraws] = field(default_factory=dict)
 
     @property
     def settings(self) -> tuple[Settings, ...]:
@@ -117,6 +121,7 @@ class Scenario:
                 rolling=self.rolling,
                 friction=self.friction,
                 zone_friction={} if self.zones is None else self.zones.friction,
+                draws=self.draws.get(model),
                 gravity_mps2=self.gravity_mps2,
                 drag=self.drag,
                 seed=self.seed,
@@ -318,11 +323,26 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
         f"{simulation.v_max_mps.max():.1f} m/s. It took {simulation.seconds:.1f} s."
     )
     remarks.append(Remark(text, "note", model))
+    if simulation.settings.draws is not None:
+        remarks.append(Remark(_drawn_sentence(simulation.settings.draws), "note", model))
     measured = simulation.settings.measured
     if measured is not None and find_model(model).draws_from_impacts:
         remarks.append(Remark(measured_sentence(measured), "note", model))
         remarks += _beyond(simulation, measured)
     return remarks
+
+
+def _drawn_sentence(draws: ParameterDraws) -> str:
+    """What each block drew, for people."""
+    ends = np.array([0.025, 0.975])
+    spans = [
+        "{} from {:.3g} to {:.3g}".format(name, *weighted_quantiles(column, draws.weight, ends).tolist())
+        for name, column in zip(draws.names, draws.values.T, strict=True)
+    ]
+    return (
+        f"Each block drew its {', '.join(spans)} (95 % of the draws): the results show what is not known of these, "
+        "and not chance alone."
+    )
 
 
 def _hit_structures(simulation: Simulation) -> list[Remark]:

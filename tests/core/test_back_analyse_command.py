@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """``rockfall back-analyse``: from stops and picks to a posterior that ``simulate`` takes, and bad input."""
 
+import csv
 import json
 import re
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from rockfall.core.cli import main
 from rockfall.core.exchange.posterior_tables import read_posterior, write_posterior
+from rockfall.core.exchange.project import read_project, write_project
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.engine import IMPACT, ON_GROUND, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
@@ -135,6 +137,75 @@ def test_one_flight_says_nothing(site: Path, tmp_path: Path, capsys) -> None:
     argv = ["back-analyse", str(picks), "--terrain", str(site / "slope.ply"), "--model", MODEL, "--fit", "rn"]
     assert main([*argv, "--out", str(tmp_path / "out")]) == 1
     assert "No observed run says anything" in capsys.readouterr().err
+
+
+# --- carried on into a simulation -------------------------------------------------------------------------------------
+
+
+def simulated(site: Path, out: Path, *more: str) -> list[str]:
+    return ["simulate", str(site / "releases.csv"), "--terrain", str(site / "slope.ply"), "--out", str(out), *more]
+
+
+def run_outs(folder: Path) -> np.ndarray:
+    with (folder / "runs.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    return np.array([[float(row["x_m"]), float(row["y_m"])] for row in rows])
+
+
+def test_blocks_draw_their_parameters_from_the_posterior(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:
+    posterior = ["--posterior", str(analysed / "posterior.csv"), "--model", MODEL, "--record", "none"]
+    assert main(simulated(site, tmp_path / "all", *posterior, "--number", "20")) == 0
+    assert "Each block drew its rn from 0." in capsys.readouterr().out
+    summary = json.loads((tmp_path / "all" / "summary.json").read_text(encoding="utf-8"))
+    drawn = summary["models"][MODEL]["drawn_parameters"]
+    model, draws = read_posterior(analysed / "posterior.csv")
+    assert drawn["rn"]["mean"] == pytest.approx(draws.mean()["rn"], abs=1e-6)
+    assert drawn["rt"]["low"] < drawn["rt"]["mean"] < drawn["rt"]["high"]
+    assert summary["inputs"]["posterior"]["file"] == "posterior.csv"
+    everywhere = run_outs(tmp_path / "all")
+    assert main(simulated(site, tmp_path / "part", *posterior, "--number", "20", "--runs", "61-120")) == 0
+    np.testing.assert_array_equal(run_outs(tmp_path / "part"), everywhere[60:])
+    one = tmp_path / "one.csv"
+    write_posterior(model, ParameterDraws(draws.names, np.array([[0.4, 0.8]]), np.ones(1)), one)
+    fixed = ["--model", MODEL, "--set", f"{MODEL}.rn=0.4", f"{MODEL}.rt=0.8", "--record", "none"]
+    assert main(simulated(site, tmp_path / "drawn", "--posterior", str(one), *posterior[2:])) == 0
+    assert main(simulated(site, tmp_path / "set", *fixed)) == 0
+    np.testing.assert_array_equal(run_outs(tmp_path / "drawn"), run_outs(tmp_path / "set"))
+
+
+def test_a_project_names_its_posterior(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:
+    text = f"""
+schema = 1
+[terrain]
+file = "{site / "slope.ply"}"
+[simulation]
+models = ["{MODEL}"]
+posterior = "{analysed / "posterior.csv"}"
+record = []
+[simulation.releases]
+from = "table"
+file = "{site / "releases.csv"}"
+"""
+    project = tmp_path / "project.toml"
+    project.write_text(text, encoding="utf-8")
+    assert main(["simulate", str(project), "--out", str(tmp_path / "out")]) == 0
+    assert "Each block drew its rn" in capsys.readouterr().out
+    write_project(read_project(project), tmp_path / "again.toml")
+    again = read_project(tmp_path / "again.toml").stated_simulation.posterior
+    assert again is not None
+    assert again.resolve() == (analysed / "posterior.csv").resolve()
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        (["--model", "noel_2017"], "The posterior is of stevens_1998, which is not simulated. Simulate with"),
+        (["--model", MODEL, "--set", f"{MODEL}.rn=0.4"], "rn is both drawn from --posterior and set. Leave"),
+    ],
+)
+def test_posteriors_that_do_not_fit(site: Path, analysed: Path, tmp_path: Path, capsys, more, problem) -> None:
+    assert main(simulated(site, tmp_path / "out", "--posterior", str(analysed / "posterior.csv"), *more)) == 1
+    assert problem in capsys.readouterr().err
 
 
 # --- tables of a posterior --------------------------------------------------------------------------------------------

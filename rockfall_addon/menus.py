@@ -57,7 +57,8 @@ STEPS = (
     ("simulation", "7  Simulation", (
         ("rockfall.draw_release", "Draw Release Line", {"kind": "line"}),
         ("rockfall.draw_release", "Draw Release Area", {"kind": "polygon"}),
-        ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}), "rockfall.use_as_structure", None,
+        ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}),
+        "rockfall.use_as_structure", "rockfall.draw_screen", None,
         "rockfall.simulate", "rockfall.select_run", "rockfall.remove_simulation",
     )),
     ("playback", "8  Playback", (

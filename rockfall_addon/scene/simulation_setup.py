@@ -13,6 +13,9 @@ import numpy as np
 from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
 from ...core.exchange.simulation_output import default_records, write_simulations
+from ...core.hazard.barriers import with_barriers
+from ...core.hazard.screen_tally import ScreenTally
+from ...core.hazard.screens import Screen, check_screens
 from ...core.impact_models.registry import MODELS
 from ...core.output import output_folder
 from ...core.progress import Progress
@@ -26,6 +29,7 @@ from . import (
     fingerprints,
     models,
     reconstruction,
+    screens,
     simulated_sources,
     simulated_zones,
     simulation,
@@ -48,12 +52,14 @@ class Plan:
     Attributes
     ----------
     scenario : for the core.
+    screens : at which passing blocks are measured, or held.
     origins : release → when its blocks start in the scene.
     said : the settings in words that a file keeps, and their fingerprint.
     remarks : what of the measured trajectories is missing in it.
     """
 
     scenario: Scenario
+    screens: tuple[Screen, ...]
     origins: Mapping[str, Origin]
     said: dict[str, object]
     remarks: tuple[Remark, ...] = ()
@@ -90,10 +96,25 @@ def plan(scene: bpy.types.Scene) -> Plan:
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
     )
-    return Plan(scenario, origins, {"print": fingerprint(scene)}, left_out)
+    return Plan(scenario, screens.screens_of(scene), origins, {"print": fingerprint(scene)}, left_out)
 
 
-def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, ...]]:
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a simulation gives to be shown and stored.
+
+    Attributes
+    ----------
+    prepared : of each model, what is shown: blocks end where a barrier holds them.
+    at_screens : see `screens.results_of`.
+    """
+
+    prepared: list[Prepared]
+    at_screens: list[dict[str, object]]
+    remarks: tuple[Remark, ...]
+
+
+def run(plan: Plan, progress: Progress) -> Found:
     """Simulate, without Blender, and prepare what will be shown; what is finished at a cancel is kept.
 
     Raises
@@ -103,6 +124,7 @@ def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, .
     """
     progress("Preparing the ground", 0, 0)
     ground = ground_of(plan.scenario)
+    check_screens(plan.screens, ground)
     progress("Releasing the blocks", 0, 0)
     releases, models = plan.scenario.releases(ground), list(plan.scenario.models)
     if len(releases) * len(models) > MOST_SHOWN:
@@ -112,7 +134,13 @@ def run(plan: Plan, progress: Progress) -> tuple[list[Prepared], tuple[Remark, .
         )
     simulations = run_models(ground, releases, plan.scenario.settings, progress=progress)
     remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *_stays(simulations)])
-    return [simulation.prepare(one) for one in simulations], tuple(remarks)
+    tallies, shown = {}, []
+    for one in simulations:
+        tally = ScreenTally(plan.screens)
+        tally.add(one)
+        tallies[one.settings.model] = tally
+        shown.append(with_barriers(one, tally.hits))
+    return Found([simulation.prepare(one) for one in shown], screens.results_of(tallies), tuple(remarks))
 
 
 def shown_counts(scene: bpy.types.Scene) -> dict[str, int]:
@@ -166,7 +194,7 @@ def missing(scene: bpy.types.Scene) -> str:
         return "Choose at least one model."
     if "observed" in settings.models and not store.has_role(scene, store.PICK_ROLE):
         return "The model of measured rebounds needs measured impacts: pick some, or leave it out."
-    return simulated_sources.missing(scene) or structures.problem(scene)
+    return simulated_sources.missing(scene) or structures.problem(scene) or screens.problem(scene)
 
 
 def ground(scene: bpy.types.Scene) -> Surface:
@@ -190,20 +218,31 @@ _grounds: list[tuple[Surface, Surface]] = []
 
 
 def fingerprint(scene: bpy.types.Scene) -> str:
-    """Of all that decides what is simulated: terrain, structures, source, blocks, models, motion."""
+    """Of all that decides what is simulated: terrain, structures, screens, source, blocks, models, motion."""
     parameters, how = models.parameters_of(scene), reconstruction.project_settings(scene, []).reconstruction
     used = {name: values for name, values in parameters.items() if name in scene.rockfall_simulation.models}
     parts = [
         fingerprints.ground(scene), fingerprints.ground_contents(scene), simulated_sources.fingerprint(scene),
         json.dumps(used, sort_keys=True), how,
     ]  # fmt: skip
-    parts += [*simulated_zones.fingerprint(scene), *structures.fingerprint(scene)]
+    parts += [*simulated_zones.fingerprint(scene), *structures.fingerprint(scene), *screens.fingerprint(scene)]
     return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()
 
 
-def keep(scene: bpy.types.Scene, said: Mapping[str, object], remarks: tuple[Remark, ...]) -> None:
-    """Store with the scene what its shown simulation is of."""
-    scene[store.SIMULATION] = json.dumps(dict(said) | {"remarks": to_plain(remarks)})
+def keep(
+    scene: bpy.types.Scene,
+    said: Mapping[str, object],
+    remarks: tuple[Remark, ...],
+    at_screens: Sequence[Mapping[str, object]] = (),
+) -> None:
+    """Store with the scene what its shown simulation is of, and what was found at the screens."""
+    kept = {"remarks": to_plain(remarks), store.AT_SCREENS: list(at_screens)}
+    scene[store.SIMULATION] = json.dumps(dict(said) | kept)
+
+
+def screen_results(scene: bpy.types.Scene) -> list[dict[str, object]]:
+    """What was found at the screens by the simulation that is shown; see `screens.results_of`."""
+    return list(store.read_json(scene, store.SIMULATION, {}).get(store.AT_SCREENS, []))
 
 
 def forget(scene: bpy.types.Scene) -> None:
@@ -217,7 +256,7 @@ def remarks(scene: bpy.types.Scene) -> list[Remark]:
     kept = store.read_json(scene, store.SIMULATION, {})
     said = list(from_plain(kept.get("remarks", []), "note"))
     if simulation.blocks_of(scene) and kept.get("print") != fingerprint(scene):
-        text = "Terrain, structures, releases, models or settings were changed since: simulate again."
+        text = "Terrain, structures, screens, releases, models or settings were changed since: simulate again."
         said.insert(0, Remark(text, "warning", "stale"))
     return said
 

@@ -234,6 +234,17 @@ BESIDE_A_PICK: dict[str, Check] = {
 OF_KEYS: dict[str, Check] = {store.WRITTEN: count, store.BLOCK_KEYS: json_of(list, _rows_of_keys)}
 """Of the action of a block."""
 
+
+def _results_at_screens(value: object) -> None:
+    """What a simulation has found at screens, if there were any."""
+    for result in value.get(store.AT_SCREENS, []):
+        for known in (result[key] for key in ("energy_kj", "height_m", "speed_mps")):
+            if known is not None:
+                _first, _low, _high = known
+        if not all(isinstance(result[key], int) for key in ("blocks", "reach", "reach_with_barriers", "hits")):
+            raise ValueError(result)
+
+
 AGAIN = "it was computed again"
 OF_A_FIT = ("model", "imitated", "names", "print", "rows", "set_b", "sets", "models")
 OF_THE_SCENE: dict[str, tuple[Check, str]] = {
@@ -257,7 +268,7 @@ OF_THE_SCENE: dict[str, tuple[Check, str]] = {
     store.GRAPH_CHOSEN: (json_of(dict, _lists_by_name), "no impacts of other sites are selected"),
     store.FIT: (json_of(dict, _having(*OF_A_FIT)), "nothing is proposed: fit again"),
     store.MOTION_LIMITS: (json_of(dict, _pairs_by_name), "the axes of the motion graphs have no limits of their own"),
-    store.SIMULATION: (json_of(dict), "simulate again to know what is shown"),
+    store.SIMULATION: (json_of(dict, _results_at_screens), "simulate again to know what is shown"),
     store.KNOWN_VIDEOS: (json_of(dict, _texts_by_name), "videos that were deleted before are not missed"),
     store.PROPOSAL: (json_of(dict, _having("ids", "names", "prints")), "nothing is proposed: refine again"),
     store.RENDER_PRESETS: (json_of(list, _presets), "the project has no films of its own"),

@@ -271,7 +271,8 @@ def test_a_cancel_keeps_what_is_finished_and_says_so(drawn: bpy.types.Scene, par
         if done >= 500:  # in the second model
             raise errors.CancelledError
 
-    prepared, remarks = setup.run(plan, stop)
+    found = setup.run(plan, stop)
+    prepared, remarks = found.prepared, found.remarks
     assert prepared[0].model == "noel_2017"
     assert "Stopped by you" in remarks[0].text
     part("rockfall_addon.scene.simulation").show_prepared(drawn, prepared, plan.origins)

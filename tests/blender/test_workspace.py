@@ -14,7 +14,8 @@ WITH_PANEL = {
     "rockfall.choose_fitted",
     "rockfall.use_ground",
     "rockfall.sort_impacts", "rockfall.remove_video", "rockfall.choose_simulated_model", "rockfall.next_run",
-    "rockfall.add_zone", "rockfall.remove_zone", "rockfall.remove_structure", "rockfall.reset_parameter",
+    "rockfall.add_zone", "rockfall.remove_zone", "rockfall.remove_structure", "rockfall.remove_screen",
+    "rockfall.reset_parameter",
     "rockfall.go_to_spin_mark",
 }  # fmt: skip
 """What works on a row of a panel's list, or is another name of what the menu has."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draw by clicks on the terrain where blocks start: points, a line, an area."""
+"""Draw by clicks on the terrain: points, a line, an area, from which blocks start, or which they cross."""
 
 import bpy
 import numpy as np
@@ -25,21 +25,11 @@ PASSED_ON = {
 """The view can be turned while one draws."""
 
 
-class ROCKFALL_OT_draw_release(bpy.types.Operator):
-    """Click on the terrain where blocks start; Enter ends, Esc leaves"""
+class Drawing:
+    """Mix-in of operators that draw by clicks: `kind` is one of points, line, polygon; `made` keeps the `points`."""
 
-    bl_idname = "rockfall.draw_release"
-    bl_label = "Draw Release"
-    bl_options = {"REGISTER", "UNDO"}
-
-    kind: EnumProperty(
-        name="Kind",
-        items=[
-            ("line", "Line", "Blocks start anywhere on a line"),
-            ("polygon", "Area", "Blocks start anywhere in an area, as many on each square metre of the terrain"),
-            ("points", "Points", "Blocks start at each point"),
-        ],
-    )
+    help = ""
+    """What to click, for the status bar."""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -53,7 +43,7 @@ class ROCKFALL_OT_draw_release(bpy.types.Operator):
         self.points: list[Array] = []
         self.mouse: Array | None = None
         self.handle = bpy.types.SpaceView3D.draw_handler_add(self.draw_points, (), "WINDOW", "POST_PIXEL")
-        context.workspace.status_text_set(f"{HELP[self.kind]}.   {ENDING}")
+        context.workspace.status_text_set(f"{self.help or HELP[self.kind]}.   {ENDING}")
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
         redraw(context)
@@ -92,12 +82,10 @@ class ROCKFALL_OT_draw_release(bpy.types.Operator):
     def finish(self, context: bpy.types.Context) -> set[str]:
         """Make the object; too few points are told, and drawing goes on."""
         try:
-            obj = drawn_releases.make(context.scene, self.kind, self.points)
+            self.made(context)
         except RockfallError as error:
             self.report({"WARNING"}, str(error))
             return {"RUNNING_MODAL"}
-        settings = context.scene.rockfall_simulation
-        settings.drawn, settings.source = obj, "DRAWN"
         self.end(context)
         return {"FINISHED"}
 
@@ -128,6 +116,28 @@ class ROCKFALL_OT_draw_release(bpy.types.Operator):
             drawing.segments(segments[good], colours, 2 * scale)
         good = np.isfinite(spots).all(axis=1)
         drawing.dots(spots[good], np.tile(YELLOW, (int(good.sum()), 1)), 8 * scale)
+
+
+class ROCKFALL_OT_draw_release(Drawing, bpy.types.Operator):
+    """Click on the terrain where blocks start; Enter ends, Esc leaves"""
+
+    bl_idname = "rockfall.draw_release"
+    bl_label = "Draw Release"
+    bl_options = {"REGISTER", "UNDO"}
+
+    kind: EnumProperty(
+        name="Kind",
+        items=[
+            ("line", "Line", "Blocks start anywhere on a line"),
+            ("polygon", "Area", "Blocks start anywhere in an area, as many on each square metre of the terrain"),
+            ("points", "Points", "Blocks start at each point"),
+        ],
+    )
+
+    def made(self, context: bpy.types.Context) -> None:
+        settings = context.scene.rockfall_simulation
+        settings.drawn = drawn_releases.make(context.scene, self.kind, self.points)
+        settings.source = "DRAWN"
 
 
 def _largest_view(context: bpy.types.Context) -> bpy.types.Area | None:

@@ -33,10 +33,9 @@ class ROCKFALL_OT_simulate(InBackground, bpy.types.Operator):
             return simulation_setup.run(plan, progress)
 
         def keep(scene: bpy.types.Scene, found: object) -> str:
-            prepared, remarks = found
-            simulation.show_prepared(scene, prepared, plan.origins)
-            simulation_setup.keep(scene, plan.said, remarks)
-            return remarks[0].text
+            simulation.show_prepared(scene, found.prepared, plan.origins)
+            simulation_setup.keep(scene, plan.said, found.remarks, found.at_screens)
+            return found.remarks[0].text
 
         return Work("simulation", compute, keep, keeps_part=True)
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.impact_models.registry import MODELS
-from ...scene import models, simulated_sources, simulation, simulation_setup, store, structures, terrain
+from ...scene import models, screens, simulated_sources, simulation, simulation_setup, store, structures, terrain
 from ...view import job, parameters
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 
@@ -170,6 +170,36 @@ class ROCKFALL_PT_simulation_structures(_Sub, bpy.types.Panel):
         layout.operator("rockfall.use_as_structure", icon="ADD")
 
 
+class ROCKFALL_PT_simulation_screens(_Sub, bpy.types.Panel):
+    bl_label = "Screens and barriers"
+    bl_idname = "ROCKFALL_PT_simulation_screens"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        found, results = screens.objects_of(scene), simulation_setup.screen_results(scene)
+        if not found:
+            text = "Draw a line across the slope: how many blocks pass there, how fast, how high; what a barrier holds."
+            paragraph(context, layout, text, "INFO")
+        for obj in found:
+            box = layout.box()
+            row = box.row(align=True)
+            row.prop(obj, "name", text="", icon="MOD_LATTICE" if obj.rockfall_screen.holds else "IPO_LINEAR")
+            row.operator("rockfall.remove_screen", text="", icon="X").name = obj.name
+            column = box.column(align=True)
+            column.prop(obj.rockfall_screen, "height_m")
+            column.prop(obj.rockfall_screen, "holds")
+            if obj.rockfall_screen.holds:
+                column.prop(obj.rockfall_screen, "capacity_kj")
+            models_shown = screens.result_rows(results, obj.name)
+            for title, rows in models_shown:
+                column = box.column(align=True)
+                column.label(text=title, icon="PHYSICS")
+                facts(column, rows)
+            if results and not models_shown:
+                paragraph(context, box, "Simulate again to measure here.", "INFO")
+        layout.operator("rockfall.draw_screen", icon="ADD")
+
+
 class ROCKFALL_PT_simulation_parameters(_Sub, bpy.types.Panel):
     bl_label = "Parameters of the models"
     bl_idname = "ROCKFALL_PT_simulation_parameters"
@@ -252,5 +282,6 @@ CLASSES = (
     ROCKFALL_PT_simulation_motion,
     ROCKFALL_PT_simulation_zones,
     ROCKFALL_PT_simulation_structures,
+    ROCKFALL_PT_simulation_screens,
     ROCKFALL_PT_simulation_look,
 )

@@ -45,6 +45,23 @@ class SimulationZone(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
+class ScreenSettings(bpy.types.PropertyGroup):
+    """Of a screen: how high it is, and what it holds."""
+
+    height_m: FloatProperty(
+        name="Height", description="Of the fence, vertically above the terrain: a barrier catches what passes with all "
+        "of the block below it", default=3.0, min=0.1, soft_max=10.0, unit="LENGTH", precision=1,
+    )  # fmt: skip
+    holds: BoolProperty(
+        name="Holds blocks", description="A barrier: it holds blocks that pass below its top with no more energy than "
+        "it takes; others go on as they came. Off: the screen measures what passes", default=False,
+    )  # fmt: skip
+    capacity_kj: FloatProperty(
+        name="Capacity [kJ]", description="Kinetic energy, of translation and rotation, up to which it holds a block",
+        default=1000.0, min=0.1, soft_max=8500.0, precision=0,
+    )  # fmt: skip
+
+
 class SimulationSettings(bpy.types.PropertyGroup):
     """Where which blocks start, which models carry them, and what is shown of them."""
 
@@ -155,12 +172,14 @@ class SimulationSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
 
 
-CLASSES = (SimulationZone, SimulationSettings)
+CLASSES = (SimulationZone, ScreenSettings, SimulationSettings)
 
 
 def register() -> None:
     bpy.types.Scene.rockfall_simulation = PointerProperty(type=SimulationSettings)
+    bpy.types.Object.rockfall_screen = PointerProperty(type=ScreenSettings)
 
 
 def unregister() -> None:
+    del bpy.types.Object.rockfall_screen
     del bpy.types.Scene.rockfall_simulation

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""``rockfall simulate``: blocks that fall down the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv."""
+"""``rockfall simulate``: blocks that fall down the terrain → tables of runs, impacts, motion, hits; maps."""
 
 import argparse
 from collections.abc import Sequence
@@ -38,6 +38,7 @@ from .release_options import (
 )
 
 if TYPE_CHECKING:
+    from ..hazard.cell_tally import CellTally
     from ..simulation.parameter_draws import ParameterDraws
     from ..simulation.release import Releases
     from ..terrain.cloud import Cloud
@@ -92,6 +93,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "on)",
     )
     parser.add_argument(
+        "--cell",
+        type=positive,
+        metavar="M",
+        help="side of the cells of maps [m]: reach probability, passages, deposits, speed, energy, height → "
+        "maps/NAME.tif (default: no maps)",
+    )
+    parser.add_argument(
         "--runs",
         type=whole_range,
         metavar="FIRST-LAST",
@@ -106,6 +114,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.simulation_entry import RECORDS
     from ..exchange.simulation_output import default_records, recorded_for, write_simulations
     from ..output import output_folder
+    from ..remarks import gravest_first
+    from ..workflow.maps import map_models, map_remarks
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
@@ -118,19 +128,21 @@ def run(arguments: argparse.Namespace) -> int:
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
         if record is None:
             record = default_records(len(releases)) if asked.record is None else asked.record
+        maps: dict[str, CellTally] = {}
         with stopped_by_interrupt(progress) as counted:
-            simulations = run_models(
-                ground,
-                releases,
-                scenario.settings,
-                record=recorded_for(record, bool(scenario.structures)),
-                first_run=first_run,
-                threads=arguments.threads,
-                progress=counted,
-            )
-        remarks = remarks_of(simulations, list(scenario.models))
+            how = {
+                "record": recorded_for(record, bool(scenario.structures)),
+                "first_run": first_run,
+                "threads": arguments.threads,
+                "progress": counted,
+            }
+            if asked.cell_m is None:
+                simulations = run_models(ground, releases, scenario.settings, **how)
+            else:
+                simulations, maps = map_models(ground, releases, scenario.settings, asked.cell_m, **how)
+        remarks = gravest_first([*remarks_of(simulations, list(scenario.models)), *map_remarks(maps)])
         written = write_simulations(
-            simulations, folder, record=record, inputs=asked.inputs, remarks=remarks, progress=progress
+            simulations, folder, record=record, inputs=asked.inputs, maps=maps, remarks=remarks, progress=progress
         )
     for sentence in (*scenario.terrain.summary, *remarks):
         print(sentence)
@@ -139,11 +151,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 class _Asked(NamedTuple):
-    """What is simulated, the tables beside runs.csv that a project names, and the files that decide it."""
+    """What is simulated, the tables beside runs.csv that a project names, the files that decide it, and the cells of
+    the maps."""
 
     scenario: "Scenario"
     record: tuple[str, ...] | None
     inputs: dict[str, Path]
+    cell_m: float | None
 
 
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
@@ -196,7 +210,7 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
     }
     if measured is not None:
         inputs["observed"] = Path(arguments.observed)
-    return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()})
+    return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()}, arguments.cell)
 
 
 def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
@@ -243,7 +257,8 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
     if arguments.posterior:
         scenario = replace(scenario, draws=_posteriors(arguments, list(models)))
         inputs = {name: file for name, file in inputs.items() if name != "posterior"}
-    return _Asked(scenario, entry.record, inputs | zone_files | _posterior_inputs(arguments.posterior))
+    inputs = inputs | zone_files | _posterior_inputs(arguments.posterior)
+    return _Asked(scenario, entry.record, inputs, arguments.cell or entry.cell_m)
 
 
 def _posteriors(arguments: argparse.Namespace, models: Sequence[str]) -> "dict[str, ParameterDraws]":

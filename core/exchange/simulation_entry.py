@@ -10,6 +10,7 @@
     drag = true
     posterior = "posterior.csv"      # of a back-analysis: each block draws its parameters
     record = ["impacts"]             # trajectories; without it the number of blocks decides
+    cell_m = 1.0                     # side of the cells of maps; without it there are none
 
     [simulation.releases]
     from = "polygon"                 # measured, table, points, line, polygon, steep
@@ -126,6 +127,7 @@ class SimulationEntry:
     posterior : posterior.csv of a back-analysis, from which each block of its model draws its parameters.
     drag : of the air, with the coefficient and density of the project's reconstruction.
     record : of `RECORDS`, the tables beside runs.csv; None lets the number of blocks decide.
+    cell_m : side of the cells of maps; None makes no maps.
     """
 
     models: tuple[str, ...] = ()
@@ -140,6 +142,7 @@ class SimulationEntry:
     posterior: Path | None = None
     seed: int = 0
     record: tuple[str, ...] | None = None
+    cell_m: float | None = None
     extra: Extra = field(default_factory=dict)
 
 
@@ -169,6 +172,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         posterior=table.path("posterior") if table.has("posterior") else None,
         seed=table.whole("seed", 0, zero_allowed=True),
         record=table.choices("record", RECORDS) if table.has("record") else None,
+        cell_m=table.number("cell_m", 1.0) if table.has("cell_m") else None,
         extra=table.rest(),
     )
 
@@ -189,6 +193,8 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
         content["posterior"] = relative(entry.posterior)
     if entry.record is not None:
         content["record"] = list(entry.record)
+    if entry.cell_m is not None:
+        content["cell_m"] = entry.cell_m
     content["releases"] = _release_content(entry.releases, relative)
     if entry.zones is not None:
         own = {"attribute": entry.zones.attribute} if entry.zones.attribute else {}

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All tables of a simulation in one folder."""
+"""All tables and maps of a simulation in one folder."""
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
+from ..hazard.cell_tally import CellTally
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Simulation
+from .map_output import draw_maps, write_maps
 from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
 from .simulation_tables import summary, write_hits, write_runs, write_summary
 
+MAPS = "maps"
+NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
 LARGE = 20_000
 """From so many blocks on, motion in time is written only when it is asked for."""
 
@@ -33,16 +38,18 @@ def write_simulations(
     *,
     record: Collection[str],
     inputs: Mapping[str, Path],
+    maps: Mapping[str, CellTally] = NO_MAPS,
     remarks: Sequence[Remark] = (),
     progress: Progress = silent,
 ) -> list[str]:
-    """Write runs.csv, what `record` names, hits.csv where there are structures, and summary.json.
+    """Write runs.csv, what `record` names, hits.csv where there are structures, maps, and summary.json.
 
     Parameters
     ----------
     simulations : of one ground and the same releases, one for each model.
     record : of `RECORDS`; the simulations must have been recorded for them.
     inputs : what it is → file, for the hashes in summary.json.
+    maps : model → what its maps are made of. They go to maps/, those of several models to maps/MODEL/.
 
     Returns
     -------
@@ -64,5 +71,13 @@ def write_simulations(
     if simulations[0].ground.structures:
         write_hits(simulations, folder / "hits.csv")
         written.append("hits.csv")
+    for model, tally in maps.items():
+        place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
+        drawn, shift = tally.maps(), simulations[0].ground.shift
+        about = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}
+        write_maps(drawn, place, shift, about, progress)
+        releases = simulations[0].releases.position
+        draw_maps(drawn, simulations[0].ground.terrain, place, said=model, releases=releases, progress=progress)
+        written.append(f"{place.relative_to(folder).as_posix()}/")
     write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     return [*written, "summary.json"]

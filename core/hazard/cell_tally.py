@@ -85,6 +85,11 @@ class CellTally:
         made.passages = Sketches.from_arrays(own)
         return made
 
+    def reached_by_few(self, few: int) -> tuple[int, int]:
+        """How many cells are reached by fewer blocks than `few`, and how many by any."""
+        reach = self.passages.figures([]).reach
+        return int((reach < few).sum()), int(reach.size)
+
     def maps(self) -> Maps:
         """All `LAYERS`."""
         figures = self.passages.figures([share / 100 for share in SHARES])

@@ -185,6 +185,18 @@ class Simulation:
             first_run=self.first_run + start,
         )
 
+    def with_records(self, record: Recorded) -> "Simulation":
+        """The same, recorded with less: as if it had been simulated so."""
+        what, level = self.records.what, RECORDED.index(record)
+        if level >= RECORDED.index(self.recorded):
+            return self
+        kept = (what == RELEASED) | (what == ENDED)
+        if record == "impacts":
+            first = np.append(True, what[:-1] != ON_GROUND)
+            kept |= (what == IMPACT) | (what == FLIES_OFF) | ((what == ON_GROUND) & first)
+        columns = {name: getattr(self.records, name)[kept] for name in Records.__dataclass_fields__}
+        return replace(self, records=Records(**columns), recorded=record)
+
 
 _OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position")
 

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs and their maps: every block is followed through the cells, whatever is recorded of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from ..errors import InputError
+from ..hazard.cell_tally import CellTally
+from ..hazard.cells import cells_over
+from ..progress import CancelledError, Progress, silent
+from ..remarks import Remark
+from ..simulation.engine import Recorded, Settings, Simulation, check_settings, joined
+from ..simulation.ground import Ground
+from ..simulation.release import Releases
+from .hazard import run_chunks
+
+FEW = 20
+"""Fewer blocks in a cell have no standard error of their 95 % values."""
+
+
+def map_models(
+    ground: Ground,
+    releases: Releases,
+    settings: Sequence[Settings],
+    cell_m: float,
+    *,
+    record: Recorded = "ends",
+    first_run: int = 0,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> tuple[tuple[Simulation, ...], dict[str, CellTally]]:
+    """Let the same blocks fall once for each of the settings, and map them.
+
+    Parameters
+    ----------
+    cell_m : side of the cells, which cover the terrain.
+    record, first_run, threads, progress : see `run_models`. The maps do not depend on what is recorded.
+
+    Returns
+    -------
+    simulations : as those of `run_models`.
+    tallies : model → what its maps are made of.
+
+    Raises
+    ------
+    InputError : cells that cannot be, a terrain of points; see `run_models`.
+    CancelledError : the work was ended before the first blocks were finished.
+    """
+    if not settings:
+        raise InputError("There is no model to simulate with", advice="Give at least one impact model")
+    cells = cells_over(ground.surface, cell_m)
+    for one in settings:
+        check_settings(ground, one)
+    n, simulations, tallies = len(releases), list[Simulation](), dict[str, CellTally]()
+    for place, one in enumerate(settings):
+        parts, tally = list[Simulation](), CellTally(cells)
+
+        def told(text: str, done: int = 0, _: int = 0, place: int = place, model: str = one.model) -> None:
+            progress(f"{text} {model}", place * n + done, len(settings) * n)
+
+        def keep(part: Simulation, parts: list[Simulation] = parts) -> None:
+            parts.append(part.with_records(record))
+
+        try:
+            counted = run_chunks(
+                ground, releases, one, [tally], first_run=first_run, threads=threads, take=keep, progress=told
+            )
+        except CancelledError:
+            if not simulations:
+                raise
+            break
+        whole = joined(parts, releases.take(slice(0, counted.blocks)))
+        simulations.append(replace(whole, wanted=n, seconds=counted.seconds, first_run=first_run))
+        tallies[one.model] = tally
+        if counted.blocks < n:
+            break
+    return tuple(simulations), tallies
+
+
+def map_remarks(tallies: Mapping[str, CellTally]) -> tuple[Remark, ...]:
+    """What a user should know of maps: model → what they are made of."""
+    remarks = []
+    for model, tally in tallies.items():
+        few, reached = tally.reached_by_few(FEW)
+        cells = tally.cells
+        text = (
+            f"Maps of {tally.blocks} blocks with {model}, in cells of {cells.size_m:g} m: {reached} cells are reached"
+        )
+        if few:
+            text += f", {few} of them by fewer than {FEW} blocks, whose 95 % values have no standard error"
+        remarks.append(Remark(f"{text}.", "warning" if 2 * few > reached else "note", "maps"))
+    return tuple(remarks)

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A design sheet: what barriers must have, from many simulated blocks, with the evidence that these are like the real.
+
+The numbers behind the page that an engineer hands over; `exchange.design_page` writes it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..analysis.calibration import Calibration, calibrate, usual_names
+from ..analysis.comparison import compare
+from ..analysis.estimation import FitOptions
+from ..analysis.scores import Score, scores
+from ..errors import InputError
+from ..hazard.design import DesignValues, PartialFactors, design_values
+from ..hazard.screen_tally import ScreenTally
+from ..hazard.screens import HELD, OUTCOMES, Screen, check_screens
+from ..impact_models.registry import find_model
+from ..progress import CancelledError, Progress, silent
+from ..reconstruction.impact import Impacts
+from ..reconstruction.trajectory import Reconstruction
+from ..remarks import Remark, gravest_first
+from ..simulation.engine import Settings, Simulation, simulate
+from ..simulation.ground import Ground
+from ..simulation.release import Releases
+from ..simulation.results import run_figures
+from ..vectors import Array
+from .hazard import Counted, run_chunks
+
+DRAWN = 250
+"""Runs of each model that are drawn, evenly among all."""
+KNOWN_TO = 0.05
+"""Blocks are enough when half the interval of a characteristic value is less than this part of it."""
+FEWEST_IMPACTS = 10
+"""With fewer measured impacts nothing is said of how well a model fits them."""
+ENERGY_LINES_DEG = (28.5, 32.0, 33.5)
+"""Usual angles of the line from the release to the furthest stops (Jaboyedoff and Labiouse 2011)."""
+SCORED = ("vn2_mps", "vt2_mps", "rn", "rt", "theta_dev_deg")
+REPLICATES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """How a model stands to the impacts that were measured on this site.
+
+    Attributes
+    ----------
+    impacts, trajectories : that could be compared.
+    scores : of the model with the parameters of the simulation.
+    calibration : of its usual parameters to these impacts, with trajectories held out; None where it was not asked for
+        or the impacts are too few.
+    """
+
+    impacts: int
+    trajectories: int
+    scores: tuple[Score, ...]
+    calibration: Calibration | None
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDesign:
+    """What one model says.
+
+    Attributes
+    ----------
+    settings, counted : what ran.
+    tally : the hits of all screens.
+    values : screen → what a barrier there must have; no entry where no block comes.
+    evidence : None where nothing was measured here.
+    drawn : some of the runs, for figures.
+    energy_lines_deg : (n,) of these runs, from the release to the end, finite ones.
+    """
+
+    settings: Settings
+    counted: Counted
+    tally: ScreenTally
+    values: Mapping[str, DesignValues]
+    evidence: Evidence | None
+    drawn: Simulation
+    energy_lines_deg: Array
+
+
+@dataclass(frozen=True, eq=False)
+class DesignSheet:
+    """Everything that the page says.
+
+    Attributes
+    ----------
+    title : of the site.
+    ground, screens, factors : for which.
+    models : one for each.
+    measured : the trajectories that were filmed here; None without.
+    remarks : what must be known, gravest first.
+    """
+
+    title: str
+    ground: Ground
+    screens: tuple[Screen, ...]
+    factors: PartialFactors
+    share: float
+    models: tuple[ModelDesign, ...]
+    measured: Reconstruction | None
+    remarks: tuple[Remark, ...]
+
+
+def design_sheet(
+    ground: Ground,
+    releases: Releases,
+    settings: Sequence[Settings],
+    screens: Sequence[Screen],
+    factors: PartialFactors,
+    *,
+    title: str = "",
+    share: float | None = None,
+    measured: Reconstruction | None = None,
+    until_known: bool = False,
+    holdout: bool = True,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> DesignSheet:
+    """Simulate with each model, and find what barriers at the screens must have.
+
+    Parameters
+    ----------
+    share : of the hits that do not exceed the characteristic values; None takes that of the factors.
+    measured : trajectories of this site, for the evidence.
+    until_known : end as soon as the characteristic energy and height of every screen that blocks reach are known to
+        `KNOWN_TO`; else all releases fall.
+    holdout : whether the evidence tells how well a model predicts trajectories that it was not fitted to.
+
+    Raises
+    ------
+    InputError : no screens, no block reaches any of them, a factor without a value, settings that cannot be.
+    """
+    if not screens:
+        raise InputError("There is no screen to design for", advice="Draw a line across the slope, and name it")
+    check_screens(screens, ground)
+    share = factors.share if share is None else share
+    models = []
+    for one in settings:
+        tally = ScreenTally(screens)
+
+        def enough(blocks: int, tally: ScreenTally = tally) -> bool:
+            return is_known(tally, factors, share)
+
+        counted = run_chunks(
+            ground, releases, one, [tally], threads=threads, enough=enough if until_known else None, progress=progress
+        )
+        if counted.blocks < counted.wanted and not (until_known and is_known(tally, factors, share)):
+            raise CancelledError
+        values = design_of(tally, factors, share)
+        if not values:
+            names = ", ".join(screen.name for screen in screens)
+            raise InputError(
+                f"None of {counted.blocks} blocks with {one.model} comes to {names}",
+                advice="Draw a screen where blocks pass, or release more",
+            )
+        models.append(_model_design(ground, releases, one, counted, tally, values, measured, holdout, progress))
+    sheet = DesignSheet(title, ground, tuple(screens), factors, share, tuple(models), measured, ())
+    return replace(sheet, remarks=tuple(_remarks(sheet)))
+
+
+def design_of(tally: ScreenTally, factors: PartialFactors, share: float) -> dict[str, DesignValues]:
+    """Screen → what a barrier there must have, for those that blocks come to.
+
+    What comes to a screen is what the barriers above it do not hold; to a barrier itself come all of these.
+    """
+    hits, found = tally.hits, {}
+    hits = hits.take(hits.reaches)
+    for place, screen in enumerate(tally.screens):
+        own = hits.take(hits.screen == place)
+        if len(own):
+            found[screen.name] = design_values(screen, own, factors, tally.blocks, share)
+    return found
+
+
+def is_known(tally: ScreenTally, factors: PartialFactors, share: float) -> bool:
+    """Whether the characteristic energy and height of every screen that blocks reach are known to `KNOWN_TO`."""
+    values = design_of(tally, factors, share).values()
+    return bool(values) and all(
+        one.energy_j.known_to <= KNOWN_TO and one.height_m.known_to <= KNOWN_TO for one in values
+    )
+
+
+def _model_design(
+    ground: Ground,
+    releases: Releases,
+    settings: Settings,
+    counted: Counted,
+    tally: ScreenTally,
+    values: Mapping[str, DesignValues],
+    measured: Reconstruction | None,
+    holdout: bool,
+    progress: Progress,
+) -> ModelDesign:
+    progress(f"Runs of {settings.model} to draw", 0, 0)
+    some = np.unique(np.linspace(0, len(releases) - 1, min(DRAWN, len(releases))).astype(np.intp))
+    drawn = simulate(ground, releases.take(some), settings)
+    lines = np.degrees(run_figures(drawn).energy_line)
+    evidence = None if measured is None else evidence_of(measured.impacts, settings, holdout, progress)
+    return ModelDesign(settings, counted, tally, values, evidence, drawn, lines[np.isfinite(lines)])
+
+
+def evidence_of(
+    impacts: Impacts, settings: Settings, holdout: bool = True, progress: Progress = silent
+) -> Evidence | None:
+    """How a model stands to measured impacts; None where they are too few to say."""
+    model = find_model(settings.model)
+    if model.draws_from_impacts:
+        return None  # it is made of them
+    progress(f"{model.name} against the measured impacts", 0, 0)
+    try:
+        predictions = compare(
+            impacts, [model.name], {model.name: settings.parameters}, replicates=REPLICATES, seed=settings.seed
+        )
+    except InputError:  # none of them can be compared
+        return None
+    row = predictions.row
+    if row.size < FEWEST_IMPACTS:
+        return None
+    marks = scores(impacts, predictions, SCORED, distances=False)
+    found = None
+    if holdout:
+        options = FitOptions(resamples=50, seed=settings.seed)
+        found = calibrate(impacts, model.name, usual_names(model), None, options, progress=progress)
+    return Evidence(int(row.size), int(np.unique(impacts.trajectory[row]).size), marks, found)
+
+
+def held_share(tally: ScreenTally, screen: Screen) -> float:
+    """The share of the hits of a barrier that it holds."""
+    place = tally.screens.index(screen)
+    figures = tally.figures(with_barriers=True)[place]
+    return figures.outcomes[OUTCOMES[HELD]] / figures.hits if figures.hits else np.nan
+
+
+def _remarks(sheet: DesignSheet) -> list[Remark]:
+    """What is not enough, and what is not known; the good news last."""
+    found = []
+    for one in sheet.models:
+        model = one.settings.model
+        for screen in sheet.screens:
+            values = one.values.get(screen.name)
+            if values is None:
+                text = f"No block with {model} comes to {screen.name}: nothing is designed there."
+                found.append(Remark(text, "warning", screen.name))
+                continue
+            if values.faults:
+                text = f"{screen.name} is not enough for {model}: {'; '.join(values.faults)}."
+                found.append(Remark(text, "problem", screen.name))
+            elif screen.holds:
+                found.append(Remark(f"{screen.name} is enough for what {model} says.", "note", screen.name))
+            if not values.is_known:
+                text = (
+                    f"{values.hits} hits at {screen.name} with {model} are too few for a {100 * sheet.share:g} % "
+                    "value: release more blocks."
+                )
+                found.append(Remark(text, "warning", screen.name))
+            elif max(values.energy_j.known_to, values.height_m.known_to) > KNOWN_TO:
+                text = (
+                    f"At {screen.name} the energy is known to {100 * values.energy_j.known_to:.0f} % and the height to "
+                    f"{100 * values.height_m.known_to:.0f} % with {model}; {100 * KNOWN_TO:.0f} % is usual."
+                )
+                found.append(Remark(text, "advice", screen.name))
+        if one.evidence is None:
+            text = (
+                f"Nothing measured on this site supports {model} here: its parameters are taken on trust."
+                if sheet.measured is None
+                else f"Too few impacts were measured here to tell how well {model} fits them."
+            )
+            found.append(Remark(text, "warning", model))
+    return gravest_first(found)

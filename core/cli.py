@@ -45,6 +45,7 @@ COMMANDS = {
     "simulate": "whole rockfalls on the terrain → runs.csv, impacts.csv, trajectories.csv, hits.csv, summary.json",
     "compare-runs": "whole observed falls beside simulated ones → whole_runs.csv, whole_values.csv, runs.csv, figures",
     "back-analyse": "parameters with which whole falls come out as observed → posterior.csv, parameters.toml, figures",
+    "design": "what barriers at screens must have, with the evidence → design.html, design.pdf, screens.csv",
     "batch": "a command for each project of a folder, or each combination of a sweep → a folder each, summary.json",
     "render": "the animation of a project, through Blender",
     "models": "the impact models, their parameters, units, ranges, defaults and sources",

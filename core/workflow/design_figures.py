@@ -6,24 +6,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.axes import round_step
-from ..analysis.figures import INK, MEASURED, MUTED, PAGE_IN, STYLE
-from ..colours import MODEL_COLOURS
+from ..analysis.figures import MEASURED, MUTED, PAGE_IN, STYLE
+from ..analysis.whole_run_figures import model_colour
 from ..extras import FIGURES, demand
 from ..hazard.screens import Screen, points_along
-from ..reconstruction.sampling import sample
+from ..impact_models.registry import find_model
+from ..reconstruction.sampling import STEP_S, sample_trajectories
 from ..simulation.parabolas import parabolas_of, polylines_of
 from ..simulation.results import fell_through
 from ..vectors import Array
 from .design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
+from .map_figures import DARKEST, Window, hillshade, north_arrow, scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SCREEN_INK = "#111418"
-MOST_CELLS = 500
-"""Of the picture of the relief, along its longer side."""
+CELL_M = 0.5
+"""Of the picture of the relief, at least."""
 MARGIN = 0.08
 PATH_TOLERANCE_M = 0.1
 
@@ -65,12 +66,15 @@ def plan_figure(sheet: DesignSheet) -> "Figure":
         figure = Figure(figsize=(width, min(width * size[1] / size[0], 1.15 * PAGE_IN)), layout="constrained")
         axes = figure.subplots()
         extent = (low[0], high[0], low[1], high[1])
-        axes.imshow(_relief(sheet, low, high), cmap="gray", vmin=0, vmax=1, extent=extent, origin="lower", zorder=0)
+        shade = hillshade(sheet.ground.terrain, Window(low[0], high[0], low[1], high[1]), CELL_M)
+        grey = DARKEST + (1 - DARKEST) * np.nan_to_num(shade, nan=1.0)
+        axes.imshow(
+            grey, cmap="gray", vmin=0, vmax=1, extent=extent, origin="lower", interpolation="bilinear", zorder=0
+        )
         for one in sheet.models:
             lines = _lines(one)
             axes.add_collection(_collection([line[:, :2] for line in lines], _colour(one), 0.4))
-        if sheet.measured is not None:
-            axes.add_collection(_collection([line[:, :2] for line in _measured(sheet)], MEASURED, 1.0, alpha=1.0))
+        axes.add_collection(_collection([line[:, :2] for line in _measured(sheet)], MEASURED, 1.0, alpha=1.0))
         for screen in sheet.screens:
             axes.plot(*screen.line.T, color="white", linewidth=4.2, solid_capstyle="butt", zorder=5)
             axes.plot(*screen.line.T, color=SCREEN_INK, linewidth=2.4, solid_capstyle="butt", zorder=6)
@@ -81,8 +85,8 @@ def plan_figure(sheet: DesignSheet) -> "Figure":
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xticks=[], yticks=[])
         for spine in axes.spines.values():
             spine.set_visible(False)
-        _scale_bar(axes, low, size)
-        _north(axes)
+        scale_bar(axes, float(size[0]))
+        north_arrow(axes)
         _legend(axes, sheet)
     return figure
 
@@ -103,9 +107,8 @@ def profile_figure(sheet: DesignSheet) -> "Figure":
         for one in sheet.models:
             lines = [np.column_stack([(line[:, :2] - origin) @ along, line[:, 2] + shift]) for line in _lines(one)]
             axes.add_collection(_collection(lines, _colour(one), 0.35))
-        if sheet.measured is not None:
-            lines = [np.column_stack([(line[:, :2] - origin) @ along, line[:, 2] + shift]) for line in _measured(sheet)]
-            axes.add_collection(_collection(lines, MEASURED, 0.8, alpha=1.0))
+        lines = [np.column_stack([(line[:, :2] - origin) @ along, line[:, 2] + shift]) for line in _measured(sheet)]
+        axes.add_collection(_collection(lines, MEASURED, 0.8, alpha=1.0))
         for screen in sheet.screens:
             place, foot = _foot(sheet, screen, origin, along)
             top = screen.height_m if np.isfinite(screen.height_m) else 0.05 * float(np.ptp(above))
@@ -153,8 +156,7 @@ def screen_figure(sheet: DesignSheet, screen: Screen) -> "Figure":
                 axes.axvline(design * factor, color=colour, linewidth=0.8, linestyle=(0, (4, 2)))
             figures = one.tally.figures(with_barriers=True)[place]
             edges = np.linspace(0, screen.length_m, figures.along.size + 1)
-            axes = along
-            axes.stairs(100 * figures.along / max(figures.hits, 1), edges, color=colour, linewidth=1.0)
+            along.stairs(100 * figures.along / max(figures.hits, 1), edges, color=colour, linewidth=1.0)
         for axes, label in (
             (speed, "speed [m/s]"),
             (energy, "kinetic energy [kJ]"),
@@ -169,8 +171,8 @@ def screen_figure(sheet: DesignSheet, screen: Screen) -> "Figure":
     return figure
 
 
-def _colour(one: ModelDesign) -> Any:
-    return MODEL_COLOURS[one.settings.model]
+def _colour(one: ModelDesign) -> tuple[float, float, float]:
+    return model_colour(one.settings.model)
 
 
 def _lines(one: ModelDesign) -> list[Array]:
@@ -182,7 +184,9 @@ def _lines(one: ModelDesign) -> list[Array]:
 
 
 def _measured(sheet: DesignSheet) -> list[Array]:
-    samples = sample(sheet.measured)
+    if sheet.measured is None:
+        return []
+    samples = sample_trajectories(sheet.measured, STEP_S)
     names = samples.trajectory
     begin = np.flatnonzero(np.r_[True, names[1:] != names[:-1]])
     return np.split(samples.position, begin[1:])
@@ -203,19 +207,6 @@ def _window(sheet: DesignSheet) -> tuple[Array, Array]:
     margin = MARGIN * float((high - low).max())
     least, most = sheet.ground.terrain.bounds
     return np.maximum(low - margin, least[:2]), np.minimum(high + margin, most[:2])
-
-
-def _relief(sheet: DesignSheet, low: Array, high: Array) -> Array:
-    """Brightness of the terrain from above, (rows, columns), lit from the north-west; light where there is none."""
-    cell = float((high - low).max()) / MOST_CELLS
-    x, y = (np.arange(a + cell / 2, b, cell) for a, b in zip(low, high, strict=True))
-    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    top = sheet.ground.terrain.bounds[1][2] + 1.0
-    z = top - sheet.ground.heights_above(np.column_stack([grid, np.full(len(grid), top)])).reshape(y.size, x.size)
-    dy, dx = np.gradient(z, cell)
-    light = np.array([-1.0, 1.0, 1.4]) / np.linalg.norm([-1.0, 1.0, 1.4])
-    shade = (-dx * light[0] - dy * light[1] + light[2]) / np.sqrt(1 + dx**2 + dy**2)
-    return np.where(np.isnan(shade), 1.0, 0.55 + 0.45 * np.clip(shade, 0, 1))
 
 
 def _axis(sheet: DesignSheet) -> tuple[Array, Array]:
@@ -262,28 +253,8 @@ def _energy_lines(axes: "Axes", sheet: DesignSheet, origin: Array, along: Array,
         )
 
 
-def _scale_bar(axes: "Axes", low: Array, size: Array) -> None:
-    length = round_step(0.12 * float(size.max()))
-    x, y = low + 0.04 * size
-    axes.plot([x, x + length], [y, y], color="white", linewidth=5, solid_capstyle="butt", zorder=8)
-    axes.plot([x, x + length], [y, y], color=INK, linewidth=2.2, solid_capstyle="butt", zorder=9)
-    axes.annotate(
-        f"{length:g} m", (x + length / 2, y), xytext=(0, 4), textcoords="offset points", ha="center", zorder=9,
-        bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0},
-    )  # fmt: skip
-
-
-def _north(axes: "Axes") -> None:
-    axes.annotate(
-        "N", xy=(0.96, 0.97), xytext=(0.96, 0.88), xycoords="axes fraction", ha="center", va="center", zorder=9,
-        fontweight="bold", arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.2},
-    )  # fmt: skip
-
-
 def _legend(axes: "Axes", sheet: DesignSheet) -> None:
     from matplotlib.lines import Line2D
-
-    from ..impact_models.registry import find_model
 
     entries = [
         Line2D([], [], color=_colour(one), linewidth=1.6, label=f"simulated, {find_model(one.settings.model).title}")

@@ -168,8 +168,8 @@ def map_figure(
         axes.set_ylim(extent[2], extent[3])
         axes.set_aspect("equal")
         _ticks(axes)
-        _scale_bar(axes, wide)
-        _north_arrow(axes)
+        scale_bar(axes, wide)
+        north_arrow(axes)
         unit = f" [{layer.unit}]" if layer.unit else ""
         axes.set_title(f"{layer.title}{unit}", fontsize=8.5, fontweight="bold", loc="left", pad=16.0)
         under = f"conditional on the release: {maps.blocks:,} blocks".replace(",", "\u202f")
@@ -210,7 +210,7 @@ def _ticks(axes: "Axes") -> None:
         axes.spines[side].set_visible(True)
 
 
-def _scale_bar(axes: "Axes", wide: float) -> None:
+def scale_bar(axes: "Axes", wide: float) -> None:
     """A bar of a length that reads well, about a fifth of the width, in the lower left corner."""
     from matplotlib.patches import Rectangle
 
@@ -229,7 +229,7 @@ def _scale_bar(axes: "Axes", wide: float) -> None:
     axes.text(x + length / 2, y + 2 * thick, words, ha="center", va="bottom", fontsize=6.0, zorder=5)
 
 
-def _north_arrow(axes: "Axes") -> None:
+def north_arrow(axes: "Axes") -> None:
     """In the upper right corner; y is north."""
     axes.annotate(
         "N", xy=(0.962, 0.975), xytext=(0.962, 0.885), xycoords="axes fraction", ha="center", va="center", fontsize=7.0,

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``rockfall design``: what barriers at screens must have, with the evidence → design.html, design.pdf, screens.csv."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from .options import (
+    add_model_option,
+    add_out,
+    add_parameter_options,
+    model_parameters,
+    models_as_asked,
+    whole,
+)
+from .progress import PrintedProgress
+
+if TYPE_CHECKING:
+    from ..hazard.screens import Screen
+    from ..simulation.ground import Ground
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("project", metavar="PROJECT", help="project.toml; its [simulation] says what falls, and where")
+    add_out(parser)
+    parser.add_argument(
+        "--screen",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="lines across the slope, GeoJSON or a table of points; with the properties height_m and capacity_kJ a "
+        "barrier that stands there",
+    )
+    parser.add_argument(
+        "--factors",
+        metavar="NAME|FILE",
+        help="partial factors: a table that is shipped, or a TOML file of your own (default uni_11211_4_literature; a "
+        "wrong name lists them)",
+    )
+    parser.add_argument(
+        "--share",
+        type=float,
+        metavar="P",
+        help="of the hits that do not exceed the characteristic values, 0.95 or 0.99 (default: that of the factors)",
+    )
+    add_model_option(parser, "models to design with (default: the project's, else noel_2017)")
+    add_parameter_options(parser)
+    parser.add_argument("--number", type=whole, metavar="N", help="blocks from each release (default: the project's)")
+    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default: the project's)")
+    parser.add_argument(
+        "--until-known",
+        action="store_true",
+        help="end as soon as energy and height at the screens are known to 5 %%; --number is then the most",
+    )
+    parser.add_argument("--no-holdout", action="store_true", help="no prediction of trajectories that are left out")
+    parser.add_argument("--no-pdf", action="store_true", help="no PDF")
+    parser.add_argument("--threads", type=whole, metavar="N", help="threads (default: all cores)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate, find what barriers must have, write the page."""
+    from ..exchange.design_page import write_design
+    from ..exchange.opening import read_project_picks, reconstruct_project
+    from ..exchange.partial_factors import USUAL, open_factors
+    from ..exchange.project import read_project
+    from ..exchange.screens import write_screens
+    from ..exchange.simulation_project import open_simulation
+    from ..output import output_folder
+    from ..workflow.design_sheet import design_sheet
+    from ..workflow.simulation import ground_of
+
+    factors = open_factors(arguments.factors or USUAL)
+    file = Path(arguments.project)
+    with output_folder(arguments.out) as folder, PrintedProgress() as progress:
+        project = read_project(file)
+        entry = project.stated_simulation
+        releases = entry.releases
+        if arguments.number is not None:
+            releases = replace(releases, number=arguments.number)
+        entry = replace(
+            entry,
+            models=models_as_asked(arguments.model, entry.models or ("noel_2017",)),
+            releases=releases,
+            seed=entry.seed if arguments.seed is None else arguments.seed,
+        )
+        project = replace(project, simulation=entry)
+        scenario, inputs = open_simulation(project, file, progress)
+        known = model_parameters(arguments, list(scenario.models), scenario.models)
+        scenario = replace(scenario, models={name: known.get(name, {}) for name in scenario.models})
+        ground = ground_of(scenario)
+        screens, screen_files = _screens(arguments.screen, ground)
+        progress("Reconstructing what was measured", 0, 0)
+        measured = None
+        if project.picks is not None and len(read_project_picks(project, None)[0]):
+            measured = reconstruct_project(project, ground.surface)
+        sheet = design_sheet(
+            ground,
+            scenario.releases(ground),
+            scenario.settings,
+            screens,
+            factors,
+            title=project.site.name,
+            share=arguments.share,
+            measured=measured,
+            until_known=arguments.until_known,
+            holdout=not arguments.no_holdout,
+            threads=arguments.threads,
+            progress=progress,
+        )
+        inputs = inputs | screen_files | {f"video {video.name}": video.file for video in project.videos}
+        written = write_design(sheet, folder, inputs, pdf=not arguments.no_pdf, progress=progress)
+        write_screens({one.settings.model: one.tally for one in sheet.models}, folder / "screens.csv")
+    for remark in sheet.remarks:
+        print(remark)
+    for one in sheet.models:
+        for name, values in one.values.items():
+            needed = f"{values.needed_energy_j / 1000:.3g} kJ (class {values.level}), {values.needed_height_m:.2f} m"
+            print(f"{name}, {one.settings.model}: needed {needed}; {values.reach} of {values.blocks} blocks come.")
+    print(f"Written: {', '.join([*written, 'screens.csv'])} in {arguments.out}")
+    return 0
+
+
+def _screens(files: list[str], ground: "Ground") -> "tuple[tuple[Screen, ...], dict[str, Path]]":
+    """The screens of some files, and the files."""
+    from ..exchange.screens import read_screens
+
+    if not files:
+        raise InputError("--screen is missing", advice="Give a file with a line across the slope, where the barrier is")
+    screens = tuple(screen for file in files for screen in read_screens(file, ground.shift))
+    return screens, {f"screens {Path(file).name}": Path(file) for file in files}

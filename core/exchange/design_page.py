@@ -1,0 +1,432 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The design sheet as a page that needs nothing else, as a PDF of the same, and as tables."""
+
+import base64
+import io
+import json
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from html import escape
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..analysis.figures import INK, MUTED, STYLE
+from ..analysis.scores import Score
+from ..analysis.variables import find_variable
+from ..hazard.design import LEVELS_KJ, DesignValues
+from ..hazard.screens import OUTCOMES
+from ..impact_models.registry import find_model
+from ..output import output_file, write_text
+from ..progress import Progress, silent
+from ..remarks import to_plain
+from ..simulation.convergence import Quantile
+from ..workflow.design_figures import figures_of
+from ..workflow.design_sheet import ENERGY_LINES_DEG, KNOWN_TO, DesignSheet, ModelDesign
+from .simulation_tables import inputs_with_digests
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STYLE_FILE = Path(__file__).parents[2] / "assets" / "report" / "design.css"
+DPI = 170
+A4_IN = (8.27, 11.69)
+LINES = 58
+"""Lines of text on a page of the PDF."""
+KJ = 1e-3
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of words, with a title and a note."""
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def write_design(
+    sheet: DesignSheet, folder: Path, inputs: Mapping[str, Path], *, pdf: bool = True, progress: Progress = silent
+) -> list[str]:
+    """Write design.html, design.pdf and design.json into a folder; returns their names.
+
+    Parameters
+    ----------
+    inputs : what it is → file: their hashes are on the page.
+
+    Raises
+    ------
+    DependencyError : Matplotlib is not installed.
+    OSError : the folder cannot be written.
+    """
+    facts = provenance(sheet, inputs)
+    tables = tuple(tables_of(sheet))
+    figures = []
+    for name, caption, figure in figures_of(sheet):
+        progress(f"Drawing {name}", 0, 0)
+        figures.append((name, caption, figure))
+    write_text(folder / "design.html", page(sheet, tables, facts, figures))
+    written = ["design.html"]
+    if pdf:
+        progress("Writing the PDF", 0, 0)
+        _write_pdf(sheet, tables, facts, figures, folder / "design.pdf")
+        written.append("design.pdf")
+    write_text(folder / "design.json", json.dumps(plain(sheet, facts), indent=2, ensure_ascii=False) + "\n")
+    return [*written, "design.json"]
+
+
+def tables_of(sheet: DesignSheet) -> Iterator[Table]:
+    """What the page tells in tables, in its order."""
+    percent = f"{100 * sheet.share:g} %"
+    rows = [(screen, one, values) for one in sheet.models for screen, values in one.values.items()]
+    yield Table(
+        "What a barrier must have",
+        ("screen", "model", f"energy, {percent} [kJ]", "design [kJ]", "needed [kJ]", "class", f"height, {percent} [m]",
+         "design [m]", "needed [m]"),
+        tuple(
+            (
+                screen, _title(one), _known(values.energy_j, KJ), _number(values.design_energy_j * KJ),
+                _number(values.needed_energy_j * KJ), _level(values), _known(values.height_m),
+                _number(values.design_height_m), _number(values.needed_height_m),
+            )
+            for screen, one, values in rows
+        ),
+        f"{percent} of the hits do not exceed the first value; behind it is its 95 % interval for that number of hits. "
+        f"Design values are these times the partial factors of {sheet.factors.title}. The needed energy is times the "
+        "factor on the capacity, the needed height is with the free height above the block. Energy is of translation "
+        "and rotation; height is that of the block's centre, vertically above the terrain. Class: of maximum energy "
+        "level (MEL) of EAD 340059-00-0106.",
+    )  # fmt: skip
+    yield Table(
+        "What comes to each screen",
+        ("screen", "model", "blocks", "reach it", "share [%]", "hits", f"speed, {percent} [m/s]", "design [m/s]",
+         "energy known to", "height known to"),
+        tuple(
+            (
+                screen, _title(one), str(values.blocks), str(values.reach),
+                f"{100 * values.reach / values.blocks:.3g}", str(values.hits), _known(values.speed_mps),
+                _number(values.design_speed_mps), _to(values.energy_j), _to(values.height_m),
+            )
+            for screen, one, values in rows
+        ),
+        "Conditional on the release: these are shares of the blocks that were released, not how often blocks fall. "
+        f"Values are known to half the width of their interval; {100 * KNOWN_TO:g} % or less is usual.",
+    )  # fmt: skip
+    barriers = [screen for screen in sheet.screens if screen.holds]
+    if barriers:
+        held = []
+        for one in sheet.models:
+            before, after = one.tally.figures(), one.tally.figures(with_barriers=True)
+            for place, screen in enumerate(sheet.screens):
+                outcomes = [str(after[place].outcomes[name]) for name in OUTCOMES[1:]] if screen.holds else ["–"] * 3
+                held.append((screen.name, _title(one), str(before[place].reach), str(after[place].reach), *outcomes))
+        names = ", ".join(
+            f"{screen.name}: {screen.height_m:g} m, {(screen.capacity_j or 0) * KJ:g} kJ" for screen in barriers
+        )
+        yield Table(
+            "Before and after the barriers",
+            ("screen", "model", "blocks without barriers", "with barriers", "held", "over", "through"),
+            tuple(held),
+            f"The same runs, with and without. {names}. A barrier holds a block that hits it with all of it below its "
+            "top, up to its capacity; what it does not hold goes on as it came.",
+        )
+    yield from _evidence_tables(sheet)
+    yield Table(
+        "Energy lines",
+        ("model", "lowest", "5 %", "median", *(f"runs that end below {angle:g}°" for angle in ENERGY_LINES_DEG)),
+        tuple(
+            (
+                _title(one),
+                *(f"{value:.1f}°" for value in np.quantile(one.energy_lines_deg, [0.0, 0.05, 0.5])),
+                *(f"{100 * float((one.energy_lines_deg < angle).mean()):.3g} %" for angle in ENERGY_LINES_DEG),
+            )
+            for one in sheet.models
+            if one.energy_lines_deg.size
+        ),
+        f"The angle below the horizontal from the release to the end, of {max(len(one.drawn) for one in sheet.models)} "
+        "runs. Observed rockfalls seldom end below 28.5° to 33.5°: many that do ask for a reason.",
+    )
+    yield Table(
+        f"Partial factors: {sheet.factors.title}",
+        ("factor", "on", "value", "meaning", "source"),
+        tuple((f.symbol, f.on, f"{f.value:g}", f.meaning, f.source) for f in sheet.factors.factors),
+        f"{sheet.factors.note} The energy is multiplied by the factors of the mass, of the energy and, squared, of the "
+        f"speed. Free height: {sheet.factors.clearance_m:g} m, or the radius of the block where that is more.",
+    )
+
+
+def _evidence_tables(sheet: DesignSheet) -> Iterator[Table]:
+    known = [(one, one.evidence) for one in sheet.models if one.evidence is not None]
+    if not known:
+        return
+    rows = []
+    for one, evidence in known:
+        for score in evidence.scores:
+            rows.append((_title(one), *_score_cells(score)))
+    evidence = known[0][1]
+    yield Table(
+        "Evidence: the impacts that were measured on this site",
+        ("model", "quantity", "impacts", "bias", "RMSE", "95 % interval", "measured within the model's 90 %"),
+        tuple(rows),
+        f"{evidence.impacts} impacts of {evidence.trajectories} trajectories, which were filmed here. Each model gets "
+        "their incident velocity, with the parameters of this simulation. Bias is model − measured. The last column "
+        "should be 90 %; a model without chance has 0.",
+    )
+    folds = [(one, e.calibration) for one, e in known if e.calibration is not None]
+    if folds:
+        yield Table(
+            "Evidence: how well trajectories that were left out are predicted",
+            ("model", "default parameters", "fitted to all", "fitted, of those left out", "verdict"),
+            tuple(
+                (
+                    _title(one), _number(c.default_score, 3), _number(c.fitted_score, 3),
+                    _number(c.held_out_score, 3), " ".join(remark.text for remark in c.remarks) or "–",
+                )
+                for one, c in folds
+            ),
+            "Mean energy score of rebounds; 0 is perfect. Each fifth of the trajectories is predicted by a fit to the "
+            "others.",
+        )  # fmt: skip
+
+
+def _score_cells(score: Score) -> tuple[str, ...]:
+    variable = find_variable(score.quantity)
+    unit = f" [{variable.unit}]" if variable.unit else ""
+    interval = "–" if score.rmse_low != score.rmse_low else f"{score.rmse_low:.2g} to {score.rmse_high:.2g}"
+    covered = "–" if score.coverage90 != score.coverage90 else f"{100 * score.coverage90:.0f} %"
+    bias = f"{score.bias:+.2g}".replace("-", "−")
+    return f"{variable.name}{unit}", str(score.n), bias, f"{score.rmse:.2g}", interval, covered
+
+
+def provenance(sheet: DesignSheet, inputs: Mapping[str, Path]) -> dict[str, str]:
+    """What ran, with what: enough to do it again."""
+    first = sheet.models[0]
+    settings = first.settings
+    facts = {
+        "Site": sheet.title or "–",
+        "Rockfall": str(import_module((__package__ or "").partition(".core")[0]).__version__),
+        "Python, NumPy": f"{platform.python_version()}, {version('numpy')}",
+        "Written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "Coordinates": sheet.ground.shift.crs or "system unknown",
+        "Blocks": ", ".join(f"{_title(one)}: {one.counted.blocks}" for one in sheet.models),
+        "Seed": str(settings.seed),
+        "Rolling, friction": f"{settings.rolling}, {settings.friction:g}",
+        "Drag of air": "yes" if settings.drag is not None else "no",
+        "Ends": "; ".join(
+            f"{_title(one)}: " + ", ".join(f"{name} {n}" for name, n in one.counted.ends.items() if n)
+            for one in sheet.models
+        ),
+    }
+    for one in sheet.models:
+        values = find_model(one.settings.model).settings(one.settings.parameters)
+        facts[f"Parameters, {_title(one)}"] = ", ".join(f"{name} = {_plain(value)}" for name, value in values.items())
+    for name, about in inputs_with_digests(inputs).items():
+        facts[f"File: {name}"] = f"{about['file']}, SHA-256 {about['sha256']}"
+    return facts
+
+
+def plain(sheet: DesignSheet, facts: Mapping[str, str]) -> dict[str, Any]:
+    """The same for programs."""
+
+    def quantile(one: Quantile) -> dict[str, float | None]:
+        return {name: _finite(getattr(one, name)) for name in ("share", "value", "low", "high")}
+
+    def values(one: DesignValues) -> dict[str, Any]:
+        names = (
+            "blocks", "reach", "hits", "radius_m", "design_speed_mps", "design_energy_j", "design_height_m",
+            "clearance_m", "needed_energy_j", "needed_height_m", "level",
+        )  # fmt: skip
+        known = {name: quantile(getattr(one, name)) for name in ("speed_mps", "energy_j", "height_m")}
+        return known | {name: getattr(one, name) for name in names} | {"faults": list(one.faults)}
+
+    return {
+        "title": sheet.title,
+        "factors": sheet.factors.title,
+        "models": {
+            one.settings.model: {name: values(found) for name, found in one.values.items()} for one in sheet.models
+        },
+        "remarks": to_plain(sheet.remarks),
+        "provenance": dict(facts),
+    }
+
+
+def page(
+    sheet: DesignSheet,
+    tables: Sequence[Table],
+    facts: Mapping[str, str],
+    figures: "Sequence[tuple[str, str, Figure]]",
+) -> str:
+    """The page as one HTML text, pictures included."""
+    remarks = "".join(f'<li class="{remark.severity}">{escape(remark.text)}</li>' for remark in sheet.remarks)
+    pictures = "".join(
+        f'<figure id="{escape(name, quote=True)}"><img alt="{escape(caption, quote=True)}" src="{_picture(figure)}">'
+        f"<figcaption>{escape(caption)}</figcaption></figure>"
+        for name, caption, figure in figures
+    )
+    body = "".join(_html(table) for table in tables)
+    rows = "".join(f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in facts.items())
+    title = escape(_heading(sheet))
+    return (
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
+        'img-src data:">'
+        f'<title>{title}</title><link rel="icon" href="data:,"><style>{STYLE_FILE.read_text(encoding="utf-8")}</style>'
+        f"</head><body><header><h1>{title}</h1><p>{escape(_summary(sheet))}</p></header><main>"
+        f'<ul class="remarks">{remarks}</ul>{_html(tables[0])}<section class="figures">{pictures}</section>'
+        f"{body[len(_html(tables[0])) :]}"
+        f'<h2>Inputs and versions</h2><div class="scroll"><table class="facts">{rows}</table></div>'
+        f"<h2>What this sheet does not say</h2><p>{escape(LIMITS)}</p></main></body></html>\n"
+    )
+
+
+LIMITS = (
+    "How often blocks fall: everything here is conditional on the release that is given above. That the blocks do not "
+    "break, and do not meet each other. What trees, water, snow or an earlier block would change. That a barrier is "
+    "where its line is drawn, stands upright, and lets pass unchanged what it does not hold."
+)
+
+
+def _heading(sheet: DesignSheet) -> str:
+    return f"Design sheet: {sheet.title}" if sheet.title else "Design sheet"
+
+
+def _summary(sheet: DesignSheet) -> str:
+    names = ", ".join(screen.name for screen in sheet.screens)
+    models = ", ".join(_title(one) for one in sheet.models)
+    blocks = max(one.counted.blocks for one in sheet.models)
+    return f"{blocks} simulated blocks with each of: {models}. Screens: {names}."
+
+
+def _html(table: Table) -> str:
+    head = "".join(f"<th>{escape(name)}</th>" for name in table.head)
+    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
+    return (
+        f'<h2>{escape(table.title)}</h2><div class="scroll"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>{note}"
+    )
+
+
+def _picture(figure: "Figure") -> str:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def _write_pdf(
+    sheet: DesignSheet,
+    tables: Sequence[Table],
+    facts: Mapping[str, str],
+    figures: "Sequence[tuple[str, str, Figure]]",
+    path: Path,
+) -> None:
+    """Pages of text in the reading order of the HTML page, and the figures."""
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_pdf import PdfPages
+    from matplotlib.figure import Figure
+
+    first = [
+        ("h1", _heading(sheet)),
+        ("p", _summary(sheet)),
+        *((remark.severity, remark.text) for remark in sheet.remarks),
+    ]
+    rest = [line for table in tables[1:] for line in _lines(table)]
+    last = [("h2", "Inputs and versions"), *(("p", f"{name}: {text}") for name, text in facts.items())]
+    last += [("h2", "What this sheet does not say"), ("p", LIMITS)]
+    with output_file(path) as part, rc_context(STYLE), PdfPages(part, metadata={"Title": _heading(sheet)}) as pdf:
+
+        def text_pages(content: list[tuple[str, str]]) -> None:
+            for lines in _paginated(content):
+                sheet_of_paper = Figure(figsize=A4_IN)
+                for place, (kind, text) in enumerate(lines):
+                    sheet_of_paper.text(0.08, 0.95 - 0.9 * place / LINES, text, **_text_style(kind))
+                pdf.savefig(sheet_of_paper)
+
+        text_pages([*first, *_lines(tables[0])])
+        for _, _, figure in figures:
+            pdf.savefig(figure)
+        text_pages([*rest, *last])
+
+
+def _lines(table: Table) -> list[tuple[str, str]]:
+    """A table as lines: each row its cells with their heads, since columns of words are wider than a page."""
+    lines = [("h2", table.title)]
+    for row in table.rows:
+        cells = [f"{name}: {cell}" for name, cell in zip(table.head, row, strict=True) if cell not in ("", "–")]
+        lines.append(("p", "   ·   ".join(cells)))
+    return [*lines, ("note", table.note)] if table.note else lines
+
+
+def _paginated(content: Sequence[tuple[str, str]]) -> Iterator[list[tuple[str, str]]]:
+    """Lines that fit the width, so many on a page."""
+    from textwrap import wrap
+
+    lines: list[tuple[str, str]] = []
+    for kind, text in content:
+        width = {"h1": 60, "h2": 80}.get(kind, 112)
+        broken = [(kind, line) for line in wrap(text, width)]
+        space = 2 if kind == "h2" else (1 if kind == "h1" else 0)
+        if len(lines) + len(broken) + space > LINES and lines:
+            yield lines
+            lines = []
+        if lines:
+            lines += [("p", "")] * space
+        while len(lines) + len(broken) > LINES:
+            room = LINES - len(lines)
+            yield [*lines, *broken[:room]]
+            lines, broken = [], broken[room:]
+        lines += broken
+        lines.append(("p", ""))
+    if lines:
+        yield lines
+
+
+def _text_style(kind: str) -> dict[str, Any]:
+    styles: dict[str, dict[str, Any]] = {
+        "h1": {"fontsize": 15, "fontweight": "bold"},
+        "h2": {"fontsize": 10, "fontweight": "bold"},
+        "note": {"fontsize": 7.5, "color": MUTED},
+        "problem": {"fontsize": 8.5, "fontweight": "bold", "color": "#9b1c1c"},
+        "warning": {"fontsize": 8.5, "color": "#8f4a00"},
+    }
+    return {"va": "top", "color": INK, "fontsize": 8.5} | styles.get(kind, {})
+
+
+def _title(one: ModelDesign) -> str:
+    return find_model(one.settings.model).title
+
+
+def _known(one: Quantile, factor: float = 1.0) -> str:
+    low, high = (_number(end * factor) if end == end else "?" for end in (one.low, one.high))
+    return f"{_number(one.value * factor)} ({low} to {high})"
+
+
+def _to(one: Quantile) -> str:
+    return f"{100 * one.known_to:.1f} %" if np.isfinite(one.known_to) else "?"
+
+
+def _level(values: DesignValues) -> str:
+    if values.level == len(LEVELS_KJ):
+        return f"8 (above {LEVELS_KJ[-1]:.0f} kJ)"
+    return f"{values.level} (MEL {values.level_kj:.0f} kJ)"
+
+
+def _number(value: float, digits: int = 3) -> str:
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.{digits}g}"
+
+
+def _plain(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

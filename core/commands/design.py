@@ -110,7 +110,8 @@ def run(arguments: argparse.Namespace) -> int:
             threads=arguments.threads,
             progress=progress,
         )
-        inputs = inputs | screen_files | {f"video {video.name}": video.file for video in project.videos}
+        videos = {f"video {video.name}": video.file for video in project.videos if video.file is not None}
+        inputs = inputs | screen_files | videos
         written = write_design(sheet, folder, inputs, pdf=not arguments.no_pdf, progress=progress)
         write_screens({one.settings.model: one.tally for one in sheet.models}, folder / "screens.csv")
     for remark in sheet.remarks:

@@ -43,12 +43,13 @@ KJ = 1e-3
 
 @dataclass(frozen=True)
 class Table:
-    """A table of words, with a title and a note."""
+    """A table, with a title and a note; `words` are columns that are no numbers, beside the first two."""
 
     title: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    words: tuple[int, ...] = ()
 
 
 def write_design(
@@ -158,6 +159,7 @@ def tables_of(sheet: DesignSheet) -> Iterator[Table]:
         tuple((f.symbol, f.on, f"{f.value:g}", f.meaning, f.source) for f in sheet.factors.factors),
         f"{sheet.factors.note} The energy is multiplied by the factors of the mass, of the energy and, squared, of the "
         f"speed. Free height: {sheet.factors.clearance_m:g} m, or the radius of the block where that is more.",
+        words=(3, 4),
     )
 
 
@@ -192,6 +194,7 @@ def _evidence_tables(sheet: DesignSheet) -> Iterator[Table]:
             ),
             "Mean energy score of rebounds; 0 is perfect. Each fifth of the trajectories is predicted by a fit to the "
             "others.",
+            words=(4,),
         )  # fmt: skip
 
 
@@ -201,7 +204,7 @@ def _score_cells(score: Score) -> tuple[str, ...]:
     interval = "–" if score.rmse_low != score.rmse_low else f"{score.rmse_low:.2g} to {score.rmse_high:.2g}"
     covered = "–" if score.coverage90 != score.coverage90 else f"{100 * score.coverage90:.0f} %"
     bias = f"{score.bias:+.2g}".replace("-", "−")
-    return f"{variable.name}{unit}", str(score.n), bias, f"{score.rmse:.2g}", interval, covered
+    return f"{variable.symbol}{unit}", str(score.n), bias, f"{score.rmse:.2g}", interval, covered
 
 
 def provenance(sheet: DesignSheet, inputs: Mapping[str, Path]) -> dict[str, str]:
@@ -240,7 +243,7 @@ def plain(sheet: DesignSheet, facts: Mapping[str, str]) -> dict[str, Any]:
     def values(one: DesignValues) -> dict[str, Any]:
         names = (
             "blocks", "reach", "hits", "radius_m", "design_speed_mps", "design_energy_j", "design_height_m",
-            "clearance_m", "needed_energy_j", "needed_height_m", "level",
+            "clearance_m", "needed_energy_j", "needed_height_m", "level", "different",
         )  # fmt: skip
         known = {name: quantile(getattr(one, name)) for name in ("speed_mps", "energy_j", "height_m")}
         return known | {name: getattr(one, name) for name in names} | {"faults": list(one.faults)}
@@ -305,8 +308,12 @@ def _summary(sheet: DesignSheet) -> str:
 
 
 def _html(table: Table) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in table.head)
-    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    def cells(tag: str, row: Sequence[str]) -> str:
+        kinds = (' class="words"' if i in table.words else "" for i in range(len(row)))
+        return "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, row, strict=True))
+
+    head = cells("th", table.head)
+    rows = "".join(f"<tr>{cells('td', row)}</tr>" for row in table.rows)
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""
     return (
         f'<h2>{escape(table.title)}</h2><div class="scroll"><table><thead><tr>{head}</tr></thead>'
@@ -405,7 +412,8 @@ def _title(one: ModelDesign) -> str:
 
 def _known(one: Quantile, factor: float = 1.0) -> str:
     low, high = (_number(end * factor) if end == end else "?" for end in (one.low, one.high))
-    return f"{_number(one.value * factor)} ({low} to {high})"
+    interval = f" ({low} to {high})" if np.isfinite([one.low, one.high]).any() else " (interval unknown)"
+    return f"{_number(one.value * factor)}{interval}"
 
 
 def _to(one: Quantile) -> str:

@@ -2,7 +2,7 @@
 """From what comes to a screen to what a barrier there must hold: characteristic values times partial factors."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan, prod
 from typing import Literal, get_args
 
@@ -20,8 +20,8 @@ SHARES = (0.95, 0.99)
 """Usual shares of the hits that characteristic values are not exceeded by."""
 LEVELS_KJ = (100.0, 250.0, 500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4500.0)
 """Maximum energy levels of the classes 0 to 7 of EAD 340059-00-0106 (ETAG 027); class 8 is everything above."""
-FEWEST = 59
-"""So many hits are needed for a one-sided bound of a 95 % value: 0.95⁵⁹ < 0.05."""
+LEAST_DIFFERENT = 0.9
+"""Part of the hits that must differ for them to be a sample."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,8 @@ class DesignValues:
     blocks, reach, hits : released, of them that come there, how often.
     speed_mps, energy_j, height_m : characteristic values with their intervals. The energy is that of translation and
         rotation, the height that of the centre vertically above the terrain.
+    different : how many of the hits differ from all others. Models without chance give the same run to the same release
+        again and again: then hits are no sample, and nothing is known of their intervals.
     radius_m : of the blocks that come, the same quantile [m].
     design_speed_mps, design_energy_j, design_height_m : times their factors; the energy times those of the mass and,
         squared, of the speed as well.
@@ -101,6 +103,7 @@ class DesignValues:
     speed_mps: Quantile
     energy_j: Quantile
     height_m: Quantile
+    different: int
     radius_m: float
     design_speed_mps: float
     design_energy_j: float
@@ -120,6 +123,11 @@ class DesignValues:
         return next((i for i, level in enumerate(LEVELS_KJ) if 1000 * level >= self.needed_energy_j), len(LEVELS_KJ))
 
     @property
+    def is_sample(self) -> bool:
+        """Whether nearly all hits differ."""
+        return self.different >= LEAST_DIFFERENT * self.hits
+
+    @property
     def is_known(self) -> bool:
         """Whether the hits are enough for an upper bound of all characteristic values."""
         return all(isfinite(one.high) for one in (self.speed_mps, self.energy_j, self.height_m))
@@ -132,11 +140,11 @@ class DesignValues:
         found = []
         if self.screen.capacity_j < self.needed_energy_j:
             found.append(
-                f"its capacity of {self.screen.capacity_j / 1000:.0f} kJ is below the needed "
-                f"{self.needed_energy_j / 1000:.0f} kJ"
+                f"its capacity of {self.screen.capacity_j / 1000:.4g} kJ is below the needed "
+                f"{self.needed_energy_j / 1000:.4g} kJ"
             )
         if self.screen.height_m < self.needed_height_m:
-            found.append(f"its height of {self.screen.height_m:.1f} m is below the needed {self.needed_height_m:.1f} m")
+            found.append(f"its height of {self.screen.height_m:.4g} m is below the needed {self.needed_height_m:.2f} m")
         return tuple(found)
 
 
@@ -170,6 +178,9 @@ def design_values(
         "energy": quantile(hits.energy_j, share),
         "height": quantile(np.nan_to_num(hits.up_m, nan=0.0), share),
     }
+    different = int(np.unique(hits.energy_j).size)
+    if different < LEAST_DIFFERENT * len(hits):
+        known = {name: replace(one, low=nan, high=nan) for name, one in known.items()}
     radius = float(np.quantile(hits.radius_m, share))
     clearance = max(factors.clearance_m, radius)
     design_energy, design_height = known["energy"].value * energy, known["height"].value * factors.product("height")
@@ -182,6 +193,7 @@ def design_values(
         known["speed"],
         known["energy"],
         known["height"],
+        different,
         radius,
         known["speed"].value * speed,
         design_energy,

@@ -242,15 +242,16 @@ def _foot(sheet: DesignSheet, screen: Screen, origin: Array, along: Array) -> tu
 
 
 def _energy_lines(axes: "Axes", sheet: DesignSheet, origin: Array, along: Array, end: float, bottom: float) -> None:
-    """From the mean release, down to the terrain's lowest place."""
-    z = float(np.mean([one.drawn.releases.position[:, 2].mean() for one in sheet.models])) + sheet.ground.shift.z
+    """From the highest release, down to the terrain's lowest place."""
+    starts = np.vstack([one.drawn.releases.position for one in sheet.models])
+    top = starts[int(np.argmax(starts[:, 2]))]
+    first, z = float((top[:2] - origin) @ along), float(top[2]) + sheet.ground.shift.z
     for angle in ENERGY_LINES_DEG:
         slope = np.tan(np.radians(angle))
-        stop = min(end, (z - bottom) / slope)
-        axes.plot([0, stop], [z, z - stop * slope], color=MUTED, linewidth=0.7, linestyle=(0, (5, 3)), zorder=2)
-        axes.annotate(
-            f"{angle:g}°", (stop, z - stop * slope), xytext=(2, 0), textcoords="offset points", color=MUTED, fontsize=6
-        )
+        stop = min(end, first + (z - bottom) / slope)
+        low = z - (stop - first) * slope
+        axes.plot([first, stop], [z, low], color=MUTED, linewidth=0.7, linestyle=(0, (5, 3)), zorder=2)
+        axes.annotate(f"{angle:g}°", (stop, low), xytext=(2, 0), textcoords="offset points", color=MUTED, fontsize=6)
 
 
 def _legend(axes: "Axes", sheet: DesignSheet) -> None:

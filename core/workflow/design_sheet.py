@@ -70,7 +70,7 @@ class ModelDesign:
     values : screen → what a barrier there must have; no entry where no block comes.
     evidence : None where nothing was measured here.
     drawn : some of the runs, for figures.
-    energy_lines_deg : (n,) of these runs, from the release to the end, finite ones.
+    energy_lines_deg : (n,) of those of them that come to rest, from the release to the stop.
     """
 
     settings: Settings
@@ -198,7 +198,7 @@ def _model_design(
     progress(f"Runs of {settings.model} to draw", 0, 0)
     some = np.unique(np.linspace(0, len(releases) - 1, min(DRAWN, len(releases))).astype(np.intp))
     drawn = simulate(ground, releases.take(some), settings)
-    lines = np.degrees(run_figures(drawn).energy_line)
+    lines = np.degrees(run_figures(drawn).energy_line)[drawn.at_rest]
     evidence = None if measured is None else evidence_of(measured.impacts, settings, holdout, progress)
     return ModelDesign(settings, counted, tally, values, evidence, drawn, lines[np.isfinite(lines)])
 
@@ -251,7 +251,14 @@ def _remarks(sheet: DesignSheet) -> list[Remark]:
                 found.append(Remark(text, "problem", screen.name))
             elif screen.holds:
                 found.append(Remark(f"{screen.name} is enough for what {model} says.", "note", screen.name))
-            if not values.is_known:
+            if not values.is_sample:
+                text = (
+                    f"Only {values.different} of {values.hits} hits at {screen.name} differ with {model}: it gives the "
+                    "same run to the same release. Release from an area, or blocks of several sizes; intervals are not "
+                    "told."
+                )
+                found.append(Remark(text, "warning", screen.name))
+            elif not values.is_known:
                 text = (
                     f"{values.hits} hits at {screen.name} with {model} are too few for a {100 * sheet.share:g} % "
                     "value: release more blocks."

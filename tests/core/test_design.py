@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Design sheets: characteristic values and partial factors by hand, tables of factors, the page and its warnings."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rockfall.core.errors import InputError
+from rockfall.core.exchange.design_page import write_design
+from rockfall.core.exchange.partial_factors import open_factors, read_factors, shipped_names
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.hazard.design import Factor, PartialFactors, design_values
+from rockfall.core.hazard.screens import Screen, ScreenHits
+from rockfall.core.simulation.engine import Settings
+from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.release import Releases, make_releases
+from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.design_sheet import DesignSheet, design_sheet
+
+LINE = np.array([[30.0, -90.0], [30.0, 90.0]])
+NONE = PartialFactors("none", "", 0.95, 0.0, ())
+
+
+def some_hits(n: int = 1000) -> ScreenHits:
+    """Hits whose energy, speed and height are 1/n … 1 times 50 kJ, 20 m/s and 4 m, of blocks of 0.4 m radius."""
+    part, zero = np.arange(1, n + 1) / n, np.zeros(n)
+    return ScreenHits(
+        zero.astype(np.int16), np.arange(1, n + 1), zero, np.zeros((n, 3)), np.column_stack([20 * part, zero, zero]),
+        zero, 4 * part, np.full(n, 0.4), zero, 45e3 * part, 5e3 * part, zero.astype(np.int8), np.ones(n, np.bool_),
+    )  # fmt: skip
+
+
+def test_characteristic_values_are_the_quantiles_and_factors_multiply_them() -> None:
+    factors = PartialFactors(
+        "ours", "", 0.95, 0.3,
+        (Factor("a", "speed", 1.1), Factor("b", "mass", 1.2), Factor("c", "energy", 1.3), Factor("d", "height", 1.5),
+         Factor("e", "height", 1.1), Factor("f", "capacity", 2.0)),
+    )  # fmt: skip
+    values = design_values(Screen("net", LINE), some_hits(), factors, 4000)
+    assert values.energy_j.value == pytest.approx(0.95 * 50e3, rel=1e-3)
+    assert values.speed_mps.value == pytest.approx(19.0, rel=1e-3)
+    assert values.height_m.value == pytest.approx(3.8, rel=1e-3)
+    assert values.design_speed_mps == pytest.approx(19.0 * 1.1, rel=1e-3)
+    assert values.design_energy_j == pytest.approx(0.95 * 50e3 * 1.2 * 1.1**2 * 1.3, rel=1e-3)
+    assert values.needed_energy_j == pytest.approx(2 * values.design_energy_j)
+    assert values.design_height_m == pytest.approx(3.8 * 1.65, rel=1e-3)
+    assert values.needed_height_m == pytest.approx(3.8 * 1.65 + 0.4, rel=1e-3), "the radius is more than the clearance"
+    assert (values.blocks, values.reach, values.hits) == (4000, 1000, 1000)
+    assert (values.level, values.level_kj) == (1, 250.0)
+    assert values.energy_j.low < values.energy_j.value < values.energy_j.high
+
+
+def test_intervals_hold_the_true_quantile_in_95_of_100_draws() -> None:
+    rng, held = np.random.default_rng(1), 0
+    for _ in range(400):
+        hits = some_hits(300)
+        hits.kinetic_j[:], hits.rotational_j[:] = rng.exponential(1e4, 300), 0.0
+        energy = design_values(Screen("net", LINE), hits, NONE, 300).energy_j
+        held += energy.low <= 1e4 * np.log(20) <= energy.high
+    assert 0.92 < held / 400 < 0.99
+
+
+def test_the_same_run_again_and_again_is_no_sample() -> None:
+    hits = some_hits(500)
+    hits.kinetic_j[:], hits.rotational_j[:] = np.repeat([1e4, 2e4], 250), 0.0
+    values = design_values(Screen("net", LINE), hits, NONE, 500)
+    assert values.different == 2
+    assert not values.is_sample
+    assert not values.is_known
+
+
+def test_a_barrier_is_enough_or_it_is_said_why_not() -> None:
+    for height, capacity, faults in ((4.3, 50e3, 0), (4.1, 50e3, 1), (4.3, 40e3, 1), (1.0, 1e3, 2)):
+        values = design_values(Screen("net", LINE, height, capacity), some_hits(), NONE, 1000)
+        assert len(values.faults) == faults
+
+
+def test_the_shipped_tables_can_be_read_and_say_their_sources() -> None:
+    assert {"none", "uni_11211_4_back_analysis", "uni_11211_4_literature", "onr_24810"} == set(shipped_names())
+    for name in shipped_names():
+        assert all(factor.source and factor.meaning for factor in open_factors(name).factors)
+    measured, literature = (open_factors(f"uni_11211_4_{which}") for which in ("back_analysis", "literature"))
+    # a back-analysis is worth 1.02/1.10 in the speed, and its square in the energy
+    assert literature.product("speed") / measured.product("speed") == pytest.approx(1.10 / 1.02)
+    with pytest.raises(InputError, match="γ_E,kin of ONR 24810 has no value"):
+        open_factors("onr_24810").product("energy")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('[[factor]]\nsymbol = "a"\non = "sped"\nvalue = 1.1', "sped"),
+        ('[[factor]]\nsymbol = "a"\nvalue = 1.1', "on is missing"),
+        ('[[factor]]\nsymbol = "a"\non = "speed"\nvalue = -1.1', "value"),
+        ("share = 1.5", "share"),
+        ("shares = 0.95", "shares"),
+    ],
+)
+def test_a_wrong_table_of_factors_is_refused(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=says):
+        read_factors(tmp_path / "own.toml")
+
+
+def test_a_table_that_is_not_there_names_the_nearest() -> None:
+    with pytest.raises(InputError, match="did you mean uni_11211_4_literature"):
+        open_factors("uni_11211_4_litterature")
+
+
+@pytest.fixture(scope="module")
+def ground() -> Ground:
+    x, y = (values.ravel() for values in np.meshgrid(np.linspace(-20, 150, 60), np.linspace(-90, 90, 50)))
+    z = -0.8 * np.clip(x, -20, 60) - 0.2 * np.clip(x - 60, 0, None) + 0.3 * np.sin(x / 3) * np.cos(y / 4)
+    i = np.arange(50 * 60).reshape(50, 60)
+    corners = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[:-1, :-1], i[1:, 1:], i[1:, :-1]], axis=-1)
+    faces = corners.reshape(-1, 3).astype(np.int32)
+    return make_ground(Surface(np.column_stack([x, y, z]), faces, GlobalShift(), "slope"))
+
+
+@pytest.fixture(scope="module")
+def releases() -> Releases:
+    rng = np.random.default_rng(7)
+    places = np.column_stack([rng.uniform(-10, 0, 400), rng.uniform(-60, 60, 400), np.full(400, 12.0)])
+    return make_releases(places, diameter_m=rng.uniform(0.3, 0.6, 400))
+
+
+@pytest.fixture(scope="module")
+def sheet(ground: Ground, releases: Releases) -> DesignSheet:
+    screens = (Screen("net", LINE, 1.0, 4e3), Screen("road", LINE + np.array([25.0, 0.0])))
+    return design_sheet(ground, releases, [Settings("noel_2017", seed=3)], screens, NONE, title="A & B <slope>")
+
+
+def test_what_comes_behind_a_barrier_is_what_it_does_not_hold(sheet: DesignSheet) -> None:
+    model = sheet.models[0]
+    net, road = model.tally.figures(with_barriers=True)
+    assert model.values["road"].hits == road.hits < model.tally.figures()[1].hits
+    assert model.values["net"].hits == net.hits
+
+
+def test_bad_news_comes_first(sheet: DesignSheet) -> None:
+    assert sheet.remarks[0].severity == "problem"
+    assert "net is not enough" in sheet.remarks[0].text
+    assert any("taken on trust" in remark.text for remark in sheet.remarks), "nothing was measured here"
+
+
+def test_the_page_the_pdf_and_the_numbers_say_the_same(sheet: DesignSheet, tmp_path: Path) -> None:
+    (tmp_path / "slope.ply").write_bytes(b"slope")
+    written = write_design(sheet, tmp_path, {"terrain": tmp_path / "slope.ply"})
+    assert written == ["design.html", "design.pdf", "design.json"]
+    html = (tmp_path / "design.html").read_text(encoding="utf-8")
+    assert "A &amp; B &lt;slope&gt;" in html
+    assert html.count("<img ") == 4  # plan, profile, two screens
+    assert "http://" not in html
+    assert "https://" not in html
+    found = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))
+    value = found["models"]["noel_2017"]["net"]["needed_energy_j"] / 1000
+    assert f"<td>{value:.3g}</td>" in html
+    assert "fb1acd44962209a65826621210c03c0a72e392169f52c2f208efbf3f272f09a2" in html
+    assert (tmp_path / "design.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_it_ends_when_the_values_are_known(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rockfall.core.workflow.design_sheet.KNOWN_TO", 10.0)
+    monkeypatch.setattr("rockfall.core.workflow.hazard.CHUNK", 100)
+    found = design_sheet(
+        ground, releases, [Settings("noel_2017", seed=3)], [Screen("net", LINE)], NONE, until_known=True
+    )
+    assert 100 <= found.models[0].counted.blocks < 400
+
+
+def test_a_screen_that_no_block_comes_to_is_refused(ground: Ground, releases: Releases) -> None:
+    above = Screen("above", np.array([[-15.0, -80.0], [-15.0, 80.0]]))
+    with pytest.raises(InputError, match="None of 400 blocks"):
+        design_sheet(ground, releases, [Settings("noel_2017")], [above], NONE)

@@ -39,6 +39,8 @@ from .release_options import (
 
 if TYPE_CHECKING:
     from ..hazard.cell_tally import CellTally
+    from ..hazard.screens import Screen
+    from ..simulation.ground import Ground
     from ..simulation.parameter_draws import ParameterDraws
     from ..simulation.release import Releases
     from ..terrain.cloud import Cloud
@@ -81,6 +83,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a wall, a road, a house: a mesh, or a cloud, whose points blocks meet",
     )
     motion.add_argument(
+        "--screen",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="lines across the slope, GeoJSON or a table of points: what passes there; with the properties height_m "
+        "and capacity_kJ a barrier, and what it holds",
+    )
+    motion.add_argument(
         "--contact",
         choices=("mesh", "points"),
         help="what of the terrain blocks meet: a surface (default; clouds and grids are meshed), or points alone, "
@@ -116,6 +126,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..output import output_folder
     from ..remarks import gravest_first
     from ..workflow.maps import map_models, map_remarks
+    from ..workflow.screens import screen_remarks, tallies_of
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
@@ -124,6 +135,7 @@ def run(arguments: argparse.Namespace) -> int:
         asked = prepare(arguments, progress)
         scenario = asked.scenario
         ground = ground_of(scenario)
+        screens, screen_files = _screens(arguments.screen, ground)
         progress("Releasing the blocks")
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
         if record is None:
@@ -131,7 +143,7 @@ def run(arguments: argparse.Namespace) -> int:
         maps: dict[str, CellTally] = {}
         with stopped_by_interrupt(progress) as counted:
             how = {
-                "record": recorded_for(record, bool(scenario.structures)),
+                "record": recorded_for(record, bool(scenario.structures), bool(screens)),
                 "first_run": first_run,
                 "threads": arguments.threads,
                 "progress": counted,
@@ -140,14 +152,30 @@ def run(arguments: argparse.Namespace) -> int:
                 simulations = run_models(ground, releases, scenario.settings, **how)
             else:
                 simulations, maps = map_models(ground, releases, scenario.settings, asked.cell_m, **how)
-        remarks = gravest_first([*remarks_of(simulations, list(scenario.models)), *map_remarks(maps)])
+        tallies = tallies_of(simulations, screens, progress)
+        said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(tallies))
+        remarks = gravest_first([*said])
         written = write_simulations(
-            simulations, folder, record=record, inputs=asked.inputs, maps=maps, remarks=remarks, progress=progress
-        )
+            simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=maps, screens=tallies,
+            remarks=remarks, progress=progress,
+        )  # fmt: skip
     for sentence in (*scenario.terrain.summary, *remarks):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0
+
+
+def _screens(files: list[str], ground: "Ground") -> "tuple[tuple[Screen, ...], dict[str, Path]]":
+    """The screens of some files, and the files."""
+    from ..exchange.screens import read_screens
+    from ..hazard.screens import check_screens
+
+    screens = tuple(screen for file in files for screen in read_screens(file, ground.shift))
+    check_screens(screens, ground)
+    for screen in screens:
+        if screen.name in ground.structures:
+            raise InputError(f"{screen.name!r} is a screen and a structure", advice="Give each a name of its own")
+    return screens, {f"screens:{Path(file).name}": Path(file) for file in files}
 
 
 class _Asked(NamedTuple):

@@ -6,13 +6,15 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..hazard.cell_tally import CellTally
+from ..hazard.screen_tally import ScreenTally
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Simulation
 from .map_output import draw_maps, write_maps
+from .screens import write_screens
 from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
-from .simulation_tables import summary, write_hits, write_runs, write_summary
+from .simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary
 
 MAPS = "maps"
 NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
@@ -25,9 +27,9 @@ def default_records(blocks: int) -> tuple[str, ...]:
     return RECORDS if blocks < LARGE else (IMPACTS,)
 
 
-def recorded_for(tables: Collection[str], structures: bool) -> Recorded:
-    """What a simulation has to record for some of `RECORDS`, and for hits.csv where there are structures."""
-    if TRAJECTORIES in tables:
+def recorded_for(tables: Collection[str], structures: bool, screens: bool = False) -> Recorded:
+    """What a simulation has to record for some of `RECORDS`, and for hits.csv where there are structures or screens."""
+    if TRAJECTORIES in tables or screens:
         return "all"
     return "impacts" if tables or structures else "ends"
 
@@ -39,10 +41,11 @@ def write_simulations(
     record: Collection[str],
     inputs: Mapping[str, Path],
     maps: Mapping[str, CellTally] = NO_MAPS,
+    screens: Mapping[str, ScreenTally] = NO_SCREENS,
     remarks: Sequence[Remark] = (),
     progress: Progress = silent,
 ) -> list[str]:
-    """Write runs.csv, what `record` names, hits.csv where there are structures, maps, and summary.json.
+    """Write runs.csv, what `record` names, hits.csv and screens.csv where there are such, maps, and summary.json.
 
     Parameters
     ----------
@@ -50,6 +53,7 @@ def write_simulations(
     record : of `RECORDS`; the simulations must have been recorded for them.
     inputs : what it is → file, for the hashes in summary.json.
     maps : model → what its maps are made of. They go to maps/, those of several models to maps/MODEL/.
+    screens : model → what passes screens, where there are any.
 
     Returns
     -------
@@ -68,8 +72,8 @@ def write_simulations(
     if TRAJECTORIES in record:
         write_simulated_trajectories(simulations, folder / "trajectories.csv", progress=progress)
         written.append("trajectories.csv")
-    if simulations[0].ground.structures:
-        write_hits(simulations, folder / "hits.csv")
+    if simulations[0].ground.structures or screens:
+        write_hits(simulations, folder / "hits.csv", screens)
         written.append("hits.csv")
     for model, tally in maps.items():
         place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
@@ -79,5 +83,8 @@ def write_simulations(
         releases = simulations[0].releases.position
         draw_maps(drawn, simulations[0].ground.terrain, place, said=model, releases=releases, progress=progress)
         written.append(f"{place.relative_to(folder).as_posix()}/")
+    if screens:
+        write_screens(screens, folder / "screens.csv")
+        written.append("screens.csv")
     write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     return [*written, "summary.json"]

@@ -5,14 +5,19 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ..analysis.likelihood_free import weighted_quantiles
 from ..errors import InputError
+from ..georeference import GlobalShift
+from ..hazard.screen_tally import ScreenTally
+from ..hazard.screens import HELD
 from ..impact_models.registry import find_model
 from ..output import write_text
 from ..reading import reader
@@ -34,6 +39,7 @@ from .simulation_parts import all_digits, in_parts
 from .tables import POSITION, VELOCITY, vector_columns
 
 SPIN = ("omegax_radps", "omegay_radps", "omegaz_radps")
+NO_SCREENS: Mapping[str, ScreenTally] = MappingProxyType({})
 DIAMETERS = ("d1_m", "d2_m", "d3_m")
 RELEASES_REQUIRED = ("x_m", "y_m")
 RELEASES_KNOWN = (
@@ -149,15 +155,43 @@ def _run_columns(simulation: Simulation) -> DecimalColumns:
     }
 
 
-def write_hits(simulations: Sequence[Simulation], path: str | Path) -> None:
-    """Write hits.csv, 6 decimals: each time that a block meets a structure; the place is that of its centre.
+def write_hits(
+    simulations: Sequence[Simulation], path: str | Path, at_screens: Mapping[str, ScreenTally] = NO_SCREENS
+) -> None:
+    """Write hits.csv, 6 decimals: each time that a block meets a structure or a screen, and where its centre is then.
+
+    Parameters
+    ----------
+    at_screens : model → what passes screens. A hit passes unless a barrier holds the block. Hits of blocks that a
+        barrier has held before are left out.
 
     Raises
     ------
     OSError : the file cannot be written.
     """
     parts = in_parts(simulations, lambda one: one.impacts, _hit_columns)
+    shift = simulations[0].ground.shift
+    parts += [partial(_screen_hit_columns, model, tally, shift) for model, tally in at_screens.items()]
     write_decimal_table(path, parts, {"run": 0})
+
+
+def _screen_hit_columns(model: str, tally: ScreenTally, shift: GlobalShift) -> DecimalColumns:
+    hits = tally.hits
+    hits = hits.take(hits.reaches)
+    return {
+        "structure": Words(hits.screen.astype(np.intp), tuple(screen.name for screen in tally.screens)),
+        "run": hits.number,
+        "model": Words(np.zeros(len(hits), np.intp), (model,)),
+        "time_s": hits.time_s,
+        **vector_columns(POSITION, shift.to_survey(hits.position)),
+        "along_m": hits.along_m,
+        "up_m": hits.up_m,
+        "v_mps": norm(hits.velocity),
+        "angle_deg": np.degrees(hits.angle),
+        "kinetic_J": hits.kinetic_j,
+        "rotational_J": hits.rotational_j,
+        "passes": Words((hits.outcome != HELD).astype(np.intp), ("0", "1")),
+    }
 
 
 def _hit_columns(simulation: Simulation) -> DecimalColumns:

@@ -9,16 +9,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..simulation.convergence import Convergence, convergence
+from ..simulation.convergence import Quantile, quantile
 from ..simulation.engine import Simulation
-from ..vectors import Array, Mask
-from .screens import HELD, OUTCOMES, OVER, THROUGH, Screen, ScreenHits, hits_at
+from ..vectors import Array, Mask, norm
+from .screens import HELD, OUTCOMES, Screen, ScreenHits, hits_at
 from .tally import Arrays
 
 MOST_KEPT = 2_000_000
 """Hits that are kept of all screens together; of more, a sample by chance that depends on the runs' numbers only."""
 PLACES = 100
 """Parts of a screen's length in which hits are counted."""
+
+
+SHARES = (0.5, 0.95, 0.99)
+"""Of the quantiles that are told."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a quantity: its mean, greatest value, and quantiles at `SHARES` with their intervals."""
+
+    mean: float
+    greatest: float
+    quantiles: tuple[Quantile, ...]
+
+    def quantile(self, share: float) -> Quantile:
+        """One of the quantiles."""
+        return next(one for one in self.quantiles if one.share == share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +50,9 @@ class ScreenFigures:
     hits : crossings, those of a block that comes again included.
     outcomes : outcome → how many hits.
     along : (PLACES,) hits by place along the screen.
-    speed_mps, energy_j, height_m, angle_deg : of the hits; None where there is none. The height is that of the centre
-        vertically above the terrain.
-    sample : how many hits these are known from: all of them unless they are more than are kept.
+    speed_mps, energy_j, height_m, angle_deg : of the hits; None where there is none. The energy is that of translation
+        and rotation, the height that of the centre vertically above the terrain, the angle that to the screen's normal.
+    sample : the hits that these are known from: all of them, unless they are more than are kept.
     """
 
     screen: Screen
@@ -44,16 +61,25 @@ class ScreenFigures:
     hits: int
     outcomes: Mapping[str, int]
     along: NDArray[np.int64]
-    speed_mps: Convergence | None
-    energy_j: Convergence | None
-    height_m: Convergence | None
-    angle_deg: Convergence | None
-    sample: int
+    speed_mps: Known | None
+    energy_j: Known | None
+    height_m: Known | None
+    angle_deg: Known | None
+    sample: ScreenHits
 
     @property
     def share(self) -> float:
         """Of the released blocks that come to the screen."""
         return self.reach / self.blocks if self.blocks else np.nan
+
+    @property
+    def beyond(self) -> float:
+        """The share of the released blocks that go on beyond a barrier, over it or through it, each at most once.
+
+        1 − held/reached for blocks that come once, which nearly all do.
+        """
+        going = self.hits - self.outcomes[OUTCOMES[HELD]]
+        return min(going, self.reach) / self.blocks if self.blocks else np.nan
 
 
 class ScreenTally:
@@ -146,11 +172,11 @@ class ScreenTally:
                     counts[1],
                     dict(zip(OUTCOMES, counts[2:], strict=True)),
                     self._along[which, place],
-                    _known(np.sqrt((at.velocity**2).sum(axis=1))),
+                    _known(norm(at.velocity)),
                     _known(at.energy_j),
                     _known(at.up_m),
                     _known(np.degrees(at.angle)),
-                    len(at),
+                    at,
                 )
             )
         return tuple(found)
@@ -159,13 +185,6 @@ class ScreenTally:
         self._kept.append(hits)
         if sum(len(one) for one in self._kept) > 2 * MOST_KEPT:
             self._kept = [_sampled(_joined(self._kept))]
-
-
-def passes(figures: ScreenFigures) -> float:
-    """The share of hits that go on beyond a barrier, over it or through it; 1 for a screen that only measures."""
-    if not figures.hits:
-        return np.nan
-    return (figures.outcomes[OUTCOMES[OVER]] + figures.outcomes[OUTCOMES[THROUGH]]) / figures.hits
 
 
 def _same(a: Sequence[Screen], b: Sequence[Screen]) -> bool:
@@ -206,11 +225,13 @@ def _chance(number: NDArray[np.int64]) -> NDArray[np.uint64]:
     return z ^ (z >> np.uint64(31))
 
 
-def _known(values: Array) -> Convergence | None:
-    values = values[np.isfinite(values)]
-    return convergence(values) if values.size else None
-
-
 def held(hits: ScreenHits) -> Mask:
     """(h,) where blocks end at a barrier."""
     return (hits.outcome == HELD) & hits.reaches
+
+
+def _known(values: Array) -> Known | None:
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return None
+    return Known(float(values.mean()), float(values.max()), tuple(quantile(values, share) for share in SHARES))

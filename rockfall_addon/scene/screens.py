@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
-from ...core.hazard.screen_tally import ScreenFigures, ScreenTally
+from ...core.hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ...core.hazard.screens import HELD, OUTCOMES, OVER, THROUGH, Screen
 from ...core.impact_models.registry import MODELS
 from ...core.terrain.raycast import cast_rays
@@ -146,11 +146,12 @@ def _result(model: str, without: ScreenFigures, behind: ScreenFigures) -> dict[s
     }
 
 
-def _ninety_five(known: object, factor: float = 1.0) -> list[float | None] | None:
+def _ninety_five(known: Known | None, factor: float = 1.0) -> list[float | None] | None:
     """A 95 % value and its interval; None where nothing is known."""
     if known is None:
         return None
-    values = (known.q95, known.q95_low, known.q95_high)
+    q95 = known.quantile(0.95)
+    values = (q95.value, q95.low, q95.high)
     return [None if value != value else factor * value for value in values]
 
 

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Screens and barriers from lines of a map, and screens.csv: what is known of them.
+
+Properties of a line, or further columns of a table of points, are ``height_m`` and ``capacity_kJ``: with both it is a
+barrier, which holds blocks; else it measures.
+"""
+
+import csv
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..georeference import GlobalShift
+from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
+from ..hazard.screens import OUTCOMES, Screen
+from ..output import output_stream
+from ..reading import reader
+from .map_shapes import MapShape, read_lines
+
+HEIGHT, CAPACITY = "height_m", "capacity_kJ"
+COLUMNS = (
+    "screen", "model", "barriers", "height_m", "capacity_kJ", "length_m", "blocks", "reach", "share", "hits",
+    *OUTCOMES[1:], "quantity", "unit", "mean", "median", "q95", "q95_low", "q95_high", "q99", "q99_low", "q99_high",
+    "greatest",
+)  # fmt: skip
+"""Those of screens.csv."""
+QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1e-3), ("height", "m", "height_m", 1.0))
+
+
+@reader("map of screens")
+def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
+    """The lines of a file as screens; those without a name have the file's.
+
+    Raises
+    ------
+    InputError : see `read_lines` and `Screen`; a capacity without a height, a value that is no number.
+    """
+    path, shapes = Path(path), read_lines(path, shift)
+    found = []
+    for number, shape in enumerate(shapes, start=1):
+        name = shape.name or (path.stem if len(shapes) == 1 else f"{path.stem} {number}")
+        height, capacity = (_number(shape, name, key, path) for key in (HEIGHT, CAPACITY))
+        _refuse_nearly(shape, name, path)
+        try:
+            if capacity is not None and height is None:
+                raise InputError(f"Barrier {name!r} has a capacity and no height", advice=f"Give it {HEIGHT} as well")
+            height_m = np.inf if height is None else height
+            capacity_j = None if capacity is None else 1000 * capacity
+            found.append(Screen(name, np.ascontiguousarray(shape.parts[0][:, :2]), height_m, capacity_j))
+        except InputError as error:
+            raise InputError(error.problem, file=path, advice=error.advice) from error
+    return tuple(found)
+
+
+def write_screens(tallies: Mapping[str, ScreenTally], path: str | Path) -> None:
+    """Write screens.csv: a row for each screen, model and quantity, without barriers and, where there are any, with.
+
+    Parameters
+    ----------
+    tallies : model → what passes the screens.
+    """
+    with output_stream(path) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for model, tally in tallies.items():
+            for barriers in (False, True) if any(screen.holds for screen in tally.screens) else (False,):
+                for figures in tally.figures(with_barriers=barriers):
+                    writer.writerows(_rows(model, barriers, figures))
+
+
+def _rows(model: str, barriers: bool, figures: ScreenFigures) -> Iterable[list[object]]:
+    screen = figures.screen
+    outcomes = [figures.outcomes[name] if screen.holds else "" for name in OUTCOMES[1:]]
+    capacity = "" if screen.capacity_j is None else screen.capacity_j / 1000
+    height = screen.height_m if np.isfinite(screen.height_m) else ""
+    first = [
+        screen.name, model, int(barriers), height, capacity, f"{screen.length_m:.3f}", figures.blocks, figures.reach,
+        f"{figures.share:.6f}", figures.hits, *outcomes,
+    ]  # fmt: skip
+    for name, unit, attribute, factor in QUANTITIES:
+        known: Known | None = getattr(figures, attribute)
+        if known is None:
+            yield [*first, name, unit, *[""] * 9]
+            continue
+        median, q95, q99 = known.quantiles
+        values = (
+            known.mean, median.value, q95.value, q95.low, q95.high, q99.value, q99.low, q99.high, known.greatest,
+        )  # fmt: skip
+        yield [*first, name, unit, *("" if value != value else f"{factor * value:.6f}" for value in values)]
+
+
+def _number(shape: MapShape, name: str, key: str, path: Path) -> float | None:
+    value = shape.properties.get(key)
+    if value is None or value == "":
+        return None
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise InputError(f"{key} of screen {name!r} is {value!r}", file=path, advice="Give a number") from None
+
+
+def _refuse_nearly(shape: MapShape, name: str, path: Path) -> None:
+    """A property that is nearly one of ours must not be passed over."""
+    ours = {HEIGHT.lower(): HEIGHT, CAPACITY.lower(): CAPACITY}
+    for key in shape.properties:
+        near = get_close_matches(key.lower(), ours, n=1, cutoff=0.75)
+        if near and key not in (HEIGHT, CAPACITY):
+            raise InputError(
+                f"Screen {name!r} has {key}",
+                file=path,
+                advice=f"Call it {ours[near[0]]} if that is meant, or take it out",
+            )

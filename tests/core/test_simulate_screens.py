@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`rockfall simulate --screen` and `rockfall design`: the tables and pages that they write, and what they refuse."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rockfall.core import cli
+
+SITE = Path(__file__).parents[2] / "assets" / "demo"
+BARRIERS = """name,x_m,y_m,height_m,capacity_kJ
+barrier,988391.6,6375682,3.0,15
+barrier,988410,6375660,3.0,15
+barrier,988428.4,6375648,3.0,15
+road,988375,6375655,,
+road,988405,6375630,,
+"""
+
+
+@pytest.fixture
+def barriers(tmp_path: Path) -> Path:
+    path = tmp_path / "barriers.csv"
+    path.write_text(BARRIERS, encoding="utf-8")
+    return path
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_screens_have_tables_that_agree(tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    arguments = ["simulate", str(SITE / "project.toml"), "--model", "noel_2017", "--number", "10", "--screen"]
+    assert cli.main([*arguments, str(barriers), "--out", str(out)]) == 0
+    hits, screens = rows(out / "hits.csv"), rows(out / "screens.csv")
+    with_barriers = {(row["screen"], row["quantity"]): row for row in screens if row["barriers"] == "1"}
+    for name in ("barrier", "road"):
+        own = [row for row in hits if row["structure"] == name]
+        told = with_barriers[name, "energy"]
+        assert len(own) == int(told["hits"])
+        assert len({row["run"] for row in own}) == int(told["reach"])
+        energy = np.array([float(row["kinetic_J"]) + float(row["rotational_J"]) for row in own]) / 1000
+        assert float(told["q95"]) == pytest.approx(np.quantile(energy, 0.95), rel=1e-5)
+        assert float(told["greatest"]) == pytest.approx(energy.max(), rel=1e-5)
+    held = [row for row in hits if row["structure"] == "barrier" and row["passes"] == "0"]
+    assert len(held) == int(with_barriers["barrier", "energy"]["held"]) > 0
+    runs = {row["run"] for row in held}
+    assert not [row for row in hits if row["structure"] == "road" and row["run"] in runs]
+    assert "barrier holds" in capsys.readouterr().out
+
+
+def test_a_design_sheet_of_the_demo(tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    arguments = ["design", str(SITE / "project.toml"), "--number", "20", "--no-holdout", "--factors", "none"]
+    assert cli.main([*arguments, "--screen", str(barriers), "--out", str(out)]) == 0
+    assert {path.name for path in out.iterdir()} == {"design.html", "design.pdf", "design.json", "screens.csv"}
+    said = capsys.readouterr().out
+    assert "barrier is not enough for noel_2017" in said
+    html = (out / "design.html").read_text(encoding="utf-8")
+    assert "Evidence: the impacts that were measured on this site" in html
+    assert "EPSG:2154" in html
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("3.0,15", "0,15", "0 m high"),
+        ("3.0,15", ",15", "no height"),
+        ("3.0,15", "three,15", "three"),
+        ("988", "788", "beside the terrain"),
+        ("height_m", "hight_m", "height_m"),
+    ],
+)
+def test_screens_that_cannot_be_are_refused(
+    tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, says: str
+) -> None:
+    barriers.write_text(BARRIERS.replace(old, new), encoding="utf-8")
+    out = tmp_path / "out"
+    arguments = ["simulate", str(SITE / "project.toml"), "--model", "noel_2017", "--screen", str(barriers)]
+    assert cli.main([*arguments, "--out", str(out)]) == 1
+    assert says in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_design_without_a_screen_or_with_unknown_factors_says_what_to_do(
+    tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project, out = str(SITE / "project.toml"), str(tmp_path / "out")
+    assert cli.main(["design", project, "--out", out]) == 1
+    assert "--screen is missing" in capsys.readouterr().err
+    assert cli.main(["design", project, "--screen", str(barriers), "--factors", "uni", "--out", out]) == 1
+    assert "uni_11211_4_literature" in capsys.readouterr().err

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the scene's settings say of a simulation, as a project states it, and where its blocks come from."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -57,6 +58,17 @@ def entry_of(scene: bpy.types.Scene) -> SimulationEntry:
         drag=settings.use_drag,
         seed=settings.seed,
     )
+
+
+def entry_with(scene: bpy.types.Scene, models: Collection[str], number: int) -> SimulationEntry:
+    """The same with other models and another number of blocks.
+
+    Raises
+    ------
+    RockfallError : see `entry_of`.
+    """
+    entry = entry_of(scene)
+    return replace(entry, models=tuple(models), releases=replace(entry.releases, number=number))
 
 
 def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequence[str] = ()) -> str:
@@ -116,14 +128,17 @@ def source_of(
     return measured_source(entry, block, measured), _origins(measured), left_out
 
 
-def fingerprint(scene: bpy.types.Scene) -> str:
-    """Of all that decides where blocks start, as what, and how they move."""
+def fingerprint(scene: bpy.types.Scene, models: Collection[str], number: int | None = None) -> str:
+    """Of all that decides where blocks start, as what, and how they move.
+
+    models, number : instead of those of the settings, where a number is given.
+    """
     try:
-        entry: object = entry_of(scene)
+        entry = entry_of(scene) if number is None else entry_with(scene, models, number)
+        parts: list[object] = [entry]
     except RockfallError as error:
-        entry = str(error)
-    parts = [entry]
-    if scene.rockfall_simulation.source in FILMED or "observed" in scene.rockfall_simulation.models:
+        parts = [str(error)]
+    if scene.rockfall_simulation.source in FILMED or "observed" in models:
         parts += [sorted(fingerprints.remembered(scene).items()), scene.get(store.BLOCKS, "")]
     return repr(parts)
 

@@ -3,7 +3,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
+from ...core.exchange.simulation_entry import SimulationEntry
 from ...core.exchange.simulation_output import default_records, write_simulations
 from ...core.hazard.barriers import with_barriers
 from ...core.hazard.screen_tally import ScreenTally
@@ -65,17 +66,19 @@ class Plan:
     remarks: tuple[Remark, ...] = ()
 
 
-def plan(scene: bpy.types.Scene) -> Plan:
+def plan(scene: bpy.types.Scene, entry: SimulationEntry | None = None) -> Plan:
     """The scene's settings as a scenario.
+
+    entry : instead of what they say of models and blocks.
 
     Raises
     ------
     RockfallError : something is missing, or cannot be.
     """
-    lacking = missing(scene)
+    lacking = missing(scene, None if entry is None else entry.models)
     if lacking:
         raise RockfallError(lacking)
-    surface, entry = ground(scene), simulated_sources.entry_of(scene)
+    surface, entry = ground(scene), entry or simulated_sources.entry_of(scene)
     met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
     source, origins, left_out = simulated_sources.source_of(scene, entry, surface)
     how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
@@ -185,14 +188,17 @@ def _stays(simulations: Sequence[Simulation]) -> list[Remark]:
     return []
 
 
-def missing(scene: bpy.types.Scene) -> str:
-    """What is still needed before anything can be simulated, in a sentence; empty when all is there."""
-    settings = scene.rockfall_simulation
+def missing(scene: bpy.types.Scene, models: Collection[str] | None = None) -> str:
+    """What is still needed before anything can be simulated, in a sentence; empty when all is there.
+
+    models : instead of those that are chosen.
+    """
+    chosen = scene.rockfall_simulation.models if models is None else models
     if not terrain.tiles(scene):
         return "Blocks fall on the terrain: import it first, in step 1."
-    if not settings.models:
+    if not chosen:
         return "Choose at least one model."
-    if "observed" in settings.models and not store.has_role(scene, store.PICK_ROLE):
+    if "observed" in chosen and not store.has_role(scene, store.PICK_ROLE):
         return "The model of measured rebounds needs measured impacts: pick some, or leave it out."
     return simulated_sources.missing(scene) or structures.problem(scene) or screens.problem(scene)
 
@@ -217,12 +223,17 @@ def ground(scene: bpy.types.Scene) -> Surface:
 _grounds: list[tuple[Surface, Surface]] = []
 
 
-def fingerprint(scene: bpy.types.Scene) -> str:
-    """Of all that decides what is simulated: terrain, structures, screens, source, blocks, models, motion."""
+def fingerprint(scene: bpy.types.Scene, chosen: Collection[str] | None = None, number: int | None = None) -> str:
+    """Of all that decides what is simulated: terrain, structures, screens, source, blocks, models, motion.
+
+    chosen, number : models, and how many blocks, instead of those of the settings.
+    """
     parameters, how = models.parameters_of(scene), reconstruction.project_settings(scene, []).reconstruction
-    used = {name: values for name, values in parameters.items() if name in scene.rockfall_simulation.models}
+    chosen = scene.rockfall_simulation.models if chosen is None else chosen
+    used = {name: values for name, values in parameters.items() if name in chosen}
+    sources = simulated_sources.fingerprint(scene, chosen, number)
     parts = [
-        fingerprints.ground(scene), fingerprints.ground_contents(scene), simulated_sources.fingerprint(scene),
+        fingerprints.ground(scene), fingerprints.ground_contents(scene), sources,
         json.dumps(used, sort_keys=True), how,
     ]  # fmt: skip
     parts += [*simulated_zones.fingerprint(scene), *structures.fingerprint(scene), *screens.fingerprint(scene)]

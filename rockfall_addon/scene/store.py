@@ -23,6 +23,7 @@ SET_ASIDE_ROLE = "pick_set_aside"  # a pick that cannot be used, until it is cor
 MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"
 SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
+MAPS_ROLE = "maps"  # of what passes through the cells of the terrain, of many runs
 RELEASE_ROLE = "release"  # a drawn line, area or points
 STRUCTURE_ROLE = "structure"  # a mesh that blocks meet beside the terrain
 SCREEN_ROLE = "screen"  # a line at which passing blocks are measured or held
@@ -69,6 +70,11 @@ BLOCK_SHOWN = "rockfall_block_shown"  # of flights: the block that they were com
 # of simulated blocks and paths
 ENDS = "rockfall_ends"  # of paths: the ways to end, as text
 RELEASES = "rockfall_releases"  # name, trajectory and clock time of each, as text
+
+# of maps
+MAP_CELLS = "rockfall_map_cells"  # south-west corner, size, columns, rows
+MAP_BLOCKS = "rockfall_map_blocks"  # how many blocks they are of
+MAP_OF = "rockfall_map_of"  # of what they were computed, and what there is to say of them, as text
 
 # of a pick; blocks and flights have the trajectory, too
 TRAJECTORY, TIME, POSITION = "rockfall_trajectory", "rockfall_time_s", "rockfall_position_m"

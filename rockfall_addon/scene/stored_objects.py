@@ -8,9 +8,9 @@ import numpy as np
 
 from ...core.impact_models.registry import MODELS
 from ...core.plausibility import GREATEST_M, OF_UNIT
-from ...core.remarks import Severity
+from ...core.remarks import Severity, from_plain
 from . import store
-from .stored_values import BEYOND, NO_TEXT, NOT_FINITE, Check, json_of, name, number, numbers
+from .stored_values import BEYOND, NO_TEXT, NOT_FINITE, Check, count, json_of, name, number, numbers
 
 PER_POSE, PER_SIGHTING, SIGMA_OF_SIGHTING = 12, 7, 5
 
@@ -91,6 +91,11 @@ def _is_model(value: object) -> str:
     return "" if isinstance(value, str) and value in MODELS else "names no model"
 
 
+def _cells(value: object) -> str:
+    problem = numbers(5, -GREATEST_M, GREATEST_M)(value)
+    return problem or ("" if value[2] > 0 and min(value[3:]) >= 1 else BEYOND)
+
+
 _model = {store.MODEL: _is_model}
 _trajectory = {store.TRAJECTORY: name}
 _amount = number(0.0)
@@ -144,6 +149,15 @@ BY_ROLE: dict[str, Kept] = {
         {**_model, store.RELEASES: json_of(list, _releases), store.ENDS: json_of(list, _texts)}, do="Simulate again"
     ),
     store.SIMULATED_PATTERN_ROLE: Kept(_model, do="Simulate again"),
+    store.MAPS_ROLE: Kept(
+        {
+            **_model,
+            store.MAP_CELLS: _cells,
+            store.MAP_BLOCKS: count,
+            store.MAP_OF: json_of(dict, lambda found: from_plain(found["remarks"], "note")),
+        },
+        do="Compute the maps again",
+    ),
     store.TERRAIN_ROLE: Kept(beside={store.REACH: _amount, store.THIN_SHARE: number(0.0, 1.0)}),
 }
 

@@ -31,9 +31,12 @@ def end() -> None:
     blf.disable(0, blf.SHADOW)
 
 
-def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], title: str) -> None:
-    """A square with a dark edge and a name for each row, from the lower margin up, and a title above."""
-    size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale
+def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], title: str, above: float = 0.0) -> None:
+    """A square with a dark edge and a name for each row, from the lower margin up, and a title above.
+
+    above : how much higher it begins [px], where another legend is below.
+    """
+    size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale + above
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for i, (name, colour) in enumerate(reversed(rows)):
         low = bottom + i * step
@@ -42,7 +45,8 @@ def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], titl
             shader.uniform_float("color", (*shade, 1.0))
             batch_for_shader(shader, "TRI_STRIP", {"pos": [(a, c), (b, c), (a, d), (b, d)]}).draw(shader)
         text(left + 1.6 * size, low + 0.1 * size, name)
-    text(left, bottom + (len(rows) + 0.2) * step, title)
+    for i, words in enumerate(reversed(title.split("; "))):
+        text(left, bottom + (len(rows) + 0.2) * step + 1.4 * TEXT * i * scale, words)
 
 
 def fitting(context: bpy.types.Context) -> tuple[float, float]:

@@ -14,6 +14,8 @@ from bpy.props import (
 )
 
 from ....core.constants import ROCK_DENSITY_KGPM3
+from ....core.hazard.cells import LEAST_M
+from ....core.hazard.maps import LAYERS
 from ....core.simulation.block_shapes import SHAPES
 from ....core.simulation.engine import FRICTION
 from ...scene import drawn_releases, models, simulation, store
@@ -165,6 +167,29 @@ class SimulationSettings(bpy.types.PropertyGroup):
     show_blocks: BoolProperty(
         name="Blocks", description="Show the simulated blocks at the scene's time", default=True, update=_look_changed
     )
+    map_model: EnumProperty(
+        name="Model", description="Impact model of the maps",
+        items=[(name, title, text) for name, title, text, _ in models.CHOICES], default="noel_2017",
+    )  # fmt: skip
+    map_number: IntProperty(
+        name="Number", description="Blocks of the maps: from each measured release or drawn point, or altogether. They "
+        "are counted and forgotten, so there may be many",
+        default=1000, min=1, soft_max=100_000, max=10_000_000,
+    )  # fmt: skip
+    map_cell_m: FloatProperty(
+        name="Cells", description="Side of a cell",
+        default=2.0, min=LEAST_M, soft_min=0.5, soft_max=20.0, unit="LENGTH", precision=2,
+    )  # fmt: skip
+    map_layer: EnumProperty(
+        name="Map", description="What is painted on the terrain",
+        items=[(name, layer.title, f"{layer.meaning} ({name})") for name, layer in LAYERS.items()],
+        default="Reach_probability",
+    )  # fmt: skip
+    show_map: BoolProperty(name="Show on the Terrain", description="Paint the map on the terrain", default=True)
+    probe_map: BoolProperty(
+        name="Numbers under the Mouse", description="The numbers of the cell under the mouse, beside it", default=True
+    )
+
     run_model: StringProperty(name="Model", description="Of the selected run")
     run: IntProperty(
         name="Run", description="The selected run: its path is drawn bold, its numbers stand below; 0 selects none",

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Maps of many runs in the scene: an object whose vertices are the cells that blocks reach, with all their numbers.
+
+It is never seen; the overlay paints the terrain from it. So maps are saved, copied and undone with the scene.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.hazard.cell_tally import CellTally
+from ...core.hazard.cells import Cells, cells_over
+from ...core.hazard.maps import LAYERS, Maps
+from ...core.progress import Progress
+from ...core.remarks import Remark, from_plain, to_plain
+from ...core.simulation.ground import Ground
+from ...core.vectors import Array
+from ...core.workflow.hazard import run_chunks
+from ...core.workflow.simulation import END_WORDS, ground_of
+from . import simulated_sources, simulation_setup, store
+from .simulation_setup import Plan
+
+COLLECTION = "Maps"
+CELL = "cell"
+"""Attribute: number of the cell, row by row from the south-west."""
+FEW = 100
+"""Fewer passages than this say little about a 95 % value."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapPlan:
+    """What is to be mapped.
+
+    Attributes
+    ----------
+    plan : one model, and the blocks of the maps.
+    cell_m : side of a cell [m].
+    model : its name.
+    """
+
+    plan: Plan
+    cell_m: float
+    model: str
+
+
+def plan(scene: bpy.types.Scene) -> MapPlan:
+    """What the settings say.
+
+    Raises
+    ------
+    RockfallError : something is missing, or cannot be.
+    """
+    settings = scene.rockfall_simulation
+    model = settings.map_model
+    planned = simulation_setup.plan(scene, simulated_sources.entry_with(scene, [model], settings.map_number))
+    return MapPlan(planned, store.double(settings.map_cell_m), model)
+
+
+def fingerprint(scene: bpy.types.Scene) -> str:
+    """Of all that decides what maps there would be now."""
+    settings = scene.rockfall_simulation
+    runs = simulation_setup.fingerprint(scene, [settings.map_model], settings.map_number)
+    return f"{runs} {store.double(settings.map_cell_m):g}"
+
+
+def run(asked: MapPlan, progress: Progress) -> tuple[Maps, tuple[Remark, ...]]:
+    """Simulate and count, without Blender; what is finished at a cancel is kept.
+
+    Raises
+    ------
+    RockfallError : whatever the core refuses.
+    CancelledError : no block was finished.
+    """
+    progress("Preparing the ground", 0, 0)
+    ground = ground_of(asked.plan.scenario)
+    tally = CellTally(cells_over(asked.plan.scenario.terrain, asked.cell_m))
+    progress("Releasing the blocks", 0, 0)
+    releases = asked.plan.scenario.releases(ground)
+    counted = run_chunks(ground, releases, asked.plan.scenario.settings[0], [tally], progress=progress)
+    maps = tally.maps()
+    return maps, (*asked.plan.remarks, *_remarks(maps, counted.wanted, counted.ends, ground))
+
+
+def _remarks(maps: Maps, wanted: int, ends: Mapping[str, int], ground: Ground) -> list[Remark]:
+    said = []
+    if maps.blocks < wanted:
+        said.append(
+            Remark(f"Stopped by you: the maps are of {maps.blocks} of {wanted} blocks.", "warning", "cancelled")
+        )
+    words = END_WORDS | {f"structure:{name}": f"held by {name}" for name in ground.structures}
+    ended = ", ".join(f"{count} {words[name]}" for name, count in ends.items() if count)
+    said.append(Remark(f"Maps of {maps.blocks} blocks, conditional on their release: {ended}.", "note", "maps"))
+    passages = maps.layers["Nr_passages"]
+    reached = passages[passages > 0]
+    few = np.count_nonzero(reached < FEW) / max(reached.size, 1)
+    if few > 0.5:
+        text = f"{100 * few:.0f} % of the cells have fewer than {FEW} passages: take more blocks, or larger cells."
+        said.append(Remark(text, "advice", "number"))
+    return said
+
+
+def show(scene: bpy.types.Scene, maps: Maps, model: str, said: str, remarks: tuple[Remark, ...]) -> bpy.types.Object:
+    """Keep these maps in the scene, and no others."""
+    remove(scene)
+    cells = maps.cells
+    filled = np.zeros(cells.shape, np.bool_)
+    for values in maps.layers.values():
+        filled |= np.isfinite(values)
+    cell = np.flatnonzero(filled)
+    mesh = bpy.data.meshes.new("Maps")
+    mesh.vertices.add(cell.size)
+    row, column = np.divmod(cell, cells.columns)
+    corner = np.array([cells.x0_m, cells.y0_m])
+    places = np.column_stack([corner + cells.size_m * (np.column_stack([column, row]) + 0.5), np.zeros(cell.size)])
+    mesh.attributes["position"].data.foreach_set("vector", places.astype(np.float32).ravel())
+    mesh.attributes.new(CELL, "INT", "POINT").data.foreach_set("value", cell.astype(np.int32))
+    for name, values in maps.layers.items():
+        attribute = mesh.attributes.new(name, "FLOAT", "POINT")
+        attribute.data.foreach_set("value", values.ravel()[cell].astype(np.float32))
+    obj = bpy.data.objects.new("Maps", mesh)
+    obj[store.ROLE], obj[store.MODEL] = store.MAPS_ROLE, model
+    obj[store.MAP_CELLS] = [cells.x0_m, cells.y0_m, cells.size_m, float(cells.columns), float(cells.rows)]
+    obj[store.MAP_BLOCKS] = maps.blocks
+    obj[store.MAP_OF] = json.dumps({"print": said, "remarks": to_plain(remarks)})
+    obj.hide_viewport = obj.hide_render = obj.hide_select = True
+    store.link(store.collection(scene, COLLECTION), obj)
+    return obj
+
+
+def remove(scene: bpy.types.Scene) -> None:
+    """Keep no maps."""
+    store.remove_objects(store.with_role(scene, store.MAPS_ROLE))
+    store.remove_collection(scene, COLLECTION)
+
+
+def maps_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The object of the scene's maps."""
+    found = next(iter(store.with_role(scene, store.MAPS_ROLE)), None)
+    return found if found is not None and found.type == "MESH" and CELL in found.data.attributes else None
+
+
+def read(obj: bpy.types.Object) -> Maps:
+    """The maps of an object, kept until it is another one; layers that are not there any more are left out."""
+    key = obj.data.session_uid, len(obj.data.vertices), tuple(obj[store.MAP_CELLS])
+    if not _read or _read[0][0] != key:
+        x0, y0, size, columns, rows = obj[store.MAP_CELLS]
+        cells = Cells(x0, y0, size, int(columns), int(rows))
+        cell = np.empty(len(obj.data.vertices), np.int32)
+        obj.data.attributes[CELL].data.foreach_get("value", cell)
+        inside = (cell >= 0) & (cell < len(cells))
+        layers = {}
+        for name in LAYERS:
+            attribute = obj.data.attributes.get(name)
+            if attribute is not None and attribute.data_type == "FLOAT" and attribute.domain == "POINT":
+                values = np.empty(len(cell), np.float32)
+                attribute.data.foreach_get("value", values)
+                whole = np.full(len(cells), np.nan)
+                whole[cell[inside]] = values[inside]
+                layers[name] = whole.reshape(cells.shape)
+        _read[:] = [(key, Maps(cells, int(obj[store.MAP_BLOCKS]), layers))]
+    return _read[0][1]
+
+
+_read: list[tuple[tuple, Maps]] = []
+
+
+def shown_values(scene: bpy.types.Scene, maps: Maps) -> Array | None:
+    """(rows, columns) of the map that the settings ask for."""
+    return maps.layers.get(scene.rockfall_simulation.map_layer)
+
+
+def remarks(scene: bpy.types.Scene) -> list[Remark]:
+    """What there is to say about the maps, bad news first."""
+    obj = maps_of(scene)
+    if obj is None:
+        return []
+    kept = store.read_json(obj, store.MAP_OF, {})
+    said = list(from_plain(kept.get("remarks", []), "note"))
+    if is_stale(scene):
+        text = "Terrain, structures, releases, models or settings were changed since: compute the maps again."
+        said.insert(0, Remark(text, "warning", "stale"))
+    return said
+
+
+def is_stale(scene: bpy.types.Scene) -> bool:
+    """Whether the maps are of something else than the scene now says."""
+    obj = maps_of(scene)
+    return obj is not None and store.read_json(obj, store.MAP_OF, {}).get("print") != fingerprint(scene)
+
+
+def cell_at(cells: Cells, place: Array) -> tuple[int, int] | None:
+    """Row and column of the cell that a place (2 or 3,) is in; None beside the maps."""
+    column, row = np.floor((place[:2] - [cells.x0_m, cells.y0_m]) / cells.size_m).astype(int).tolist()
+    return (row, column) if 0 <= row < cells.rows and 0 <= column < cells.columns else None

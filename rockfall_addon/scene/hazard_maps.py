@@ -5,7 +5,6 @@ It is never seen; the overlay paints the terrain from it. So maps are saved, cop
 """
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -15,19 +14,17 @@ from ...core.hazard.cell_tally import CellTally
 from ...core.hazard.cells import Cells, cells_over
 from ...core.hazard.maps import LAYERS, Maps
 from ...core.progress import Progress
-from ...core.remarks import Remark, from_plain, to_plain
-from ...core.simulation.ground import Ground
+from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.vectors import Array
 from ...core.workflow.hazard import run_chunks
-from ...core.workflow.simulation import END_WORDS, ground_of
+from ...core.workflow.maps import map_remarks
+from ...core.workflow.simulation import ground_of
 from . import simulated_sources, simulation_setup, store
 from .simulation_setup import Plan
 
 COLLECTION = "Maps"
 CELL = "cell"
 """Attribute: number of the cell, row by row from the south-west."""
-FEW = 100
-"""Fewer passages than this say little about a 95 % value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,27 +76,22 @@ def run(asked: MapPlan, progress: Progress) -> tuple[Maps, tuple[Remark, ...]]:
     tally = CellTally(cells_over(asked.plan.scenario.terrain, asked.cell_m))
     progress("Releasing the blocks", 0, 0)
     releases = asked.plan.scenario.releases(ground)
-    counted = run_chunks(ground, releases, asked.plan.scenario.settings[0], [tally], progress=progress)
-    maps = tally.maps()
-    return maps, (*asked.plan.remarks, *_remarks(maps, counted.wanted, counted.ends, ground))
-
-
-def _remarks(maps: Maps, wanted: int, ends: Mapping[str, int], ground: Ground) -> list[Remark]:
-    said = []
-    if maps.blocks < wanted:
-        said.append(
-            Remark(f"Stopped by you: the maps are of {maps.blocks} of {wanted} blocks.", "warning", "cancelled")
-        )
-    words = END_WORDS | {f"structure:{name}": f"held by {name}" for name in ground.structures}
-    ended = ", ".join(f"{count} {words[name]}" for name, count in ends.items() if count)
-    said.append(Remark(f"Maps of {maps.blocks} blocks, conditional on their release: {ended}.", "note", "maps"))
-    passages = maps.layers["Nr_passages"]
-    reached = passages[passages > 0]
-    few = np.count_nonzero(reached < FEW) / max(reached.size, 1)
-    if few > 0.5:
-        text = f"{100 * few:.0f} % of the cells have fewer than {FEW} passages: take more blocks, or larger cells."
-        said.append(Remark(text, "advice", "number"))
-    return said
+    barriers = [screen for screen in asked.plan.screens if screen.holds]
+    settings = asked.plan.scenario.settings[0]
+    if barriers:  # what is mapped is what is shown: blocks end where a barrier holds them
+        counted = run_chunks(ground, releases, settings, [], behind=[tally], barriers=barriers, progress=progress)
+    else:
+        counted = run_chunks(ground, releases, settings, [tally], progress=progress)
+    remarks = list(map_remarks({asked.model: tally}))
+    if counted.blocks < counted.wanted:
+        text = f"Stopped by you: the maps are of {counted.blocks} of {counted.wanted} blocks."
+        remarks.append(Remark(text, "warning", "cancelled"))
+    if barriers:
+        names = ", ".join(barrier.name for barrier in barriers)
+        remarks.append(Remark(f"Blocks end where a barrier holds them: {names}.", "note", "barriers"))
+    text = "All numbers are conditional on the release: how often blocks are released is not in them."
+    remarks.append(Remark(text, "note", "maps"))
+    return tally.maps(), tuple(gravest_first([*asked.plan.remarks, *remarks]))
 
 
 def show(scene: bpy.types.Scene, maps: Maps, model: str, said: str, remarks: tuple[Remark, ...]) -> bpy.types.Object:
@@ -165,11 +157,6 @@ def read(obj: bpy.types.Object) -> Maps:
 
 
 _read: list[tuple[tuple, Maps]] = []
-
-
-def shown_values(scene: bpy.types.Scene, maps: Maps) -> Array | None:
-    """(rows, columns) of the map that the settings ask for."""
-    return maps.layers.get(scene.rockfall_simulation.map_layer)
 
 
 def remarks(scene: bpy.types.Scene) -> list[Remark]:

@@ -18,7 +18,7 @@ from . import map_overlay
 
 AWAY = 22
 """Between the mouse and the card [px at interface scale 1]."""
-FIRST, NEXT = 11.0, 4.6
+FIRST, NEXT = 12.0, 4.4
 """Widths of the first column and of the others, in heights of the text."""
 
 _handles: list[object] = []
@@ -86,12 +86,10 @@ def _draw(mouse: tuple[int, int]) -> None:
     maps = hazard_maps.read(obj)
     cell = None if place is None else hazard_maps.cell_at(maps.cells, place)
     if cell is not None:
-        _draw_card(context, mouse, spot, *card_of(maps, *cell))
+        _draw_card(context, mouse, *card_of(maps, *cell))
 
 
-def _draw_card(
-    context: bpy.types.Context, mouse: tuple[int, int], spot: np.ndarray, said: list[str], table: list[list[str]]
-) -> None:
+def _draw_card(context: bpy.types.Context, mouse: tuple[int, int], said: list[str], table: list[list[str]]) -> None:
     scale, theme = context.preferences.system.ui_scale, context.preferences.themes[0].user_interface
     size = legend.TEXT * scale
     step = 1.5 * size
@@ -100,10 +98,12 @@ def _draw_card(
     if table:
         width = max(width, (FIRST + NEXT * (len(table[0]) - 1)) * size)
     width, height = width + 1.5 * step, (len(said) + len(table) + 0.8) * step
-    left, low = mouse[0] + AWAY * scale, mouse[1] - AWAY * scale - height
-    if spot[0] + AWAY * scale + width > context.region.width - legend.covered_right(context.area):
-        left = mouse[0] - AWAY * scale - width
-    if spot[1] - AWAY * scale - height < 0:
+    region, area = context.region, context.area
+    least = region.x + legend.covered_left(area)
+    most = region.x + region.width - legend.covered_right(area) - width
+    left = max(min(mouse[0] + AWAY * scale, most), least)  # beside the mouse as far as there is room, below it always
+    low = mouse[1] - AWAY * scale - height
+    if low < region.y:
         low = mouse[1] + AWAY * scale
     left, low = round(left), round(low)
     gpu.state.blend_set("ALPHA")

@@ -15,7 +15,6 @@ from ...core.errors import RockfallError
 from ...core.exchange.simulation_entry import SimulationEntry
 from ...core.exchange.simulation_output import default_records, write_simulations
 from ...core.hazard.barriers import with_barriers
-from ...core.hazard.screen_tally import ScreenTally
 from ...core.hazard.screens import Screen, check_screens
 from ...core.impact_models.registry import MODELS
 from ...core.output import output_folder
@@ -25,6 +24,7 @@ from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.simulation.engine import Simulation
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
+from ...core.workflow.screens import screen_remarks, tallies_of
 from ...core.workflow.simulation import Scenario, ground_of, remarks_of, run_models
 from . import (
     fingerprints,
@@ -137,12 +137,8 @@ def run(plan: Plan, progress: Progress) -> Found:
         )
     simulations = run_models(ground, releases, plan.scenario.settings, progress=progress)
     remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *_stays(simulations)])
-    tallies, shown = {}, []
-    for one in simulations:
-        tally = ScreenTally(plan.screens)
-        tally.add(one)
-        tallies[one.settings.model] = tally
-        shown.append(with_barriers(one, tally.hits))
+    tallies = tallies_of(simulations, plan.screens, progress)
+    shown = [with_barriers(one, tallies[one.settings.model].hits) if tallies else one for one in simulations]
     return Found([simulation.prepare(one) for one in shown], screens.results_of(tallies), tuple(remarks))
 
 
@@ -170,9 +166,13 @@ def export(plan: Plan, counts: Mapping[str, int], folder: Path, progress: Progre
         if one.model in counts:
             some = releases.take(slice(0, counts[one.model]))
             found += run_models(ground, some, [one], progress=progress)
+    tallies = tallies_of(found, plan.screens, progress)
+    remarks = gravest_first([*remarks_of(found), *screen_remarks(tallies)])
     with output_folder(folder) as place:
         records = default_records(len(releases))
-        return write_simulations(found, place, record=records, inputs={}, remarks=remarks_of(found), progress=progress)
+        return write_simulations(
+            found, place, record=records, inputs={}, remarks=remarks, tallies=tallies, progress=progress
+        )
 
 
 def _stays(simulations: Sequence[Simulation]) -> list[Remark]:

@@ -10,9 +10,9 @@ from ....core.errors import RockfallError
 from ....core.vectors import Array
 from ...scene import fingerprints, problems, screens, store
 
-MEASURES, HOLDS = (0.35, 0.75, 1.0), (1.0, 0.72, 0.15)
-"""Colours of a screen and of a barrier, as on the screen."""
-FILL, FAINT = 0.28, 0.3
+MEASURES, HOLDS = (0.88, 0.89, 0.92), (1.0, 0.36, 0.78)
+"""Colours of a screen and of a barrier, which no model has."""
+FILL, FAINT = 0.25, 0.3
 """Opacity of the area; of the lines where the terrain hides them."""
 WIDTH_PX, POST_M = 2.2, 5.0
 NEARER = 2e-5

@@ -173,6 +173,7 @@ class ROCKFALL_PT_simulation_structures(_Sub, bpy.types.Panel):
 class ROCKFALL_PT_simulation_screens(_Sub, bpy.types.Panel):
     bl_label = "Screens and barriers"
     bl_idname = "ROCKFALL_PT_simulation_screens"
+    bl_options = set()
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
@@ -277,11 +278,11 @@ def _draw_result(context: bpy.types.Context, layout: bpy.types.UILayout, setting
 CLASSES = (
     ROCKFALL_PT_simulation,
     ROCKFALL_PT_simulated_run,
+    ROCKFALL_PT_simulation_screens,
     ROCKFALL_PT_simulation_parameters,
     ROCKFALL_PT_simulation_blocks,
     ROCKFALL_PT_simulation_motion,
     ROCKFALL_PT_simulation_zones,
     ROCKFALL_PT_simulation_structures,
-    ROCKFALL_PT_simulation_screens,
     ROCKFALL_PT_simulation_look,
 )

@@ -185,6 +185,9 @@ def _percent(part: int, whole: int) -> str:
 
 def _with_interval(values: Sequence[float | None], unit: str) -> str:
     value, low, high = values
-    if low is None and high is None:
-        return f"{value:.3g} {unit}"
-    return f"{value:.3g} ({'–' if low is None else f'{low:.3g}'} to {'–' if high is None else f'{high:.3g}'}) {unit}"
+    match low is None, high is None:
+        case False, False:
+            return f"{value:.3g} {unit} ({low:.3g}–{high:.3g})"
+        case False, True:
+            return f"{value:.3g} {unit} (≥ {low:.3g})"
+    return f"{value:.3g} {unit}"

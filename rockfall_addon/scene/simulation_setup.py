@@ -171,7 +171,7 @@ def export(plan: Plan, counts: Mapping[str, int], folder: Path, progress: Progre
     with output_folder(folder) as place:
         records = default_records(len(releases))
         return write_simulations(
-            found, place, record=records, inputs={}, remarks=remarks, tallies=tallies, progress=progress
+            found, place, record=records, inputs={}, remarks=remarks, screens=tallies, progress=progress
         )
 
 

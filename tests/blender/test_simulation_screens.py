@@ -111,3 +111,11 @@ def test_what_is_no_screen_is_refused(slope: bpy.types.Scene, screen: bpy.types.
     screen.data.clear_geometry()
     assert "road has 0 points" in setup.missing(slope)
     assert not bpy.ops.rockfall.simulate.poll()
+
+
+def test_exported_tables_have_the_hits(slope: bpy.types.Scene, screen: bpy.types.Object, part, tmp_path: Path) -> None:
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert bpy.ops.rockfall.export_simulation(directory=str(tmp_path / "tables")) == {"FINISHED"}
+    lines = (tmp_path / "tables" / "hits.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) - 1 == result(part, slope)["hits"]
+    assert all(line.startswith("road,") for line in lines[1:])

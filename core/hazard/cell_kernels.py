@@ -84,6 +84,20 @@ def _border(p, d, low, size, cell):  # type: ignore[no-untyped-def]
 
 
 @borrowing
+def _stays(plan, tri, x, y, column, row, west, south, size):  # type: ignore[no-untyped-def]
+    """Whether a place is in a cell and over a triangle: so is the straight way there from another such place."""
+    x0, y0 = west + column * size, south + row * size
+    if not (x0 <= x < x0 + size and y0 <= y < y0 + size):
+        return False
+    ax, ay, bx, by, cx, cy = plan[tri, 0], plan[tri, 1], plan[tri, 2], plan[tri, 3], plan[tri, 4], plan[tri, 5]
+    return (
+        (bx - ax) * (y - ay) >= (by - ay) * (x - ax)
+        and (cx - bx) * (y - by) >= (cy - by) * (x - bx)
+        and (ax - cx) * (y - cy) >= (ay - cy) * (x - cx)
+    )
+
+
+@borrowing
 def _among_layers(tree, stack, bounds, below, p, v, a, start, stop, best):  # type: ignore[no-untyped-def]
     """The greatest height of a part of a piece where triangles lie on top of each other, or there are none."""
     fall = max(-a[2], 1e-9)  # a way that bends upwards is on the ground, and short
@@ -101,7 +115,7 @@ def _among_layers(tree, stack, bounds, below, p, v, a, start, stop, best):  # ty
 @kernel
 def walk(  # type: ignore[no-untyped-def]
     west, south, size, columns, rows, plan, tree, order, begin, what, time, position, v2, omega2, v1, omega1,
-    half_mass, half_inertia, drag, gravity, seen, keys, values,
+    half_mass, half_inertia, drag, gravity, seen, known, keys, values,
 ):  # fmt: skip
     """All passages of runs; returns (keys, values, how many).
 
@@ -112,14 +126,14 @@ def walk(  # type: ignore[no-untyped-def]
     order : (n,) of the runs; begin : (n + 1,) where the records of each begin.
     what … omega1 : (k, …) the records.
     half_mass, half_inertia, drag : (n,) of the runs: energies are these times squares; ½ρC_D A/m [1/m].
-    seen : (cells,) zeros, work space.
+    seen : (cells,) work space: of runs that were followed before, their numbers from 1 to `known`, or 0.
     keys, values : to be filled, and made longer: (p,) the cell, row · columns + column, −1 − cell for the first
         passage of a run; (p, 4) see `COLUMNS`.
     """
     stack, bounds, below = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE), np.empty(STACK_SIZE, np.int64)
     count = 0
     for number in range(len(order)):
-        run = order[number]
+        run, stamp = order[number], np.int32(known + number + 1)
         first, last = begin[run], begin[run + 1] - 1
         if last < first:
             continue
@@ -127,9 +141,10 @@ def walk(  # type: ignore[no-untyped-def]
         column, row = np.int64(floor((p[0] - west) / size)), np.int64(floor((p[1] - south) / size))
         tri = triangle_below(tree, stack, p[0], p[1], p[2])
         mass, inertia, k = half_mass[run], half_inertia[run], drag[run]
-        square, energy, height = 0.0, 0.0, -inf
+        square, energy, height, gx, gy, c0 = 0.0, 0.0, -inf, 0.0, 0.0, nan
         if tri >= 0:
-            height = p[2] - plan[tri, 8] - plan[tri, 6] * p[0] - plan[tri, 7] * p[1]
+            gx, gy, c0 = plan[tri, 6], plan[tri, 7], plan[tri, 8]
+            height = p[2] - c0 - gx * p[0] - gy * p[1]
             if isnan(height):
                 height = _among_layers(tree, stack, bounds, below, p, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0, -inf)
         for i in range(first, last + 1):
@@ -144,20 +159,16 @@ def walk(  # type: ignore[no-untyped-def]
             a, part, gain_of_spin, air = (0.0, 0.0, -gravity), left, 0.0, k
             if not flies:
                 air = 0.0
-                a = ((v1[i + 1, 0] - v[0]) / left, (v1[i + 1, 1] - v[1]) / left, (v1[i + 1, 2] - v[2]) / left)
-                v = (
-                    (position[i + 1, 0] - p[0]) / left - 0.5 * a[0] * left,
-                    (position[i + 1, 1] - p[1]) / left - 0.5 * a[1] * left,
-                    (position[i + 1, 2] - p[2]) / left - 0.5 * a[2] * left,
-                )
+                each, half = 1.0 / left, 0.5 * left
+                a = ((v1[i + 1, 0] - v[0]) * each, (v1[i + 1, 1] - v[1]) * each, (v1[i + 1, 2] - v[2]) * each)
+                way = (position[i + 1, 0] - p[0], position[i + 1, 1] - p[1], position[i + 1, 2] - p[2])
+                v = (way[0] * each - a[0] * half, way[1] * each - a[1] * half, way[2] * each - a[2] * half)
                 then = inertia * (omega1[i + 1, 0] ** 2 + omega1[i + 1, 1] ** 2 + omega1[i + 1, 2] ** 2)
-                gain_of_spin = (then - spin) / left
-                way_x, way_y = position[i + 1, 0] - p[0], position[i + 1, 1] - p[1]
-                way = sqrt(way_x * way_x + way_y * way_y)
-                bend = abs(a[0] * way_y - a[1] * way_x) / way if way > 0.0 else 0.0
-                cuts = sqrt(bend * left * left / (8.0 * STRAIGHT_M))
-                if cuts > 1.0:
-                    part = left / min(ceil(cuts), MOST_CUTS)
+                gain_of_spin = (then - spin) * each
+                square_way = way[0] * way[0] + way[1] * way[1]
+                bend = (a[0] * way[1] - a[1] * way[0]) * left * left / (8.0 * STRAIGHT_M)
+                if bend * bend > square_way > 0.0:
+                    part = left / min(ceil(sqrt(abs(bend) / sqrt(square_way))), MOST_CUTS)
             while left > 0.0:
                 duration, then_v = min(part, left), v
                 if air > 0.0:
@@ -173,20 +184,33 @@ def walk(  # type: ignore[no-untyped-def]
                 left = left - duration if duration < left * (1.0 - 1e-9) else 0.0
                 half = 0.5 * duration
                 dx, dy = (v[0] + a[0] * half) * duration, (v[1] + a[1] * half) * duration
+                if tri < 0:
+                    tri = triangle_below(tree, stack, p[0], p[1], p[2])
+                    c0 = nan
+                    if tri >= 0:
+                        gx, gy, c0 = plan[tri, 6], plan[tri, 7], plan[tri, 8]
+                c, b, f = p[2] - c0 - gx * p[0] - gy * p[1], v[2] - gx * v[0] - gy * v[1], a[2] - gx * a[0] - gy * a[1]
+                if (
+                    tri >= 0
+                    and not isnan(c)
+                    and _stays(plan, tri, p[0] + dx, p[1] + dy, column, row, west, south, size)
+                ):
+                    height = max(height, c, c + (b + 0.5 * f * duration) * duration)
+                    if b > 0.0 > b + f * duration:
+                        height = max(height, c - 0.5 * b * b / f)
+                    s, spin = _square(v, a, air, gravity, duration), spin + gain_of_spin * duration
+                    square, energy = max(square, s), max(energy, mass * s + spin)
+                    p = (p[0] + dx, p[1] + dy, p[2] + (v[2] + a[2] * half) * duration)
+                    v = then_v if flies else (v[0] + a[0] * duration, v[1] + a[1] * duration, v[2] + a[2] * duration)
+                    continue
                 length, speed, gain = sqrt(dx * dx + dy * dy), 0.0, 0.0
                 if (a[0] != 0.0 or a[1] != 0.0) and length > 0.0:
                     speed = max((v[0] * dx + v[1] * dy) / length, 0.0)
                     gain = 2.0 * (length / duration - speed) / duration
                 at_x, at_y = _border(p[0], dx, west, size, column), _border(p[1], dy, south, size, row)
+                step_x, step_y = size / abs(dx), size / abs(dy)
                 now, start, at_once = 0.0, 0.0, 0
-                if tri < 0:
-                    tri = triangle_below(tree, stack, p[0], p[1], p[2])
                 at_edge, edge = (inf, 0) if tri < 0 else _exit(plan, tri, p, dx, dy, now)
-                c, b, f = nan, 0.0, 0.0
-                if tri >= 0:
-                    gx, gy = plan[tri, 6], plan[tri, 7]
-                    c, b = p[2] - plan[tri, 8] - gx * p[0] - gy * p[1], v[2] - gx * v[0] - gy * v[1]
-                    f = a[2] - gx * a[0] - gy * a[1]
                 while True:
                     border = min(at_x, at_y)
                     then = min(border, at_edge, 1.0)
@@ -218,18 +242,18 @@ def walk(  # type: ignore[no-untyped-def]
                             if count == len(keys):
                                 keys, values = _longer(keys, values)
                             cell = row * columns + column
-                            keys[count] = cell if seen[cell] == run + 1 else -1 - cell
-                            seen[cell] = run + 1
+                            keys[count] = cell if seen[cell] == stamp else -1 - cell
+                            seen[cell] = stamp
                             values[count, 0], values[count, 1] = sqrt(square), energy
                             values[count, 2], values[count, 3] = mass * square, height if height > -inf else nan
                             count += 1
                         square, energy, height = s, mass * s + now_spin, -inf
                         if at_x <= border + 1e-12:
                             column += 1 if dx > 0.0 else -1
-                            at_x = _border(p[0], dx, west, size, column)
+                            at_x += step_x
                         if at_y <= border + 1e-12:
                             row += 1 if dy > 0.0 else -1
-                            at_y = _border(p[1], dy, south, size, row)
+                            at_y += step_y
                         if tri < 0:
                             place = (
                                 p[0] + now * dx, p[1] + now * dy, p[2] + (v[2] + 0.5 * a[2] * stop) * stop
@@ -238,11 +262,11 @@ def walk(  # type: ignore[no-untyped-def]
                         elif at_edge > now:
                             continue
                     at_edge, edge = (inf, 0) if tri < 0 else _exit(plan, tri, p, dx, dy, now)
-                    c = nan
+                    c0 = nan
                     if tri >= 0:
-                        gx, gy = plan[tri, 6], plan[tri, 7]
-                        c, b = p[2] - plan[tri, 8] - gx * p[0] - gy * p[1], v[2] - gx * v[0] - gy * v[1]
-                        f = a[2] - gx * a[0] - gy * a[1]
+                        gx, gy, c0 = plan[tri, 6], plan[tri, 7], plan[tri, 8]
+                    c, b = p[2] - c0 - gx * p[0] - gy * p[1], v[2] - gx * v[0] - gy * v[1]
+                    f = a[2] - gx * a[0] - gy * a[1]
                 s, spin = _square(v, a, air, gravity, duration), spin + gain_of_spin * duration
                 square, energy = max(square, s), max(energy, mass * s + spin)
                 p = (p[0] + dx, p[1] + dy, p[2] + (v[2] + a[2] * half) * duration)
@@ -251,8 +275,8 @@ def walk(  # type: ignore[no-untyped-def]
             if count == len(keys):
                 keys, values = _longer(keys, values)
             cell = row * columns + column
-            keys[count] = cell if seen[cell] == run + 1 else -1 - cell
-            seen[cell] = run + 1
+            keys[count] = cell if seen[cell] == stamp else -1 - cell
+            seen[cell] = stamp
             values[count, 0], values[count, 1] = sqrt(square), energy
             values[count, 2], values[count, 3] = mass * square, height if height > -inf else nan
             count += 1

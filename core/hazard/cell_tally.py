@@ -20,6 +20,8 @@ UNITS = (2.0**-20, 2.0**-10, 2.0**-10, 2.0**-20)
 """Of the sums of speeds [m/s], energies [J] and heights [m]."""
 JOULES = 1000.0
 """In a kJ."""
+MOST_RUNS = 2**31 - 1
+"""That are told apart in the work space of the kernel before it begins again."""
 PER_METRE, PER_RUN = 1.4, 8
 """Passages through cells of 1 m that room is made for at first."""
 
@@ -34,13 +36,16 @@ class CellTally:
 
     def __init__(self, cells: Cells) -> None:
         self.cells, self.blocks = cells, 0
+        self._spaces = list[_Space]()
         self.deposits = np.zeros(len(cells), np.int64)
         limits = [JOULES * limit for limit in CLASSES_KJ]
         self.passages = Sketches(len(cells), UNITS, column=list(QUANTITIES).index("E"), limits=limits)
 
     def empty(self) -> "CellTally":
         """One for the same cells to which nothing was added."""
-        return CellTally(self.cells)
+        other = CellTally(self.cells)
+        other._spaces = self._spaces
+        return other
 
     def add(self, simulation: Simulation) -> None:
         """Count the runs of a simulation.
@@ -49,7 +54,7 @@ class CellTally:
         ------
         InputError : it did not record all; the terrain is a cloud of points.
         """
-        key, values = passages_of(simulation, self.cells)
+        key, values = passages_of(simulation, self.cells, self._spaces)
         self.passages.add(key, values)
         self.deposits += np.bincount(_cells_at(self.cells, simulation), minlength=len(self.cells))
         self.blocks += len(simulation)
@@ -119,31 +124,63 @@ class CellTally:
         return Maps(self.cells, self.blocks, layers)
 
 
-def passages_of(simulation: Simulation, cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def passages_of(
+    simulation: Simulation, cells: Cells, spaces: "list[_Space] | None" = None
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
     """All passages of a simulation: (p,) the cells, −1 − cell for the first passage of a run through it; (p, 4) of each
     the speed [m/s], kinetic energy, translational energy [J] and height [m].
+
+    Parameters
+    ----------
+    spaces : memory to use, and to give back.
 
     Raises
     ------
     InputError : see `CellTally.add`.
     """
-    from .cell_kernels import COLUMNS, walk
+    from .cell_kernels import walk
 
     if simulation.recorded != "all":
         raise InputError("Maps need the whole motion of the blocks", advice="Record all of it")
     records, releases, ground = simulation.records, simulation.releases, simulation.ground
     size = int(PER_METRE * simulation.length_m.sum() / cells.size_m) + PER_RUN * len(simulation)
-    keys, values = np.empty(size, np.int32), np.empty((size, COLUMNS), np.float32)
+    space = spaces.pop() if spaces else _Space(len(cells))
+    space.make_room(size, len(simulation))
     order = np.argsort(along_curve(releases.position[:, :2]), kind="stable")
     mass, radius = releases.mass_kg, releases.radius_m
-    keys, values, count = walk(
+    space.keys, space.values, count = walk(
         cells.x0_m, cells.y0_m, cells.size_m, cells.columns, cells.rows, ground.plan, ground.terrain_tree, order,
         np.searchsorted(records.run, np.arange(len(simulation) + 1)), records.what, records.time_s, records.position,
         records.v2, records.omega2, records.v1, records.omega1, 0.5 * mass,
         0.5 * releases.inertia * mass * radius**2, releases.drag_per_m(simulation.settings.drag),
-        simulation.settings.gravity_mps2, np.zeros(len(cells), np.int32), keys, values,
+        simulation.settings.gravity_mps2, space.seen, space.runs, space.keys, space.values,
     )  # fmt: skip
-    return keys[:count].copy(), values[:count].copy()
+    space.runs += len(simulation)
+    found = space.keys[:count].copy(), space.values[:count].copy()
+    if spaces is not None:
+        spaces.append(space)
+    return found
+
+
+class _Space:
+    """Memory of the kernel that is used again: to take fresh memory costs more than to fill it.
+
+    Attributes
+    ----------
+    keys, values : its passages.
+    seen : (cells,) the last run in each, of all `runs` that were followed, from 1.
+    """
+
+    def __init__(self, cells: int) -> None:
+        self.seen, self.runs = np.zeros(cells, np.int32), 0
+        self.keys, self.values = np.empty(0, np.int32), np.empty((0, len(QUANTITIES)), np.float32)
+
+    def make_room(self, passages: int, runs: int) -> None:
+        """For so many passages of so many runs."""
+        if passages > len(self.keys):
+            self.keys, self.values = np.empty(passages, np.int32), np.empty((passages, len(QUANTITIES)), np.float32)
+        if self.runs + runs >= MOST_RUNS:
+            self.seen[:], self.runs = 0, 0
 
 
 def _cells_at(cells: Cells, simulation: Simulation) -> NDArray[np.intp]:

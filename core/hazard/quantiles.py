@@ -14,7 +14,7 @@ from .tally import Arrays
 
 RELATIVE_ERROR = 0.01
 """Of a quantile of more values than are kept; see `sketch_kernels`."""
-PENDING = 6_000_000
+PENDING = 4_000_000
 """So many values wait until they are sorted by their keys: then the memory of each key is looked up once for many."""
 
 
@@ -59,6 +59,8 @@ class Sketches:
         self.keys, self.column = keys, column
         self.units, self.limits = np.array(units, np.float64), np.array(limits, np.float64)
         self._pending: list[tuple[NDArray[np.int32], NDArray[np.float32]]] = []
+        self._waiting = 0
+        self._sorted = np.empty((0, len(units)), np.float32)
         self._store: _Store | None = None
 
     def empty(self) -> "Sketches":
@@ -69,7 +71,8 @@ class Sketches:
         """Add rows (p, q) under keys (p,), where −1 − key is that key with the first value of a run."""
         if len(key):
             self._pending.append((key, values))
-            if sum(len(one) for one, _ in self._pending) >= PENDING:
+            self._waiting += len(key)
+            if self._waiting >= PENDING:
                 self._fold()
 
     def merge(self, other: "Sketches") -> None:
@@ -81,7 +84,7 @@ class Sketches:
             and self.column == other.column
         ):
             raise InputError("Results of other cells or faces cannot be added", advice="Add those of one simulation")
-        pending, other._pending = other._pending, []
+        pending, other._pending, other._waiting = other._pending, [], 0
         if other._store is not None:
             self._add_arrays(other.arrays())
         for key, values in pending:
@@ -157,10 +160,12 @@ class Sketches:
         begin = np.concatenate([[0], np.cumsum(counts[wanted, 0], dtype=np.int64)])
         place = np.empty(self.keys, np.int64)
         place[wanted] = begin[:-1]
-        values = np.empty((int(begin[-1]), len(self.units)), np.float32)
+        if begin[-1] > len(self._sorted):  # kept: to take fresh memory costs more than to fill it
+            self._sorted = np.empty((int(begin[-1]), len(self.units)), np.float32)
+        values = self._sorted
         for key, rows in self._pending:
             sort_values(key, rows, place, values)
-        self._pending = []
+        self._pending, self._waiting = [], 0
         self._add_rows(wanted, begin, counts[wanted, 1].astype(np.int64), values)
         return self._store
 

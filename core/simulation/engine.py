@@ -198,6 +198,19 @@ class Simulation:
         return replace(self, records=Records(**columns), recorded=record)
 
 
+class RecordSpace:
+    """Memory for the records of one simulation after the other: to take fresh memory costs more than to fill it."""
+
+    def __init__(self) -> None:
+        self._rows = np.empty((0, 0))
+
+    def rows(self, number: int, columns: int) -> Array:
+        """(number, columns); what was there before is lost."""
+        if number > len(self._rows) or columns != self._rows.shape[1]:
+            self._rows = np.empty((number + number // 4, columns))
+        return self._rows[:number]
+
+
 _OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position")
 
 
@@ -209,6 +222,7 @@ def simulate(
     record: Recorded = "all",
     first_run: int = 0,
     threads: int | None = None,
+    space: RecordSpace | None = None,
     progress: Progress = silent,
 ) -> Simulation:
     """Let blocks fall.
@@ -219,6 +233,7 @@ def simulate(
         runs 50 to 99 of a hundred blocks are those of the blocks 50 to 99 with the first run 50.
     record : what to keep of the motion, see `RECORDED`; it changes nothing of the runs.
     threads : None takes all cores. The result does not depend on it.
+    space : where the records go. They are lost when it is used again.
     progress : called with the number of finished blocks. A `CancelledError` raised in it ends the simulation with the
         runs that are finished, from the first on without a gap; for that it goes on for up to `WINDOW_S` or one batch.
 
@@ -272,7 +287,7 @@ def simulate(
     with ThreadPoolExecutor(cores) as pool:
         whole = _take_turns(pool, cores, batch, along_curve(releases.position[:, :2]), told)
         begin = np.cumsum(count) - count
-        rows = np.empty((int(count.sum()), COLUMNS))
+        rows = (space or RecordSpace()).rows(int(count.sum()), COLUMNS)
         # Each batch is given up for its place among all, so that memory lasts.
         list(pool.map(lambda _: in_turn(moments.pop(), first_run, begin, rows), range(len(moments))))
     records = _records(rows, ground.element, first_run)

@@ -523,7 +523,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
     draws = np.empty(draw_count)
-    rows, count = np.empty((64 * len(runs), COLUMNS)), np.int64(0)
+    rows, count = np.empty(((256 if record == ALL else 64) * len(runs), COLUMNS)), np.int64(0)
     for i in range(len(runs)):
         rows, count, end, time, impacts, length, v_max = run_block(
             tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows, count,

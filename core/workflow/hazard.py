@@ -22,7 +22,7 @@ from ..hazard.barriers import with_barriers
 from ..hazard.screens import Screen, check_screens, hits_at
 from ..hazard.tally import Tally
 from ..progress import CancelledError, Progress, silent
-from ..simulation.engine import Settings, Simulation, check_settings, simulate
+from ..simulation.engine import Recorded, RecordSpace, Settings, Simulation, check_settings, simulate
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
 
@@ -85,6 +85,7 @@ def run_chunks(
     threads: int | None = None,
     enough: Enough | None = None,
     take: Callable[[Simulation], None] | None = None,
+    record: Recorded = "all",
     progress: Progress = silent,
 ) -> Counted:
     """Simulate releases and add them to tallies.
@@ -96,7 +97,7 @@ def run_chunks(
     first_run : see `simulate`.
     threads : None takes all cores.
     enough : asked when 1, 2, 4, 8 … chunks are counted, whatever the number of threads; the first yes ends it.
-    take : gets each chunk, with all that it recorded and without what `barriers` do, in the order of the runs.
+    take : gets each chunk, without what `barriers` do, in the order of the runs; of its records what `record` says.
     progress : called with the number of finished blocks; a `CancelledError` raised in it ends it with the blocks that
         are finished, from the first on without a gap.
 
@@ -114,7 +115,7 @@ def run_chunks(
     progress("Compiling where needed, then simulating", 0, n)
     simulate(ground, releases.take(slice(0, 1)), settings, first_run=first_run, threads=1)
 
-    stopping = Event()
+    stopping, spaces = Event(), list[RecordSpace]()
 
     def until_stopped(*_: object) -> None:
         if stopping.is_set():
@@ -122,9 +123,11 @@ def run_chunks(
 
     def chunk(start: int) -> _Chunk:
         part = releases.take(slice(start, min(start + CHUNK, n)))
+        space = spaces.pop() if spaces else RecordSpace()
         simulation = simulate(
-            ground, part, settings, record="all", first_run=first_run + start, threads=1, progress=until_stopped
-        )
+            ground, part, settings, record="all", first_run=first_run + start, threads=1, space=space,
+            progress=until_stopped,
+        )  # fmt: skip
         own, later = [each.empty() for each in tallies], [each.empty() for each in behind]
         for each in own:
             each.add(simulation)
@@ -133,10 +136,12 @@ def run_chunks(
             for each in later:
                 each.add(held)
         ended = np.bincount(simulation.end, minlength=len(simulation.ends))
+        kept = None if take is None else simulation.with_records(record)
+        if kept is not simulation:  # else its records are in the space
+            spaces.append(space)
         return _Chunk(
-            len(simulation), len(part), simulation.ends, ended, int(simulation.impacts.sum()),
-            simulation if take is not None else None, [*own, *later],
-        )  # fmt: skip
+            len(simulation), len(part), simulation.ends, ended, int(simulation.impacts.sum()), kept, [*own, *later]
+        )
 
     def add(done: _Chunk) -> None:
         nonlocal ends, counted, impacts, names

@@ -58,13 +58,11 @@ def map_models(
         def told(text: str, done: int = 0, _: int = 0, place: int = place, model: str = one.model) -> None:
             progress(f"{text} {model}", place * n + done, len(settings) * n)
 
-        def keep(part: Simulation, parts: list[Simulation] = parts) -> None:
-            parts.append(part.with_records(record))
-
         try:
             counted = run_chunks(
-                ground, releases, one, [tally], first_run=first_run, threads=threads, take=keep, progress=told
-            )
+                ground, releases, one, [tally], first_run=first_run, threads=threads, take=parts.append,
+                record=record, progress=told,
+            )  # fmt: skip
         except CancelledError:
             if not simulations:
                 raise

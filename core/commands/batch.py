@@ -42,8 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run all jobs, write summary.json, print what failed, then the rest; 1 when a job failed."""
     from ..exchange.batch import SUMMARY, Batch, run_batch, write_batch_summary
-    from ..exchange.job_inputs import versions
     from ..exchange.sweep import find_jobs
+    from ..versions import versions
 
     own = argparse.ArgumentParser(prog="rockfall batch", add_help=False, allow_abbrev=False)
     _add_own(own)

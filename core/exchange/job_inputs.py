@@ -7,21 +7,11 @@ import os
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-LIBRARIES = ("numpy", "numba")
-"""On which the bits of a result depend, beside Rockfall's own version."""
 BESIDE = (".prj", ".PRJ", ".tfw", ".dbf", ".shx", ".cpg", ".mtl", ".aux.xml")
 """Files that readers look for beside another one of the same name."""
-
-
-def versions() -> dict[str, str]:
-    """Of what computes results."""
-    own = str(import_module((__package__ or "").partition(".core")[0]).__version__)
-    return {"rockfall": own, **{name: version(name) for name in LIBRARIES}}
 
 
 def input_files(project: Path, options: Sequence[str]) -> dict[str, Path]:

@@ -37,6 +37,7 @@ CORE_FLOORS = (
         "progress",
         "reading",
         "remarks",
+        "versions",
     },
     {"georeference"},
     {"terrain", "footage", "camera", "impact_models"},

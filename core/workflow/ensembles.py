@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Many runs in chunks, wherever they are computed: what they add up to is the same bits for any number of workers.
+
+A chunk is a fixed number of runs. Its worker simulates them, counts them in tallies, and gives up their records. What
+comes back is added up as it comes, and kept in a store, so that work which was ended goes on where it was.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..hazard.tally import Arrays, Tally
+from ..progress import CancelledError, Progress, silent
+from ..simulation.engine import Recorded, Settings, Simulation, simulate
+from ..simulation.ground import Ground
+from ..simulation.release import Releases
+
+CHUNK = 4096
+"""Runs of a chunk: about a second of work, and a lost one costs no more."""
+
+type Tables = Mapping[str, bytes]
+"""Name of a table → its rows, with the header."""
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """What every worker needs once, whatever chunks it computes.
+
+    Attributes
+    ----------
+    tallies : name → an empty one.
+    record : what is recorded while a chunk is computed.
+    tables : makes the rows of a chunk; None for none.
+    """
+
+    ground: Ground
+    settings: Settings
+    tallies: Mapping[str, Tally]
+    record: Recorded = "all"
+    tables: Callable[[Simulation], Tables] | None = None
+
+    def chunk(self, releases: Releases, first_run: int) -> "Chunk":
+        """Simulate some runs on one thread, and count them."""
+        simulation = simulate(self.ground, releases, self.settings, record=self.record, first_run=first_run, threads=1)
+        arrays = {}
+        for name, tally in self.tallies.items():
+            own = tally.empty()
+            own.add(simulation)
+            arrays[name] = own.arrays()
+        return Chunk(arrays, {} if self.tables is None else self.tables(simulation))
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """What came of a chunk: name of each tally → its state; and tables."""
+
+    arrays: Mapping[str, Arrays]
+    tables: Tables = field(default_factory=dict)
+
+
+class Store(Protocol):
+    """Keeps what is finished; see `exchange.chunk_store`."""
+
+    def merged(self) -> tuple[Mapping[str, Arrays], frozenset[int]]:
+        """What is added up already, of which chunks."""
+        ...
+
+    def single(self) -> Iterator[tuple[int, Mapping[str, Arrays]]]:
+        """The chunks that are kept one by one."""
+        ...
+
+    def keep(self, number: int, chunk: Chunk) -> None:
+        """Keep a chunk."""
+        ...
+
+    def keep_merged(self, arrays: Mapping[str, Arrays], numbers: frozenset[int]) -> None:
+        """Keep what is added up of some chunks, in place of these."""
+        ...
+
+
+class Pool(Protocol):
+    """Whoever computes chunks."""
+
+    def compute(
+        self, work: Work, chunks: Iterator[tuple[int, int, Releases]], beat: Callable[[], None]
+    ) -> Iterator[tuple[int, Chunk]]:
+        """Chunks as they are finished, in any order.
+
+        Parameters
+        ----------
+        chunks : number, first run and releases; taken as they can be computed, so that few wait.
+        beat : called now and then; what it raises ends the work.
+        """
+        ...
+
+
+MERGED_EVERY = 64
+"""Chunks that are kept one by one before they are kept as one."""
+
+
+def run_ensemble(
+    work: Work,
+    releases: Releases,
+    pool: Pool,
+    *,
+    first_run: int = 0,
+    size: int = CHUNK,
+    store: Store | None = None,
+    progress: Progress = silent,
+) -> dict[str, Tally]:
+    """Compute all chunks that the store does not have, and add all up.
+
+    Parameters
+    ----------
+    progress : counts the runs. A `CancelledError` raised in it ends the work; what is finished is in the store.
+
+    Raises
+    ------
+    InputError : there are no runs, or the workers or the store fail; what is finished is in the store.
+    CancelledError : see `progress`.
+    """
+    n = len(releases)
+    if not n:
+        raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
+    if size < 1:
+        raise InputError(f"A chunk of {size} runs is none", advice="Give at least one")
+    numbers = range(-(-n // size))
+    tallies, done = _kept(work.tallies, store)
+    counted = sum(min(size, n - size * number) for number in done)
+    text = f"Simulating {work.settings.model}"
+    progress(text, counted, n)
+    left = ((i, first_run + i * size, releases.take(slice(i * size, (i + 1) * size))) for i in numbers if i not in done)
+    alone = 0
+
+    def beat() -> None:
+        progress(text, counted, n)
+
+    for number, chunk in pool.compute(work, left, beat):
+        if store is not None:
+            store.keep(number, chunk)
+        _add(tallies, chunk.arrays)
+        done |= {number}
+        alone += 1
+        counted += min(size, n - size * number)
+        if store is not None and alone >= MERGED_EVERY:
+            store.keep_merged(_state(tallies), frozenset(done))
+            alone = 0
+        progress(text, counted, n)
+    if len(done) < len(numbers):
+        raise CancelledError
+    return tallies
+
+
+def _kept(empty: Mapping[str, Tally], store: Store | None) -> tuple[dict[str, Tally], set[int]]:
+    """What the store has, and of which chunks."""
+    tallies = {name: tally.empty() for name, tally in empty.items()}
+    if store is None:
+        return tallies, set()
+    arrays, numbers = store.merged()
+    done = set(numbers)
+    if done:
+        _add(tallies, arrays)
+    for number, one in store.single():
+        _add(tallies, one)
+        done.add(number)
+    return tallies, done
+
+
+def _add(tallies: Mapping[str, Tally], arrays: Mapping[str, Arrays]) -> None:
+    for name, tally in tallies.items():
+        tally.merge(type(tally).from_arrays(arrays[name]))
+
+
+def _state(tallies: Mapping[str, Tally]) -> dict[str, dict[str, NDArray[Any]]]:
+    return {name: tally.arrays() for name, tally in tallies.items()}
+
+
+class HereAlone:
+    """Computes one chunk after the other, in this process."""
+
+    def compute(
+        self, work: Work, chunks: Iterator[tuple[int, int, Releases]], beat: Callable[[], None]
+    ) -> Iterator[tuple[int, Chunk]]:
+        """See `Pool`."""
+        for number, first, part in chunks:
+            beat()
+            yield number, work.chunk(part, first)

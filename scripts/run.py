@@ -109,7 +109,15 @@ def set_up() -> None:
         if made.returncode:
             fail("could not make .venv; the message above says why")
     say("installing Rockfall and what it needs; the first time this downloads about 600 MB")
-    command = [str(PYTHON), "-m", "pip", "install", "--quiet", "--editable", ".[blender,figures,explore,e57,dev]"]
+    command = [
+        str(PYTHON),
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--editable",
+        ".[blender,figures,explore,e57,cluster,dev]",
+    ]
     command += ["--constraint", str(ROOT / "scripts" / "constraints.txt")]
     for attempt in (1, 2):
         if subprocess.run(command, check=False, cwd=ROOT, env=environment).returncode == 0:

@@ -36,6 +36,7 @@ from .release_options import (
     sources_given,
     zones_as_asked,
 )
+from .worker_options import add_worker_options, forget_chunks, several_workers, simulate_on_workers
 
 if TYPE_CHECKING:
     from ..hazard.cell_tally import CellTally
@@ -100,7 +101,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--record",
         metavar="A,B",
         help="tables beside runs.csv: impacts, trajectories, or none (default both; impacts alone from 20000 blocks "
-        "on)",
+        "on, none from a million)",
     )
     parser.add_argument(
         "--cell",
@@ -116,6 +117,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="only these of all blocks, as a part of the same simulation (default all)",
     )
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
+    add_worker_options(parser)
     add_terrain_options(parser)
 
 
@@ -130,6 +132,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
+    on_workers = several_workers(arguments)
     prepare = _project if (arguments.releases or "").endswith(".toml") else _scenario
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         asked = prepare(arguments, progress)
@@ -140,6 +143,7 @@ def run(arguments: argparse.Namespace) -> int:
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
         if record is None:
             record = default_records(len(releases)) if asked.record is None else asked.record
+<<<<<<< HEAD
         maps: dict[str, CellTally] = {}
         with stopped_by_interrupt(progress) as counted:
             how = {
@@ -160,6 +164,31 @@ def run(arguments: argparse.Namespace) -> int:
             remarks=remarks, progress=progress,
         )  # fmt: skip
     for sentence in (*scenario.terrain.summary, *remarks):
+=======
+        if on_workers:
+            written, said, kept = simulate_on_workers(
+                arguments, scenario, ground, releases,
+                record=record, first_run=first_run, folder=folder, inputs=asked.inputs, progress=progress,
+            )  # fmt: skip
+        else:
+            with stopped_by_interrupt(progress) as counted:
+                simulations = run_models(
+                    ground,
+                    releases,
+                    scenario.settings,
+                    record=recorded_for(record, bool(scenario.structures)),
+                    first_run=first_run,
+                    threads=arguments.threads,
+                    progress=counted,
+                )
+            remarks, kept = remarks_of(simulations, list(scenario.models)), ()
+            said = [str(remark) for remark in remarks]
+            written = write_simulations(
+                simulations, folder, record=record, inputs=asked.inputs, remarks=remarks, progress=progress
+            )
+    forget_chunks(kept)
+    for sentence in (*scenario.terrain.summary, *said):
+>>>>>>> 9e4363e (simulate --workers and --scheduler: the same tables from chunks on the workers of Dask, which are kept until all are done)
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0

@@ -8,6 +8,7 @@ rows of a table. Each file appears whole or not at all; a chunk counts when its 
 import io
 import shutil
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,12 @@ class ChunkStore:
         for number in numbers:
             self._chunk(number).unlink(missing_ok=True)
 
+    def tables(self) -> list[str]:
+        """The names of the tables of the first chunk."""
+        begin = f"{0:06d}."
+        names = [file.name.removeprefix(begin) for file in self.folder.glob(f"{begin}*") if file.suffix != ".npz"]
+        return sorted(names, key=lambda name: (name != "runs.csv", name))
+
     def write_table(self, name: str, chunks: int, path: Path) -> None:
         """Put the rows of all chunks together, in their order, under the header of the first."""
         with path.open("ab") as table:
@@ -80,8 +87,10 @@ class ChunkStore:
                     shutil.copyfileobj(rows, table)
 
     def remove(self) -> None:
-        """Remove all: the result is written."""
+        """Remove all: the result is written. The folder that it is in goes with the last one."""
         shutil.rmtree(self.folder, ignore_errors=True)
+        with suppress(OSError):
+            self.folder.parent.rmdir()
 
     def _chunk(self, number: int) -> Path:
         return self.folder / f"{number:06d}.npz"
@@ -90,11 +99,11 @@ class ChunkStore:
         return self.folder / f"{number:06d}.{name}"
 
 
-def _packed(arrays: Mapping[str, Arrays], numbers: frozenset[int]) -> memoryview:
+def _packed(arrays: Mapping[str, Arrays], numbers: frozenset[int]) -> bytes:
     stream = io.BytesIO()
     content = {f"{tally}/{name}": values for tally, own in arrays.items() for name, values in own.items()}
     np.savez(stream, allow_pickle=False, **content, **{CHUNKS: np.array(sorted(numbers), np.int64)})
-    return stream.getbuffer()
+    return stream.getvalue()
 
 
 @reader("kept chunk", "Remove its folder, and start again")

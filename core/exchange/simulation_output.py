@@ -20,11 +20,13 @@ MAPS = "maps"
 NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
 LARGE = 20_000
 """From so many blocks on, motion in time is written only when it is asked for."""
+HUGE = 1_000_000
+"""From so many on, their impacts neither."""
 
 
 def default_records(blocks: int) -> tuple[str, ...]:
     """The tables beside runs.csv where none are named."""
-    return RECORDS if blocks < LARGE else (IMPACTS,)
+    return RECORDS if blocks < LARGE else (IMPACTS,) if blocks < HUGE else ()
 
 
 def recorded_for(tables: Collection[str], structures: bool, screens: bool = False) -> Recorded:
@@ -63,6 +65,15 @@ def write_simulations(
     ------
     OSError : the folder cannot be written.
     """
+    written = write_tables(simulations, folder, record=record, progress=progress)
+    write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
+    return [*written, "summary.json"]
+
+
+def write_tables(
+    simulations: Sequence[Simulation], folder: Path, *, record: Collection[str], progress: Progress = silent
+) -> list[str]:
+    """Write the tables of `write_simulations` without summary.json."""
     progress("Writing the tables", 0, 0)
     write_runs(simulations, folder / "runs.csv")
     written = ["runs.csv"]
@@ -75,6 +86,7 @@ def write_simulations(
     if simulations[0].ground.structures or screens:
         write_hits(simulations, folder / "hits.csv", screens)
         written.append("hits.csv")
+<<<<<<< HEAD
     for model, tally in maps.items():
         place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
         drawn, shift = tally.maps(), simulations[0].ground.shift
@@ -88,3 +100,6 @@ def write_simulations(
         written.append("screens.csv")
     write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     return [*written, "summary.json"]
+=======
+    return written
+>>>>>>> 9e4363e (simulate --workers and --scheduler: the same tables from chunks on the workers of Dask, which are kept until all are done)

@@ -5,6 +5,7 @@ Each worker gets the ground, the settings and empty tallies once, also one that 
 sums come back. A worker that is lost costs the chunks that it had not finished: others compute them again.
 """
 
+import asyncio
 import logging
 import time
 import warnings
@@ -13,6 +14,7 @@ from concurrent.futures import CancelledError as FutureCancelledError
 from contextlib import ExitStack, suppress
 from importlib import import_module
 from queue import Empty, Queue
+from threading import Thread
 from types import TracebackType
 from typing import Any
 from uuid import uuid4
@@ -28,9 +30,11 @@ ANSWER_S = 15.0
 GONE_S = 60.0
 """Without any worker for so long the work ends; those of a cluster may come back before."""
 AHEAD = 2
-"""Chunks for each thread of all workers that are sent before one has come back: none waits, and little memory is held."""
+"""Chunks for each thread of all workers that are sent before one has come back: no thread waits, and memory lasts."""
 BEAT_S, LOOK_S = 0.2, 2.0
 """Between two beats of the progress, and two looks at the workers."""
+ANYWHERE = "127.0.0.1:0"
+"""A port that is free, which only this machine reaches."""
 TRIES = 3
 """A chunk whose computation fails is computed so often again."""
 
@@ -64,9 +68,13 @@ class DaskPool:
             address: Any = self._address
             if address is None:
                 address = self._open.enter_context(
-                    LocalCluster(n_workers=self._workers, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+                    LocalCluster(
+                        n_workers=self._workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50
+                    )
                 )
             try:
+                if self._address is not None and not _answers(self._address):
+                    raise TimeoutError
                 self._client = self._open.enter_context(Client(address, timeout=ANSWER_S, set_as_default=False))
                 self._client.wait_for_workers(1, timeout=ANSWER_S)
                 self._compare_versions()
@@ -152,6 +160,29 @@ class DaskPool:
             f"The scheduler at {self._address} does not answer within {ANSWER_S:g} s",
             advice="Check the address, whether it runs, and that no firewall is between",
         )
+
+
+def _answers(address: str) -> bool:
+    """Whether what is at an address speaks as a scheduler does; Dask itself waits for ever where it says nothing."""
+    from distributed.comm import connect
+
+    answered: Queue[bool] = Queue()
+
+    async def ask() -> None:
+        comm = await connect(address, timeout=ANSWER_S)
+        await comm.close()
+
+    def wait() -> None:
+        try:
+            asyncio.run(ask())
+            answered.put(True)
+        except (OSError, TimeoutError, ValueError):
+            answered.put(False)
+
+    Thread(target=wait, daemon=True).start()
+    with suppress(Empty):
+        return answered.get(timeout=ANSWER_S)
+    return False
 
 
 class _Watch:

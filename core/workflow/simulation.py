@@ -187,14 +187,7 @@ def run_models(
     InputError : no model, one that is given twice, or settings that cannot be: before anything falls.
     CancelledError : the work was ended before the first blocks were finished.
     """
-    models = [one.model for one in settings]
-    if not models:
-        raise InputError("There is no model to simulate with", advice="Give at least one impact model")
-    for model in models:
-        if models.count(model) > 1:
-            raise InputError(f"The model {model} is given twice", advice="Give each model once")
-    for one in settings:
-        check_settings(ground, one)
+    check_models(ground, settings)
     n = len(releases)
     finished: list[Simulation] = []
     for place, one in enumerate(settings):
@@ -211,6 +204,23 @@ def run_models(
         if len(simulation) < simulation.wanted:
             break
     return tuple(finished)
+
+
+def check_models(ground: Ground, settings: Sequence[Settings]) -> None:
+    """Look at all settings before anything falls.
+
+    Raises
+    ------
+    InputError : no model, one that is given twice, or settings that cannot be.
+    """
+    models = [one.model for one in settings]
+    if not models:
+        raise InputError("There is no model to simulate with", advice="Give at least one impact model")
+    for model in models:
+        if models.count(model) > 1:
+            raise InputError(f"The model {model} is given twice", advice="Give each model once")
+    for one in settings:
+        check_settings(ground, one)
 
 
 def _among(progress: Progress, model: str, before: int, total: int) -> Progress:

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""``--workers`` and ``--scheduler``: the runs of a simulation in chunks, on several processes or machines."""
+
+import argparse
+import sys
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import InputError, RockfallError
+from .options import whole
+from .progress import PrintedProgress, stopped_by_interrupt
+
+if TYPE_CHECKING:
+    from ..exchange.chunk_store import ChunkStore
+    from ..simulation.ground import Ground
+    from ..simulation.release import Releases
+    from ..workflow.simulation import Scenario
+
+CHUNKS = ".chunks"
+"""Ends the name of the folder beside the output in which finished chunks are kept until all are."""
+
+
+def add_worker_options(parser: argparse.ArgumentParser) -> None:
+    """Who computes."""
+    group = parser.add_argument_group("several workers (Dask); the result is the same")
+    group.add_argument("--workers", type=whole, metavar="N", help="so many processes on this machine")
+    group.add_argument(
+        "--scheduler", metavar="ADDRESS", help="the workers of a scheduler of Dask that runs, such as tcp://node7:8786"
+    )
+
+
+def several_workers(arguments: argparse.Namespace) -> bool:
+    """Whether the options ask for workers.
+
+    Raises
+    ------
+    InputError : options that exclude each other.
+    """
+    if arguments.workers is None and arguments.scheduler is None:
+        return False
+    if arguments.workers is not None and arguments.scheduler is not None:
+        raise InputError("--workers are started here, and --scheduler has its own", advice="Give one of them")
+    if arguments.workers == 0:
+        raise InputError("--workers 0 compute nothing", advice="Give at least one")
+    if arguments.threads is not None:
+        raise InputError("--threads is of one process, and each worker has its own", advice="Leave out --threads")
+    return True
+
+
+def simulate_on_workers(
+    arguments: argparse.Namespace,
+    scenario: "Scenario",
+    ground: "Ground",
+    releases: "Releases",
+    *,
+    record: Collection[str],
+    first_run: int,
+    folder: Path,
+    inputs: Mapping[str, Path],
+    progress: PrintedProgress,
+) -> tuple[list[str], list[str], "tuple[ChunkStore, ...]"]:
+    """Simulate, and write the tables into the folder.
+
+    Returns
+    -------
+    The names of the files, what to say, and what is kept of it until the folder is complete.
+
+    Raises
+    ------
+    RockfallError : no workers, or not the right ones; the disk is full.
+    """
+    from ..exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
+    from ..exchange.simulation_tables import summary, write_summary
+    from ..interrupts import Interrupt
+    from ..output import final_path
+    from ..progress import CancelledError
+    from ..workflow.dask_pool import DaskPool
+    from ..workflow.simulation import check_models, remarks_of
+
+    check_models(ground, scenario.settings)
+    out = final_path(Path(arguments.out).absolute())
+    kept = out.with_name(f"{out.name}{CHUNKS}")
+    goes_on = f"what is finished is kept in {kept}, and the same command goes on with the rest"
+    progress("Looking for workers")
+    try:
+        with stopped_by_interrupt(progress) as counted, DaskPool(arguments.scheduler, arguments.workers or 1) as pool:
+            try:
+                simulations, stores = simulate_in_chunks(
+                    ground, releases, scenario.settings, pool, kept,
+                    record=record, first_run=first_run, progress=counted,
+                )  # fmt: skip
+            except CancelledError as error:
+                raise Interrupt(said=goes_on) from error
+        remarks = remarks_of(simulations, list(scenario.models))
+        written = write_chunk_tables(stores, folder, len(releases), progress=progress)
+        write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
+    except RockfallError:
+        if kept.is_dir():
+            print(f"rockfall: {goes_on[:1].upper()}{goes_on[1:]}.", file=sys.stderr)
+        raise
+    return [*written, "summary.json"], [str(one) for one in remarks], stores
+
+
+def forget_chunks(stores: "tuple[ChunkStore, ...]") -> None:
+    """The output is complete."""
+    for store in stores:
+        store.remove()

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs in chunks: what they add up to is that of one piece, also after the work was ended, however that was."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rockfall.core.errors import InputError
+from rockfall.core.exchange.chunk_store import ChunkStore
+from rockfall.core.exchange.content_digest import content_digest
+from rockfall.core.exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
+from rockfall.core.exchange.simulation_output import write_tables
+from rockfall.core.georeference import GlobalShift
+from rockfall.core.hazard.run_tally import RunTally
+from rockfall.core.progress import CancelledError
+from rockfall.core.simulation.blocks import Blocks
+from rockfall.core.simulation.engine import Settings, simulate
+from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.release import Releases
+from rockfall.core.simulation.release_sources import on_points
+from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow import ensembles
+from rockfall.core.workflow.ensembles import HereAlone, Work, run_ensemble
+
+SETTINGS = Settings("noel_2017", seed=5)
+SIZE, RUNS = 7, 45  # the last chunk is not full
+
+
+def plane() -> Ground:
+    vertices = np.array([[x, y, -0.6 * x] for y in (0.0, 60.0) for x in (0.0, 60.0)])
+    return make_ground(Surface(vertices, np.array([[0, 1, 3], [0, 3, 2]], np.int32), GlobalShift(), "plane"), {})
+
+
+def blocks_on(ground: Ground, number: int = RUNS) -> Releases:
+    return on_points(ground, np.array([[10.0, 30.0, np.nan]]), Blocks(), number, seed=5)
+
+
+def same(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> bool:
+    return first.keys() == second.keys() and all(
+        one.dtype == second[name].dtype and one.tobytes() == second[name].tobytes() for name, one in first.items()
+    )
+
+
+class Counting(HereAlone):
+    """Says which chunks it has computed."""
+
+    def __init__(self) -> None:
+        self.computed: list[int] = []
+
+    def compute(self, work, chunks, beat):
+        for number, chunk in super().compute(work, chunks, beat):
+            self.computed.append(number)
+            yield number, chunk
+
+
+class Backwards(Counting):
+    """Gives its chunks in another order than it was asked for them."""
+
+    def compute(self, work, chunks, beat):
+        yield from reversed(list(super().compute(work, chunks, beat)))
+
+
+@pytest.fixture(scope="module")
+def ground() -> Ground:
+    return plane()
+
+
+@pytest.fixture
+def work(ground: Ground) -> Work:
+    return Work(ground, SETTINGS, {"runs": RunTally()}, "ends")
+
+
+def ends(work: Work, releases: Releases, pool=None, **options) -> dict[str, np.ndarray]:
+    return run_ensemble(work, releases, pool or HereAlone(), size=SIZE, **options)["runs"].arrays()
+
+
+def test_chunks_in_any_order_are_the_simulation_in_one_piece(work, ground):
+    releases = blocks_on(ground)
+    whole = simulate(ground, releases, SETTINGS, record="ends", first_run=3)
+    for pool in (HereAlone(), Backwards()):
+        found = ends(work, releases, pool, first_run=3)
+        np.testing.assert_array_equal(found["number"], np.arange(4, 4 + RUNS))
+        for name in ("end", "time_s", "length_m", "v_max_mps", "impacts", "position"):
+            np.testing.assert_array_equal(found[name], getattr(whole, name))
+
+
+@pytest.mark.parametrize("merged_every", [2, 100])
+def test_work_that_is_stopped_goes_on_with_the_rest_alone(work, ground, tmp_path, monkeypatch, merged_every):
+    monkeypatch.setattr(ensembles, "MERGED_EVERY", merged_every)
+    releases, store = blocks_on(ground), ChunkStore(tmp_path / "kept")
+
+    def stop(text: str, done: int, total: int) -> None:
+        if done >= 3 * SIZE:
+            raise CancelledError
+
+    with pytest.raises(CancelledError):
+        ends(work, releases, store=store, progress=stop)
+    pool, told = Counting(), []
+    resumed = ends(work, releases, pool, store=store, progress=lambda text, done, total: told.append(done))
+    assert pool.computed == [3, 4, 5, 6]
+    assert told[0] == 3 * SIZE
+    assert told[-1] == RUNS
+    assert same(resumed, ends(work, releases))
+    again = Counting()
+    assert same(ends(work, releases, again, store=store), resumed)
+    assert again.computed == []
+
+
+def test_a_chunk_that_was_merged_and_not_yet_removed_counts_once(work, ground, tmp_path):
+    releases, store = blocks_on(ground), ChunkStore(tmp_path)
+    first = work.chunk(releases.take(slice(0, SIZE)), 0)
+    store.keep(0, first)
+    left = (tmp_path / "000000.npz").read_bytes()
+    store.keep_merged(first.arrays, frozenset([0]))
+    (tmp_path / "000000.npz").write_bytes(left)
+    assert same(ends(work, releases, store=store), ends(work, releases))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there is no SIGKILL")
+def test_work_that_is_killed_goes_on_and_gives_the_same_tables(ground, tmp_path):
+    kept, releases = tmp_path / "kept", blocks_on(ground)
+    code = (
+        "import sys, time\nfrom pathlib import Path\n"
+        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "from test_ensembles import SETTINGS, SIZE, HereAlone, blocks_on, plane\n"
+        "from rockfall.core.exchange.simulation_chunks import simulate_in_chunks\n"
+        "ground = plane()\n"
+        "class Slow(HereAlone):\n"
+        "    def compute(self, work, chunks, beat):\n"
+        "        for one in super().compute(work, chunks, beat):\n"
+        "            time.sleep(0.1 if one[0] < 3 else 100)\n"
+        "            yield one\n"
+        f"simulate_in_chunks(ground, blocks_on(ground), [SETTINGS], Slow(), Path({str(kept)!r}), "
+        "record=['impacts'], size=SIZE)\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code])
+    while len(list(kept.glob("*/[0-9]*.npz"))) < 3:
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    pool = Counting()
+    simulations, stores = simulate_in_chunks(ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE)
+    assert pool.computed == [3, 4, 5, 6]
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    out.mkdir()
+    whole.mkdir()
+    assert write_chunk_tables(stores, out, RUNS, size=SIZE) == ["runs.csv", "impacts.csv"]
+    write_tables([simulate(ground, releases, SETTINGS, record="impacts")], whole, record=["impacts"])
+    for name in ("runs.csv", "impacts.csv"):
+        assert (out / name).read_bytes() == (whole / name).read_bytes()
+    assert len(simulations[0]) == RUNS
+    stores[0].remove()
+    assert not kept.exists()
+
+
+def test_a_full_disk_keeps_what_is_finished(work, ground, tmp_path, monkeypatch):
+    releases, store, synced = blocks_on(ground), ChunkStore(tmp_path / "kept"), []
+    really = os.fsync
+
+    def full_at_the_third(descriptor: int) -> None:
+        synced.append(descriptor)
+        if len(synced) == 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        really(descriptor)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full_at_the_third)
+        with pytest.raises(InputError, match="No space left") as caught:
+            ends(work, releases, store=store)
+    assert caught.value.file == tmp_path / "kept" / "000002.npz"
+    assert sorted(file.name for file in store.folder.iterdir()) == ["000000.npz", "000001.npz"]
+    pool = Counting()
+    assert same(ends(work, releases, pool, store=store), ends(work, releases))
+    assert pool.computed == [2, 3, 4, 5, 6]
+
+
+def test_a_damaged_chunk_is_named(work, ground, tmp_path):
+    (tmp_path / "000001.npz").write_bytes(b"PK\x03\x04")
+    with pytest.raises(InputError, match=r"000001\.npz"):
+        ends(work, blocks_on(ground), store=ChunkStore(tmp_path))
+
+
+def test_no_runs_are_refused(work, ground):
+    with pytest.raises(InputError, match="nothing to simulate"):
+        ends(work, blocks_on(ground).take(slice(0, 0)))
+
+
+def test_what_is_kept_belongs_to_one_scenario(ground, tmp_path):
+    """Another seed, number or size of chunks, and other blocks, begin anew."""
+    releases = blocks_on(ground)
+
+    def folders(settings: Settings = SETTINGS, first_run: int = 0, size: int = 30, blocks: Releases = releases) -> None:
+        simulate_in_chunks(ground, blocks, [settings], HereAlone(), tmp_path, record=[], first_run=first_run, size=size)
+
+    for options in (
+        {}, {}, {"settings": Settings("noel_2017", seed=6)}, {"settings": Settings("noel_2017", friction=0.4)},
+        {"first_run": 1}, {"size": 31}, {"blocks": releases.take(slice(0, 44))},
+    ):  # fmt: skip
+        folders(**options)
+    assert len(list(tmp_path.iterdir())) == 6
+
+
+def test_a_digest_knows_values_types_and_places():
+    values = [
+        (np.arange(3),), (np.arange(3.0),), (np.arange(3)[::-1],), (1, 2), ([1], 2), ([1, 2],), ("1", 2), (None,),
+        ({"a": 1},), ({"a": 2},), (SETTINGS,),
+    ]  # fmt: skip
+    assert len({content_digest(*each) for each in values}) == len(values)
+    assert content_digest({"a": 1, "b": 2}) == content_digest({"b": 2, "a": 1})
+    with pytest.raises(TypeError):
+        content_digest(object())

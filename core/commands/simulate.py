@@ -39,6 +39,7 @@ from .release_options import (
 from .worker_options import add_worker_options, forget_chunks, several_workers, simulate_on_workers
 
 if TYPE_CHECKING:
+    from ..exchange.chunk_store import ChunkStore
     from ..hazard.cell_tally import CellTally
     from ..hazard.screens import Screen
     from ..simulation.ground import Ground
@@ -143,52 +144,37 @@ def run(arguments: argparse.Namespace) -> int:
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
         if record is None:
             record = default_records(len(releases)) if asked.record is None else asked.record
-<<<<<<< HEAD
-        maps: dict[str, CellTally] = {}
-        with stopped_by_interrupt(progress) as counted:
-            how = {
-                "record": recorded_for(record, bool(scenario.structures), bool(screens)),
-                "first_run": first_run,
-                "threads": arguments.threads,
-                "progress": counted,
-            }
-            if asked.cell_m is None:
-                simulations = run_models(ground, releases, scenario.settings, **how)
-            else:
-                simulations, maps = map_models(ground, releases, scenario.settings, asked.cell_m, **how)
-        tallies = tallies_of(simulations, screens, progress)
-        said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(tallies))
-        remarks = gravest_first([*said])
-        written = write_simulations(
-            simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=maps, screens=tallies,
-            remarks=remarks, progress=progress,
-        )  # fmt: skip
-    for sentence in (*scenario.terrain.summary, *remarks):
-=======
+        kept: tuple[ChunkStore, ...] = ()
         if on_workers:
-            written, said, kept = simulate_on_workers(
+            if screens:
+                raise InputError("Screens are not counted on workers yet", advice="Leave out --workers or --screen")
+            written, remarks, kept = simulate_on_workers(
                 arguments, scenario, ground, releases,
-                record=record, first_run=first_run, folder=folder, inputs=asked.inputs, progress=progress,
+                record=record, cell_m=asked.cell_m, first_run=first_run, folder=folder, inputs=asked.inputs,
+                progress=progress,
             )  # fmt: skip
         else:
+            maps: dict[str, CellTally] = {}
             with stopped_by_interrupt(progress) as counted:
-                simulations = run_models(
-                    ground,
-                    releases,
-                    scenario.settings,
-                    record=recorded_for(record, bool(scenario.structures)),
-                    first_run=first_run,
-                    threads=arguments.threads,
-                    progress=counted,
-                )
-            remarks, kept = remarks_of(simulations, list(scenario.models)), ()
-            said = [str(remark) for remark in remarks]
+                how = {
+                    "record": recorded_for(record, bool(scenario.structures), bool(screens)),
+                    "first_run": first_run,
+                    "threads": arguments.threads,
+                    "progress": counted,
+                }
+                if asked.cell_m is None:
+                    simulations = run_models(ground, releases, scenario.settings, **how)
+                else:
+                    simulations, maps = map_models(ground, releases, scenario.settings, asked.cell_m, **how)
+            tallies = tallies_of(simulations, screens, progress)
+            said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(tallies))
+            remarks = gravest_first([*said])
             written = write_simulations(
-                simulations, folder, record=record, inputs=asked.inputs, remarks=remarks, progress=progress
-            )
+                simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=maps, screens=tallies,
+                remarks=remarks, progress=progress,
+            )  # fmt: skip
     forget_chunks(kept)
-    for sentence in (*scenario.terrain.summary, *said):
->>>>>>> 9e4363e (simulate --workers and --scheduler: the same tables from chunks on the workers of Dask, which are kept until all are done)
+    for sentence in (*scenario.terrain.summary, *remarks):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
     return 0

@@ -3,7 +3,7 @@
 
 import argparse
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from .progress import PrintedProgress, stopped_by_interrupt
 
 if TYPE_CHECKING:
     from ..exchange.chunk_store import ChunkStore
+    from ..remarks import Remark
     from ..simulation.ground import Ground
     from ..simulation.release import Releases
     from ..workflow.simulation import Scenario
@@ -55,11 +56,12 @@ def simulate_on_workers(
     releases: "Releases",
     *,
     record: Collection[str],
+    cell_m: float | None,
     first_run: int,
     folder: Path,
     inputs: Mapping[str, Path],
     progress: PrintedProgress,
-) -> tuple[list[str], list[str], "tuple[ChunkStore, ...]"]:
+) -> "tuple[list[str], Sequence[Remark], tuple[ChunkStore, ...]]":
     """Simulate, and write the tables into the folder.
 
     Returns
@@ -71,11 +73,14 @@ def simulate_on_workers(
     RockfallError : no workers, or not the right ones; the disk is full.
     """
     from ..exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
+    from ..exchange.simulation_output import write_all_maps
     from ..exchange.simulation_tables import summary, write_summary
     from ..interrupts import Interrupt
     from ..output import final_path
     from ..progress import CancelledError
+    from ..remarks import gravest_first
     from ..workflow.dask_pool import DaskPool
+    from ..workflow.maps import map_remarks
     from ..workflow.simulation import check_models, remarks_of
 
     check_models(ground, scenario.settings)
@@ -86,20 +91,21 @@ def simulate_on_workers(
     try:
         with stopped_by_interrupt(progress) as counted, DaskPool(arguments.scheduler, arguments.workers or 1) as pool:
             try:
-                simulations, stores = simulate_in_chunks(
+                simulations, maps, stores = simulate_in_chunks(
                     ground, releases, scenario.settings, pool, kept,
-                    record=record, first_run=first_run, progress=counted,
+                    record=record, cell_m=cell_m, first_run=first_run, progress=counted,
                 )  # fmt: skip
             except CancelledError as error:
                 raise Interrupt(said=goes_on) from error
-        remarks = remarks_of(simulations, list(scenario.models))
+        remarks = gravest_first([*remarks_of(simulations, list(scenario.models)), *map_remarks(maps)])
         written = write_chunk_tables(stores, folder, len(releases), progress=progress)
+        written += write_all_maps(simulations, maps, folder, progress)
         write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     except RockfallError:
         if kept.is_dir():
             print(f"rockfall: {goes_on[:1].upper()}{goes_on[1:]}.", file=sys.stderr)
         raise
-    return [*written, "summary.json"], [str(one) for one in remarks], stores
+    return [*written, "summary.json"], remarks, stores
 
 
 def forget_chunks(stores: "tuple[ChunkStore, ...]") -> None:

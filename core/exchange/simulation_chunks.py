@@ -6,12 +6,16 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import cast
 
 import numpy as np
 
+from ..hazard.cell_tally import CellTally
+from ..hazard.cells import cells_over
 from ..hazard.run_tally import COLUMNS, RunTally
+from ..hazard.tally import Tally
 from ..progress import Progress, silent
-from ..simulation.engine import Records, Settings, Simulation
+from ..simulation.engine import Recorded, Records, Settings, Simulation
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
 from ..vectors import Array
@@ -19,7 +23,7 @@ from ..versions import versions
 from ..workflow.ensembles import CHUNK, Pool, Tables, Work, run_ensemble
 from .chunk_store import ChunkStore
 from .content_digest import content_digest
-from .simulation_output import recorded_for, write_tables
+from .simulation_output import MAPS, recorded_for, write_tables
 
 RUNS = "runs"
 KEY_LETTERS = 16
@@ -27,13 +31,14 @@ KEY_LETTERS = 16
 
 @dataclass(frozen=True)
 class TablesOf:
-    """Makes the tables of a chunk, on the worker; `record` as in `write_simulations`."""
+    """Makes the tables of a chunk, on the worker; `record` as in `write_simulations`, `recorded` what they need."""
 
     record: tuple[str, ...]
+    recorded: Recorded
 
     def __call__(self, simulation: Simulation) -> Tables:
         with TemporaryDirectory() as folder:
-            names = write_tables([simulation], Path(folder), record=self.record)
+            names = write_tables([simulation.with_records(self.recorded)], Path(folder), record=self.record)
             return {name: (Path(folder) / name).read_bytes() for name in names}
 
 
@@ -45,37 +50,45 @@ def simulate_in_chunks(
     kept: Path,
     *,
     record: Collection[str],
+    cell_m: float | None = None,
     first_run: int = 0,
     size: int = CHUNK,
     progress: Progress = silent,
-) -> tuple[tuple[Simulation, ...], tuple[ChunkStore, ...]]:
+) -> tuple[tuple[Simulation, ...], dict[str, CellTally], tuple[ChunkStore, ...]]:
     """Let the same blocks fall once for each of the settings, chunk by chunk.
 
     Parameters
     ----------
     kept : folder for what is finished; from there the same simulation goes on after it was ended.
     record : tables beside runs.csv, see `write_simulations`.
+    cell_m : side of the cells of maps; None for no maps.
     first_run, progress : see `run_models`.
 
     Returns
     -------
-    The simulations, without the moments of their motion, and what has their tables, for `write_chunk_tables`.
+    The simulations, without the moments of their motion; of each model what its maps are made of; and what has the
+    tables, for `write_chunk_tables`.
 
     Raises
     ------
     InputError, CancelledError : see `run_ensemble`.
     """
-    tables = TablesOf(tuple(sorted(record)))
     recorded = recorded_for(record, bool(ground.structures))
-    simulations, stores = [], []
+    tables = TablesOf(tuple(sorted(record)), recorded)
+    tallies: dict[str, Tally] = {RUNS: RunTally()}
+    if cell_m is not None:
+        tallies[MAPS] = CellTally(cells_over(ground.surface, cell_m))
+        recorded = "all"
+    simulations, maps, stores = [], dict[str, CellTally](), []
     for one in settings:
         began = time.perf_counter()
-        decides = (ground, releases, one, first_run, size, tables, versions())
+        decides = (ground, releases, one, first_run, size, tables, cell_m, versions())
         store = ChunkStore(kept / content_digest(*decides)[:KEY_LETTERS])
-        work = Work(ground, one, {RUNS: RunTally()}, recorded, tables)
-        ends = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)[
-            RUNS
-        ].arrays()
+        work = Work(ground, one, tallies, recorded, tables)
+        found = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)
+        if cell_m is not None:
+            maps[one.model] = cast(CellTally, found[MAPS])
+        ends = found[RUNS].arrays()
         columns = {name: ends[name].astype(np.intp if kind is np.int32 else kind) for name, kind in COLUMNS.items()}
         simulations.append(
             Simulation(
@@ -84,7 +97,7 @@ def simulate_in_chunks(
             )
         )  # fmt: skip
         stores.append(store)
-    return tuple(simulations), tuple(stores)
+    return tuple(simulations), maps, tuple(stores)
 
 
 def write_chunk_tables(

@@ -65,15 +65,40 @@ def write_simulations(
     ------
     OSError : the folder cannot be written.
     """
-    written = write_tables(simulations, folder, record=record, progress=progress)
+    written = write_tables(simulations, folder, record=record, screens=screens, progress=progress)
+    written += write_all_maps(simulations, maps, folder, progress)
+    if screens:
+        write_screens(screens, folder / "screens.csv")
+        written.append("screens.csv")
     write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     return [*written, "summary.json"]
 
 
-def write_tables(
-    simulations: Sequence[Simulation], folder: Path, *, record: Collection[str], progress: Progress = silent
+def write_all_maps(
+    simulations: Sequence[Simulation], maps: Mapping[str, CellTally], folder: Path, progress: Progress = silent
 ) -> list[str]:
-    """Write the tables of `write_simulations` without summary.json."""
+    """Write the maps of `write_simulations`; returns the names of their folders."""
+    written = []
+    for model, tally in maps.items():
+        place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
+        drawn, shift = tally.maps(), simulations[0].ground.shift
+        about = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}
+        write_maps(drawn, place, shift, about, progress)
+        releases = simulations[0].releases.position
+        draw_maps(drawn, simulations[0].ground.terrain, place, said=model, releases=releases, progress=progress)
+        written.append(f"{place.relative_to(folder).as_posix()}/")
+    return written
+
+
+def write_tables(
+    simulations: Sequence[Simulation],
+    folder: Path,
+    *,
+    record: Collection[str],
+    screens: Mapping[str, ScreenTally] = NO_SCREENS,
+    progress: Progress = silent,
+) -> list[str]:
+    """Write the tables of `write_simulations` but for screens.csv and summary.json."""
     progress("Writing the tables", 0, 0)
     write_runs(simulations, folder / "runs.csv")
     written = ["runs.csv"]
@@ -86,20 +111,4 @@ def write_tables(
     if simulations[0].ground.structures or screens:
         write_hits(simulations, folder / "hits.csv", screens)
         written.append("hits.csv")
-<<<<<<< HEAD
-    for model, tally in maps.items():
-        place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
-        drawn, shift = tally.maps(), simulations[0].ground.shift
-        about = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}
-        write_maps(drawn, place, shift, about, progress)
-        releases = simulations[0].releases.position
-        draw_maps(drawn, simulations[0].ground.terrain, place, said=model, releases=releases, progress=progress)
-        written.append(f"{place.relative_to(folder).as_posix()}/")
-    if screens:
-        write_screens(screens, folder / "screens.csv")
-        written.append("screens.csv")
-    write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
-    return [*written, "summary.json"]
-=======
     return written
->>>>>>> 9e4363e (simulate --workers and --scheduler: the same tables from chunks on the workers of Dask, which are kept until all are done)

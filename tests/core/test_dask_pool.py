@@ -79,15 +79,16 @@ def test_the_command_writes_the_same_tables_with_workers(cluster, tmp_path, caps
     write_ply(surface(), tmp_path / "plane.ply")
     (tmp_path / "releases.csv").write_text("x_m,y_m,number\n10,30,30\n12,20,10\n")
     command = ["simulate", str(tmp_path / "releases.csv"), "--terrain", str(tmp_path / "plane.ply"), "--seed", "4"]
-    command += ["--model", "noel_2017", "stevens_1998", "--diameter", "0.3..0.6"]
+    command += ["--model", "stevens_1998", "--diameter", "0.3..0.6", "--cell", "5"]
     here, there = tmp_path / "here", tmp_path / "there"
     assert main([*command, "--out", str(here)]) == 0
     assert main([*command, "--scheduler", cluster.scheduler_address, "--out", str(there)]) == 0
-    names = sorted(file.name for file in here.iterdir())
-    assert names == sorted(file.name for file in there.iterdir())
-    for name in names:
-        if name.endswith(".csv"):
-            assert (there / name).read_bytes() == (here / name).read_bytes()
+    names = sorted(file.relative_to(here) for file in here.rglob("*"))
+    assert names == sorted(file.relative_to(there) for file in there.rglob("*"))
+    compared = [name for name in names if name.suffix in (".csv", ".tif")]
+    assert len(compared) > 20
+    for name in compared:
+        assert (there / name).read_bytes() == (here / name).read_bytes()
     assert not (tmp_path / "there.chunks").exists()
 
 

@@ -146,7 +146,7 @@ def test_work_that_is_killed_goes_on_and_gives_the_same_tables(ground, tmp_path)
     process.send_signal(signal.SIGKILL)
     process.wait()
     pool = Counting()
-    simulations, stores = simulate_in_chunks(ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE)
+    simulations, _, stores = simulate_in_chunks(ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE)
     assert pool.computed == [3, 4, 5, 6]
     out, whole = tmp_path / "out", tmp_path / "whole"
     out.mkdir()

@@ -42,12 +42,15 @@ if TYPE_CHECKING:
     from ..exchange.chunk_store import ChunkStore
     from ..hazard.cell_tally import CellTally
     from ..hazard.screens import Screen
+    from ..reconstruction.trajectory import Reconstruction
     from ..simulation.ground import Ground
     from ..simulation.parameter_draws import ParameterDraws
     from ..simulation.release import Releases
     from ..terrain.cloud import Cloud
     from ..terrain.surface import Surface
     from ..workflow.simulation import Scenario
+
+GEOPACKAGE = "simulation.gpkg"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,6 +115,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "maps/NAME.tif (default: no maps)",
     )
     parser.add_argument(
+        "--geopackage",
+        action="store_true",
+        help="also simulation.gpkg for a GIS: releases, stops, screens, what --record names as impacts and paths in "
+        "space, and what a project has measured",
+    )
+    parser.add_argument(
         "--runs",
         type=whole_range,
         metavar="FIRST-LAST",
@@ -125,6 +134,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, write the tables, print the summary."""
     from ..exchange.simulation_entry import RECORDS
+    from ..exchange.simulation_geopackage import write_simulation_geopackage
     from ..exchange.simulation_output import default_records, recorded_for, write_simulations
     from ..output import output_folder
     from ..remarks import gravest_first
@@ -146,6 +156,10 @@ def run(arguments: argparse.Namespace) -> int:
             record = default_records(len(releases)) if asked.record is None else asked.record
         kept: tuple[ChunkStore, ...] = ()
         if on_workers:
+            if arguments.geopackage:
+                raise InputError(
+                    "No GeoPackage is written of blocks on workers", advice="Leave out --workers or --geopackage"
+                )
             if screens:
                 raise InputError("Screens are not counted on workers yet", advice="Leave out --workers or --screen")
             written, remarks, kept = simulate_on_workers(
@@ -173,6 +187,11 @@ def run(arguments: argparse.Namespace) -> int:
                 simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=maps, screens=tallies,
                 remarks=remarks, progress=progress,
             )  # fmt: skip
+            if arguments.geopackage:
+                write_simulation_geopackage(
+                    simulations, folder / GEOPACKAGE, measured=asked.measured, screens=screens, progress=progress
+                )
+                written.append(GEOPACKAGE)
     forget_chunks(kept)
     for sentence in (*scenario.terrain.summary, *remarks):
         print(sentence)
@@ -194,13 +213,14 @@ def _screens(files: list[str], ground: "Ground") -> "tuple[tuple[Screen, ...], d
 
 
 class _Asked(NamedTuple):
-    """What is simulated, the tables beside runs.csv that a project names, the files that decide it, and the cells of
-    the maps."""
+    """What is simulated, the tables beside runs.csv that a project names, the files that decide it, the cells of the
+    maps, and what the project has measured, where that is to be written beside it."""
 
     scenario: "Scenario"
     record: tuple[str, ...] | None
     inputs: dict[str, Path]
     cell_m: float | None
+    measured: "Reconstruction | None" = None
 
 
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
@@ -258,8 +278,10 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
 
 def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
     """A project, in which options replace what its [simulation] says."""
+    from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
     from ..exchange.simulation_project import open_simulation
+    from ..terrain.surface import Surface
 
     own = ["--terrain", "--structure", "--gravity", "--zone-attribute", *sources_given(arguments)[1:]]
     for option in own:
@@ -301,7 +323,10 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
         scenario = replace(scenario, draws=_posteriors(arguments, list(models)))
         inputs = {name: file for name, file in inputs.items() if name != "posterior"}
     inputs = inputs | zone_files | _posterior_inputs(arguments.posterior)
-    return _Asked(scenario, entry.record, inputs, arguments.cell or entry.cell_m)
+    measured = None
+    if arguments.geopackage and project.picks is not None:
+        measured = reconstruct_project(project, scenario.terrain if isinstance(scenario.terrain, Surface) else None)
+    return _Asked(scenario, entry.record, inputs, arguments.cell or entry.cell_m, measured)
 
 
 def _posteriors(arguments: argparse.Namespace, models: Sequence[str]) -> "dict[str, ParameterDraws]":

@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hazard.screens import Screen
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..reconstruction.impact import Impacts
-from ..reconstruction.sampling import TrajectorySamples
+from ..reconstruction.sampling import TrajectorySamples, sample_trajectories
+from ..reconstruction.trajectory import Reconstruction
 from ..simulation.engine import Simulation
+from ..simulation.ground import Ground
 from ..simulation.results import impacts_of, release_names, run_figures
 from ..simulation.run_lines import lines_of
 from ..vectors import Array, norm
@@ -20,6 +23,9 @@ from .geopackage import FeatureLayer, write_geopackage
 from .qgis_styles import line_style, point_style
 
 BLACK, STOP, RELEASE = (0.0, 0.0, 0.0), (0.2, 0.24, 0.3), (1.0, 1.0, 1.0)
+SCREEN = (0.0, 0.45, 0.70)
+MEASURED_STEP_S = 0.05
+"""Between the points of a measured trajectory, in which chords are within 3 mm of the parabola."""
 FAINT = 0.4
 """Opacity of paths, of which there are many."""
 
@@ -28,9 +34,8 @@ def write_simulation_geopackage(
     simulations: Sequence[Simulation],
     path: str | Path,
     *,
-    measured: TrajectorySamples | None = None,
-    measured_impacts: Impacts | None = None,
-    further: Sequence[FeatureLayer] = (),
+    measured: Reconstruction | None = None,
+    screens: Sequence[Screen] = (),
     about: Mapping[str, str] | None = None,
     progress: Progress = silent,
 ) -> tuple[str, ...]:
@@ -38,8 +43,8 @@ def write_simulation_geopackage(
 
     Parameters
     ----------
-    measured, measured_impacts : of the same site.
-    further : layers such as screens.
+    measured : of the same site.
+    screens : across the slope.
     about : see `write_geopackage`.
 
     Returns
@@ -63,11 +68,12 @@ def write_simulation_geopackage(
                     impacts_of(simulation), f"impacts{suffix}", find_model(simulation.settings.model).colour
                 )
             yield stops_layer(simulation, f"stops{suffix}")
-        if measured is not None and len(measured):
-            yield measured_layer(measured)
-        if measured_impacts is not None and len(measured_impacts):
-            yield impacts_layer(measured_impacts, "measured_impacts", BLACK)
-        yield from further
+        if measured is not None and len(measured.flights):
+            yield measured_layer(sample_trajectories(measured, MEASURED_STEP_S))
+        if measured is not None and len(measured.impacts):
+            yield impacts_layer(measured.impacts, "measured_impacts", BLACK)
+        if screens:
+            yield screens_layer(screens, simulations[0].ground)
 
     settings = simulations[0].settings
     said = {"seed": str(settings.seed), "blocks": str(len(simulations[0])), **(about or {})}
@@ -164,3 +170,21 @@ def measured_layer(samples: TrajectorySamples) -> FeatureLayer:
     }
     said = "Measured trajectories of the blocks' centres"
     return FeatureLayer("measured", said, samples.position, first, columns, line_style(BLACK, 0.5))
+
+
+def screens_layer(screens: Sequence[Screen], ground: Ground) -> FeatureLayer:
+    """Lines of screens on the terrain; where it has none below, at its lowest height."""
+    plan = np.concatenate([screen.line for screen in screens])
+    low, high = ground.terrain.bounds[:, 2].tolist()
+    above = ground.heights_above(np.column_stack([plan, np.full(len(plan), high + 1.0)]))
+    points = np.column_stack([plan, np.where(np.isnan(above), low, high + 1.0 - above)])
+    first = np.cumsum([0, *(len(screen.line) for screen in screens)])
+    height = np.array([screen.height_m for screen in screens])
+    columns = {
+        "name": np.array([screen.name for screen in screens]),
+        "height_m": np.where(np.isfinite(height), height, np.nan),
+        "capacity_kJ": np.array([np.nan if s.capacity_j is None else s.capacity_j / 1000 for s in screens]),
+        "length_m": np.array([screen.length_m for screen in screens]),
+    }
+    said = "Screens, and barriers with a height and a capacity, at their foot"
+    return FeatureLayer("screens", said, points, first, columns, line_style(SCREEN, 0.8))

@@ -7,8 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rockfall.core.cli import main
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.geopackage import FeatureLayer, write_geopackage
+from rockfall.core.exchange.opening import open_terrain
+from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.qgis_styles import line_style
 from rockfall.core.exchange.simulation_geopackage import measured_layer, write_simulation_geopackage
 from rockfall.core.georeference import GlobalShift
@@ -19,6 +22,7 @@ from rockfall.core.simulation.release import make_releases
 from rockfall.core.simulation.run_lines import lines_of
 from rockfall.core.terrain.surface import Surface
 
+DEMO = Path(__file__).parents[2] / "assets" / "demo"
 SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 800.0, "EPSG:2056")
 POINTS = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0], [5.0, 5.0, 5.0], [6.0, 4.0, 5.5], [7.0, 3.0, 5.25]])
 
@@ -182,3 +186,30 @@ def test_measured_trajectories_break_where_nothing_was_seen() -> None:
     assert layer.columns["trajectory"].tolist() == ["A", "A", "B"]
     np.testing.assert_array_equal(layer.columns["height_max_m"], [1.0, 3.0, np.nan])
     np.testing.assert_allclose(layer.columns["v_max_mps"], np.sqrt(3) * np.array([1.0, 3.0, 5.0]))
+
+
+def test_the_command_writes_what_was_measured_and_screens_beside(tmp_path: Path) -> None:
+    """The demo: each measured path ends at its pick, and a screen lies on the terrain."""
+    line = "name,x_m,y_m,height_m,capacity_kJ\nfence,988391.6,6375682,3.0,15\nfence,988428.4,6375648,3.0,15\n"
+    (tmp_path / "screens.csv").write_text(line, encoding="utf-8")
+    asked = ["simulate", str(DEMO / "project.toml"), "--model", "noel_2017", "--number", "2", "--geopackage"]
+    assert main([*asked, "--screen", str(tmp_path / "screens.csv"), "--out", str(tmp_path / "out")]) == 0
+    path = tmp_path / "out" / "simulation.gpkg"
+    counts = {
+        name: rows(path, f"SELECT count(*) FROM {name}")[0][0]
+        for (name,) in rows(path, "SELECT table_name FROM gpkg_geometry_columns")
+    }
+    assert counts.keys() == {
+        "releases", "trajectories", "impacts", "stops", "measured", "measured_impacts", "screens",
+    }  # fmt: skip
+    assert counts["trajectories"] == counts["stops"] == counts["releases"] == 30
+    assert (counts["measured"], counts["measured_impacts"], counts["screens"]) == (15, 104, 1)
+    assert rows(path, "SELECT name, height_m, capacity_kJ FROM screens") == [("fence", 3.0, 15.0)]
+    (shape,) = rows(path, "SELECT geom FROM screens")[0]
+    ends = np.frombuffer(shape[65:], "<f8").reshape(-1, 3)
+    np.testing.assert_allclose(ends[:, :2], [[988391.6, 6375682], [988428.4, 6375648]])
+    surface = open_terrain(read_project(DEMO / "project.toml"))
+    assert surface is not None
+    local = surface.shift.to_local(ends)
+    near = [surface.vertices[np.hypot(*(surface.vertices - place)[:, :2].T).argmin(), 2] for place in local]
+    np.testing.assert_allclose(local[:, 2], near, atol=1.0)

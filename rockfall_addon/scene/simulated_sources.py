@@ -102,6 +102,7 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
         settings.drawn = _drawing(scene, releases)
     absent = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
     absent += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
+    absent += [f"the posterior {entry.posterior.name}"] if entry.posterior is not None else []
     absent += left_out
     return f"Of the project's simulation Blender leaves out {', '.join(absent)}." if absent else ""
 

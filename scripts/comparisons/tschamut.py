@@ -10,20 +10,29 @@ defaults. An open simulator, untuned, stops at 63.4 m (translational) and at 203
 
 import csv
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from rockfall.core.analysis.observed_runs import observe_stops
-from rockfall.core.impact_models.registry import COMPARED
+from rockfall.core.analysis.observed_runs import Observed, observe_stops
+from rockfall.core.analysis.priors import make_priors
+from rockfall.core.impact_models.registry import COMPARED, find_model
 from rockfall.core.simulation.engine import Settings
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases, placed_on
 from rockfall.core.terrain.readers import read_terrain
 from rockfall.core.vectors import Array
+from rockfall.core.workflow.back_analysis import BackAnalysis, back_analyse
 from rockfall.core.workflow.whole_runs import ComparedSimulations, compare_whole_runs
 
 DATA = Path(__file__).parents[2] / "tests" / "data"
 NUMBER = 20
+FITTED: tuple[tuple[str, tuple[str, ...], dict[str, str]], ...] = (
+    ("stevens_1998", ("rn", "rt", "friction"), {}),
+    ("pfeiffer_bowen_1989", ("rn", "rt", "friction"), {}),
+    ("dorren_2015", ("rn", "rg70", "friction"), {"rg70": "0..0.5"}),
+)
+"""Models, what is fitted, and priors that are not the whole range."""
 PEER = "an open simulator, untuned: 63.4 m translational, 203 m rotating sphere"
 
 
@@ -53,17 +62,42 @@ def blocks(ground: Ground, number: int) -> Releases:
     )
 
 
-def compare(number: int = NUMBER, models: tuple[str, ...] = COMPARED) -> ComparedSimulations:
-    """The observed stops beside those of the models."""
-    ground = make_ground(read_terrain(DATA / "tschamut_2014_terrain.asc"))
+def observed_stops(ground: Ground) -> Observed:
+    """The 80 stops."""
     stops = columns("stops")
-    observed = observe_stops(
+    return observe_stops(
         np.array(stops["trajectory_id"]),
         ground.shift.to_local(vectors(stops, "release_x_m", "release_y_m", "release_z_m")),
         ground.shift.to_local(vectors(stops, "x_m", "y_m", "z_m")),
         vectors(stops, "mass_kg")[:, 0],
     )
-    return compare_whole_runs(ground, observed, blocks(ground, number), [Settings(model) for model in models])
+
+
+def compare(number: int = NUMBER, models: tuple[str, ...] = COMPARED) -> ComparedSimulations:
+    """The observed stops beside those of the models."""
+    ground = make_ground(read_terrain(DATA / "tschamut_2014_terrain.asc"))
+    models_as_they_are = [Settings(model) for model in models]
+    return compare_whole_runs(ground, observed_stops(ground), blocks(ground, number), models_as_they_are)
+
+
+def back_analysis(model: str, names: Sequence[str], priors: dict[str, str], sets: int = 2000) -> BackAnalysis:
+    """What the 80 stops say of parameters."""
+    ground = make_ground(read_terrain(DATA / "tschamut_2014_terrain.asc"))
+    laws = make_priors(find_model(model), list(names), priors)
+    return back_analyse(ground, observed_stops(ground), blocks(ground, 1), Settings(model), laws, sets=sets)
+
+
+def tell(analysis: BackAnalysis) -> None:
+    """Print intervals, checks and remarks."""
+    print(f"\n{analysis.model}: {analysis.runs} runs in {analysis.seconds:.0f} s")
+    for one in analysis.estimates:
+        print(f"  {one.name:<12}{one.median:>8.3f}   {one.low:.3f} … {one.high:.3f}   {one.verdict}")
+    for check in analysis.checks:
+        print(
+            f"  {check.title:<28}{check.observed:>8.1f} {check.unit}  {check.low:.1f} … {check.high:.1f}   p = {check.p:.2g}"
+        )
+    for remark in analysis.remarks:
+        print(f"  {remark}")
 
 
 def main() -> None:
@@ -82,6 +116,8 @@ def main() -> None:
         print(f"{one.model:<24}{mean:>12.1f} m{low:>9.1f}{high:>9.1f}{left:>7}   {one.verdict}")
     print(f"\n{PEER}. A block that left the terrain counts with its place at the edge.")
     print("The terrain is a 5 m proxy, not a survey: this tells the order of magnitude, not which model is right.")
+    for model, names, priors in FITTED:
+        tell(back_analysis(model, names, priors))
 
 
 if __name__ == "__main__":

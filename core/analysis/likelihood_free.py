@@ -281,22 +281,25 @@ def project(table: SimulatedSets, weight: Array, *, squares: bool) -> Projection
     spread = np.where(spread > IDLE * np.maximum(np.abs(centre), 1.0), spread, np.inf)
     features = _features((clipped - centre) / spread, squares)
     mean = w @ features
-    root = np.sqrt(w)[:, None]
     wanted = ndtri(table.place[some])
     middle = w @ wanted
-    left, singular, right = np.linalg.svd(root * (features - mean), full_matrices=False)
-    aim = root * (wanted - middle)
-    turned = left.T @ aim
+    apart = wanted - middle
+    features = features - mean
+    weighted = w[:, None] * features
+    square, axes = np.linalg.eigh(features.T @ weighted)
+    square = np.maximum(square, 0.0)
+    aim = axes.T @ (weighted.T @ apart)
+    total = w @ apart**2
     number = 1.0 / float(w @ w)
     slopes = []
     for j in range(wanted.shape[1]):
         errors = []
         for ridge in RIDGES:
-            kept = singular**2 / (singular**2 + ridge)
-            rest = float(aim[:, j] @ aim[:, j] - (turned[:, j] ** 2) @ (1 - (1 - kept) ** 2))
-            errors.append(rest / max(1.0 - float(kept.sum()) / number, 1e-6) ** 2)
+            rest = float(total[j] - ((square + 2 * ridge) / (square + ridge) ** 2) @ aim[:, j] ** 2)
+            free = float((square / (square + ridge)).sum())
+            errors.append(rest / max(1.0 - free / number, 1e-6) ** 2)
         ridge = RIDGES[int(np.argmin(errors))]
-        slopes.append(right.T @ (singular / (singular**2 + ridge) * turned[:, j]))
+        slopes.append(axes @ (aim[:, j] / (square + ridge)))
     slope = np.stack(slopes, axis=1)
     return Projection(centre, spread, low, high, squares, np.vstack([slope, middle - mean @ slope]))
 

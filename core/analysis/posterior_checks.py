@@ -26,6 +26,7 @@ UNLIKELY = 0.05
 FOLDS = 5
 FEWEST_COVERED = 0.85
 """Of known parameters within their 95 % intervals; with fewer the intervals are said to be too narrow."""
+NOTHING = 1e-9
 NINETY = np.array([0.05, 0.95])
 
 
@@ -295,7 +296,7 @@ def posterior_remarks(
     wrong = [one for one in checks if not one.fits]
     if wrong:
         named = ", ".join(
-            f"{one.title} (observed {one.observed:.3g} {one.unit}, simulated {one.low:.3g}…{one.high:.3g})"
+            f"{one.title} (observed {_short(one.observed)}, simulated {_short(one.low)}…{_short(one.high)} {one.unit})"
             for one in sorted(wrong, key=lambda one: one.p)[:3]
         )
         text = (
@@ -318,6 +319,11 @@ def posterior_remarks(
     if not wrong and checks:
         yield Remark(f"{model} can give what was observed in all {len(checks)} quantities.", "note", "fit")
     yield from _about_held_out(model, folds)
+
+
+def _short(value: float) -> str:
+    """Three digits, without the rounding of what is zero."""
+    return f"{0.0 if abs(value) < NOTHING else value:.3g}"
 
 
 def _about_held_out(model: str, folds: Sequence[HeldOut]) -> Iterator[Remark]:

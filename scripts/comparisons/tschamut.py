@@ -92,10 +92,8 @@ def tell(analysis: BackAnalysis) -> None:
     print(f"\n{analysis.model}: {analysis.runs} runs in {analysis.seconds:.0f} s")
     for one in analysis.estimates:
         print(f"  {one.name:<12}{one.median:>8.3f}   {one.low:.3f} … {one.high:.3f}   {one.verdict}")
-    for check in analysis.checks:
-        print(
-            f"  {check.title:<28}{check.observed:>8.1f} {check.unit}  {check.low:.1f} … {check.high:.1f}   p = {check.p:.2g}"
-        )
+    for one in analysis.checks:
+        print(f"  {one.title:<28}{one.observed:>8.1f} {one.unit}   {one.low:.1f} … {one.high:.1f}   p = {one.p:.2g}")
     for remark in analysis.remarks:
         print(f"  {remark}")
 

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FILE",
         help="lines across the slope, GeoJSON or a table of points; with the properties height_m and capacity_kJ a "
-        "barrier that stands there",
+        "barrier that stands there (a project can state its own: [[simulation.screens]])",
     )
     parser.add_argument(
         "--factors",
@@ -91,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
         known = model_parameters(arguments, list(scenario.models), scenario.models)
         scenario = replace(scenario, models={name: known.get(name, {}) for name in scenario.models})
         ground = ground_of(scenario)
-        screens, screen_files = _screens(arguments.screen, ground)
+        screens, screen_files = _screens(arguments.screen, ground, scenario.screens)
         progress("Reconstructing what was measured", 0, 0)
         measured = None
         if project.picks is not None and len(read_project_picks(project, None)[0]):
@@ -124,11 +124,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _screens(files: list[str], ground: "Ground") -> "tuple[tuple[Screen, ...], dict[str, Path]]":
-    """The screens of some files, and the files."""
+def _screens(
+    files: list[str], ground: "Ground", stated: "tuple[Screen, ...]"
+) -> "tuple[tuple[Screen, ...], dict[str, Path]]":
+    """The screens that a project states and those of some files, and these files."""
     from ..exchange.screens import read_screens
 
-    if not files:
+    if not (files or stated):
         raise InputError("--screen is missing", advice="Give a file with a line across the slope, where the barrier is")
-    screens = tuple(screen for file in files for screen in read_screens(file, ground.shift))
+    screens = (*stated, *(screen for file in files for screen in read_screens(file, ground.shift)))
     return screens, {f"screens {Path(file).name}": Path(file) for file in files}

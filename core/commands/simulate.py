@@ -149,7 +149,7 @@ def run(arguments: argparse.Namespace) -> int:
         asked = prepare(arguments, progress)
         scenario = asked.scenario
         ground = ground_of(scenario)
-        screens, screen_files = _screens(arguments.screen, ground)
+        screens, screen_files = _screens(arguments.screen, ground, scenario.screens)
         progress("Releasing the blocks")
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
         if record is None:
@@ -199,12 +199,14 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _screens(files: list[str], ground: "Ground") -> "tuple[tuple[Screen, ...], dict[str, Path]]":
-    """The screens of some files, and the files."""
+def _screens(
+    files: list[str], ground: "Ground", stated: "tuple[Screen, ...]"
+) -> "tuple[tuple[Screen, ...], dict[str, Path]]":
+    """The screens that a project states and those of some files, and these files."""
     from ..exchange.screens import read_screens
     from ..hazard.screens import check_screens
 
-    screens = tuple(screen for file in files for screen in read_screens(file, ground.shift))
+    screens = (*stated, *(screen for file in files for screen in read_screens(file, ground.shift)))
     check_screens(screens, ground)
     for screen in screens:
         if screen.name in ground.structures:

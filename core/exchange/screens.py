@@ -6,7 +6,7 @@ barrier, which holds blocks; else it measures.
 """
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from ..hazard.screens import OUTCOMES, Screen
 from ..output import output_stream
 from ..reading import reader
 from .map_shapes import MapShape, read_lines
+from .simulation_entry import ScreenEntry
 
 HEIGHT, CAPACITY = "height_m", "capacity_kJ"
 COLUMNS = (
@@ -53,6 +54,34 @@ def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
         except InputError as error:
             raise InputError(error.problem, file=path, advice=error.advice) from error
     return tuple(found)
+
+
+def screens_of(entries: Sequence[ScreenEntry], shift: GlobalShift) -> tuple[Screen, ...]:
+    """The screens that a project states, its maps read.
+
+    Raises
+    ------
+    InputError : see `read_screens` and `Screen`.
+    """
+    found: list[Screen] = []
+    for entry in entries:
+        if entry.file is not None:
+            found += read_screens(entry.file, shift)
+            continue
+        survey = np.array([(*point[:2], 0.0) for point in entry.points_m])
+        capacity_j = None if entry.capacity_kj is None else 1000 * entry.capacity_kj
+        height_m = np.inf if entry.height_m is None else entry.height_m
+        found.append(Screen(entry.name, shift.to_local(survey)[:, :2].copy(), height_m, capacity_j))
+    return tuple(found)
+
+
+def entry_of(screen: Screen, shift: GlobalShift) -> ScreenEntry:
+    """A screen as a project states it."""
+    survey = shift.to_survey(np.column_stack([screen.line, np.zeros(len(screen.line))]))[:, :2]
+    height_m = screen.height_m if np.isfinite(screen.height_m) else None
+    capacity_kj = None if screen.capacity_j is None else screen.capacity_j / 1000
+    points = tuple((x, y) for x, y in survey.tolist())
+    return ScreenEntry(screen.name, None, points, height_m, capacity_kj)
 
 
 def write_screens(tallies: Mapping[str, ScreenTally], path: str | Path) -> None:

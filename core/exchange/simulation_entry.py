@@ -29,6 +29,13 @@
     name = "fence"
     file = "fence.ply"
 
+    [[simulation.screens]]
+    name = "road"
+    points_m = [[2600060.0, 1200030.0], [2600062.0, 1200070.0]]
+    height_m = 4.0                   # with a capacity it is a barrier, without one it measures what passes
+    capacity_kJ = 1000.0
+    # file = "screens.geojson"       # in place of all that: lines of a map
+
 The parameters of the models are those of the whole project, ``[models.NAME]``; gravity and the drag of air are those of
 its ``[reconstruction]``.
 """
@@ -100,6 +107,25 @@ class StructureEntry:
 
 
 @dataclass(frozen=True)
+class ScreenEntry:
+    """A line across the slope, at which blocks are measured or held; or a map of such lines.
+
+    Attributes
+    ----------
+    file : a map of screens, see `exchange.screens`; then nothing else is given.
+    points_m : its line: survey coordinates [m].
+    height_m, capacity_kj : of a barrier; a screen without a capacity measures.
+    """
+
+    name: str = ""
+    file: Path | None = None
+    points_m: tuple[tuple[float, ...], ...] = ()
+    height_m: float | None = None
+    capacity_kj: float | None = None
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class ZonesEntry:
     """Parts of the ground with parameters of their own.
 
@@ -121,7 +147,7 @@ class SimulationEntry:
     Attributes
     ----------
     models : names, in the order in which they run; none takes those that are compared by default.
-    releases, structures, zones, rolling, friction, seed : see `workflow.simulation.Scenario`.
+    releases, structures, screens, zones, rolling, friction, seed : see `workflow.simulation.Scenario`.
     contact : what of the terrain blocks meet, see `simulation.ground.CONTACTS`.
     observed : impacts.csv that the model observed draws from; None takes what the project has measured.
     posterior : posterior.csv of a back-analysis, from which each block of its model draws its parameters.
@@ -133,6 +159,7 @@ class SimulationEntry:
     models: tuple[str, ...] = ()
     releases: ReleaseEntry = field(default_factory=ReleaseEntry)
     structures: tuple[StructureEntry, ...] = ()
+    screens: tuple[ScreenEntry, ...] = ()
     contact: Contact = "mesh"
     zones: ZonesEntry | None = None
     rolling: Rolling = "azzoni_1995"
@@ -163,6 +190,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         models=models,
         releases=_read_releases(table.table("releases")),
         structures=_read_structures(table),
+        screens=tuple(map(_read_screen, table.tables("screens"))),
         contact=cast(Contact, table.choice("contact", CONTACTS, "mesh")),
         zones=_read_zones(table.table("zones")) if table.has("zones") else None,
         rolling=cast(Rolling, table.choice("rolling", ROLLING, "azzoni_1995")),
@@ -204,6 +232,18 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
             {"name": structure.name, "file": relative(structure.file)} | dict(structure.extra)
             for structure in entry.structures
         ]
+    if entry.screens:
+        content["screens"] = [_screen_content(screen, relative) for screen in entry.screens]
+    return content | dict(entry.extra)
+
+
+def _screen_content(entry: ScreenEntry, relative: Callable[[Path], str]) -> dict[str, Any]:
+    if entry.file is not None:
+        return {"file": relative(entry.file)} | dict(entry.extra)
+    content: dict[str, Any] = {"name": entry.name, "points_m": [list(point) for point in entry.points_m]}
+    for name, value in (("height_m", entry.height_m), ("capacity_kJ", entry.capacity_kj)):
+        if value is not None:
+            content[name] = value
     return content | dict(entry.extra)
 
 
@@ -274,6 +314,21 @@ def _read_law(table: TomlTable, key: str) -> Distribution | None:
 
 def _read_zones(table: TomlTable) -> ZonesEntry:
     return ZonesEntry(table.path("file"), table.text("attribute", ""), table.rest())
+
+
+def _read_screen(table: TomlTable) -> ScreenEntry:
+    if table.has("file"):
+        for key in ("name", "points_m", "height_m", "capacity_kJ"):
+            if table.has(key):
+                raise table.wrong(key, "is given beside file", "The lines of the file have their own: leave out one")
+        return ScreenEntry(file=table.path("file"), extra=table.rest())
+    points = table.points("points_m")
+    if len(points) < 2:
+        raise table.wrong("points_m", f"has {len(points)} points", "Give a screen two or more, or a file")
+    height, capacity = table.optional_number("height_m"), table.optional_number("capacity_kJ")
+    if capacity is not None and height is None:
+        raise table.wrong("height_m", "is missing", "A barrier has a height beside its capacity_kJ")
+    return ScreenEntry(table.text("name"), None, points, height, capacity, table.rest())
 
 
 def _read_structures(table: TomlTable) -> tuple[StructureEntry, ...]:

@@ -30,6 +30,7 @@ from .opening import open_terrain, read_project_picks, reconstruct_project
 from .parameters import checked_parameters
 from .posterior_tables import posteriors_of
 from .project import BlockEntry, Project
+from .screens import screens_of
 from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry, SimulationEntry
 from .simulation_output import recorded_for
 from .simulation_tables import read_releases
@@ -81,6 +82,9 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         progress(f"Reading {structure.file.name}", 0, 0)
         structures[structure.name] = read_structure(structure.file, up=source.up, unit_m=source.unit_m)
         inputs[structure.name] = structure.file
+    for screens in entry.screens:
+        if screens.file is not None:
+            inputs[f"screens:{screens.file.name}"] = screens.file
     how = project.reconstruction
     met: Surface | Cloud = terrain
     if entry.contact == "points":
@@ -99,13 +103,14 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         {name: known.get(name, {}) for name in models},
         _drawn_from(project, terrain, entry) if drawing else None,
         structures=structures,
+        screens=screens_of(entry.screens, terrain.shift),
         zones=zones,
         rolling=entry.rolling,
         friction=entry.friction,
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
-        record="all" if entry.record is None else recorded_for(entry.record, bool(structures)),
+        record="all" if entry.record is None else recorded_for(entry.record, bool(structures), bool(entry.screens)),
         draws=draws,
     )
     return scenario, inputs

@@ -11,6 +11,7 @@ from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.measured_rebounds import beyond_measured, beyond_sentence, measured_sentence
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
+from ..hazard.screens import Screen
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
@@ -87,6 +88,7 @@ class Scenario:
     draws : name → what each block of this model draws its parameters from, and friction.
     measured : what the model observed draws from; None where it does not run.
     structures : name → walls, fences, roads, houses that stand on the terrain.
+    screens : lines at which blocks are measured or held; they change nothing of the runs.
     zones : None for one that is everywhere.
     rolling, friction, drag, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
     record : what to keep of the motion, see `engine.RECORDED`.
@@ -97,6 +99,7 @@ class Scenario:
     models: Mapping[str, Mapping[str, object]]
     measured: MeasuredRebounds | None = None
     structures: Mapping[str, Surface | Cloud] = field(default_factory=dict)
+    screens: tuple[Screen, ...] = ()
     zones: Zones | None = None
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION

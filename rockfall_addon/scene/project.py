@@ -20,6 +20,7 @@ from ...core.exchange.project import (
     read_project,
     write_project,
 )
+from ...core.exchange.screens import entry_of, screens_of
 from ...core.exchange.simulation_entry import SimulationEntry, StructureEntry, ZonesEntry
 from ...core.exchange.tables import write_picks
 from ...core.exchange.zones import open_zones, write_attribute_zones
@@ -41,6 +42,7 @@ from . import (
     picks,
     project_videos,
     reconstruction,
+    screens,
     set_aside_words,
     simulated_sources,
     simulated_zones,
@@ -81,6 +83,8 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         surface, result = open_project(project)
     zones = _zones(project, surface)
     met, left_out = _structures(project, surface)
+    entry = project.simulation
+    stated_screens = () if entry is None or surface is None else screens_of(entry.screens, surface.shift)
     shading = None if surface is None else shade(surface)
     known = surface.shift if surface is not None else None if result is None else result.picks.shift
     found = project_videos.read_videos(project, surface, known) if with_videos else []
@@ -104,6 +108,8 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
             simulated_zones.keep(scene, zones, tile)
     for name, structure in met.items():
         structures.make(scene, name, structure)
+    for screen in stated_screens:
+        screens.keep(scene, screen, surface)
     project_videos.show_videos(scene, found, names[0] if len(set(names)) == 1 else "")
     if result is not None:
         reconstruction.show(scene, result)
@@ -140,7 +146,8 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
     if surface is not None and stated is not None:
         zones = simulated_zones.zones_of(scene, surface, stated.models)
     met = structures.met_of(scene)
-    if met and stated is None:
+    drawn = [entry_of(screen, shift) for screen in screens.screens_of(scene)] if surface is not None else []
+    if (met or drawn) and stated is None:
         stated = SimulationEntry()
     with output_folder(folder) as place:
         if table is not None:
@@ -151,7 +158,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             write_attribute_zones(zones, place / "zones.csv")
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
         if stated is not None:
-            stated = replace(stated, structures=_write_structures(met, place))
+            stated = replace(stated, structures=_write_structures(met, place), screens=tuple(drawn))
         source = TerrainSource(
             (place / "terrain.ply",), (shift.x, shift.y, shift.z), shift.crs, up="z", sigma_m=terrain.accuracy_m(scene)
         )

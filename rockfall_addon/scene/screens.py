@@ -17,6 +17,7 @@ from ...core.hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ...core.hazard.screens import HELD, OUTCOMES, OVER, THROUGH, Screen
 from ...core.impact_models.registry import MODELS
 from ...core.terrain.raycast import cast_rays
+from ...core.terrain.surface import Surface
 from ...core.vectors import Array
 from . import drawn_releases, store, terrain
 
@@ -46,6 +47,20 @@ def make(scene: bpy.types.Scene, points: Sequence[Array], name: str = "Screen") 
     obj[store.ROLE], obj[store.ID] = store.SCREEN_ROLE, uuid.uuid4().hex
     obj.hide_render = True
     store.link(store.collection(scene, COLLECTION), obj)
+    return obj
+
+
+def keep(scene: bpy.types.Scene, screen: Screen, surface: Surface) -> bpy.types.Object:
+    """A screen of a project as an object: its points stand on the terrain, at half its height where there is none."""
+    low, high = surface.bounds
+    above = np.column_stack([screen.line, np.full(len(screen.line), high[2] + 1.0)])
+    z = cast_rays(surface, above, (0, 0, -1)).point[:, 2]
+    obj = make(scene, np.column_stack([screen.line, np.where(np.isnan(z), (low[2] + high[2]) / 2, z)]), screen.name)
+    settings = obj.rockfall_screen
+    if np.isfinite(screen.height_m):
+        settings.height_m = screen.height_m
+    if screen.capacity_j is not None:
+        settings.holds, settings.capacity_kj = True, screen.capacity_j / 1000
     return obj
 
 

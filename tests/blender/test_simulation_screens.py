@@ -119,3 +119,20 @@ def test_exported_tables_have_the_hits(slope: bpy.types.Scene, screen: bpy.types
     lines = (tmp_path / "tables" / "hits.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) - 1 == result(part, slope)["hits"]
     assert all(line.startswith("road,") for line in lines[1:])
+
+
+def test_a_project_takes_screens_along(slope: bpy.types.Scene, screen: bpy.types.Object, part, tmp_path: Path) -> None:
+    screen.rockfall_screen.holds, screen.rockfall_screen.capacity_kj = True, 750.0
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    project = tmp_path / "out" / "project.toml"
+    (entry,) = part("core.exchange.project").read_project(project).simulation.screens
+    assert (entry.name, entry.height_m, entry.capacity_kj) == ("road", 3.0, 750.0)
+    np.testing.assert_allclose(entry.points_m[1], [2_600_000.0 + FOOT_X, 1_200_060.0])
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
+    scene = bpy.context.scene
+    (again,) = part("rockfall_addon.scene.screens").screens_of(scene)
+    assert (again.name, again.height_m, again.capacity_j) == ("road", 3.0, 750_000.0)
+    np.testing.assert_allclose(again.line, [[FOOT_X, -1.0], [FOOT_X, 60.0], [FOOT_X, 121.0]], atol=1e-5)
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert result(part, scene)["reach"] > 0

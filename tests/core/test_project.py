@@ -21,7 +21,13 @@ from rockfall.core.exchange.project import (
     read_project,
     write_project,
 )
-from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, StructureEntry, ZonesEntry
+from rockfall.core.exchange.simulation_entry import (
+    ReleaseEntry,
+    ScreenEntry,
+    SimulationEntry,
+    StructureEntry,
+    ZonesEntry,
+)
 from rockfall.core.simulation.distributions import Distribution
 
 FULL = """
@@ -285,12 +291,20 @@ kept = 4
 name = "fence"
 file = "fence.ply"
 kept = 3
+[[simulation.screens]]
+name = "road"
+points_m = [[2600060.0, 1200030.0], [2600062.0, 1200070.0]]
+height_m = 4
+capacity_kJ = 1000
+kept = 5
+[[simulation.screens]]
+file = "screens.geojson"
 """
 
 
 def test_a_simulation_round_trips(tmp_path: Path) -> None:
     path, again = tmp_path / "project.toml", tmp_path / "again.toml"
-    for name in ("fence.ply", "impacts.csv", "soil.csv"):
+    for name in ("fence.ply", "impacts.csv", "soil.csv", "screens.geojson"):
         (tmp_path / name).touch()
     path.write_text(SIMULATED, encoding="utf-8")
     project = read_project(path)
@@ -307,6 +321,10 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
             extra={"kept": 2},
         ),
         structures=(StructureEntry("fence", tmp_path / "fence.ply", {"kept": 3}),),
+        screens=(
+            ScreenEntry("road", None, ((2600060.0, 1200030.0), (2600062.0, 1200070.0)), 4.0, 1000.0, {"kept": 5}),
+            ScreenEntry(file=tmp_path / "screens.geojson"),
+        ),
         zones=ZonesEntry(tmp_path / "soil.csv", "soil", {"kept": 4}),
         rolling="coulomb",
         friction=0.4,
@@ -348,11 +366,14 @@ def test_a_simulation_round_trips(tmp_path: Path) -> None:
         ('"soil.csv"', '"sand.csv"', "simulation.zones.file names a file that is not there"),
         ('"fence.ply"', '"wall.ply"', "structures 1: file names a file that is not there"),
         ("kept = 3", '[[simulation.structures]]\nname = "fence"\nfile = "fence.ply"', "names 'fence' twice"),
+        (", [2600062.0, 1200070.0]", "", "screens 1: points_m has 1 points"),
+        ("height_m = 4\n", "", "screens 1: height_m is missing"),
+        ('file = "screens', 'height_m = 2\nfile = "screens', "screens 2: height_m is given beside file"),
     ],
 )
 def test_bad_simulations_are_located(tmp_path: Path, old: str, new: str, problem: str) -> None:
     path = tmp_path / "project.toml"
-    for name in ("fence.ply", "impacts.csv", "soil.csv"):
+    for name in ("fence.ply", "impacts.csv", "soil.csv", "screens.geojson"):
         (tmp_path / name).touch()
     assert SIMULATED.count(old) == 1
     path.write_text(SIMULATED.replace(old, new), encoding="utf-8")

@@ -2,6 +2,7 @@
 """`rockfall simulate --screen` and `rockfall design`: the tables and pages that they write, and what they refuse."""
 
 import csv
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,27 @@ def test_screens_have_tables_that_agree(tmp_path: Path, barriers: Path, capsys: 
     runs = {row["run"] for row in held}
     assert not [row for row in hits if row["structure"] == "road" and row["run"] in runs]
     assert "barrier holds" in capsys.readouterr().out
+
+
+def test_screens_of_a_project_are_those_of_a_file(tmp_path: Path, barriers: Path) -> None:
+    stated = tmp_path / "site" / "project.toml"
+    shutil.copytree(SITE, stated.parent, ignore=shutil.ignore_patterns("footage"))
+    arguments = ["simulate", str(stated), "--model", "noel_2017", "--number", "5", "--out"]
+    assert cli.main([*arguments, str(tmp_path / "file"), "--screen", str(barriers)]) == 0
+    more = """
+[[simulation.screens]]
+name = "barrier"
+points_m = [[988391.6, 6375682.0], [988410.0, 6375660.0], [988428.4, 6375648.0]]
+height_m = 3.0
+capacity_kJ = 15
+[[simulation.screens]]
+name = "road"
+points_m = [[988375.0, 6375655.0], [988405.0, 6375630.0]]
+"""
+    stated.write_text(stated.read_text(encoding="utf-8") + more, encoding="utf-8")
+    assert cli.main([*arguments, str(tmp_path / "stated")]) == 0
+    for name in ("hits.csv", "screens.csv"):
+        assert (tmp_path / "stated" / name).read_bytes() == (tmp_path / "file" / name).read_bytes()
 
 
 def test_a_design_sheet_of_the_demo(tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,6 +13,8 @@ from .options import (
     add_parameter_options,
     model_parameters,
     models_as_asked,
+    not_negative,
+    share,
     whole,
 )
 from .progress import PrintedProgress
@@ -20,6 +22,8 @@ from .progress import PrintedProgress
 if TYPE_CHECKING:
     from ..hazard.screens import Screen
     from ..simulation.ground import Ground
+
+CELL_M = 2.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--share",
-        type=float,
+        type=share,
         metavar="P",
         help="of the hits that do not exceed the characteristic values, 0.95 or 0.99 (default: that of the factors)",
     )
@@ -50,6 +54,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_parameter_options(parser)
     parser.add_argument("--number", type=whole, metavar="N", help="blocks from each release (default: the project's)")
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default: the project's)")
+    parser.add_argument(
+        "--cell",
+        type=not_negative,
+        default=CELL_M,
+        metavar="M",
+        help="side of the cells of maps [m], 0 for no maps (default %(default)g)",
+    )
     parser.add_argument(
         "--until-known",
         action="store_true",
@@ -105,6 +116,7 @@ def run(arguments: argparse.Namespace) -> int:
             title=project.site.name,
             share=arguments.share,
             measured=measured,
+            cell_m=arguments.cell or None,
             until_known=arguments.until_known,
             holdout=not arguments.no_holdout,
             threads=arguments.threads,

@@ -23,6 +23,7 @@ from .options import (
     models_as_asked,
     positive,
     reading_as_asked,
+    share,
     terrain_as_asked,
     whole,
     whole_range,
@@ -41,6 +42,7 @@ from .worker_options import add_worker_options, forget_chunks, several_workers, 
 if TYPE_CHECKING:
     from ..exchange.chunk_store import ChunkStore
     from ..hazard.cell_tally import CellTally
+    from ..hazard.screen_tally import ScreenTally
     from ..hazard.screens import Screen
     from ..reconstruction.trajectory import Reconstruction
     from ..simulation.ground import Ground
@@ -121,6 +123,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "space, and what a project has measured",
     )
     parser.add_argument(
+        "--until-known",
+        type=share,
+        metavar="P",
+        help="end as soon as the energy and height that this share of the hits of a screen does not exceed are known "
+        "to 5 %%, 0.95 for example; --number is then the most",
+    )
+    parser.add_argument(
         "--runs",
         type=whole_range,
         metavar="FIRST-LAST",
@@ -138,8 +147,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.simulation_output import default_records, recorded_for, write_simulations
     from ..output import output_folder
     from ..remarks import gravest_first
+    from ..workflow.enough import enough_remarks, in_chance_order
     from ..workflow.maps import map_models, map_remarks
-    from ..workflow.screens import screen_remarks, tallies_of
+    from ..workflow.screens import screen_remarks
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
@@ -152,6 +162,12 @@ def run(arguments: argparse.Namespace) -> int:
         screens, screen_files = _screens(arguments.screen, ground, scenario.screens)
         progress("Releasing the blocks")
         releases, first_run = _asked_runs(scenario.releases(ground), arguments.runs)
+        if arguments.until_known is not None:
+            if not screens:
+                raise InputError(
+                    "--until-known is known nowhere", advice="Give --screen: a line, or the closed outline of an area"
+                )
+            releases = in_chance_order(releases, scenario.seed)
         if record is None:
             record = default_records(len(releases)) if asked.record is None else asked.record
         kept: tuple[ChunkStore, ...] = ()
@@ -161,7 +177,7 @@ def run(arguments: argparse.Namespace) -> int:
                     "No GeoPackage is written of blocks on workers", advice="Leave out --workers or --geopackage"
                 )
             if screens:
-                raise InputError("Screens are not counted on workers yet", advice="Leave out --workers or --screen")
+                raise InputError("Screens are not counted on workers", advice="Leave out --workers or --screen")
             written, remarks, kept = simulate_on_workers(
                 arguments, scenario, ground, releases,
                 record=record, cell_m=asked.cell_m, first_run=first_run, folder=folder, inputs=asked.inputs,
@@ -169,19 +185,25 @@ def run(arguments: argparse.Namespace) -> int:
             )  # fmt: skip
         else:
             maps: dict[str, CellTally] = {}
+            tallies: dict[str, ScreenTally] = {}
             with stopped_by_interrupt(progress) as counted:
                 how = {
-                    "record": recorded_for(record, bool(scenario.structures), bool(screens)),
+                    "record": recorded_for(record, bool(scenario.structures)),
                     "first_run": first_run,
                     "threads": arguments.threads,
                     "progress": counted,
                 }
-                if asked.cell_m is None:
+                if asked.cell_m is None and not screens:
                     simulations = run_models(ground, releases, scenario.settings, **how)
                 else:
-                    simulations, maps = map_models(ground, releases, scenario.settings, asked.cell_m, **how)
-            tallies = tallies_of(simulations, screens, progress)
+                    until = arguments.until_known
+                    simulations, maps, tallies = map_models(
+                        ground, releases, scenario.settings, asked.cell_m, screens, until_known=until, **how
+                    )
             said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(tallies))
+            if arguments.until_known is not None:
+                for model, tally in tallies.items():
+                    said += tuple(enough_remarks(model, tally, arguments.until_known))
             remarks = gravest_first([*said])
             written = write_simulations(
                 simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=maps, screens=tallies,

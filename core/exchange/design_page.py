@@ -27,7 +27,8 @@ from ..progress import Progress, silent
 from ..remarks import to_plain
 from ..simulation.convergence import Quantile
 from ..workflow.design_figures import figures_of
-from ..workflow.design_sheet import ENERGY_LINES_DEG, KNOWN_TO, DesignSheet, ModelDesign
+from ..workflow.design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
+from ..workflow.enough import KNOWN_TO
 from .simulation_tables import inputs_with_digests
 
 if TYPE_CHECKING:

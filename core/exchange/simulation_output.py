@@ -30,7 +30,7 @@ def default_records(blocks: int) -> tuple[str, ...]:
 
 
 def recorded_for(tables: Collection[str], structures: bool, screens: bool = False) -> Recorded:
-    """What a simulation has to record for some of `RECORDS`, and for hits.csv where there are structures or screens."""
+    """What a simulation has to record for some of `RECORDS`, and for hits where there are structures or screens."""
     if TRAJECTORIES in tables or screens:
         return "all"
     return "impacts" if tables or structures else "ends"

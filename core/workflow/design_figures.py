@@ -9,6 +9,7 @@ import numpy as np
 from ..analysis.figures import MEASURED, MUTED, PAGE_IN, STYLE
 from ..analysis.whole_run_figures import model_colour
 from ..extras import FIGURES, demand
+from ..hazard.maps import LAYERS
 from ..hazard.screens import Screen, points_along
 from ..impact_models.registry import find_model
 from ..reconstruction.sampling import STEP_S, sample_trajectories
@@ -16,12 +17,14 @@ from ..simulation.parabolas import parabolas_of, polylines_of
 from ..simulation.results import fell_through
 from ..vectors import Array
 from .design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
-from .map_figures import DARKEST, Window, hillshade, north_arrow, scale_bar
+from .map_figures import DARKEST, Window, hillshade, map_figure, north_arrow, reached, scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+MAPPED = ("Reach_probability", "E_95CI")
+"""Maps that a sheet shows."""
 SCREEN_INK = "#111418"
 CELL_M = 0.5
 """Of the picture of the relief, at least."""
@@ -38,6 +41,11 @@ def figures_of(sheet: DesignSheet) -> "Iterator[tuple[str, str, Figure]]":
     """
     demand(FIGURES)
     yield "plan", "Simulated paths in colour, measured ones in black, screens as thick lines.", plan_figure(sheet)
+    for one in sheet.models:
+        title = find_model(one.settings.model).title
+        for name in MAPPED if one.maps is not None else ():
+            figure = map_figure_of(sheet, one, name)
+            yield f"{name} {one.settings.model}", f"{LAYERS[name].meaning}, with {title}, without barriers.", figure
     yield (
         "profile",
         "Seen from the side, along the mean way of the blocks: the highest and the lowest terrain that they pass over "
@@ -88,6 +96,21 @@ def plan_figure(sheet: DesignSheet) -> "Figure":
         scale_bar(axes, float(size[0]))
         north_arrow(axes)
         _legend(axes, sheet)
+    return figure
+
+
+def map_figure_of(sheet: DesignSheet, one: ModelDesign, name: str) -> "Figure":
+    """One map, with the screens on it."""
+    if one.maps is None:
+        raise ValueError("there are no maps")
+    terrain, window = sheet.ground.terrain, reached(one.maps)
+    shade = hillshade(terrain, window, one.maps.cells.size_m)
+    said = find_model(one.settings.model).title
+    figure = map_figure(one.maps, name, window, shade, terrain, said=said, releases=one.drawn.releases.position)
+    shift = terrain.shift
+    for screen in sheet.screens:
+        line = screen.line + np.array([shift.x, shift.y])
+        figure.axes[0].plot(*line.T, color=SCREEN_INK, linewidth=1.8, solid_capstyle="butt", zorder=6)
     return figure
 
 

@@ -14,7 +14,10 @@ from ..analysis.comparison import compare
 from ..analysis.estimation import FitOptions
 from ..analysis.scores import Score, scores
 from ..errors import InputError
+from ..hazard.cell_tally import CellTally
+from ..hazard.cells import cells_over
 from ..hazard.design import DesignValues, PartialFactors, design_values
+from ..hazard.maps import Maps
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import HELD, OUTCOMES, Screen, check_screens
 from ..impact_models.registry import find_model
@@ -27,12 +30,11 @@ from ..simulation.ground import Ground
 from ..simulation.release import Releases
 from ..simulation.results import run_figures
 from ..vectors import Array
+from .enough import KNOWN_TO, in_chance_order, is_known
 from .hazard import Counted, run_chunks
 
 DRAWN = 250
 """Runs of each model that are drawn, evenly among all."""
-KNOWN_TO = 0.05
-"""Blocks are enough when half the interval of a characteristic value is less than this part of it."""
 FEWEST_IMPACTS = 10
 """With fewer measured impacts nothing is said of how well a model fits them."""
 ENERGY_LINES_DEG = (28.5, 32.0, 33.5)
@@ -69,6 +71,7 @@ class ModelDesign:
     tally : the hits of all screens.
     values : screen → what a barrier there must have; no entry where no block comes.
     evidence : None where nothing was measured here.
+    maps : of all runs, without barriers; None where they were not asked for.
     drawn : some of the runs, for figures.
     energy_lines_deg : (n,) of those of them that come to rest, from the release to the stop.
     """
@@ -78,6 +81,7 @@ class ModelDesign:
     tally: ScreenTally
     values: Mapping[str, DesignValues]
     evidence: Evidence | None
+    maps: Maps | None
     drawn: Simulation
     energy_lines_deg: Array
 
@@ -115,6 +119,7 @@ def design_sheet(
     title: str = "",
     share: float | None = None,
     measured: Reconstruction | None = None,
+    cell_m: float | None = None,
     until_known: bool = False,
     holdout: bool = True,
     threads: int | None = None,
@@ -126,6 +131,7 @@ def design_sheet(
     ----------
     share : of the hits that do not exceed the characteristic values; None takes that of the factors.
     measured : trajectories of this site, for the evidence.
+    cell_m : side of the cells of maps; None for no maps.
     until_known : end as soon as the characteristic energy and height of every screen that blocks reach are known to
         `KNOWN_TO`; else all releases fall.
     holdout : whether the evidence tells how well a model predicts trajectories that it was not fitted to.
@@ -138,17 +144,26 @@ def design_sheet(
         raise InputError("There is no screen to design for", advice="Draw a line across the slope, and name it")
     check_screens(screens, ground)
     share = factors.share if share is None else share
+    if until_known:
+        releases = in_chance_order(releases, settings[0].seed)
     models = []
     for one in settings:
         tally = ScreenTally(screens)
+        cells = None if cell_m is None else CellTally(cells_over(ground.surface, cell_m))
 
         def enough(blocks: int, tally: ScreenTally = tally) -> bool:
-            return is_known(tally, factors, share)
+            return is_known(tally, share)
 
         counted = run_chunks(
-            ground, releases, one, [tally], threads=threads, enough=enough if until_known else None, progress=progress
+            ground,
+            releases,
+            one,
+            [tally] if cells is None else [tally, cells],
+            threads=threads,
+            enough=enough if until_known else None,
+            progress=progress,
         )
-        if counted.blocks < counted.wanted and not (until_known and is_known(tally, factors, share)):
+        if counted.blocks < counted.wanted and not (until_known and is_known(tally, share)):
             raise CancelledError
         values = design_of(tally, factors, share)
         if not values:
@@ -157,7 +172,8 @@ def design_sheet(
                 f"None of {counted.blocks} blocks with {one.model} comes to {names}",
                 advice="Draw a screen where blocks pass, or release more",
             )
-        models.append(_model_design(ground, releases, one, counted, tally, values, measured, holdout, progress))
+        maps = None if cells is None else cells.maps()
+        models.append(_model_design(ground, releases, one, counted, tally, values, measured, maps, holdout, progress))
     sheet = DesignSheet(title, ground, tuple(screens), factors, share, tuple(models), measured, ())
     return replace(sheet, remarks=tuple(_remarks(sheet)))
 
@@ -176,14 +192,6 @@ def design_of(tally: ScreenTally, factors: PartialFactors, share: float) -> dict
     return found
 
 
-def is_known(tally: ScreenTally, factors: PartialFactors, share: float) -> bool:
-    """Whether the characteristic energy and height of every screen that blocks reach are known to `KNOWN_TO`."""
-    values = design_of(tally, factors, share).values()
-    return bool(values) and all(
-        one.energy_j.known_to <= KNOWN_TO and one.height_m.known_to <= KNOWN_TO for one in values
-    )
-
-
 def _model_design(
     ground: Ground,
     releases: Releases,
@@ -192,6 +200,7 @@ def _model_design(
     tally: ScreenTally,
     values: Mapping[str, DesignValues],
     measured: Reconstruction | None,
+    maps: Maps | None,
     holdout: bool,
     progress: Progress,
 ) -> ModelDesign:
@@ -200,7 +209,7 @@ def _model_design(
     drawn = simulate(ground, releases.take(some), settings)
     lines = np.degrees(run_figures(drawn).energy_line)[drawn.at_rest]
     evidence = None if measured is None else evidence_of(measured.impacts, settings, holdout, progress)
-    return ModelDesign(settings, counted, tally, values, evidence, drawn, lines[np.isfinite(lines)])
+    return ModelDesign(settings, counted, tally, values, evidence, maps, drawn, lines[np.isfinite(lines)])
 
 
 def evidence_of(

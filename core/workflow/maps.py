@@ -7,11 +7,15 @@ from dataclasses import replace
 from ..errors import InputError
 from ..hazard.cell_tally import CellTally
 from ..hazard.cells import cells_over
+from ..hazard.screen_tally import ScreenTally
+from ..hazard.screens import Screen, check_screens
+from ..hazard.tally import Tally
 from ..progress import CancelledError, Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Settings, Simulation, check_settings, joined
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
+from .enough import is_known
 from .hazard import run_chunks
 
 FEW = 20
@@ -22,24 +26,29 @@ def map_models(
     ground: Ground,
     releases: Releases,
     settings: Sequence[Settings],
-    cell_m: float,
+    cell_m: float | None,
+    screens: Sequence[Screen] = (),
     *,
+    until_known: float | None = None,
     record: Recorded = "ends",
     first_run: int = 0,
     threads: int | None = None,
     progress: Progress = silent,
-) -> tuple[tuple[Simulation, ...], dict[str, CellTally]]:
-    """Let the same blocks fall once for each of the settings, and map them.
+) -> tuple[tuple[Simulation, ...], dict[str, CellTally], dict[str, ScreenTally]]:
+    """Let the same blocks fall once for each of the settings, map them, and look at what passes screens.
 
     Parameters
     ----------
-    cell_m : side of the cells, which cover the terrain.
+    cell_m : side of the cells, which cover the terrain; None for no maps.
+    until_known : end when the values that this share of the hits does not exceed are known at the screens; the
+        simulations then have the blocks that were enough.
     record, first_run, threads, progress : see `run_models`. The maps do not depend on what is recorded.
 
     Returns
     -------
     simulations : as those of `run_models`.
-    tallies : model → what its maps are made of.
+    maps : model → what its maps are made of.
+    screens : model → what passes the screens.
 
     Raises
     ------
@@ -48,31 +57,44 @@ def map_models(
     """
     if not settings:
         raise InputError("There is no model to simulate with", advice="Give at least one impact model")
-    cells = cells_over(ground.surface, cell_m)
+    check_screens(screens, ground)
+    cells = None if cell_m is None else cells_over(ground.surface, cell_m)
     for one in settings:
         check_settings(ground, one)
-    n, simulations, tallies = len(releases), list[Simulation](), dict[str, CellTally]()
+    n, simulations = len(releases), list[Simulation]()
+    maps, passed = dict[str, CellTally](), dict[str, ScreenTally]()
     for place, one in enumerate(settings):
-        parts, tally = list[Simulation](), CellTally(cells)
+        parts, hits = list[Simulation](), ScreenTally(screens)
+        tallies: list[Tally] = [] if cells is None else [CellTally(cells)]
+        if screens:
+            tallies.append(hits)
 
         def told(text: str, done: int = 0, _: int = 0, place: int = place, model: str = one.model) -> None:
             progress(f"{text} {model}", place * n + done, len(settings) * n)
 
+        def enough(_: int, hits: ScreenTally = hits) -> bool:
+            return until_known is not None and is_known(hits, until_known)
+
         try:
             counted = run_chunks(
-                ground, releases, one, [tally], first_run=first_run, threads=threads, take=parts.append,
-                record=record, progress=told,
+                ground, releases, one, tallies, first_run=first_run, threads=threads, take=parts.append,
+                record=record, enough=None if until_known is None else enough, progress=told,
             )  # fmt: skip
         except CancelledError:
             if not simulations:
                 raise
             break
         whole = joined(parts, releases.take(slice(0, counted.blocks)))
-        simulations.append(replace(whole, wanted=n, seconds=counted.seconds, first_run=first_run))
-        tallies[one.model] = tally
-        if counted.blocks < n:
+        ended = until_known is not None and is_known(hits, until_known)
+        wanted = counted.blocks if ended else n
+        simulations.append(replace(whole, wanted=wanted, seconds=counted.seconds, first_run=first_run))
+        if isinstance(tallies[0], CellTally):
+            maps[one.model] = tallies[0]
+        if screens:
+            passed[one.model] = hits
+        if counted.blocks < wanted:
             break
-    return tuple(simulations), tallies
+    return tuple(simulations), maps, passed
 
 
 def map_remarks(tallies: Mapping[str, CellTally]) -> tuple[Remark, ...]:

@@ -75,7 +75,17 @@ points_m = [[988375.0, 6375655.0], [988405.0, 6375630.0]]
 
 def test_a_design_sheet_of_the_demo(tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    arguments = ["design", str(SITE / "project.toml"), "--number", "20", "--no-holdout", "--factors", "none"]
+    arguments = [
+        "design",
+        str(SITE / "project.toml"),
+        "--number",
+        "20",
+        "--no-holdout",
+        "--factors",
+        "none",
+        "--cell",
+        "4",
+    ]
     assert cli.main([*arguments, "--screen", str(barriers), "--out", str(out)]) == 0
     assert {path.name for path in out.iterdir()} == {"design.html", "design.pdf", "design.json", "screens.csv"}
     said = capsys.readouterr().out
@@ -83,6 +93,7 @@ def test_a_design_sheet_of_the_demo(tmp_path: Path, barriers: Path, capsys: pyte
     html = (out / "design.html").read_text(encoding="utf-8")
     assert "Evidence: the impacts that were measured on this site" in html
     assert "EPSG:2154" in html
+    assert html.count("<img ") == 6  # plan, two maps, profile, two screens
 
 
 @pytest.mark.parametrize(
@@ -114,3 +125,28 @@ def test_a_design_without_a_screen_or_with_unknown_factors_says_what_to_do(
     assert "--screen is missing" in capsys.readouterr().err
     assert cli.main(["design", project, "--screen", str(barriers), "--factors", "uni", "--out", out]) == 1
     assert "uni_11211_4_literature" in capsys.readouterr().err
+
+
+def test_it_ends_when_the_values_are_known_and_says_how_many_it_took(
+    tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rockfall.core.workflow.enough.KNOWN_TO", 0.5)
+    monkeypatch.setattr("rockfall.core.workflow.hazard.CHUNK", 200)
+    arguments = ["simulate", str(SITE / "project.toml"), "--model", "noel_2017", "--number", "60", "--record", "none"]
+    out = tmp_path / "out"
+    assert cli.main([*arguments, "--screen", str(barriers), "--until-known", "0.95", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    found = len(rows(out / "runs.csv"))
+    assert 200 <= found < 900
+    assert f"{found} blocks with noel_2017 are enough" in said
+    assert len({row["release"] for row in rows(out / "runs.csv")}) == 15, "of all releases"
+    assert cli.main([*arguments, "--until-known", "0.95", "--out", str(out)]) == 1
+    assert "known nowhere" in capsys.readouterr().err
+
+
+def test_screens_without_maps_and_with_them_are_the_same(tmp_path: Path, barriers: Path) -> None:
+    arguments = ["simulate", str(SITE / "project.toml"), "--model", "noel_2017", "--number", "4"]
+    for name, more in (("plain", []), ("mapped", ["--cell", "5"])):
+        assert cli.main([*arguments, "--screen", str(barriers), *more, "--out", str(tmp_path / name)]) == 0
+    for table in ("hits.csv", "screens.csv", "runs.csv"):
+        assert (tmp_path / "plain" / table).read_bytes() == (tmp_path / "mapped" / table).read_bytes()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 EPILOG = """examples:
   rockfall batch sites simulate --number 1000 --out results
   rockfall batch sweep.toml simulate --out results --jobs 4
-  rockfall batch sites track '{folder}/run.mp4' --start 120 … --out tracks
+  rockfall batch sites track '{folder}/run.mp4' --clicks '{folder}/clicks.csv' --out tracks
 
 COMMAND is run once for each project, which it gets as its first argument; where its options have {project} or
 {folder}, these stand for the project's file or its folder instead. A batch that was stopped, or in which projects were

@@ -13,7 +13,7 @@ from .fitting_options import (
     table_of,
     wrapped,
 )
-from .options import add_out, naming
+from .options import add_out, impacts_as_asked, naming
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv, or a project.toml with picks")
     add_out(parser)
     parser.add_argument("--model", required=True, metavar="NAME", help="of the model (`rockfall models` lists them)")
     add_fit_arguments(
@@ -41,7 +41,6 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.calibration import calibrate
     from ..exchange.calibration_tables import write_estimates, write_folds
     from ..exchange.parameters import write_parameters
-    from ..exchange.tables import read_impacts
     from ..impact_models.registry import find_model
     from ..output import output_folder
 
@@ -49,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     names, fixed = parameter_names(model, arguments.fit), parameter_values(model, arguments.set)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
-        impacts, options = read_impacts(arguments.impacts), fit_options(arguments)
+        impacts, options = impacts_as_asked(arguments.impacts), fit_options(arguments)
         result = calibrate(
             impacts, model.name, names, fixed, options, holdout=not arguments.no_holdout, progress=progress
         )

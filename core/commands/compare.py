@@ -17,6 +17,7 @@ from .options import (
     add_terrain_files,
     add_terrain_options,
     figure_formats,
+    impacts_as_asked,
     measured_as_asked,
     model_parameters,
     models_as_asked,
@@ -39,7 +40,7 @@ SHOWN = (("rn", "R_N"), ("rt", "R_T"), ("r", "R"), ("theta_dev_deg", "θ_dev [°
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv")
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv, or a project.toml with picks")
     add_out(parser)
     add_model_option(parser, "models to compare (default: the six of Noël et al. 2018)")
     add_parameter_options(parser)
@@ -71,7 +72,6 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.scores import scores
     from ..exchange.comparison_tables import write_predictions, write_scores, write_settings
     from ..exchange.predicted_flight_tables import write_predicted_flights
-    from ..exchange.tables import read_impacts
     from ..impact_models.registry import COMPARED
     from ..output import output_folder
 
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     measured = measured_as_asked(arguments, models)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.impacts):
         progress(f"Reading {arguments.impacts}")
-        impacts = read_impacts(arguments.impacts)
+        impacts = impacts_as_asked(arguments.impacts)
         progress("Comparing")
         predictions = compare(
             impacts,

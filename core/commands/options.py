@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..exchange.database import Database
     from ..impact_models.machinery.measured import MeasuredRebounds
     from ..progress import Progress
+    from ..reconstruction.impact import Impacts
     from ..terrain.opening import HowToRead
     from ..terrain.surface import Surface
 
@@ -272,6 +273,23 @@ def tables_as_asked(
         package = Path(path).is_dir() or Path(path).suffix == ".json"
         parts.append(read_package(path) if package else read_source(path, site, licence))
     return parts
+
+
+def impacts_as_asked(file: str) -> "Impacts":
+    """Read impacts.csv, or reconstruct those of a project.
+
+    Raises
+    ------
+    RockfallError : see `read_impacts` and `open_project`.
+    """
+    from ..exchange.opening import open_project
+    from ..exchange.project import read_project
+    from ..exchange.tables import read_impacts
+
+    if not file.endswith(".toml"):
+        return read_impacts(file)
+    with naming(file):
+        return open_project(read_project(file))[1].impacts
 
 
 def add_model_option(parser: argparse.ArgumentParser, text: str, flag: str = "--model") -> None:

@@ -5,19 +5,22 @@ import argparse
 from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
+from ..errors import InputError
 from ..reconstruction.sampling import STEP_S
 from .options import add_out, add_terrain_files, add_terrain_options, naming, not_negative, positive, terrain_as_asked
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..reconstruction.block import Block
+    from ..reconstruction.trajectory import Reconstruction
+    from ..terrain.surface import Surface
 
 DEFAULT_DIAMETER_M = 0.35
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("picks", metavar="PICKS", help="picks.csv")
+    parser.add_argument("picks", metavar="PICKS", help="picks.csv; or project.toml, which says the rest itself")
     add_out(parser)
     add_terrain_files(parser, "mesh, grid or cloud; not needed with nx, ny, nz")
     parser.add_argument(
@@ -80,37 +83,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, write the tables, print the summary."""
-    from ..exchange.tables import read_picks, write_impacts, write_trajectories
+    from ..exchange.tables import write_impacts, write_trajectories
     from ..output import output_folder
-    from ..plausibility import check_plausible
-    from ..reconstruction.drag import Drag
     from ..reconstruction.sampling import sample_trajectories
     from ..reconstruction.summary import summarise
-    from ..reconstruction.trajectory import reconstruct
-    from ..workflow.uprightness import turned_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.picks}")
-        picks = read_picks(arguments.picks)
-        surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
-        picks, turned = turned_picks(picks, surface)
-        block = _block(arguments)
-        check_plausible("air_density_kgpm3", arguments.air_density, "density of the air")
-        check_plausible("drag_coefficient", arguments.drag_coefficient, "drag coefficient")
-        drag = Drag(arguments.air_density, arguments.drag_coefficient) if arguments.drag else None
-        progress("Reconstructing")
-        with naming(arguments.picks):
-            reconstruction = reconstruct(
-                picks,
-                surface=surface,
-                block=block,
-                gravity_mps2=arguments.gravity,
-                drag=drag,
-                normal_radius_m=arguments.normal_radius,
-                site=arguments.site,
-                eq10=arguments.eq10,
-                flights=arguments.flights,
-            )
+        made = _of_project if arguments.picks.endswith(".toml") else _of_table
+        surface, reconstruction, turned = made(arguments, progress)
         progress("Writing the tables")
         write_impacts(reconstruction.impacts, folder / "impacts.csv")
         write_trajectories(sample_trajectories(reconstruction, arguments.step, surface), folder / "trajectories.csv")
@@ -118,6 +99,60 @@ def run(arguments: argparse.Namespace) -> int:
         print(sentence)
     print(f"Written: impacts.csv, trajectories.csv in {arguments.out}")
     return 0
+
+
+type _Made = tuple["Surface | None", "Reconstruction", tuple[str, ...]]
+
+
+def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Made:
+    """As the options say."""
+    from ..exchange.tables import read_picks
+    from ..plausibility import check_plausible
+    from ..reconstruction.drag import Drag
+    from ..reconstruction.trajectory import reconstruct
+    from ..workflow.uprightness import turned_picks
+
+    picks = read_picks(arguments.picks)
+    surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
+    picks, turned = turned_picks(picks, surface)
+    block = _block(arguments)
+    check_plausible("air_density_kgpm3", arguments.air_density, "density of the air")
+    check_plausible("drag_coefficient", arguments.drag_coefficient, "drag coefficient")
+    drag = Drag(arguments.air_density, arguments.drag_coefficient) if arguments.drag else None
+    progress("Reconstructing")
+    with naming(arguments.picks):
+        reconstruction = reconstruct(
+            picks,
+            surface=surface,
+            block=block,
+            gravity_mps2=arguments.gravity,
+            drag=drag,
+            normal_radius_m=arguments.normal_radius,
+            site=arguments.site,
+            eq10=arguments.eq10,
+            flights=arguments.flights,
+        )
+    return surface, reconstruction, turned
+
+
+def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Made:
+    """As a project says."""
+    from ..exchange.opening import open_project
+    from ..exchange.project import read_project
+
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    plain = vars(parser.parse_args([arguments.picks, "--out", arguments.out]))
+    for action in parser._actions:
+        given = getattr(arguments, action.dest, None) != plain.get(action.dest)
+        if given and action.dest not in ("out", "step"):
+            raise InputError(
+                f"{action.option_strings[0]} is what a project says itself", advice="Write it into the project"
+            )
+    project = read_project(arguments.picks)
+    progress("Reconstructing")
+    with naming(arguments.picks):
+        return *open_project(project), ()
 
 
 def _block(arguments: argparse.Namespace) -> "Block":

@@ -178,3 +178,22 @@ def test_zones_of_a_project_have_their_parameters(folder: Path, capsys) -> None:
     with_attribute = project(folder, '[simulation.zones]\nfile = "zones.csv"\nattribute = "soil"')
     assert main(["simulate", str(with_attribute), "--record", "none", "--out", str(folder / "other")]) == 1
     assert "The file has no attribute 'soil'" in capsys.readouterr().err
+
+
+def test_a_project_is_reconstructed_and_compared_as_its_table_with_the_same_options(folder: Path, capsys) -> None:
+    path = project(folder, "[reconstruction]\nnormal_radius_m = 1.0\n")
+    options = ["--terrain", str(folder / "terrain.ply"), "--diameter", "0.4", "--normal-radius", "1"]
+    said, typed = folder / "said", folder / "typed"
+    assert main(["reconstruct", str(path), "--out", str(said)]) == 0
+    assert main(["reconstruct", str(folder / "picks.csv"), *options, "--out", str(typed)]) == 0
+    for name in ("impacts.csv", "trajectories.csv"):
+        assert (said / name).read_bytes() == (typed / name).read_bytes()
+    for source, out in ((path, "of_project"), (said / "impacts.csv", "of_table")):
+        assert main(["compare", str(source), "--tables-only", "--out", str(folder / out)]) == 0
+    predictions = [rows_of(folder / out / "predictions.csv") for out in ("of_project", "of_table")]
+    assert len(predictions[0]) == len(predictions[1]) > 0
+    speeds = [numbers(rows, "v2x_mps", "v2y_mps", "v2z_mps") for rows in predictions]
+    np.testing.assert_allclose(*speeds, atol=1e-4)
+    capsys.readouterr()
+    assert main(["reconstruct", str(path), "--diameter", "0.5", "--out", str(folder / "no")]) == 1
+    assert "--diameter is what a project says itself" in capsys.readouterr().err

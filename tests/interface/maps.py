@@ -41,12 +41,12 @@ def case_maps_of_the_demo(window):
     spot = location_3d_to_region_2d(region, view, Vector((x, y, z)))
     yield from window.move(region.x + spot.x, region.y + spot.y)
     yield 1.0
-    window.screenshot("1-reach")
+    reach = window.screenshot("1-reach")
     settings().map_layer = "E_95CI"
     yield 0.5
     yield from window.move(region.x + spot.x - 2, region.y + spot.y)
     yield 1.0
-    window.screenshot("2-energy")
+    assert window.screenshot("2-energy").read_bytes() != reach.read_bytes(), "another map is painted at once"
     settings().seed = 5
     light = Path(bpy.utils.system_resource("SCRIPTS")) / "presets" / "interface_theme" / "Blender_Light.xml"
     bpy.ops.script.execute_preset(filepath=str(light), menu_idname="USERPREF_MT_interface_theme_presets")

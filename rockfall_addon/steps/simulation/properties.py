@@ -19,10 +19,15 @@ from ....core.hazard.maps import LAYERS
 from ....core.simulation.block_shapes import SHAPES
 from ....core.simulation.engine import FRICTION
 from ...scene import drawn_releases, models, simulation, store
+from ...view.reporting import redraw
 
 
 def _look_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     simulation.look(self.id_data)
+
+
+def _map_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    redraw(context)
 
 
 def _can_be_source(self: bpy.types.PropertyGroup, obj: bpy.types.Object) -> bool:
@@ -183,12 +188,15 @@ class SimulationSettings(bpy.types.PropertyGroup):
     map_layer: EnumProperty(
         name="Map", description="What is painted on the terrain",
         items=[(name, layer.title, f"{layer.meaning} ({name})") for name, layer in LAYERS.items()],
-        default="Reach_probability",
+        default="Reach_probability", update=_map_changed,
     )  # fmt: skip
-    show_map: BoolProperty(name="Show on the Terrain", description="Paint the map on the terrain", default=True)
-    probe_map: BoolProperty(
-        name="Numbers under the Mouse", description="The numbers of the cell under the mouse, beside it", default=True
+    show_map: BoolProperty(
+        name="Show on the Terrain", description="Paint the map on the terrain", default=True, update=_map_changed
     )
+    probe_map: BoolProperty(
+        name="Numbers under the Mouse", description="The numbers of the cell under the mouse, beside it", default=True,
+        update=_map_changed,
+    )  # fmt: skip
 
     run_model: StringProperty(name="Model", description="Of the selected run")
     run: IntProperty(

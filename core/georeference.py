@@ -32,6 +32,7 @@ class GlobalShift:
     ----------
     x, y, z : the survey coordinates of the local origin [m].
     crs : coordinate reference system as the source states it ("EPSG:2056"), empty when unknown.
+    vertical : the system of the heights, likewise ("EPSG:5728").
 
     Raises
     ------
@@ -42,6 +43,7 @@ class GlobalShift:
     y: float = 0.0
     z: float = 0.0
     crs: str = ""
+    vertical: str = ""
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.vector).all():

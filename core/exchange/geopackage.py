@@ -88,7 +88,7 @@ def write_geopackage(
                 _write_layer(database, layer, shift, system, spatial)
                 written.append(layer.name)
         _write_styles(database)
-        said = {"crs": shift.crs or UNKNOWN, "vertical_datum": UNKNOWN, "unit": "m", **(about or {})}
+        said = {"crs": shift.crs or UNKNOWN, "vertical_datum": shift.vertical or UNKNOWN, "unit": "m", **(about or {})}
         _write_about(database, said)
     return tuple(written)
 

@@ -26,6 +26,7 @@ LARGE_BYTES = 3_500_000_000
 PIXEL_SCALE, TIE_POINT, GEOKEYS, GDAL_METADATA, GDAL_NODATA = 33550, 33922, 34735, 42112, 42113
 DOUBLE, SHORT, ASCII = 12, 3, 2
 MODEL_TYPE, PROJECTED, RASTER_TYPE, AREA, PROJECTED_CRS, LINEAR_UNIT, METRE = 1024, 1, 1025, 1, 3072, 3076, 9001
+VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099
 
 
 def epsg_code(crs: str) -> int | None:
@@ -65,7 +66,12 @@ def write_map(
         raise InputError(f"A map of {values.shape} values is not one of {cells.shape} cells", file=Path(path))
     import tifffile
 
-    said = {"MEANING": layer.meaning, "CRS": shift.crs or UNKNOWN, "VERTICAL_DATUM": UNKNOWN, **(about or {})}
+    said = {
+        "MEANING": layer.meaning,
+        "CRS": shift.crs or UNKNOWN,
+        "VERTICAL_DATUM": shift.vertical or UNKNOWN,
+        **(about or {}),
+    }
     tags = [*_place(cells, shift, Path(path)), (GDAL_METADATA, ASCII, 0, _metadata(layer, said), True)]
     nodata = (GDAL_NODATA, ASCII, 0, f"{NODATA:g}", True)
     pictures = _with_overviews(np.ascontiguousarray(values[::-1], dtype=np.float32))
@@ -97,6 +103,9 @@ def _place(cells: Cells, shift: GlobalShift, path: Path) -> list[tuple[int, int,
     code = epsg_code(shift.crs)
     if code is not None:  # without one any key would make readers invent a system
         keys = [(MODEL_TYPE, PROJECTED), (RASTER_TYPE, AREA), (PROJECTED_CRS, code), (LINEAR_UNIT, METRE)]
+        vertical = epsg_code(shift.vertical)
+        if vertical is not None:
+            keys += [(VERTICAL_CRS, vertical), (VERTICAL_UNIT, METRE)]
         directory = [1, 1, 0, len(keys)] + [number for key, value in keys for number in (key, 0, 1, value)]
         tags.append((GEOKEYS, SHORT, len(directory), tuple(directory), True))
     return tags

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 GEOGRAPHIC_TYPE, PROJECTED_TYPE = 2048, 3072
+VERTICAL_TYPE = 4096
 MODEL_TYPE, MODEL_GEOGRAPHIC = 1024, 2
 USER_DEFINED = 32767
 
@@ -17,6 +18,12 @@ def crs_from_geokeys(keys: Sequence[tuple[int, int]]) -> tuple[str, bool]:
     geographic = not code and (values.get(MODEL_TYPE) == MODEL_GEOGRAPHIC or GEOGRAPHIC_TYPE in values)
     code = code or values.get(GEOGRAPHIC_TYPE, 0)
     return (f"EPSG:{code}" if 0 < code < USER_DEFINED else ""), geographic
+
+
+def vertical_from_geokeys(keys: Sequence[tuple[int, int]]) -> str:
+    """ "EPSG:5728" of the heights, or "", from GeoTIFF keys (id, value)."""
+    code = dict(keys).get(VERTICAL_TYPE, 0)
+    return f"EPSG:{code}" if 0 < code < USER_DEFINED else ""
 
 
 def crs_from_wkt(text: str) -> tuple[str, bool]:

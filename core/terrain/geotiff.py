@@ -12,7 +12,7 @@ from ..memory import check_memory
 from ..opencv import quiet_opencv
 from ..reading import check_promise, reading
 from ..vectors import Array
-from .crs import crs_beside, crs_from_geokeys
+from .crs import crs_beside, crs_from_geokeys, vertical_from_geokeys
 from .source import Source
 
 PIXEL_IS_POINT, RASTER_TYPE = 2, 1025
@@ -68,7 +68,14 @@ def read_geotiff(path: Path) -> Source:
     if bands > 1:
         notes.append(f"The first of {bands} bands is taken as the height.")
     points = np.stack([x, y, heights], axis=-1).reshape(-1, 3)
-    return Source(points, grid_shape=(rows, columns), crs=crs, geographic=geographic, notes=tuple(notes))
+    return Source(
+        points,
+        grid_shape=(rows, columns),
+        crs=crs,
+        geographic=geographic,
+        notes=tuple(notes),
+        vertical=vertical_from_geokeys(keys),
+    )
 
 
 def _first_band(page: Any, path: Path) -> NDArray[Any]:

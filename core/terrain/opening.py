@@ -149,6 +149,8 @@ def _localised(
     low, high = box_of(points[heights], path)
     advice.refuse_degrees(source, low, high, how.unit_m, path)
     shift = _shift(shift, low, high, source.crs, path)
+    if source.vertical and not shift.vertical:
+        shift = replace(shift, vertical=source.vertical)
     said = [*advice.sentences(low, high, shift)]
     if source.kind == "cloud" and advice.faces_along_y(points):
         said.append(advice.Y_UP)

@@ -21,6 +21,7 @@ class Source:
     faces : (m, 3) of a mesh.
     grid_shape : (rows, columns) of a grid.
     crs : "EPSG:2056", another name that the file gives, or empty.
+    vertical : the system of the heights, likewise.
     geographic : the file says that its coordinates are degrees.
     up : axis that points up by the format's standard.
     turned : y was up, and the points were turned.
@@ -35,6 +36,7 @@ class Source:
     up: str = "z"
     turned: bool = False
     notes: tuple[str, ...] = ()
+    vertical: str = ""
 
     @property
     def kind(self) -> str:

@@ -17,6 +17,7 @@ from rockfall.core.hazard.cells import Cells
 from rockfall.core.hazard.classes import classes_of
 from rockfall.core.hazard.maps import LAYERS
 from rockfall.core.terrain.geotiff import read_geotiff
+from rockfall.core.terrain.readers import read_terrain
 
 CELLS = Cells(-20.0, -30.0, 2.0, 700, 300)
 SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 800.0, "EPSG:2056")
@@ -94,6 +95,18 @@ def test_a_system_without_a_code_is_named_and_not_invented(tmp_path, values, crs
     rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
     with rasterio.open(path) as raster:
         assert raster.crs is None
+
+
+def test_the_vertical_system_of_a_terrain_comes_back_in_its_maps(tmp_path, values):
+    """A terrain with heights in LN02: known after it was opened, and in what is written of it."""
+    shift = GlobalShift(2_600_000.0, 1_200_000.0, 0.0, "EPSG:2056", "EPSG:5728")
+    path = written(tmp_path / "heights.tif", np.full(CELLS.shape, 500.0), shift)
+    opened = read_terrain(path).shift
+    assert (opened.crs, opened.vertical) == ("EPSG:2056", "EPSG:5728")
+    assert items_of(written(tmp_path / "b.tif", values, opened))["VERTICAL_DATUM"] == "EPSG:5728"
+    rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
+    with rasterio.open(path) as raster:
+        assert raster.crs.to_epsg() == 2056 or "2056" in raster.crs.to_wkt()
 
 
 def test_the_same_map_is_the_same_file(tmp_path, values):

@@ -53,6 +53,8 @@ CHECKED = 500
 TRUTHS = 200
 """Simulated data sets with known parameters that are analysed as the observed one is."""
 RUNS_AT_ONCE = 16_384
+FAR_M = 1e9
+"""No run is longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,13 +161,14 @@ def observe_values(observed: Observed, sections: Sequence[Section], ground: Grou
     InputError : none does.
     """
     paths = observed.paths
-    axis, limits = axis_of(paths), Limits.of(paths)
+    axis, limits = axis_of(paths), _limits(paths)
 
     def measure(these: Paths) -> dict[Key, Array]:
         return _measured(these, sections, axis, ground, limits)
 
     found = measure(paths)
-    found["", "impacts_per_m"][limits.impacts < 2] = np.nan  # the way to the first impact is that of the release
+    few = np.bincount(paths.run[paths.impact_piece], minlength=len(paths)) < 2
+    found["", "impacts_per_m"][few] = np.nan  # the way to the first impact is that of the release
     sigma = errors_of(observed, found, measure)
     seen = {key: np.isfinite(column) for key, column in found.items()}
     for section in sections:
@@ -181,6 +184,16 @@ def observe_values(observed: Observed, sections: Sequence[Section], ground: Grou
         )
     return ObservedValues(
         paths.name, keys, columns_of(keys, found), columns_of(keys, sigma), columns_of(keys, seen).astype(np.bool_)
+    )
+
+
+def _limits(paths: Paths) -> Limits:
+    """Up to where runs were observed; those that were seen to their stop have no limit: it would tell of them."""
+    limits, whole = Limits.of(paths), paths.whole & np.isfinite(paths.stop[:, 0])
+    return Limits(
+        np.where(whole, np.iinfo(np.intp).max, limits.impacts),
+        np.where(whole, FAR_M, limits.length_m),
+        limits.shortest_s,
     )
 
 
@@ -253,7 +266,7 @@ class _Work:
         if len(simulation) < simulation.wanted:
             raise CancelledError
         paths = self.observed.paths
-        limits, axis = Limits.of(paths).take(np.tile(np.arange(n), size)), axis_of(paths)
+        limits, axis = _limits(paths).take(np.tile(np.arange(n), size)), axis_of(paths)
         found = _measured(simulated_paths(simulation), self.sections, axis, self.ground, limits)
         return columns_of(self.values.keys, found).reshape(size, n, -1)
 

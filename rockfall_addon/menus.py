@@ -70,7 +70,8 @@ STEPS = (
         "rockfall.set_up_film", "rockfall.preview_film", "rockfall.render_film", "rockfall.remove_film",
     )),
     ("share", "10  Share", (
-        "rockfall.export_tables", "rockfall.export_graphs", "rockfall.export_simulation", "rockfall.export_project",
+        "rockfall.export_tables", "rockfall.export_graphs", "rockfall.export_simulation",
+        "rockfall.design_sheet", "rockfall.export_project",
     )),
 )  # fmt: skip
 """Name, title and entries of each menu: an operator, or an operator with its text and properties; None is a line."""

@@ -54,13 +54,20 @@ class Table:
 
 
 def write_design(
-    sheet: DesignSheet, folder: Path, inputs: Mapping[str, Path], *, pdf: bool = True, progress: Progress = silent
+    sheet: DesignSheet,
+    folder: Path,
+    inputs: Mapping[str, Path],
+    *,
+    pdf: bool = True,
+    drawn: bool = True,
+    progress: Progress = silent,
 ) -> list[str]:
     """Write design.html, design.pdf and design.json into a folder; returns their names.
 
     Parameters
     ----------
     inputs : what it is → file: their hashes are on the page.
+    drawn : whether there are figures, and so a PDF; a page without them says so, and needs no Matplotlib.
 
     Raises
     ------
@@ -70,12 +77,12 @@ def write_design(
     facts = provenance(sheet, inputs)
     tables = tuple(tables_of(sheet))
     figures = []
-    for name, caption, figure in figures_of(sheet):
+    for name, caption, figure in figures_of(sheet) if drawn else ():
         progress(f"Drawing {name}", 0, 0)
         figures.append((name, caption, figure))
     write_text(folder / "design.html", page(sheet, tables, facts, figures))
     written = ["design.html"]
-    if pdf:
+    if pdf and drawn:
         progress("Writing the PDF", 0, 0)
         _write_pdf(sheet, tables, facts, figures, folder / "design.pdf")
         written.append("design.pdf")
@@ -283,13 +290,17 @@ def page(
         'img-src data:">'
         f'<title>{title}</title><link rel="icon" href="data:,"><style>{STYLE_FILE.read_text(encoding="utf-8")}</style>'
         f"</head><body><header><h1>{title}</h1><p>{escape(_summary(sheet))}</p></header><main>"
-        f'<ul class="remarks">{remarks}</ul>{_html(tables[0])}<section class="figures">{pictures}</section>'
+        f'<ul class="remarks">{remarks}</ul>{_html(tables[0])}'
+        f'<section class="figures">{pictures or NO_FIGURES}</section>'
         f"{body[len(_html(tables[0])) :]}"
         f'<h2>Inputs and versions</h2><div class="scroll"><table class="facts">{rows}</table></div>'
         f"<h2>What this sheet does not say</h2><p>{escape(LIMITS)}</p></main></body></html>\n"
     )
 
 
+NO_FIGURES = (
+    "<p>No figures: this page was made where Matplotlib is not installed. <code>rockfall design</code> draws them.</p>"
+)
 LIMITS = (
     "How often blocks fall: everything here is conditional on the release that is given above. That the blocks do not "
     "break, and do not meet each other. What trees, water, snow or an earlier block would change. That a barrier is "

@@ -136,3 +136,15 @@ def test_a_project_takes_screens_along(slope: bpy.types.Scene, screen: bpy.types
     np.testing.assert_allclose(again.line, [[FOOT_X, -1.0], [FOOT_X, 60.0], [FOOT_X, 121.0]], atol=1e-5)
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     assert result(part, scene)["reach"] > 0
+
+
+def test_the_design_sheet_of_a_drawn_screen(
+    slope: bpy.types.Scene, screen: bpy.types.Object, part, tmp_path: Path
+) -> None:
+    out = tmp_path / "sheet"
+    screen.rockfall_screen.holds = True
+    assert bpy.ops.rockfall.design_sheet(directory=str(out), factors="none", holdout=False) == {"FINISHED"}
+    assert {"design.html", "design.json", "screens.csv"} <= {path.name for path in out.iterdir()}
+    assert "road" in (out / "design.html").read_text(encoding="utf-8")
+    bpy.ops.rockfall.remove_screen(name="road")
+    assert not bpy.ops.rockfall.design_sheet.poll(), "there is nothing to design for"

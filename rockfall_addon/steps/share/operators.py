@@ -13,9 +13,12 @@ from ....core.output import output_folder
 from ....core.progress import Progress
 from ....core.reconstruction.sampling import sample_trajectories
 from ....core.remarks import Remark
-from ...scene import project, reconstruction, simulation, simulation_setup, spins, store, terrain, trails
+from ...scene import design_sheet, project, reconstruction, simulation, simulation_setup, spins, store, terrain, trails
+from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
+
+FACTORS = [(name, title, "") for name, title in design_sheet.factor_tables()]
 
 
 class _IntoFolder:
@@ -94,6 +97,44 @@ class ROCKFALL_OT_export_simulation(InBackground, _IntoFolder, bpy.types.Operato
         return InBackground.execute(self, context) if bpy.app.background else self._begin(context)
 
 
+class ROCKFALL_OT_design_sheet(InBackground, _IntoFolder, bpy.types.Operator):
+    """Write the design sheet of the drawn screens: what barriers there must have, with the measured evidence"""
+
+    bl_idname = "rockfall.design_sheet"
+    bl_label = "Design Sheet"
+
+    factors: bpy.props.EnumProperty(
+        name="Partial factors", description="Editable tables, to be checked against the standard", items=FACTORS
+    )
+    holdout: bpy.props.BoolProperty(
+        name="Predict left-out trajectories", default=True,
+        description="How well each model predicts measured trajectories that it was not fitted to; takes longer",
+    )  # fmt: skip
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        lacking = design_sheet.missing(context.scene)
+        return possible(cls, not lacking, lacking) and job.is_free(cls)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        return _IntoFolder.invoke(self, context, event)
+
+    def prepare(self, context: bpy.types.Context) -> Work:
+        asked = design_sheet.ask(context.scene, self.factors, self.holdout)
+        folder = Path(bpy.path.abspath(self.directory))
+
+        def compute(progress: Progress) -> object:
+            return design_sheet.write(asked, folder, progress)
+
+        def keep(scene: bpy.types.Scene, written: object) -> str:
+            return f"{', '.join(written)} are in {folder}."
+
+        return Work("share", compute, keep)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return InBackground.execute(self, context) if bpy.app.background else self._begin(context)
+
+
 class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
     """Write project.toml with the picks and the terrain: all that the command line, or another file, needs"""
 
@@ -121,4 +162,9 @@ def _report(operator: bpy.types.Operator, text: str, left_out: Sequence[Remark])
     operator.report({"WARNING"}, f"Something is missing: {left_out[0].text}{more} The rest is written: {text}")
 
 
-CLASSES = (ROCKFALL_OT_export_tables, ROCKFALL_OT_export_simulation, ROCKFALL_OT_export_project)
+CLASSES = (
+    ROCKFALL_OT_export_tables,
+    ROCKFALL_OT_export_simulation,
+    ROCKFALL_OT_design_sheet,
+    ROCKFALL_OT_export_project,
+)

@@ -25,6 +25,7 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
         self.layout.operator("rockfall.export_tables", icon="EXPORT")
         self.layout.operator("rockfall.export_graphs", icon="EXPORT")
         self.layout.operator("rockfall.export_simulation", icon="EXPORT")
+        self.layout.operator("rockfall.design_sheet", icon="TEXT")
         self.layout.operator("rockfall.export_project", icon="FILE_FOLDER")
         job.draw(context, self.layout, "share")
 

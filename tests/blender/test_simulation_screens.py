@@ -139,12 +139,15 @@ def test_a_project_takes_screens_along(slope: bpy.types.Scene, screen: bpy.types
 
 
 def test_the_design_sheet_of_a_drawn_screen(
-    slope: bpy.types.Scene, screen: bpy.types.Object, part, tmp_path: Path
+    slope: bpy.types.Scene, screen: bpy.types.Object, part, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(part("rockfall_addon.scene.design_sheet"), "is_there", lambda extra: False)
     out = tmp_path / "sheet"
     screen.rockfall_screen.holds = True
     assert bpy.ops.rockfall.design_sheet(directory=str(out), factors="none", holdout=False) == {"FINISHED"}
-    assert {"design.html", "design.json", "screens.csv"} <= {path.name for path in out.iterdir()}
-    assert "road" in (out / "design.html").read_text(encoding="utf-8")
+    assert {path.name for path in out.iterdir()} == {"design.html", "design.json", "screens.csv"}
+    page = (out / "design.html").read_text(encoding="utf-8")
+    assert "road" in page
+    assert "No figures: this page was made where Matplotlib is not installed" in page
     bpy.ops.rockfall.remove_screen(name="road")
     assert not bpy.ops.rockfall.design_sheet.poll(), "there is nothing to design for"

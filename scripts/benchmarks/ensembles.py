@@ -20,7 +20,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import redirect_stdout
+from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -73,31 +73,37 @@ def work_on(triangles: float) -> Work:
     return Work(make_ground(surface), Settings("noel_2017", seed=1), {"maps": CellTally(cells_over(surface, CELL_M))})
 
 
-def seconds(work: Work, releases: Releases, pool: Pool) -> float:
-    began = time.perf_counter()
+def seconds(work: Work, releases: Releases, pool: Pool) -> tuple[float, float]:
+    """By the clock, and of all processors: of this process and the workers."""
+    began, used = time.perf_counter(), cpu(pool)
     run_ensemble(work, releases, pool)
-    return time.perf_counter() - began
+    return time.perf_counter() - began, cpu(pool) - used
+
+
+def cpu(pool: Pool) -> float:
+    there = sum(pool._client.run(time.process_time).values()) if isinstance(pool, DaskPool) else 0.0
+    return time.process_time() + there
 
 
 def workers(triangles: float, blocks: int, repeats: int) -> None:
     work = work_on(triangles)
     releases, few = blocks_on(work.ground, blocks), blocks_on(work.ground, 4 * 4096)
     print(f"{triangles:g} triangles, {blocks} blocks, maps of {CELL_M:g} m; {os.cpu_count()} cores", flush=True)
-    pools: dict[str, Pool] = {"1 thread": Threads(1), "2 threads": Threads(2)}
-    opened = {f"{n} worker{'s' * (n > 1)}": DaskPool(None, n).__enter__() for n in (1, 2, 4)}
-    pools |= opened
-    times: dict[str, list[float]] = {name: [] for name in pools}
-    for pool in pools.values():
-        run_ensemble(work, few, pool)
-    for _ in range(repeats):
-        for name, pool in pools.items():
-            times[name].append(seconds(work, releases, pool))
-    for name, each in times.items():
-        ratio = statistics.median(a / b for a, b in zip(each, times["2 threads"], strict=True))
-        print(f"{name:10} {statistics.median(each):7.2f} s {blocks / statistics.median(each):8.0f} blocks/s, "
-              f"{ratio:.3f} times two threads")  # fmt: skip
-    for pool in opened.values():
-        pool.__exit__(None, None, None)
+    measured: dict[str, list[tuple[float, float]]] = {}
+    with ExitStack() as opened:
+        pools: dict[str, Pool] = {"1 thread": Threads(1), "2 threads": Threads(2)}
+        pools |= {f"{n} workers": opened.enter_context(DaskPool(None, n)) for n in (1, 2, 4)}
+        for pool in pools.values():
+            run_ensemble(work, few, pool)
+        for _ in range(repeats):
+            for name, pool in pools.items():
+                measured.setdefault(name, []).append(seconds(work, releases, pool))
+    base = measured["2 threads"]
+    for name, each in measured.items():
+        clock, used = (statistics.median(values) for values in zip(*each, strict=True))
+        ratios = [statistics.median(a[i] / b[i] for a, b in zip(each, base, strict=True)) for i in (0, 1)]
+        print(f"{name:10} {clock:7.2f} s, {blocks / clock:8.0f} blocks/s, {used:7.2f} s of processors; "
+              f"{ratios[0]:.3f} and {ratios[1]:.3f} times two threads", flush=True)  # fmt: skip
 
 
 def many(triangles: float, blocks: int) -> None:
@@ -107,7 +113,7 @@ def many(triangles: float, blocks: int) -> None:
     placed = time.perf_counter() - began
     with DaskPool(None, 2) as pool:
         run_ensemble(work, releases.take(slice(0, 8192)), pool)
-        took = seconds(work, releases, pool)
+        took, _ = seconds(work, releases, pool)
         memory = sum(
             one["metrics"]["memory"] for one in pool._client.scheduler_info()["workers"].values()
         ) + 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # fmt: skip

@@ -16,7 +16,7 @@ import bpy
 DEMO = ("load_demo", "load_footage_demo", "open_project")
 SLOW = {
     "render_film", "preview_film", "calibrate", "find_equivalent", "simulate", "track_block", "follow_background",
-    "refine", "build_proxy", "export_graphs", "propose_pairs", "propose_impacts",
+    "refine", "build_proxy", "export_graphs", "propose_pairs", "propose_impacts", "compute_maps", "export_maps",
 }  # fmt: skip
 """Operators that may take more than a second."""
 REPLACES = {"import_picks", "load_demo", "open_project", "load_footage_demo"}

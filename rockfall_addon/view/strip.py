@@ -27,6 +27,8 @@ SHAPES = {
     "takeoff": "triangle",
 }
 WARNING = (1.0, 0.55, 0.0)
+NAME_PART = 0.2
+"""Of the strip's width that a name may have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +202,8 @@ def _draw_rows(context: bpy.types.Context, strip: Strip, seen: Look) -> None:
             drawing.fill(Rectangle(0.0, low, strip.area.width, strip.row_height), alpha(seen.ink, 0.05))
         size = min(seen.text, 0.85 * strip.row_height)
         colour = seen.chosen if name == active else mixed(seen.plot, seen.ink, 0.8)
-        drawing.text(6 * seen.scale, low + strip.row_height / 2, name, size, colour, (0.0, 0.5))
+        words = drawing.shortened(name, size, NAME_PART * strip.area.width)
+        drawing.text(6 * seen.scale, low + strip.row_height / 2, words, size, colour, (0.0, 0.5))
 
 
 def _draw_chosen(context: bpy.types.Context, strip: Strip, seen: Look, diameter: float) -> None:

@@ -273,6 +273,16 @@ def lines(places: np.ndarray, colour: Rgba, width: float) -> None:
     Lines(places).draw(colour, width)
 
 
+def shortened(words: str, size: float, width: float) -> str:
+    """The beginning of words that are wider than a width [px], with …, else all of them."""
+    blf.size(FONT, size)
+    if blf.dimensions(FONT, words)[0] <= width:
+        return words
+    while words and blf.dimensions(FONT, f"{words}…")[0] > width:
+        words = words[:-1]
+    return f"{words.rstrip()}…"
+
+
 def text(
     x: float,
     y: float,

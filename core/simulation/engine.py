@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from functools import cache
+from threading import Lock
 from typing import Any, Literal
 
 import numpy as np
@@ -378,6 +379,10 @@ def _own_rows(settings: Settings, zones: int, first: int, number: int) -> NDArra
     return settings.draws.set_of(settings.seed, first, number) * zones
 
 
+_COMPILING = Lock()
+"""Of threads that begin together one compiles."""
+
+
 @cache
 def _compiled_for(tree_type: Any, facets_type: Any) -> Any:
     """`run_blocks` for one kind of ground and any model, which it takes as a pointer to a function: compiled once."""
@@ -404,7 +409,8 @@ def _compiled_runs(tree: Any, facets: Any) -> Any:
     import numba
 
     typeof: Any = numba.typeof
-    return _compiled_for(typeof(tree), typeof(facets))
+    with _COMPILING:
+        return _compiled_for(typeof(tree), typeof(facets))
 
 
 def _take_turns(

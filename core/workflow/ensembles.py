@@ -7,7 +7,6 @@ comes back is added up as it comes, and kept in a store, so that work which was 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from threading import Lock
 from typing import Any, Protocol
 
 from numpy.typing import NDArray
@@ -21,9 +20,6 @@ from ..simulation.release import Releases
 
 CHUNK = 4096
 """Runs of a chunk: about a second of work, and a lost one costs no more."""
-
-COMPILING = Lock()
-"""Of threads that begin together one compiles."""
 
 type Tables = Mapping[str, bytes]
 """Name of a table → its rows, with the header."""
@@ -48,8 +44,6 @@ class Work:
 
     def chunk(self, releases: Releases, first_run: int) -> "Chunk":
         """Simulate some runs on one thread, and count them; several threads may do so at once."""
-        with COMPILING:
-            simulate(self.ground, releases.take(slice(0, 1)), self.settings, record=self.record, threads=1)
         simulation = simulate(self.ground, releases, self.settings, record=self.record, first_run=first_run, threads=1)
         arrays = {}
         for name, tally in self.tallies.items():

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which runs come near screens. Compiled kernels."""
+"""Which ways of runs come near screens. Compiled kernels."""
+
+import numpy as np
 
 from ..compiled import kernel
 
 
 @kernel
-def near_boxes(run, position, boxes, near):  # type: ignore[no-untyped-def]
-    """Set `near` (n,) for runs with two moments between which a box (s, 4) in plan is touched: x, y least and most."""
+def near_boxes(run, position, boxes):  # type: ignore[no-untyped-def]
+    """Records (k,) from which the way to the next touches a box (s, 4) in plan: x, y least and most."""
+    found, count = np.empty(256, np.int64), 0
     for i in range(1, run.size):
-        r = run[i]
-        if r != run[i - 1] or near[r]:
+        if run[i] != run[i - 1]:
             continue
         x0, x1, y0, y1 = position[i - 1, 0], position[i, 0], position[i - 1, 1], position[i, 1]
         if x0 > x1:
@@ -18,5 +20,11 @@ def near_boxes(run, position, boxes, near):  # type: ignore[no-untyped-def]
             y0, y1 = y1, y0
         for k in range(boxes.shape[0]):
             if x1 >= boxes[k, 0] and y1 >= boxes[k, 1] and x0 <= boxes[k, 2] and y0 <= boxes[k, 3]:
-                near[r] = True
+                if count == found.size:
+                    more = np.empty(2 * count, np.int64)
+                    more[:count] = found
+                    found = more
+                found[count] = i - 1
+                count += 1
                 break
+    return found[:count]

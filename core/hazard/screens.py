@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..simulation.engine import Records, Simulation
+from ..simulation.engine import ENDS, LIMIT, Records, Simulation
 from ..simulation.ground import Ground
 from ..simulation.parabolas import Parabolas, parabolas_of
 from ..vectors import Array, Indices, Mask, dot, norm
@@ -152,12 +152,12 @@ def points_along(screen: Screen, spacing_m: float) -> Array:
 
 def hits_at(simulation: Simulation, screens: Sequence[Screen]) -> ScreenHits:
     """All crossings of screens, on the exact paths of runs all of whose moments were recorded."""
-    runs = _near(simulation, screens)
-    some = only_runs(simulation, runs)
-    pieces = parabolas_of(some)
-    found = [_crossings(pieces, place, screen) for place, screen in enumerate(screens)]
+    ways = _near(simulation, screens)
+    pieces = parabolas_of(_only(simulation, ways))
+    ends = _ends(pieces, simulation.records.position[ways + 1])
+    found = [_crossings(pieces, ends, place, screen) for place, screen in enumerate(screens)]
     piece, elapsed, place, along, angle_normal = (np.concatenate(part) for part in zip(*found, strict=True))
-    run = pieces.run[piece]
+    run = simulation.records.run[ways[pieces.run[piece]]]
     time = pieces.start_s[piece] + elapsed
     order = np.lexsort((place, time, run))
     again = np.zeros(order.size, np.bool_)
@@ -169,12 +169,13 @@ def hits_at(simulation: Simulation, screens: Sequence[Screen]) -> ScreenHits:
         part[order] for part in (piece, elapsed, place, along, angle_normal, run, time)
     )
     position, velocity = pieces.states(piece, elapsed)
-    radius, mass = some.releases.radius_m[run], some.releases.mass_kg[run]
+    releases = simulation.releases
+    radius, mass = releases.radius_m[run], releases.mass_kg[run]
     speed, spin = norm(velocity), pieces.spin[piece]
     head_on = np.abs(velocity[:, 0] * normal[:, 0] + velocity[:, 1] * normal[:, 1])
     hits = ScreenHits(
         screen=place.astype(np.int16),
-        number=simulation.number[runs][run],
+        number=simulation.number[run],
         time_s=time,
         position=position,
         velocity=velocity,
@@ -183,7 +184,7 @@ def hits_at(simulation: Simulation, screens: Sequence[Screen]) -> ScreenHits:
         radius_m=radius,
         angle=np.arccos(np.clip(np.divide(head_on, speed, out=np.ones_like(speed), where=speed > 0), 0.0, 1.0)),
         kinetic_j=0.5 * mass * speed**2,
-        rotational_j=0.5 * some.releases.inertia[run] * mass * radius**2 * dot(spin, spin),
+        rotational_j=0.5 * releases.inertia[run] * mass * radius**2 * dot(spin, spin),
         outcome=np.zeros(order.size, np.int8),
         reaches=np.ones(order.size, np.bool_),
     )
@@ -208,46 +209,50 @@ def _with_outcomes(hits: ScreenHits, screens: Sequence[Screen]) -> ScreenHits:
 
 
 def _near(simulation: Simulation, screens: Sequence[Screen]) -> Indices:
-    """Places of the runs that come near a screen in plan: their moments tell, since paths are straight between."""
+    """Records from which a way leads that may cross a screen: in plan it is nearly straight to the next."""
     from .screen_kernels import near_boxes
 
-    boxes = np.array([[*screen.line.min(axis=0), *screen.line.max(axis=0)] for screen in screens])
-    near = np.zeros(len(simulation), np.bool_)
-    near_boxes(simulation.records.run, simulation.records.position, boxes, near)
-    return np.flatnonzero(near)
+    ends = [np.stack([screen.line[:-1], screen.line[1:]], axis=1) for screen in screens]
+    boxes = np.vstack([np.column_stack([part.min(axis=1), part.max(axis=1)]) for part in ends])
+    return near_boxes(simulation.records.run, simulation.records.position, boxes)
 
 
-def only_runs(simulation: Simulation, runs: Indices) -> Simulation:
-    """Some runs, numbered from 0; only good for their motion."""
-    begin = np.searchsorted(simulation.records.run, [runs, runs + 1])
-    count = begin[1] - begin[0]
-    which = np.repeat(np.arange(runs.size), count)
-    rows = begin[0][which] + np.arange(which.size) - np.repeat(np.cumsum(count) - count, count)
+def _only(simulation: Simulation, ways: Indices) -> Simulation:
+    """Some ways between two records, each as if it were a run; only good for its motion."""
+    rows, run = np.column_stack([ways, ways + 1]).ravel(), simulation.records.run[ways]
     columns = {name: getattr(simulation.records, name)[rows] for name in Records.__dataclass_fields__}
-    own = {name: getattr(simulation, name)[runs] for name in ("end", "time_s", "length_m", "v_max_mps", "impacts")}
+    own = {name: getattr(simulation, name)[run] for name in ("time_s", "length_m", "v_max_mps", "impacts")}
     return replace(
         simulation,
         **own,
-        position=simulation.position[runs],
-        releases=simulation.releases.take(runs),
-        records=Records(**columns | {"run": which}),
-        wanted=runs.size,
+        end=np.full(ways.size, ENDS.index(LIMIT)),  # none of them rests
+        position=simulation.position[run],
+        releases=simulation.releases.take(run),
+        records=Records(**columns | {"run": np.repeat(np.arange(ways.size), 2)}),
+        wanted=ways.size,
         first_run=0,
     )
 
 
-def _crossings(pieces: Parabolas, place: int, screen: Screen) -> tuple[Indices, Array, NDArray[np.int16], Array, Array]:
+def _ends(pieces: Parabolas, last: Array) -> Array:
+    """(k, 2) where pieces end: where the next begins, or the way does; never what rounding makes of it.
+
+    So none is lost or counted twice that begins or ends on a screen.
+    """
+    ends = np.array(last[pieces.run, :2])
+    joined = np.flatnonzero(pieces.run[1:] == pieces.run[:-1])
+    ends[joined] = pieces.position[joined + 1, :2]
+    return ends
+
+
+def _crossings(
+    pieces: Parabolas, end: Array, place: int, screen: Screen
+) -> tuple[Indices, Array, NDArray[np.int16], Array, Array]:
     """Pieces that cross a screen: which, how long after their start, the screen, where along it, its normal (h, 2).
 
-    On which side a piece begins and ends is told by the places where pieces join, so that none is lost or counted
-    twice. A piece crosses a straight part once.
+    A piece crosses a straight part once; `end` (k, 2) is where it ends.
     """
-    start = pieces.position[:, :2]
-    duration = np.where(np.isfinite(pieces.duration_s), pieces.duration_s, 0.0)
-    end, _ = pieces.states(np.arange(len(pieces)), duration)
-    joined = np.flatnonzero(pieces.run[1:] == pieces.run[:-1])
-    end[joined] = pieces.position[joined + 1]
-    end = end[:, :2]
+    start, duration = pieces.position[:, :2], pieces.duration_s
     found: list[tuple[Indices, Array, Array, Array]] = []
     before = 0.0
     for a, b in pairwise(screen.line):

@@ -3,6 +3,8 @@
 
 from pathlib import Path
 
+from .mp4_index import file_boxes
+
 HEAD_BYTES = 4096
 MAGIC = (
     (0, b"\x1aE\xdf\xa3", "Matroska"),
@@ -88,20 +90,7 @@ def codec_name(fourcc: int) -> str:
 
 def lacks_index(path: Path) -> bool:
     """Whether an MP4 or MOV file ends before its index (the box "moov"), as after a recording that broke off."""
-    size, offset = path.stat().st_size, 0
-    with path.open("rb") as file:
-        while offset + 8 <= size:
-            file.seek(offset)
-            header = file.read(16)
-            length, kind = int.from_bytes(header[:4], "big"), header[4:8]
-            if kind in (b"moov", b"moof"):
-                return False
-            if length == 1:
-                length = int.from_bytes(header[8:16], "big")
-            if length < 8:
-                break
-            offset += length
-    return True
+    return not any(box.kind in (b"moov", b"moof") for box in file_boxes(path))
 
 
 def holds_sound(path: Path) -> bool:

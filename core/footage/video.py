@@ -20,6 +20,7 @@ from ..progress import Progress, silent
 from ..reading import reader
 from ..vectors import Array, Indices
 from .containers import codec_name, container_of, holds_sound, lacks_index
+from .mp4_index import indexed_frames
 
 type Image = NDArray[np.uint8]
 
@@ -32,6 +33,8 @@ LOCAL_STEPS = 31
 SAME_RATE = 0.02
 """Steps that differ by less than this, relatively, are of a constant rate."""
 FEW_FRAMES = 48
+FEWEST_FRAMES, FEW_PIXELS = 4, 8e6
+"""Of a file with a whole index, so many of the first frames are decoded, that is `FEW_FRAMES` of small pictures."""
 FAR_FRAMES = 40
 """Beyond this many frames a seek is quicker than grabbing on: it goes back 16 frames itself, then to a keyframe."""
 MOST_REORDERED = 16
@@ -170,8 +173,9 @@ class Video:
 def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool = False) -> Video:
     """Find the frames of a video file and their timestamps.
 
-    The timestamps come from the packets, without decoding, where decoding the frames at both ends of the video finds
-    the same; otherwise, and when `thorough`, all frames are decoded.
+    The timestamps come from the packets, without decoding, where decoding the first frames finds the same, and those at
+    the end as well unless the index of an MP4 or MOV file says that they are there; otherwise, and when `thorough`,
+    all frames are decoded.
 
     Parameters
     ----------
@@ -186,8 +190,9 @@ def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool 
     _refuse_other_files(path)
     progress(f"Reading the timestamps of {path.name}", 0, 0)
     packet_times, keyframes = _packets(path)
-    video = replace(_described(path), time_s=packet_times, keyframe_s=keyframes)
-    if thorough or not _decodes_as_declared(video):
+    video, head_s, changing = _begun(path)
+    video = replace(video, time_s=packet_times, keyframe_s=keyframes)
+    if thorough or not (_is_indexed(video, head_s) or _decodes_as_declared(video)):
         video = _decoded(video, progress)
     if video.frames > 1 and video.time_s[-1] - video.time_s[0] < SAME_TIME_S:
         raise InputError(
@@ -195,7 +200,8 @@ def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool 
             file=path,
             advice=f"Tell the true rate with ffmpeg -r RATE -i {path.name} -c copy {path.stem}.mp4",
         )
-    _refuse_still(video)
+    if not changing:
+        _refuse_still(video)
     return video
 
 
@@ -300,17 +306,31 @@ def _checked(video: Video, indices: Sequence[int] | Indices | None) -> Indices:
     return wanted
 
 
-def _described(path: Path) -> Video:
-    """The video without its frames, as its header and its first picture tell.
+def _begun(path: Path) -> tuple[Video, Array, bool]:
+    """The video without its frames, the timestamps of the first few, and whether their pictures differ.
 
     Raises
     ------
     InputError : there is no picture.
     """
-    cv2, capture = opencv(), _capture(path)
+    capture = _capture(path)
     picture: Any = capture.retrieve()[1] if _grab(capture) else None
     if picture is None:
         raise _no_picture(path)
+    video = _described(path, capture, picture)
+    few = int(np.clip(FEW_PIXELS / (picture.size / 3), FEWEST_FRAMES, FEW_FRAMES))
+    times, changing = [_time_s(capture)], False
+    while len(times) < few and _grab(capture):
+        times.append(_time_s(capture))
+        if not changing:
+            there, other = capture.retrieve()
+            changing = there and not np.array_equal(other, picture)
+    return video, np.array(times), changing
+
+
+def _described(path: Path, capture: Any, picture: Image) -> Video:
+    """The video without its frames, as its header and its first picture tell."""
+    cv2 = opencv()
     rate, frames = capture.get(cv2.CAP_PROP_FPS), capture.get(cv2.CAP_PROP_FRAME_COUNT)
     across, up = capture.get(cv2.CAP_PROP_SAR_NUM), capture.get(cv2.CAP_PROP_SAR_DEN)
     rotation = round(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
@@ -340,6 +360,14 @@ def _packets(path: Path) -> tuple[Array, Array]:
         keys.append(capture.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME) > 0)
     time_s = np.array(times)
     return np.sort(time_s), np.sort(time_s[np.array(keys, bool)])
+
+
+def _is_indexed(video: Video, head_s: Array) -> bool:
+    """Whether the file's index names each of the packets, and the first of them have been decoded at their times."""
+    if video.frames == 0 or video.duplicates.size or indexed_frames(video.path) != video.frames:
+        return False
+    head = video.time_s[: head_s.size]
+    return head.size == head_s.size and bool(np.abs(head - head_s).max() <= SAME_TIME_S)
 
 
 def _decodes_as_declared(video: Video) -> bool:

@@ -13,6 +13,7 @@ import pytest
 import rockfall.core.footage.video as module
 from rockfall.core.errors import InputError
 from rockfall.core.footage.containers import container_of
+from rockfall.core.footage.mp4_index import indexed_frames
 from rockfall.core.footage.video import frame_at, open_video, read_frame, read_frames
 from rockfall.core.opencv import FFMPEG_QUIET
 
@@ -60,6 +61,38 @@ def test_timestamps_are_those_of_pyav(name):
         if name == "cut.avi":  # PyAV refuses the packet that was cut in two
             assert video.frames == expected.size
         np.testing.assert_allclose(video.time_s, expected, atol=2e-6)
+
+
+@pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "variable.mp4", "slower.mp4"])
+def test_an_index_tells_the_times_of_large_pictures_as_decoding_them_does(name, monkeypatch):
+    monkeypatch.setattr(module, "FEW_PIXELS", 0)
+    monkeypatch.setattr(module, "_decodes_as_declared", lambda _: pytest.fail("the index was not used"))
+    np.testing.assert_allclose(open_video(FOLDER / name).time_s, open_video(FOLDER / name, thorough=True).time_s)
+
+
+@pytest.mark.parametrize(("box", "place", "value"), [(b"elst", 8, 500), (b"elst", 16, 0x20000), (b"stts", 8, 99)])
+def test_an_index_that_shows_other_frames_is_not_relied_upon(box, place, value, tmp_path, monkeypatch):
+    """Half a second is shown, twice as quickly, or the tables disagree."""
+    data = bytearray((FOLDER / "constant.mp4").read_bytes())
+    begin = data.index(box) + 4 + place
+    assert indexed_frames(FOLDER / "constant.mp4") == 40
+    data[begin : begin + 4] = value.to_bytes(4, "big")
+    path = tmp_path / "edited.mp4"
+    path.write_bytes(data)
+    assert indexed_frames(path) == 0
+    monkeypatch.setattr(module, "FEW_PIXELS", 0)
+    np.testing.assert_allclose(open_video(path).time_s, open_video(path, thorough=True).time_s)
+
+
+def test_an_index_of_a_file_that_is_cut_off_is_not_relied_upon(tmp_path):
+    """The index stands in front: it names frames that are not there any more."""
+    data = (FOLDER / "constant.mp4").read_bytes()
+    index = data.index(b"moov") - 4
+    assert index > data.index(b"mdat")
+    begin = data.index(b"mdat") - 4
+    path = tmp_path / "cut.mp4"
+    path.write_bytes(data[:begin] + data[index:] + data[begin : index - 200])
+    assert indexed_frames(path) == 0
 
 
 @pytest.mark.parametrize("name", WHOLE)

@@ -94,7 +94,7 @@ def _flags(impacts: Impacts) -> Words:
 
 def _sample_columns(simulation: Simulation, step_s: float) -> DecimalColumns:
     samples = sample_runs(simulation, step_s)
-    run, none = samples.run - simulation.first_run - 1, np.zeros(len(samples), np.intp)
+    run, none = simulation.place_of(samples.run), np.zeros(len(samples), np.intp)
     return {
         "source": Words(none, (simulation.settings.model,)),
         "trajectory": Words(run, tuple(release_names(simulation).tolist())),

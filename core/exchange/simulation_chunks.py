@@ -93,7 +93,7 @@ def simulate_in_chunks(
         simulations.append(
             Simulation(
                 one, ground, releases, **columns, records=_no_records(), wanted=len(releases), recorded="ends",
-                seconds=time.perf_counter() - began, first_run=first_run,
+                seconds=time.perf_counter() - began, number=np.arange(first_run + 1, first_run + len(releases) + 1),
             )
         )  # fmt: skip
         stores.append(store)

@@ -19,7 +19,7 @@ def with_barriers(simulation: Simulation, hits: ScreenHits) -> Simulation:
     hits = hits.take(held(hits))
     if not len(hits):
         return simulation
-    run = (hits.number - 1 - simulation.first_run).astype(np.intp)
+    run = simulation.place_of(hits.number)
     until = np.full(len(simulation), np.inf)
     until[run] = hits.time_s
     records = simulation.records

@@ -22,6 +22,8 @@ JOULES = 1000.0
 """In a kJ."""
 MOST_RUNS = 2**31 - 1
 """That are told apart in the work space of the kernel before it begins again."""
+MOST_WAITING = 256
+"""Chunks whose deposits wait: to count those of a few blocks in all cells costs more than to find them."""
 PER_METRE, PER_RUN = 1.4, 8
 """Passages through cells of 1 m that room is made for at first."""
 
@@ -37,7 +39,8 @@ class CellTally:
     def __init__(self, cells: Cells) -> None:
         self.cells, self.blocks = cells, 0
         self._spaces = list[_Space]()
-        self.deposits = np.zeros(len(cells), np.int64)
+        self._resting = list[NDArray[np.intp]]()
+        self._deposits: NDArray[np.int64] | None = None
         limits = [JOULES * limit for limit in CLASSES_KJ]
         self.passages = Sketches(len(cells), UNITS, column=list(QUANTITIES).index("E"), limits=limits)
 
@@ -56,27 +59,41 @@ class CellTally:
         """
         key, values = passages_of(simulation, self.cells, self._spaces)
         self.passages.add(key, values)
-        self.deposits += np.bincount(_cells_at(self.cells, simulation), minlength=len(self.cells))
+        self._resting.append(_cells_at(self.cells, simulation))
         self.blocks += len(simulation)
+
+    @property
+    def deposits(self) -> NDArray[np.int64]:
+        """(cells,) blocks that came to rest in each."""
+        waiting, self._resting = self._resting, []
+        if waiting or self._deposits is None:
+            more = np.bincount(np.concatenate([np.empty(0, np.intp), *waiting]), minlength=len(self.cells))
+            self._deposits = more if self._deposits is None else self._deposits + more
+        return self._deposits
 
     def merge(self, other: "CellTally") -> None:
         """Count what another one has counted."""
         if other.cells != self.cells:
             raise InputError("Maps of other cells cannot be added", advice="Take the same terrain and size of cells")
         self.passages.merge(other.passages)
-        self.deposits += other.deposits
+        self._resting += other._resting
+        if other._deposits is not None:
+            self._deposits = self.deposits + other._deposits
+        elif len(self._resting) > MOST_WAITING:
+            _ = self.deposits
         self.blocks += other.blocks
 
     def arrays(self) -> Arrays:
         """See `Tally`."""
         cells = self.cells
-        resting = np.flatnonzero(self.deposits)
+        deposits = self.deposits
+        resting = np.flatnonzero(deposits)
         return {
             "corner": np.array([cells.x0_m, cells.y0_m, cells.size_m]),
             "shape": np.array([cells.columns, cells.rows]),
             "blocks": np.array(self.blocks),
             "resting": resting,
-            "deposits": self.deposits[resting],
+            "deposits": deposits[resting],
             **{f"passages_{name}": values for name, values in self.passages.arrays().items()},
         }
 
@@ -85,7 +102,8 @@ class CellTally:
         """See `Tally`."""
         made = cls(Cells(*arrays["corner"].tolist(), *arrays["shape"].tolist()))
         made.blocks = int(arrays["blocks"])
-        made.deposits[arrays["resting"]] = arrays["deposits"]
+        made._deposits = np.zeros(len(made.cells), np.int64)
+        made._deposits[arrays["resting"]] = arrays["deposits"]
         own = {name[9:]: values for name, values in arrays.items() if name.startswith("passages_")}
         made.passages = Sketches.from_arrays(own)
         return made
@@ -105,7 +123,8 @@ class CellTally:
             filled[rows, columns] = values
             return filled
 
-        deposits = np.where(self.deposits > 0, self.deposits, np.nan).reshape(self.cells.shape)
+        number = self.deposits
+        deposits = np.where(number > 0, number, np.nan).reshape(self.cells.shape)
         layers = {
             "Reach_probability": layer(100.0 * figures.reach / max(self.blocks, 1)),
             "Nr_passages": layer(figures.count),

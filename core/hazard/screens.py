@@ -230,7 +230,7 @@ def _only(simulation: Simulation, ways: Indices) -> Simulation:
         releases=simulation.releases.take(run),
         records=Records(**columns | {"run": np.repeat(np.arange(ways.size), 2)}),
         wanted=ways.size,
-        first_run=0,
+        number=np.arange(1, ways.size + 1),
     )
 
 

@@ -85,7 +85,7 @@ def draw_blocks(blocks: Blocks, number: int, seed: int) -> tuple[Array, Array]:
     from .chance_kernels import BLOCK, fill_runs
 
     u = np.empty((number, 2))
-    fill_runs(seed, 0, BLOCK, u)
+    fill_runs(seed, np.arange(len(u)), BLOCK, u)
     density = blocks.density.values(u[:, 1])
     if blocks.measured is None:
         parts = np.array(blocks.proportions)

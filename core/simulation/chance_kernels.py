@@ -43,7 +43,7 @@ def fill_uniform(seed, run, impact, values):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fill_runs(seed, first, impact, values):  # type: ignore[no-untyped-def]
-    """Fill the rows of `values` (n, k): the uniform numbers of one impact of each run from `first` on."""
+def fill_runs(seed, runs, impact, values):  # type: ignore[no-untyped-def]
+    """Fill the rows of `values` (n, k): the uniform numbers of one impact of each of the runs (n,), from 0."""
     for i in range(values.shape[0]):
-        fill_uniform(seed, first + i, impact, values[i])
+        fill_uniform(seed, runs[i], impact, values[i])

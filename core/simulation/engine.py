@@ -3,9 +3,8 @@
 
 import os
 import time
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
 from threading import Lock
@@ -20,15 +19,15 @@ from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
 from ..memory import available_bytes
-from ..progress import CancelledError, Progress, silent
+from ..progress import Progress, silent
 from ..reconstruction.drag import Drag
-from ..terrain.ordering import along_curve
 from ..vectors import Array, Indices, Mask
 from .ground import Ground
 from .memory import check_records
 from .parameter_draws import FRICTION_NAME, ParameterDraws, check_draws
 from .release import Releases
 from .structures import held_by
+from .turns import take_turns
 
 Rolling = Literal["azzoni_1995", "coulomb", "none"]
 ROLLING: tuple[Rolling, ...] = ("none", "azzoni_1995", "coulomb")
@@ -38,12 +37,6 @@ RECORDED: tuple[Recorded, ...] = ("ends", "impacts", "all")
 """How each run begins and ends; also flights and impacts; also each step on the ground. In the kernels' order."""
 FRICTION = 0.5
 """Coefficient of friction on the ground where none is given."""
-BATCH = 64
-"""Runs that one thread takes at a time; larger ones leave a thread without work at the end."""
-WINDOW, WINDOW_S = 4096, 0.5
-"""Of so many runs, and of no more than take so long, those that are released near one another are taken one after the
-other: they find the terrain in the processor's cache. After a cancel a window that is begun is finished, so that no
-finished run is lost."""
 ENOUGH = 1000
 """So many runs tell how much memory all will need."""
 
@@ -135,7 +128,7 @@ class Simulation:
     wanted : how many blocks were asked for; more than n after a cancel.
     recorded : what `records` has, see `RECORDED`.
     seconds : how long it took.
-    first_run : number of the first run, from 0, where these are a part of the runs.
+    number : (n,) of each run, from 1, as tables say it; they rise.
     """
 
     settings: Settings
@@ -151,15 +144,19 @@ class Simulation:
     wanted: int
     recorded: Recorded
     seconds: float
-    first_run: int = 0
+    number: Indices
 
     def __len__(self) -> int:
         return self.end.size
 
     @property
-    def number(self) -> Indices:
-        """(n,) of each run, from 1, as tables say it."""
-        return np.arange(self.first_run + 1, self.first_run + len(self) + 1)
+    def first_run(self) -> int:
+        """Number of the first run, from 0."""
+        return int(self.number[0]) - 1
+
+    def place_of(self, number: Indices) -> Indices:
+        """(k,) where the runs with these numbers (k,) are among all, from 0."""
+        return np.searchsorted(self.number, number)
 
     @property
     def ends(self) -> tuple[str, ...]:
@@ -183,7 +180,6 @@ class Simulation:
             releases=self.releases.take(slice(start, stop)),
             records=Records(**columns | {"run": columns["run"] - start}),
             wanted=len(own["end"]),
-            first_run=self.first_run + start,
         )
 
     def with_records(self, record: Recorded) -> "Simulation":
@@ -212,7 +208,7 @@ class RecordSpace:
         return self._rows[:number]
 
 
-_OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position")
+_OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position", "number")
 
 
 def simulate(
@@ -222,6 +218,7 @@ def simulate(
     *,
     record: Recorded = "all",
     first_run: int = 0,
+    runs: Indices | None = None,
     threads: int | None = None,
     space: RecordSpace | None = None,
     progress: Progress = silent,
@@ -232,6 +229,7 @@ def simulate(
     ----------
     first_run : number of the first of these runs, from 0. A run depends on its number and the seed, not on the others:
         runs 50 to 99 of a hundred blocks are those of the blocks 50 to 99 with the first run 50.
+    runs : (n,) all their numbers, rising, where they do not follow one another.
     record : what to keep of the motion, see `RECORDED`; it changes nothing of the runs.
     threads : None takes all cores. The result does not depend on it.
     space : where the records go. They are lost when it is used again.
@@ -261,24 +259,28 @@ def simulate(
         releases.inertia, releases.principal_kgm2, releases.drag_per_m(settings.drag),
     )  # fmt: skip
     blocks = [np.ascontiguousarray(column, dtype=np.float64) for column in columns]
-    own = _own_rows(settings, len(ground.zones), first_run, n)
+    runs = np.arange(first_run, first_run + n) if runs is None else runs
+    own = _own_rows(settings, len(ground.zones), runs)
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
-    def batch(part: NDArray[np.int64]) -> tuple[int, int]:
+    def batch(part: Indices) -> int:
         ended = np.empty((part.size, 5))
         rows = run_blocks(
-            tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, first_run + part,
+            tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, runs[part],
             settings.seed, *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts,
             settings.most_s, level, ended,
         )  # fmt: skip
         results[part] = ended
         count[part] = np.diff(np.flatnonzero(rows[:, 1] == RELEASED), append=len(rows))
+        rows[:, 0] = np.repeat(part, count[part])
         moments.append(rows)
-        return part.size, len(rows)
+        return len(rows)
 
-    there, started = available_bytes(), time.perf_counter()
+    there, started, recorded = available_bytes(), time.perf_counter(), 0
 
-    def told(finished: int, recorded: int) -> None:
+    def told(moments: int, finished: int) -> None:
+        nonlocal recorded
+        recorded += moments
         if finished >= ENOUGH:
             check_records(n, finished, recorded, there)
         progress("Simulating", finished, n)
@@ -286,12 +288,12 @@ def simulate(
     progress("Simulating", 0, n)
     cores = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
-        whole = _take_turns(pool, cores, batch, along_curve(releases.position[:, :2]), told)
+        whole = take_turns(pool, cores, batch, releases.position[:, :2], told)
         begin = np.cumsum(count) - count
         rows = (space or RecordSpace()).rows(int(count.sum()), COLUMNS)
         # Each batch is given up for its place among all, so that memory lasts.
-        list(pool.map(lambda _: in_turn(moments.pop(), first_run, begin, rows), range(len(moments))))
-    records = _records(rows, ground.element, first_run)
+        list(pool.map(lambda _: in_turn(moments.pop(), begin, rows), range(len(moments))))
+    records = _records(rows, ground.element)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
     if ground.structures:
@@ -301,25 +303,30 @@ def simulate(
     return Simulation(
         settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
         results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,
-        time.perf_counter() - started, first_run,
+        time.perf_counter() - started, runs[:whole] + 1,
     )  # fmt: skip
 
 
 def joined(parts: Sequence[Simulation], releases: Releases) -> Simulation:
-    """Parts of a simulation that follow one another, as one; `releases` are those of all."""
-    first = parts[0]
-    begins = np.cumsum([0, *(len(part) for part in parts)])
+    """Parts of a simulation as one, in the order of the runs; `releases` are those of all."""
+    own = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _OF_RUNS}
+    order = np.argsort(own["number"], kind="stable")
+    place = np.argsort(order)
+    begins = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    run = np.concatenate([place[part.records.run + begin] for part, begin in zip(parts, begins, strict=False)])
+    rows = np.argsort(run, kind="stable")
     columns = {
-        name: np.concatenate([getattr(part.records, name) for part in parts]) for name in Records.__dataclass_fields__
+        name: np.concatenate([getattr(part.records, name) for part in parts])[rows]
+        for name in Records.__dataclass_fields__
+        if name != "run"
     }
-    runs = [part.records.run + begin for part, begin in zip(parts, begins.tolist(), strict=False)]
     return replace(
-        first,
+        parts[0],
         releases=releases,
-        records=Records(**(columns | {"run": np.concatenate(runs)})),
+        records=Records(run=run[rows], **columns),
         wanted=sum(part.wanted for part in parts),
         seconds=sum(part.seconds for part in parts),
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _OF_RUNS},
+        **{name: values[order] for name, values in own.items()},
     )
 
 
@@ -372,11 +379,11 @@ def _drawn(
     return all_rows.reshape(-1, rows.shape[1]), all_friction.ravel()
 
 
-def _own_rows(settings: Settings, zones: int, first: int, number: int) -> NDArray[np.intp]:
-    """(number,) where the rows of each run begin among those of `check_settings`."""
+def _own_rows(settings: Settings, zones: int, runs: Indices) -> Indices:
+    """(n,) where the rows of each run begin among those of `check_settings`."""
     if settings.draws is None:
-        return np.zeros(number, dtype=np.intp)
-    return settings.draws.set_of(settings.seed, first, number) * zones
+        return np.zeros(runs.size, dtype=np.intp)
+    return settings.draws.set_of(settings.seed, runs) * zones
 
 
 _COMPILING = Lock()
@@ -413,53 +420,10 @@ def _compiled_runs(tree: Any, facets: Any) -> Any:
         return _compiled_for(typeof(tree), typeof(facets))
 
 
-def _take_turns(
-    pool: ThreadPoolExecutor,
-    cores: int,
-    batch: Callable[[NDArray[np.int64]], tuple[int, int]],
-    curve: NDArray[np.uint32],
-    told: Callable[[int, int], None],
-) -> int:
-    """Do all runs, window after window, in each along the curve (n,); returns how many, from the first, are finished.
-
-    Parameters
-    ----------
-    batch : does some runs, and says how many, and how many moments they have.
-    told : hears of all that are finished; a `CancelledError` raised in it lets no further window begin.
-    """
-    n = curve.size
-    begun, finished, recorded, goes_on, started = 0, 0, 0, True, time.perf_counter()
-    batches, waiting = deque[NDArray[np.int64]](), set[Future[tuple[int, int]]]()
-    try:
-        while True:
-            while len(waiting) < 2 * cores and (batches or (goes_on and begun < n)):
-                if not batches:
-                    in_time = int(WINDOW_S * finished / (time.perf_counter() - started))
-                    size = max(BATCH * cores, min(WINDOW, in_time, n // 4) // BATCH * BATCH)
-                    window = begun + np.argsort(curve[begun : begun + size], kind="stable")
-                    batches.extend(window[start : start + BATCH] for start in range(0, window.size, BATCH))
-                    begun += window.size
-                waiting.add(pool.submit(batch, batches.popleft()))
-            if not waiting:
-                return begun
-            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-            for one in ready:
-                runs, moments = one.result()
-                finished, recorded = finished + runs, recorded + moments
-            if goes_on:
-                try:
-                    told(finished, recorded)
-                except CancelledError:
-                    goes_on = False
-    finally:
-        for one in waiting:
-            one.cancel()
-
-
-def _records(rows: Array, element: NDArray[np.int32], first_run: int) -> Records:
+def _records(rows: Array, element: NDArray[np.int32]) -> Records:
     place = rows[:, 21].astype(np.intp)
     return Records(
-        run=rows[:, 0].astype(np.intp) - first_run,
+        run=rows[:, 0].astype(np.intp),
         what=rows[:, 1].astype(np.int8),
         time_s=rows[:, 2],
         position=rows[:, 3:6],

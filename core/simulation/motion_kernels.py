@@ -537,12 +537,12 @@ def run_blocks(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def in_turn(moments, first_run, begin, rows):  # type: ignore[no-untyped-def]
+def in_turn(moments, begin, rows):  # type: ignore[no-untyped-def]
     """Put the records of some runs where those of each begin among all."""
     place, last = 0, -1.0
     for i in range(len(moments)):
         if moments[i, 0] != last:
             last = moments[i, 0]
-            place = begin[np.int64(last) - first_run]
+            place = begin[np.int64(last)]
         rows[place] = moments[i]
         place += 1

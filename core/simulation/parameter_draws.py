@@ -53,12 +53,12 @@ class ParameterDraws:
     def __len__(self) -> int:
         return self.weight.size
 
-    def set_of(self, seed: int, first: int, number: int) -> Indices:
-        """(number,) the set of each run from the number `first` on."""
+    def set_of(self, seed: int, runs: Indices) -> Indices:
+        """(n,) the set of each of the runs (n,), whose numbers are from 0."""
         if self.runs_each is not None:
-            return np.asarray((np.arange(first, first + number) // self.runs_each) % len(self), dtype=np.intp)
-        uniform = np.empty((number, 1))
-        fill_runs(seed, first, PARAMETERS, uniform)
+            return np.asarray((runs // self.runs_each) % len(self), dtype=np.intp)
+        uniform = np.empty((runs.size, 1))
+        fill_runs(seed, runs, PARAMETERS, uniform)
         up_to = np.cumsum(self.weight)
         found = np.searchsorted(up_to, uniform[:, 0] * up_to[-1], side="right")
         return np.minimum(found, np.flatnonzero(self.weight)[-1])

@@ -259,7 +259,7 @@ def _uniform(seed: int, number: int, columns: int, attempt: int) -> Array:
     from .chance_kernels import PLACE, fill_runs
 
     u = np.empty((number, columns))
-    fill_runs(seed, 0, PLACE + attempt, u)
+    fill_runs(seed, np.arange(len(u)), PLACE + attempt, u)
     return u
 
 

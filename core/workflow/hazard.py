@@ -7,12 +7,10 @@ number of threads.
 
 import os
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
-from threading import Event
 from typing import NamedTuple
 
 import numpy as np
@@ -25,11 +23,13 @@ from ..progress import CancelledError, Progress, silent
 from ..simulation.engine import Recorded, RecordSpace, Settings, Simulation, check_settings, simulate
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
+from ..simulation.turns import take_turns
+from ..vectors import Indices
 
-CHUNK = 1024
-"""Runs that are simulated and counted at once: of more, the records would take fresh memory each time."""
-LOOK_S = 0.1
-"""How often progress is told, and a cancel noticed."""
+CHUNK = 512
+"""Runs that are simulated and counted at once: the records of more leave the processor's cache."""
+ROUND = 1024
+"""Runs after which it is first asked whether they are enough."""
 
 type Enough = Callable[[int], bool]
 """Whether so many blocks, which the tallies have counted, are enough."""
@@ -64,8 +64,6 @@ class Counted:
 class _Chunk(NamedTuple):
     """What is left of a chunk: its runs, all of them where that is asked for, and its tallies."""
 
-    blocks: int
-    wanted: int
     ends: tuple[str, ...]
     ended: NDArray[np.intp]
     impacts: int
@@ -96,10 +94,11 @@ def run_chunks(
     behind : what counts the same runs where `barriers` hold blocks.
     first_run : see `simulate`.
     threads : None takes all cores.
-    enough : asked when 1, 2, 4, 8 … chunks are counted, whatever the number of threads; the first yes ends it.
-    take : gets each chunk, without what `barriers` do, in the order of the runs; of its records what `record` says.
+    enough : asked after `ROUND` runs, twice as many, four times …; the first yes ends it.
+    take : gets each chunk, without what `barriers` do, and of its records what `record` says; its runs are in their
+        order, the chunks are not: see `joined`.
     progress : called with the number of finished blocks; a `CancelledError` raised in it ends it with the blocks that
-        are finished, from the first on without a gap.
+        are finished, from the first on without a gap: see `take_turns`.
 
     Raises
     ------
@@ -115,19 +114,14 @@ def run_chunks(
     progress("Compiling where needed, then simulating", 0, n)
     simulate(ground, releases.take(slice(0, 1)), settings, first_run=first_run, threads=1)
 
-    stopping, spaces = Event(), list[RecordSpace]()
+    spaces = list[RecordSpace]()
 
-    def until_stopped(*_: object) -> None:
-        if stopping.is_set():
-            raise CancelledError
-
-    def chunk(start: int) -> _Chunk:
-        part = releases.take(slice(start, min(start + CHUNK, n)))
+    def chunk(part: Indices) -> _Chunk:
+        part = np.sort(part)
         space = spaces.pop() if spaces else RecordSpace()
         simulation = simulate(
-            ground, part, settings, record="all", first_run=first_run + start, threads=1, space=space,
-            progress=until_stopped,
-        )  # fmt: skip
+            ground, releases.take(part), settings, record="all", runs=first_run + part, threads=1, space=space
+        )
         own, later = [each.empty() for each in tallies], [each.empty() for each in behind]
         for each in own:
             each.add(simulation)
@@ -139,31 +133,29 @@ def run_chunks(
         kept = None if take is None else simulation.with_records(record)
         if kept is not simulation:  # else its records are in the space
             spaces.append(space)
-        return _Chunk(
-            len(simulation), len(part), simulation.ends, ended, int(simulation.impacts.sum()), kept, [*own, *later]
-        )
+        return _Chunk(simulation.ends, ended, int(simulation.impacts.sum()), kept, [*own, *later])
 
-    def add(done: _Chunk) -> None:
-        nonlocal ends, counted, impacts, names
+    def add(done: _Chunk, finished: int) -> None:
+        nonlocal ends, impacts, names
         names = done.ends
         ends = _padded(ends, len(names)) + done.ended
-        counted, impacts = counted + done.blocks, impacts + done.impacts
+        impacts += done.impacts
         if take is not None and done.whole is not None:
             take(done.whole)
         for whole, part in zip((*tallies, *behind), done.tallies, strict=True):
             whole.merge(part)
-
-    def tell() -> None:
-        try:
-            progress("Simulating", counted, n)
-        except CancelledError:
-            stopping.set()
+        progress("Simulating", counted + finished, n)
 
     cores = threads or os.cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
         for begin, end in _rounds(n) if enough is not None else [(0, n)]:
-            goes_on = _do(pool, cores, range(begin, end, CHUNK), chunk, add, tell, stopping)
-            if not goes_on or (enough is not None and enough(counted)):
+
+            def of_round(part: Indices, begin: int = begin) -> _Chunk:
+                return chunk(begin + part)
+
+            done = take_turns(pool, cores, of_round, releases.position[begin:end, :2], add, CHUNK)
+            counted += done
+            if done < end - begin or (enough is not None and enough(counted)):
                 break
     if not counted:
         raise CancelledError
@@ -171,46 +163,9 @@ def run_chunks(
     return Counted(settings, counted, n, told, impacts, time.perf_counter() - started)
 
 
-def _do(
-    pool: ThreadPoolExecutor,
-    cores: int,
-    starts: range,
-    chunk: Callable[[int], _Chunk],
-    add: Callable[[_Chunk], None],
-    tell: Callable[[], None],
-    stopping: Event,
-) -> bool:
-    """Do chunks, a few at a time, and add them in their order; False where it was stopped.
-
-    Then those that are at work end early; what is finished behind a gap is left out.
-    """
-    waiting, left = deque[Future[_Chunk]](), iter(starts)
-    try:
-        while True:
-            while not stopping.is_set() and len(waiting) < cores + 2 and (start := next(left, None)) is not None:
-                waiting.append(pool.submit(chunk, start))
-            if not waiting:
-                return not stopping.is_set()
-            wait((waiting[0],), LOOK_S)
-            while waiting and waiting[0].done():
-                done = waiting.popleft().result()
-                add(done)
-                if done.blocks < done.wanted:
-                    return False
-            if not stopping.is_set():
-                tell()
-    except CancelledError:
-        return False
-    finally:
-        if waiting:
-            stopping.set()
-            for one in waiting:
-                one.cancel()
-
-
 def _rounds(n: int) -> list[tuple[int, int]]:
-    """Rounds after which it is asked whether the blocks are enough: 1, 2, 4, 8 … chunks altogether."""
-    edges, size = [0], CHUNK
+    """The first run of each round, and the one behind its last: see `ROUND`."""
+    edges, size = [0], ROUND
     while size < n:
         edges.append(size)
         size *= 2

@@ -87,7 +87,7 @@ def map_models(
         whole = joined(parts, releases.take(slice(0, counted.blocks)))
         ended = until_known is not None and is_known(hits, until_known)
         wanted = counted.blocks if ended else n
-        simulations.append(replace(whole, wanted=wanted, seconds=counted.seconds, first_run=first_run))
+        simulations.append(replace(whole, wanted=wanted, seconds=counted.seconds))
         if isinstance(tallies[0], CellTally):
             maps[one.model] = tallies[0]
         if screens:

@@ -162,7 +162,7 @@ def test_the_page_the_pdf_and_the_numbers_say_the_same(sheet: DesignSheet, tmp_p
 
 def test_it_ends_when_the_values_are_known(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rockfall.core.workflow.enough.KNOWN_TO", 10.0)
-    monkeypatch.setattr("rockfall.core.workflow.hazard.CHUNK", 100)
+    monkeypatch.setattr("rockfall.core.workflow.hazard.ROUND", 100)
     found = design_sheet(
         ground, releases, [Settings("noel_2017", seed=3)], [Screen("net", LINE)], NONE, until_known=True
     )

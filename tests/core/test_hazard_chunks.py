@@ -8,7 +8,7 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.cell_tally import CellTally
 from rockfall.core.hazard.cells import cells_over
 from rockfall.core.progress import CancelledError
-from rockfall.core.simulation.engine import Settings, Simulation, simulate
+from rockfall.core.simulation.engine import Records, Settings, Simulation, joined, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases
 from rockfall.core.terrain.surface import Surface
@@ -77,13 +77,26 @@ def test_nor_on_the_order_in_which_parts_are_merged_even_over_files(
         np.testing.assert_array_equal(values, at_once.maps().layers[name])
 
 
-def test_each_chunk_is_handed_on_in_order(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_chunk_is_handed_on(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hazard, "CHUNK", 64)
     taken: list[Simulation] = []
     run_chunks(ground, releases, SETTINGS, [], threads=3, take=taken.append)
-    assert [part.first_run for part in taken] == list(range(0, BLOCKS, 64))
-    whole = simulate(ground, releases, SETTINGS, record="ends")
-    np.testing.assert_array_equal(np.concatenate([part.position for part in taken]), whole.position)
+    assert len(taken) > 4
+    whole, together = simulate(ground, releases, SETTINGS), joined(taken, releases)
+    np.testing.assert_array_equal(together.number, np.arange(1, BLOCKS + 1))
+    for name in ("position", "end", "impacts", "time_s"):
+        np.testing.assert_array_equal(getattr(together, name), getattr(whole, name))
+    for name in Records.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(together.records, name), getattr(whole.records, name))
+
+
+def test_runs_may_have_any_numbers(ground: Ground, releases: Releases) -> None:
+    whole, some = simulate(ground, releases, SETTINGS), np.array([3, 7, 8, 40, 499])
+    part = simulate(ground, releases.take(some), SETTINGS, runs=some)
+    np.testing.assert_array_equal(part.number, some + 1)
+    np.testing.assert_array_equal(part.position, whole.position[some])
+    np.testing.assert_array_equal(part.place_of(np.array([41, 4])), [3, 0])
+    np.testing.assert_array_equal(part.records.time_s, whole.records.time_s[np.isin(whole.records.run, some)])
 
 
 def test_a_cancel_keeps_the_first_blocks(

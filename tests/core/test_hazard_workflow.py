@@ -71,7 +71,7 @@ def test_behind_barriers_what_they_hold_is_missing(ground: Ground, releases: Rel
 
 
 def test_it_ends_when_enough_are_known(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hazard, "CHUNK", 50)
+    monkeypatch.setattr(hazard, "ROUND", 50)
     asked: list[int] = []
 
     def enough(blocks: int) -> bool:

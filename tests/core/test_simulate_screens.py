@@ -131,7 +131,7 @@ def test_it_ends_when_the_values_are_known_and_says_how_many_it_took(
     tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rockfall.core.workflow.enough.KNOWN_TO", 0.5)
-    monkeypatch.setattr("rockfall.core.workflow.hazard.CHUNK", 200)
+    monkeypatch.setattr("rockfall.core.workflow.hazard.ROUND", 200)
     arguments = ["simulate", str(SITE / "project.toml"), "--model", "noel_2017", "--number", "60", "--record", "none"]
     out = tmp_path / "out"
     assert cli.main([*arguments, "--screen", str(barriers), "--until-known", "0.95", "--out", str(out)]) == 0

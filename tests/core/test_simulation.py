@@ -8,7 +8,7 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.registry import MODELS
 from rockfall.core.progress import CancelledError
 from rockfall.core.reconstruction.drag import Drag
-from rockfall.core.simulation import engine
+from rockfall.core.simulation import engine, turns
 from rockfall.core.simulation.chance_kernels import fill_uniform, philox
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
@@ -289,9 +289,9 @@ def test_the_same_bits_for_any_threads_and_batches(monkeypatch: pytest.MonkeyPat
     ground, releases = drops(rough(), 150)
     settings = Settings("stevens_1998", seed=4)
     one = simulate(ground, releases, settings, threads=1)
-    monkeypatch.setattr(engine, "BATCH", 7)
+    monkeypatch.setattr(turns, "BATCH", 7)
     for threads, window in ((2, 4096), (7, 14)):
-        monkeypatch.setattr(engine, "WINDOW", window)
+        monkeypatch.setattr(turns, "WINDOW", window)
         other = simulate(ground, releases, settings, threads=threads)
         for name in ("end", "time_s", "length_m", "v_max_mps", "impacts", "position"):
             np.testing.assert_array_equal(getattr(other, name), getattr(one, name))
@@ -382,7 +382,7 @@ def test_each_run_has_the_parameters_that_it_drew() -> None:
     draws = drawn(rn=[one["rn"] for one in sets], friction=mu, rt=[one["rt"] for one in sets])
     settings = Settings("pfeiffer_bowen_1989", draws=draws, seed=5)
     together = simulate(ground, releases, settings)
-    chosen = draws.set_of(5, 0, 120)
+    chosen = draws.set_of(5, np.arange(120))
     assert set(chosen.tolist()) == {0, 1, 2}
     for place, one in enumerate(sets):
         alone = simulate(ground, releases, Settings(settings.model, one, friction=mu[place], seed=5))
@@ -395,12 +395,12 @@ def test_each_run_has_the_parameters_that_it_drew() -> None:
 
 def test_parameters_are_drawn_by_their_weights() -> None:
     draws = ParameterDraws(("rn",), np.array([[0.1], [0.2], [0.3], [0.4]]), np.array([0.0, 1.0, 3.0, 0.0]))
-    counts = np.bincount(draws.set_of(3, 1000, 20_000), minlength=4)
+    counts = np.bincount(draws.set_of(3, np.arange(1000, 21_000)), minlength=4)
     assert counts[0] == counts[3] == 0
     assert counts[2] / 20_000 == pytest.approx(0.75, abs=4 * np.sqrt(0.75 * 0.25 / 20_000))
     assert draws.mean() == pytest.approx({"rn": 0.275})
     in_turn = ParameterDraws(draws.names, draws.values, draws.weight, runs_each=3)
-    assert in_turn.set_of(3, 4, 12).tolist() == [1, 1, 2, 2, 2, 3, 3, 3, 0, 0, 0, 1]
+    assert in_turn.set_of(3, np.arange(4, 16)).tolist() == [1, 1, 2, 2, 2, 3, 3, 3, 0, 0, 0, 1]
 
 
 def test_what_a_zone_has_of_its_own_is_not_drawn() -> None:

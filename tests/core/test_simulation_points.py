@@ -16,7 +16,7 @@ from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
-from rockfall.core.simulation import engine
+from rockfall.core.simulation import turns
 from rockfall.core.simulation.blocks import Blocks
 from rockfall.core.simulation.distributions import Distribution
 from rockfall.core.simulation.engine import ENDS, IMPACT, Settings, Simulation, simulate
@@ -332,7 +332,7 @@ def test_points_give_the_same_bits_for_any_threads_and_batches(
     one_surface: dict[str, Ground], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one = fall_on(one_surface["cloud"], count=60, threads=1)
-    monkeypatch.setattr(engine, "BATCH", 7)
+    monkeypatch.setattr(turns, "BATCH", 7)
     for threads in (2, 7):
         other = fall_on(one_surface["cloud"], count=60, threads=threads)
         np.testing.assert_array_equal(other.position, one.position)

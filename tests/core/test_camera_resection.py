@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 import pytest
 from rockfall.core.camera.model import Camera, look_at, project, rays, rotation_from_vector
+from rockfall.core.camera.resection import resect as resect_module
 from rockfall.core.camera.resection.advice import Geometry, remarks_on
 from rockfall.core.camera.resection.resect import Resection, resect
-from rockfall.core.camera.resection.starting import poses_from_three
+from rockfall.core.camera.resection.starting import find_starts, poses_from_three
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import norm, unit
@@ -71,6 +72,33 @@ def test_no_start_is_needed(n: int, free: tuple[str, ...], planar: bool) -> None
         found = resect(pixels, points, WIDTH, HEIGHT, free=free, camera=known, sigma_px=0.5)
         assert error_squared(found, camera) < 30, seed
         assert found.used.all(), seed
+
+
+@pytest.mark.parametrize("planar", [False, True])
+def test_a_camera_that_is_nearly_known_leads_where_a_search_does(planar: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    searched = []
+
+    def counted(*arguments: object, **more: object) -> object:
+        searched.append(0)
+        return find_starts(*arguments, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(resect_module, "find_starts", counted)
+    for seed in range(6):
+        camera, pixels, points = made(seed, 12, planar=planar)
+        near = replace(camera, position=camera.position + 0.05, fx=1.01 * camera.fx, fy=1.01 * camera.fy)
+        alone = resect(pixels, points, WIDTH, HEIGHT, sigma_px=0.5)
+        known = resect(pixels, points, WIDTH, HEIGHT, sigma_px=0.5, camera=near)
+        sigma = np.sqrt(np.diagonal(alone.covariance)[3:6])
+        assert known.camera.position == pytest.approx(alone.camera.position, abs=1e-3 * float(sigma.min()))
+        assert known.camera.fx == pytest.approx(alone.camera.fx, abs=1e-3 * alone.sigma["f"])
+        assert known.remarks == alone.remarks
+    assert len(searched) < 9  # six without a camera, and where the mirrored one may be a rival
+
+
+def test_wrong_pairs_are_named_beside_a_camera_that_is_nearly_known() -> None:
+    camera, pixels, points = made(3, 12)
+    pixels[4] = np.clip(pixels[4] + (40.0, -30.0), 0, (WIDTH, HEIGHT))
+    assert resect(pixels, points, WIDTH, HEIGHT, sigma_px=0.5, camera=camera).wrong == ("5",)
 
 
 def test_intervals_and_errors_are_those_promised() -> None:

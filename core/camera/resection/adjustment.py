@@ -51,17 +51,23 @@ def adjusted_from(start: Camera, problem: Problem, starts: Starts, index: int, u
     return adjusted(camera, problem, used)
 
 
-def adjusted(camera: Camera, problem: Problem, used: Mask) -> Solution | None:
+def adjusted(camera: Camera, problem: Problem, used: Mask, *, steps: int = STEPS) -> Solution | None:
     """Levenberg–Marquardt; the points' errors, seen from the camera, are renewed between rounds."""
     noise = _noise(camera, problem)
-    solution = _minimised(camera, problem, used, noise)
+    solution = _minimised(camera, problem, used, noise, steps)
     if problem.sigma_m.any():
         for _ in range(3):
             if solution is None:
                 break
             noise = _noise(solution.camera, problem)
-            solution = _minimised(solution.camera, problem, used, noise)
+            solution = _minimised(solution.camera, problem, used, noise, steps)
     return solution
+
+
+def is_settled(solution: Solution) -> bool:
+    """Whether another step would move no parameter by a thousandth of its standard deviation."""
+    step = damped_step(solution.normal, solution.right, 0.0)
+    return bool(np.abs(step * scales(solution.normal)).max() < 1e-3)
 
 
 def _noise(camera: Camera, problem: Problem) -> Array:
@@ -73,11 +79,11 @@ def _noise(camera: Camera, problem: Problem) -> Array:
     return noise
 
 
-def _minimised(camera: Camera, problem: Problem, used: Mask, noise: Array) -> Solution | None:
+def _minimised(camera: Camera, problem: Problem, used: Mask, noise: Array, steps: int) -> Solution | None:
     trust = np.asarray(np.linalg.inv(noise[used]), dtype=np.float64)
     now = _measured(camera, problem, used, noise, trust)
     damping = 1e-7
-    for _ in range(STEPS):
+    for _ in range(steps):
         if now is None:
             break
         step = damped_step(now.normal, now.right, damping)

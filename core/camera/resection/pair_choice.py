@@ -12,12 +12,19 @@ from ...errors import RockfallError
 from ...least_squares import inverse
 from ...vectors import Array, Mask, norm
 from ..model import Camera
-from .adjustment import Solution, adjusted, adjusted_from, scatter_of, squares
+from .adjustment import Solution, adjusted, adjusted_from, is_settled, scatter_of, squares
 from .problem import Problem
-from .starting import Starts
+from .starting import Starts, mirrored
 
 ADJUSTED = 3
 """From how many of the starts the least squares begin."""
+
+CHECKED_BY = 12
+"""Observations more than unknowns from which the least squares may begin at the last camera alone."""
+
+NEAR_STEPS, MIRRORED_STEPS = 12, 5
+HOPELESS_SCATTER = 20.0
+"""A mirrored camera that is still so bad after `MIRRORED_STEPS` is no rival."""
 
 STARTS_OF_MAJORITIES = 8
 COST_OF_A_PAIR = 30.0
@@ -52,6 +59,31 @@ def choose(start: Camera, problem: Problem, starts: Starts, robust: bool) -> tup
             "counts down from the top of the image, and the points' coordinates."
         )
     return best, other, used
+
+
+def choose_near(last: Camera, problem: Problem, robust: bool) -> tuple[Solution, Mask] | None:
+    """The camera and the pairs that are believed, from a camera that is nearly known; None where a search must tell.
+
+    That is where few pairs are more than needed, where some do not fit, where the least squares take long, and where
+    the camera mirrored in a flat set of points may be a rival.
+    """
+    if 2 * len(problem.points) - problem.unknowns < CHECKED_BY:
+        return None
+    used = np.ones(len(problem.points), dtype=bool)
+    best = adjusted(last, problem, used, steps=NEAR_STEPS)
+    if best is None or not is_settled(best) or scatter_of(best, problem, used) > TRUSTED_SCATTER:
+        return None
+    other = adjusted(mirrored(best.camera, problem.points), problem, used, steps=MIRRORED_STEPS)
+    if other is not None and _may_rival(other, best, problem, used):
+        return None
+    return _snooped(problem, best, used) if robust else (best, used)
+
+
+def _may_rival(other: Solution, best: Solution, problem: Problem, used: Mask) -> bool:
+    """Whether more steps could make another camera fit as well as the best."""
+    distance = float(norm(problem.points - best.camera.position).mean())
+    apart = float(norm(other.camera.position - best.camera.position))
+    return apart > 0.001 * distance and scatter_of(other, problem, used) < HOPELESS_SCATTER
 
 
 def _best_adjusted(

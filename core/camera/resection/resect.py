@@ -16,10 +16,10 @@ from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, distance_to_ray, norm
 from ..model import SIGMA_PX, Camera, rays
-from .adjustment import moved_with, sigma_without, spread_of
+from .adjustment import Solution, moved_with, sigma_without, spread_of
 from .advice import Geometry, remarks_on
-from .pair_choice import choose
-from .problem import basis_of, check_number, checked_pairs, free_columns, starting_camera
+from .pair_choice import choose, choose_near
+from .problem import Problem, basis_of, check_number, checked_pairs, free_columns, starting_camera
 from .starting import find_starts
 
 POSE = ("rx", "ry", "rz", "x", "y", "z")
@@ -139,17 +139,11 @@ def resect(
     problem = replace(problem, basis=basis_of(start, columns))
     check_number(problem, columns, source)
 
-    focal_is_free = bool({"f", "fx", "fy"} & set(columns))
-    starts = find_starts(
-        start,
-        problem.pixels,
-        problem.points,
-        problem.sigma_px,
-        problem.sigma_m,
-        free_focal=focal_is_free,
-        with_pose=camera is not None,
-    )
-    solution, other, used = choose(start, problem, starts, robust)
+    near = choose_near(start, problem, robust) if camera is not None else None
+    if near is not None:
+        (solution, used), other = near, None
+    else:
+        solution, other, used = _searched(start, problem, columns, robust, with_pose=camera is not None)
     scatter, covariance = spread_of(solution, problem, used)
     residual_m = distance_to_ray(problem.points, *rays(solution.camera, problem.pixels))
     depth = (problem.points - solution.camera.position) @ solution.camera.rotation[2]
@@ -186,3 +180,19 @@ def resect(
         remarks=remarks_on(geometry),
         wrong=tuple(name for name, *_ in geometry.wrong),
     )
+
+
+def _searched(
+    start: Camera, problem: Problem, columns: tuple[str, ...], robust: bool, *, with_pose: bool
+) -> tuple[Solution, Solution | None, Mask]:
+    """The best of the cameras that three pairs at a time lead to, a rival, and which pairs are believed."""
+    starts = find_starts(
+        start,
+        problem.pixels,
+        problem.points,
+        problem.sigma_px,
+        problem.sigma_m,
+        free_focal=bool({"f", "fx", "fy"} & set(columns)),
+        with_pose=with_pose,
+    )
+    return choose(start, problem, starts, robust)

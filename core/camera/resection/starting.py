@@ -98,6 +98,12 @@ def find_starts(
     return _improved(camera, pixels, points, sigma_px, sigma_m, position, rotation, focal[chosen], free_focal, width)
 
 
+def mirrored(camera: Camera, points: Array) -> Camera:
+    """The camera that sees a flat set of points nearly alike from far."""
+    position, rotation = _turned_over(points, camera.position[None], camera.rotation[None])
+    return replace(camera, position=position[0], rotation=rotation[0])
+
+
 def poses_from_three(bearings: Array, points: Array) -> tuple[Array, Array, Array]:
     """The cameras that see three points along three rays.
 

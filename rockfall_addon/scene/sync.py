@@ -58,7 +58,9 @@ _recomputing: set[int] = set()  # session_uid of scenes
 
 @dataclass
 class Done:
-    """What a `sync` has done: trajectories it computed again or could not; whether picks came or went."""
+    """What a `sync` has done: trajectories it computed again or could not; whether picks came, went, followed their
+    block's keys, or have new names: the step that Blender has stored for undo has to know of these.
+    """
 
     rebuilt: list[str]
     failed: list[str]
@@ -229,7 +231,7 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
                 said[name].append(Remark(edited[name], "warning", name))
     if not dragging:
         for members in groups.values():
-            pick_names.follow(members)  # follows again after an undo, so that no undo step has to know
+            done.picks_changed = pick_names.follow(members) or done.picks_changed
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:
@@ -333,7 +335,7 @@ def _take_edits_of_blocks(
             continue
         picks.take_edits(scene, members, edits)
         block_keys.remember(block, [picks.with_id(scene, one) for one in edits.identifiers])
-        done.picks_changed = done.picks_changed or edits.is_of_objects
+        done.picks_changed = True
     return edited
 
 

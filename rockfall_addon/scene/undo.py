@@ -9,15 +9,22 @@ import bpy
 IDENTIFIER = "rockfall.extend_step"
 
 
-def extend_last_step() -> None:
-    """Store the step of the last operator again, with what followed from it; nothing without a window.
+def extend_last_step(name: str | None = None) -> None:
+    """Store a step again, with what followed from it; nothing without a window.
 
+    Parameters
+    ----------
+    name : of the last step; None is that of the last operator.
+
+    Notes
+    -----
     Blender joins steps of operators with the same undo group: one of the last operator's name takes its step's place.
     """
     manager = bpy.context.window_manager
     if bpy.app.background or not manager.windows:
         return
-    name = manager.operators[-1].name if manager.operators else "Rockfall"
+    if name is None:
+        name = manager.operators[-1].name if manager.operators else "Rockfall"
     operator = type(
         "ROCKFALL_OT_extend_step",
         (bpy.types.Operator,),

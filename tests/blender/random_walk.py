@@ -39,9 +39,18 @@ class Walk:
     folder : empty, for what is written.
     part : a module of the registered package by its name.
     slow : whether operators that take long belong to it, too.
+    first_the_step : whether, as in a window, the undo step is stored before anything looks at what was done.
     """
 
-    def __init__(self, seed: int, folder: Path, part: Callable[[str], object], *, slow: bool = False) -> None:
+    def __init__(
+        self,
+        seed: int,
+        folder: Path,
+        part: Callable[[str], object],
+        *,
+        slow: bool = False,
+        first_the_step: bool = False,
+    ) -> None:
         self.random, self.folder, self.part = random.Random(seed), folder, part
         self.operators = sorted(name for name in dir(bpy.ops.rockfall) if not name.startswith("_"))
         if not slow:
@@ -59,7 +68,7 @@ class Walk:
         self.may_change = False
         self.history: list[Picks] = []
         self.place = -1
-        self.pushes = False
+        self.pushes, self.pushed, self.first_the_step = False, "", first_the_step
         self.done: list[str] = []
 
     def begin(self) -> None:
@@ -80,8 +89,14 @@ class Walk:
 
     def check(self) -> None:
         """Nothing has gone wrong in the last step; it can be undone."""
-        said = self.done[-1]
+        said, self.pushed = self.done[-1], self.done[-1][:60] if self.pushes else self.pushed
+        if self.pushes and self.first_the_step:
+            bpy.ops.ed.undo_push(message=self.pushed)
         problems, sync = self.part("rockfall_addon.scene.problems"), self.part("rockfall_addon.scene.sync")
+        if self.first_the_step:
+            for scene in bpy.data.scenes:
+                sync.touch(scene)
+            sync.work()
         for scene in bpy.data.scenes:
             sync.sync(scene)
         troubles = [remark.text for remark in problems.remarks(bpy.context.scene) if "went wrong" in remark.text]
@@ -100,7 +115,8 @@ class Walk:
         again = settled(sync)
         assert again == now, (said, "a second look changes picks", different(now, again))
         if self.pushes:
-            bpy.ops.ed.undo_push(message=said[:60])
+            if not self.first_the_step:
+                bpy.ops.ed.undo_push(message=self.pushed)
             self.history = [*self.history[: self.place + 1], now][-UNDO_STEPS:]
             self.place = len(self.history) - 1
 

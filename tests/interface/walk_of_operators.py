@@ -24,20 +24,21 @@ def case_random_walk(window):
     steps, seed = (
         int(os.environ.get(f"ROCKFALL_WALK_{key}", value)) for key, value in (("STEPS", STEPS), ("SEED", SEED))
     )
-    walk = random_walk.Walk(seed, Path(tempfile.mkdtemp()), window.part)
+    walk = random_walk.Walk(seed, Path(tempfile.mkdtemp()), window.part, first_the_step=True)
     with window.override():
         walk.begin()
     yield 1.0
     undo = window.part("rockfall_addon.scene.undo")
-    extend, undo.extend_last_step = undo.extend_last_step, lambda: None  # no operator has stored a step to be extended
+    extend = undo.extend_last_step
+    undo.extend_last_step = lambda: extend(walk.pushed)  # the walk stores the steps, not operators
     try:
         for number in range(steps):
             with window.override():
                 print(f"{number:4d} {walk.step()}", flush=True)
+            with window.override():  # another one where a file was loaded
+                walk.check()
             if number % DRAWN == 0:
                 yield BREATH_S
-            with window.override():
-                walk.check()
     finally:
         undo.extend_last_step = extend
     window.screenshot("1-end")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..simulation.engine import ENDED, ENDS, IMPACT, ON_GROUND, STOPPED, Records, Simulation
+from ..simulation.engine import ENDED, ENDS, IMPACT, ON_GROUND, STOPPED, TREE, Records, Simulation
 from ..vectors import norm
 from .screen_tally import held
 from .screens import ScreenHits
@@ -43,10 +43,10 @@ def with_barriers(simulation: Simulation, hits: ScreenHits) -> Simulation:
     ended = {name: getattr(simulation, name).copy() for name in ("end", "time_s", "length_m", "v_max_mps", "position")}
     ended["end"][run], ended["time_s"][run] = ENDS.index(STOPPED), hits.time_s
     ended["position"][run] = hits.position
-    impacts = np.bincount(records.run[records.what == IMPACT], minlength=len(simulation))
+    met = [np.bincount(records.run[records.what == what], minlength=len(simulation)) for what in (IMPACT, TREE)]
     way, fastest = _ways(records, run)
     ended["length_m"][run], ended["v_max_mps"][run] = way, fastest
-    return replace(simulation, records=records, impacts=impacts, **ended)
+    return replace(simulation, records=records, impacts=met[0], tree_hits=met[1], **ended)
 
 
 def _ways(records: Records, run: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compiled import borrowing, kernel
 from ..simulation.height_kernels import flight_height
-from ..simulation.motion_kernels import DRAG_CHANGE, FLIES_OFF, IMPACT, ON_GROUND, RELEASED, with_drag
+from ..simulation.motion_kernels import DRAG_CHANGE, ON_GROUND, with_drag
 from ..simulation.plan_kernels import triangle_below
 from ..terrain.kernels import STACK_SIZE
 
@@ -155,7 +155,7 @@ def walk(  # type: ignore[no-untyped-def]
             left = time[i + 1] - time[i] if i < last else 0.0
             if not left > 0.0:
                 continue
-            flies = (what[i] == RELEASED or what[i] == IMPACT or what[i] == FLIES_OFF) and what[i + 1] != ON_GROUND
+            flies = what[i] != ON_GROUND and what[i + 1] != ON_GROUND
             a, part, gain_of_spin, air = (0.0, 0.0, -gravity), left, 0.0, k
             if not flies:
                 air = 0.0

@@ -16,9 +16,10 @@ COLUMNS: Mapping[str, Any] = {
     "length_m": np.float64,
     "v_max_mps": np.float64,
     "impacts": np.int32,
+    "tree_hits": np.int32,
     "position": np.float64,
 }
-"""Attributes of a `Simulation`, one value (of the position three) for each run: 64 bytes, with the number 72."""
+"""Attributes of a `Simulation`, one value (of the position three) for each run: 68 bytes, with the number 76."""
 
 
 class RunTally:

@@ -27,6 +27,7 @@ from .memory import check_records
 from .parameter_draws import FRICTION_NAME, ParameterDraws, check_draws
 from .release import Releases
 from .structures import held_by
+from .trees import Trees, in_cells
 from .turns import take_turns
 
 Rolling = Literal["azzoni_1995", "coulomb", "none"]
@@ -42,7 +43,7 @@ ENOUGH = 1000
 
 STOPPED, LEFT_TERRAIN, LIMIT = "stopped", "left_terrain", "limit"
 ENDS = (STOPPED, LEFT_TERRAIN, LIMIT)
-RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED = range(5)
+RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED, TREE = range(6)
 """What a record is about, as the kernels write it."""
 
 
@@ -61,7 +62,8 @@ class Settings:
     draws : sets of which each run has one, in place of `parameters` and `friction`; what a zone has of its own stays.
     drag : in flight and on the ground; None for none.
     seed : of all random numbers.
-    most_impacts, most_s : a run that is longer ends with "limit".
+    most_impacts, most_s : a run that is longer ends with "limit"; hits of trees count as well.
+    trees : that blocks meet; None for none. Each run finds all of them standing.
     """
 
     model: str
@@ -77,25 +79,28 @@ class Settings:
     seed: int = 0
     most_impacts: int = 10_000
     most_s: float = 3600.0
+    trees: Trees | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Records:
     """k moments of all runs, in the order of the runs and of time.
 
-    Between two of them a block flies; before an `ON_GROUND` it keeps to the ground. There, where all is recorded, its
+    Between two of them a block flies; before an `ON_GROUND` it keeps to the ground. A `TREE` that a block meets on the
+    ground follows an `ON_GROUND` of the same moment. There, where all is recorded, its
     acceleration is nearly constant from v2 of the first to v1 of the second; `parabolas` follows it.
 
     Attributes
     ----------
     run : (k,) place of the run in the simulation, from 0.
-    what : (k,) `RELEASED`, `IMPACT`, `ON_GROUND` (a step on the ground ends), `FLIES_OFF` or `ENDED`.
+    what : (k,) `RELEASED`, `IMPACT`, `ON_GROUND` (a step on the ground ends), `FLIES_OFF`, `ENDED` or `TREE` (a stem).
     time_s : (k,) since the release.
     position : (k, 3) of the centre, local [m].
     v2, omega2 : (k, 3) just after [m/s], [rad/s].
     v1, omega1 : (k, 3) just before.
     normal : (k, 3) from the contact to the centre.
-    face : (k,) element of the ground: a triangle or, behind the last of them, a point; −1 for none.
+    face : (k,) element of the ground: a triangle or, behind the last of them, a point; −1 for none. At a `TREE` its
+        place among the trees.
     """
 
     run: Indices
@@ -123,6 +128,7 @@ class Simulation:
     end : (n,) place in `ends`.
     time_s, length_m, v_max_mps : (n,) until the end, of the path, the greatest speed.
     impacts : (n,) how many.
+    tree_hits : (n,) how many stems each met.
     position : (n, 3) of the centre at the end, local [m].
     records : the moments that were asked for, releases and ends at least.
     wanted : how many blocks were asked for; more than n after a cancel.
@@ -139,6 +145,7 @@ class Simulation:
     length_m: Array
     v_max_mps: Array
     impacts: Indices
+    tree_hits: Indices
     position: Array
     records: Records
     wanted: int
@@ -190,7 +197,7 @@ class Simulation:
         kept = (what == RELEASED) | (what == ENDED)
         if record == "impacts":
             first = np.append(True, what[:-1] != ON_GROUND)
-            kept |= (what == IMPACT) | (what == FLIES_OFF) | ((what == ON_GROUND) & first)
+            kept |= (what == IMPACT) | (what == FLIES_OFF) | (what == TREE) | ((what == ON_GROUND) & first)
         columns = {name: getattr(self.records, name)[kept] for name in Records.__dataclass_fields__}
         return replace(self, records=Records(**columns), recorded=record)
 
@@ -208,7 +215,7 @@ class RecordSpace:
         return self._rows[:number]
 
 
-_OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "position", "number")
+_OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "tree_hits", "position", "number")
 
 
 def simulate(
@@ -247,13 +254,13 @@ def simulate(
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
     ground.refuse_small(releases.radius_m)
     tree, zone = ground.tree, ground.zone_in_tree
-    results, moments, count = np.empty((n, 5)), list[Array](), np.zeros(n, np.intp)
+    results, moments, count = np.empty((n, 6)), list[Array](), np.zeros(n, np.intp)
 
     from .motion_kernels import COLUMNS, in_turn
 
     progress("Compiling where needed, then simulating", 0, n)
-    facets = ground.facets
-    run_blocks = _compiled_runs(tree, facets)
+    facets, stems = ground.facets, in_cells(settings.trees)
+    run_blocks = _compiled_runs(tree, facets, stems)
     columns = (
         releases.position, releases.velocity, releases.angular_velocity, releases.radius_m, releases.mass_kg,
         releases.inertia, releases.principal_kgm2, releases.drag_per_m(settings.drag),
@@ -264,11 +271,11 @@ def simulate(
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
 
     def batch(part: Indices) -> int:
-        ended = np.empty((part.size, 5))
+        ended = np.empty((part.size, 6))
         rows = run_blocks(
             tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, runs[part],
             settings.seed, *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts,
-            settings.most_s, level, ended,
+            settings.most_s, level, stems, ended,
         )  # fmt: skip
         results[part] = ended
         count[part] = np.diff(np.flatnonzero(rows[:, 1] == RELEASED), append=len(rows))
@@ -302,8 +309,8 @@ def simulate(
         end[stopped[held >= 0]] = len(ENDS) + held[held >= 0]
     return Simulation(
         settings, ground, releases.take(slice(0, whole)), end, results[:whole, 1], results[:whole, 3],
-        results[:whole, 4], results[:whole, 2].astype(np.intp), records.position[last], records, n, record,
-        time.perf_counter() - started, runs[:whole] + 1,
+        results[:whole, 4], results[:whole, 2].astype(np.intp), results[:whole, 5].astype(np.intp),
+        records.position[last], records, n, record, time.perf_counter() - started, runs[:whole] + 1,
     )  # fmt: skip
 
 
@@ -391,8 +398,8 @@ _COMPILING = Lock()
 
 
 @cache
-def _compiled_for(tree_type: Any, facets_type: Any) -> Any:
-    """`run_blocks` for one kind of ground and any model, which it takes as a pointer to a function: compiled once."""
+def _compiled_for(tree_type: Any, facets_type: Any, stems_type: Any) -> Any:
+    """`run_blocks` for one kind of ground, trees or none, and any model (a pointer to a function): compiled once."""
     from numba import types
 
     from ..impact_models.machinery.compilation import rebound_type
@@ -405,26 +412,30 @@ def _compiled_for(tree_type: Any, facets_type: Any) -> Any:
     run_blocks.compile(
         numba_types.Array(types.float64, 2, "C")(
             tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, types.intp[::1], whole,
-            types.int64[::1], whole, *block, number, whole, whole, number, whole, lines,
+            types.int64[::1], whole, *block, number, whole, whole, number, whole, stems_type, lines,
         )
     )  # fmt: skip
     run_blocks.disable_compile()
     return run_blocks
 
 
-def _compiled_runs(tree: Any, facets: Any) -> Any:
+def _compiled_runs(tree: Any, facets: Any, stems: Any) -> Any:
     import numba
 
     typeof: Any = numba.typeof
     with _COMPILING:
-        return _compiled_for(typeof(tree), typeof(facets))
+        return _compiled_for(typeof(tree), typeof(facets), typeof(stems))
 
 
 def _records(rows: Array, element: NDArray[np.int32]) -> Records:
-    place = rows[:, 21].astype(np.intp)
+    place, what = rows[:, 21].astype(np.intp), rows[:, 1].astype(np.int8)
+    met = what == TREE
+    place[met] = -1
+    face = np.where(place >= 0, element[place], -1)
+    face[met] = rows[met, 21].astype(np.intp)
     return Records(
         run=rows[:, 0].astype(np.intp),
-        what=rows[:, 1].astype(np.int8),
+        what=what,
         time_s=rows[:, 2],
         position=rows[:, 3:6],
         v2=rows[:, 6:9],
@@ -432,5 +443,5 @@ def _records(rows: Array, element: NDArray[np.int32]) -> Records:
         v1=rows[:, 12:15],
         omega1=rows[:, 15:18],
         normal=rows[:, 18:21],
-        face=np.where(place >= 0, element[place], -1),
+        face=face,
     )

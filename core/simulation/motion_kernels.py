@@ -36,10 +36,11 @@ from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, in
 from .near_point_kernels import KNOWN, MOST_CLOSE, forget
 from .point_kernels import closest
 from .rotation import drawn_axes, turn
+from .tree_kernels import MOST_FALLEN, PARTS, against_stem, first_stem, let_fall, round_stem, stem_on_way
 
 STOPPED, LEFT, LIMIT = 0, 1, 2
 """How a run ends."""
-RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED = 0, 1, 2, 3, 4
+RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED, TREE = 0, 1, 2, 3, 4, 5
 """What a record is about."""
 NO_ROLLING, AZZONI, COULOMB = 0, 1, 2
 ENDS_ONLY, IMPACTS, ALL = 0, 1, 2
@@ -63,8 +64,12 @@ From 0.05 to 1, with 600 blocks and two models each: on the demo site's triangle
 clouds at most 15 runs, by 0.7 m below 0.3 and by 1.5 m above, and mean run-outs by 0.005 m. Up to 0.1 some blocks, 9 at
 most, rock on to the limit of time, from 0.2 on none: the value is among those, and far from either end.
 """
+MOST_LEANT = 20
+"""So is one that meets stems so often without getting further."""
 SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 """Contacts nearer in time than this are one moment; so many are taken one after the other."""
+DRIFTS = 1e-6
+"""A block that flies more slowly than this in plan [m/s] meets no stem: it falls."""
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 COLUMNS = 22
 """run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
@@ -235,6 +240,15 @@ def _moved(p, q, v, towards, gravity, mu):  # type: ignore[no-untyped-def]
 
 
 @borrowing
+def _on_ground(v, n):  # type: ignore[no-untyped-def]
+    """A velocity along the ground in the same direction in plan, as fast as it was."""
+    z = -(n[0] * v[0] + n[1] * v[1]) / max(n[2], 1e-6)
+    size, speed = sqrt(v[0] * v[0] + v[1] * v[1] + z * z), sqrt(_dot(v, v))
+    s = speed / size if size > 0.0 else 0.0
+    return s * v[0], s * v[1], s * z
+
+
+@borrowing
 def _dragged(v, drag, ds):  # type: ignore[no-untyped-def]
     """What drag leaves of a velocity on the way ds: drag [1/m] is that of the mass that moves."""
     kept = exp(-drag * ds)
@@ -271,9 +285,10 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
 @kernel
 def run_block(  # type: ignore[no-untyped-def]
     tree, facets, zone, rebound, parameters, friction, own, draws, stack, times, nearby, close, rows, count,
-    run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record,
+    run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems,
+    fallen,
 ):  # fmt: skip
-    """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max).
+    """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max, trees).
 
     Parameters
     ----------
@@ -285,6 +300,7 @@ def run_block(  # type: ignore[no-untyped-def]
     inertia : c of c m r², for rolling. moments : three, of inertia, for flight. drag : ½ρC_D A/m [1/m].
     law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
     record : `ENDS_ONLY`, `IMPACTS` or `ALL`.
+    stems : see `tree_kernels`; empty for none. fallen : work space, those that gave way to this block.
     """
     zero = (0.0, 0.0, 0.0)
     bounds = box(tree)
@@ -296,7 +312,8 @@ def run_block(  # type: ignore[no-untyped-def]
     nearby[2][0], nearby[2][5] = -1.0, NEIGHBOURHOOD  # nothing of another block
     forget(close)
     known, t, e, hit, edge, marked = False, 0.0, zero, NOWHERE, ON_TRIANGLE, False
-    anchor, lingers = p, 0
+    anchor, lingers, trees = p, 0, 0
+    fallen[0], leant, stem_met = 0, -inf, -1
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:
         u = np.empty(3)
@@ -307,7 +324,7 @@ def run_block(  # type: ignore[no-untyped-def]
     while end < 0:
         if count + 2 >= rows.shape[0]:
             rows = _grown(rows)
-        if impacts >= most_impacts or time >= most_s:
+        if impacts + trees >= most_impacts or time >= most_s:
             end = LIMIT
             break
         speed = sqrt(_dot(v, v))
@@ -327,6 +344,32 @@ def run_block(  # type: ignore[no-untyped-def]
             if not known:
                 t, e, hit = first_contact(tree, stack, times, p, v, a, radius, horizon)
             known = False
+            if len(stems) == PARTS and v[0] * v[0] + v[1] * v[1] > DRIFTS * DRIFTS:
+                until = t if hit >= 0 else min(horizon, _leaves(bounds, p, v, a, radius))
+                until, struck = first_stem(stems, fallen, p, v, a, radius, until)
+                if struck >= 0:
+                    before, start = p, v
+                    p, v = _at(p, v, a, until)
+                    if drag > 0.0:
+                        v = with_drag(start, drag, gravity, until)[1]
+                    time += until
+                    chord = (p[0] - before[0], p[1] - before[1], p[2] - before[2])
+                    length += sqrt(_dot(chord, chord))
+                    if tumbles:
+                        axes, w = turn(moments, axes, w, time - spun)
+                        spun = time
+                    v1, w1 = v, w
+                    v_max = max(v_max, sqrt(_dot(v, v)))
+                    v, w, away, stands = against_stem(stems[3], struck, p, v1, w1, radius, mass)
+                    if struck != stem_met and time - leant < SAME_MOMENT_S:
+                        v, w = zero, zero  # wedged between two stems
+                    leant, stem_met, trees = time, struck, trees + 1
+                    if not stands:
+                        let_fall(fallen, stems[4][struck])
+                    if record >= IMPACTS:
+                        _write(rows, count, run, TREE, time, p, v, w, v1, w1, away, stems[4][struck])
+                        count += 1
+                    continue
             if hit < 0:
                 gone = _leaves(bounds, p, v, a, radius)
                 t = min(horizon, gone)
@@ -383,7 +426,8 @@ def run_block(  # type: ignore[no-untyped-def]
         if speed < 1e-6 and steep <= mu * cosine:
             end = STOPPED
             break
-        moves, leaves = False, False
+        moves, leaves, bent = False, False, False
+        p0, v0, n0, place0, time0, length0 = p, v, n, place, time, length
         if len(tree) == 6:
             if edge == ON_TRIANGLE:
                 e, hit, longest = n, place, most_s - time
@@ -393,7 +437,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 t, q, turned, edge = leg(
                     tree, facets, stack, nearby, p, v, n, place, radius, gravity, factor, mu, longest
                 )
-                moves = t > 0.0
+                moves = bent = t > 0.0
                 if moves and edge == AT_ANOTHER:
                     q = _touching(tree, stack, q, turned, radius, nearby, close, n)[0]
             elif edge != AT_ANOTHER:
@@ -498,6 +542,53 @@ def run_block(  # type: ignore[no-untyped-def]
                 p, length = away, length + ds
                 if drag > 0.0:
                     v = _dragged(v, factor * drag, ds)
+        if len(stems) == PARTS:
+            half = 0.5 * t if bent and part == 1.0 else 0.0
+            middle = (p0[0] + half * v0[0], p0[1] + half * v0[1], p0[2] + half * v0[2])
+            if half == 0.0:
+                middle = (0.5 * (p0[0] + p[0]), 0.5 * (p0[1] + p[1]), 0.5 * (p0[2] + p[2]))
+            struck, there, ahead = stem_on_way(stems, fallen, p0, middle, p, radius)
+            if struck >= 0:
+                way, goes_round = (there[0] - p0[0], there[1] - p0[1], there[2] - p0[2]), False
+                if struck == stem_met and _dot(way, way) < (HELD * radius) ** 2:
+                    goes_round, there, ahead = round_stem(stems[3], struck, p0, p, radius)
+                    if not goes_round:
+                        n, place, p, time, length = n0, place0, p0, time0, length0
+                        v, w, end = zero, zero, STOPPED
+                        break  # it leans on the stem
+                    ahead = _on_ground(ahead, n)
+                else:
+                    n, place = n0, place0
+                part, p, v, ds = _moved(p0, there, v0, ahead, factor * gravity, mu * max(cosine, 0.0))
+                if drag > 0.0:
+                    v = _dragged(v, factor * drag, part * ds)
+                both = speed + sqrt(_dot(v, v))
+                time = time0 + (2.0 * part * ds / both if both > 0.0 else 0.0)
+                length, end, held, edge = length0 + part * ds, -1, 0, AT_ANOTHER
+                w = _rolling(n, v, radius)
+                v_max = max(v_max, sqrt(_dot(v, v)))
+                if record == ALL or (record == IMPACTS and not marked):
+                    _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
+                    count, marked = count + 1, True
+                if not goes_round:
+                    v1, w1 = v, w
+                    v, w, away, stands = against_stem(stems[3], struck, p, v1, w1, radius, mass)
+                    v, marked = _on_ground(v, n), False
+                    if struck != stem_met and time - leant < SAME_MOMENT_S:
+                        v = zero  # wedged between two stems
+                    leant, stem_met, trees = time, struck, trees + 1
+                    if not stands:
+                        let_fall(fallen, stems[4][struck])
+                    if record >= IMPACTS:
+                        _write(rows, count, run, TREE, time, p, v, w, v1, w1, away, stems[4][struck])
+                        count += 1
+                gone = (p[0] - anchor[0], p[1] - anchor[1], p[2] - anchor[2])
+                lingers += 1
+                if _dot(gone, gone) > (LINGERS * radius) ** 2:
+                    anchor, lingers = p, 0
+                if lingers > MOST_LEANT or (goes_round and part * ds < HELD * radius):
+                    end = STOPPED
+                continue
         w = _rolling(n, v, radius)
         v_max = max(v_max, sqrt(_dot(v, v)))
         if record == ALL or (record == IMPACTS and not marked):
@@ -508,31 +599,34 @@ def run_block(  # type: ignore[no-untyped-def]
     if count + 2 >= rows.shape[0]:
         rows = _grown(rows)
     _write(rows, count, run, ENDED, time, p, v, w, v, w, n, place)
-    return rows, count + 1, end, time, impacts, length, v_max
+    return rows, count + 1, end, time, impacts, length, v_max, trees
 
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
     tree, facets, zone, rebound, parameters, friction, own, draw_count, runs, seed, place, velocity, spin, radius, mass,
-    inertia, moments, drag, gravity, law, most_impacts, most_s, record, results,
+    inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems, results,
 ):  # fmt: skip
-    """Simulate n blocks, `own` (n,) their sets; fills `results` (n, 5): end, time, impacts, length, v_max; returns the
-    records.
+    """Simulate n blocks, `own` (n,) their sets; returns the records.
+
+    Fills `results` (n, 6): end, time, impacts, length, v_max, hits of trees.
     """
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
-    draws = np.empty(draw_count)
+    draws, fallen = np.empty(draw_count), np.empty(1 + MOST_FALLEN, np.int64)
     rows, count = np.empty(((256 if record == ALL else 64) * len(runs), COLUMNS)), np.int64(0)
     for i in range(len(runs)):
-        rows, count, end, time, impacts, length, v_max = run_block(
+        rows, count, end, time, impacts, length, v_max, trees = run_block(
             tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows, count,
             runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
             (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
             (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],
-            (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record,
+            (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record, stems,
+            fallen,
         )  # fmt: skip
-        results[i, 0], results[i, 1], results[i, 2], results[i, 3], results[i, 4] = end, time, impacts, length, v_max
+        results[i, 0], results[i, 1], results[i, 2] = end, time, impacts
+        results[i, 3], results[i, 4], results[i, 5] = length, v_max, trees
     return rows[:count].copy()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..reconstruction.free_flight import fly
 from ..vectors import Array, Indices, Mask, norm
-from .engine import ENDED, FLIES_OFF, IMPACT, ON_GROUND, RELEASED, Simulation
+from .engine import ENDED, FLIES_OFF, IMPACT, ON_GROUND, RELEASED, TREE, Simulation
 
 TOLERANCE_M = 0.01
 """A leg on the ground, or a flight with drag, is followed as near as this."""
@@ -74,7 +74,7 @@ def parabolas_of(simulation: Simulation, tolerance_m: float = TOLERANCE_M) -> Pa
     drag = simulation.releases.drag_per_m(settings.drag)[records.run]
     begin = np.flatnonzero((records.run[:-1] == records.run[1:]) & (np.diff(records.time_s) > 0))
     duration = records.time_s[begin + 1] - records.time_s[begin]
-    flies = np.isin(records.what[begin], (RELEASED, IMPACT, FLIES_OFF)) & (records.what[begin + 1] != ON_GROUND)
+    flies = np.isin(records.what[begin], (RELEASED, IMPACT, FLIES_OFF, TREE)) & (records.what[begin + 1] != ON_GROUND)
     arrival, _ = fly(records.position[begin], records.v2[begin], duration, settings.gravity_mps2, drag[begin])
     flies &= norm(arrival - records.position[begin + 1]) <= tolerance_m
     free = flies & (drag[begin] == 0)

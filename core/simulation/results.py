@@ -12,7 +12,7 @@ from ..reconstruction.impact import Impacts, apparent, make_impacts
 from ..reconstruction.sampling import STEP_S, TrajectorySamples
 from ..terrain.cloud import Cloud
 from ..vectors import Array, Indices, Mask, Names, dot
-from .engine import ENDS, FLIES_OFF, IMPACT, LEFT_TERRAIN, ON_GROUND, RELEASED, Simulation
+from .engine import ENDS, FLIES_OFF, IMPACT, LEFT_TERRAIN, ON_GROUND, RELEASED, TREE, Simulation
 from .holes import within_rims
 
 FIRST_FLIGHTS, MOMENTS = 3, 9
@@ -72,7 +72,7 @@ def fell_through(simulation: Simulation) -> Mask:
 def flights_of(simulation: Simulation) -> tuple[Indices, Array]:
     """Rows of the records at which a flight begins, and how long it lasts [s]."""
     records = simulation.records
-    begins = np.isin(records.what[:-1], (RELEASED, IMPACT, FLIES_OFF)) & (records.what[1:] != ON_GROUND)
+    begins = np.isin(records.what[:-1], (RELEASED, IMPACT, FLIES_OFF, TREE)) & (records.what[1:] != ON_GROUND)
     begins &= records.run[:-1] == records.run[1:]
     rows = np.flatnonzero(begins)
     duration = records.time_s[rows + 1] - records.time_s[rows]

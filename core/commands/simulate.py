@@ -37,6 +37,7 @@ from .release_options import (
     sources_given,
     zones_as_asked,
 )
+from .tree_options import add_tree_options, trees_said
 from .worker_options import add_worker_options, forget_chunks, several_workers, simulate_on_workers
 
 if TYPE_CHECKING:
@@ -79,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
     add_release_options(parser)
+    add_tree_options(parser)
     motion = parser.add_argument_group("motion")
     add_motion_options(motion)
     motion.add_argument("--gravity", type=positive, metavar="G", help=f"[m/s²] (default {GRAVITY_MPS2:g})")
@@ -250,6 +252,7 @@ class _Asked(NamedTuple):
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
     """What the options say."""
     from ..exchange.project import terrain_inputs
+    from ..exchange.trees import open_trees
     from ..reconstruction.drag import Drag
     from ..terrain.readers import read_structure, read_tile_points
     from ..workflow.simulation import Scenario
@@ -278,6 +281,8 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
     else:
         terrain = terrain_as_asked(arguments, arguments.terrain, progress)
     zones, zone_files = zones_as_asked(arguments, terrain, models)
+    entry = trees_said(arguments)
+    trees, tree_files = (None, {}) if entry is None else open_trees(entry, terrain, arguments.seed or 0)
     scenario = Scenario(
         terrain,
         source,
@@ -287,12 +292,14 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
         zones=zones,
         drag=Drag() if arguments.drag else None,
         draws=draws,
+        trees=trees,
         **given,
     )
     inputs = {
         **_posterior_inputs(arguments.posterior),
         **release_files,
         **zone_files,
+        **tree_files,
         **terrain_inputs(arguments.terrain),
     }
     if measured is not None:
@@ -337,6 +344,7 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
         drag=arguments.drag or entry.drag,
         observed=entry.observed if arguments.observed is None else Path(arguments.observed),
         seed=entry.seed if arguments.seed is None else arguments.seed,
+        trees=trees_said(arguments, entry.trees),
     )
     scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
     known = model_parameters(arguments, list(scenario.models), scenario.models)

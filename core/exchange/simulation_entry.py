@@ -21,6 +21,15 @@
     diameter_m = "lognormal:0.5,0.2" # or a number, "0.3..0.6", "normal:MEAN,SD"
     density_kgpm3 = 2600
 
+    [simulation.trees]               # without it there are none
+    file = "trees.csv"               # x_m, y_m, dbh_cm; or in place of it
+    # stems_per_hectare = 400
+    # dbh_cm = 32
+    # dbh_sd_cm = 12
+    # within = "forest.geojson"      # polygons; else everywhere on the terrain
+    height_m = 10.0                  # up to which a stem is met
+    species = "coniferous"           # broadleaved, silver_fir
+
     [simulation.zones]
     file = "zones.geojson"           # polygons with parameters of their own
     # attribute = "soil"             # of the terrain's PLY file; the file is then a table of its values
@@ -51,6 +60,7 @@ from ..simulation.block_shapes import SHAPES, Shape
 from ..simulation.distributions import FORMS, Distribution, parse_distribution
 from ..simulation.engine import FRICTION, ROLLING, Rolling
 from ..simulation.ground import CONTACTS, Contact
+from ..simulation.trees import HEIGHT_M, KIND, SPECIES
 from .toml_text import TomlTable, is_number
 
 MEASURED, TABLE, POINTS, LINE, POLYGON, STEEP = "measured", "table", "points", "line", "polygon", "steep"
@@ -141,13 +151,35 @@ class ZonesEntry:
 
 
 @dataclass(frozen=True)
+class TreesEntry:
+    """Stems that blocks meet: a table of them, or a forest of which only density and diameters are known.
+
+    Attributes
+    ----------
+    file : see `exchange.trees`; None draws them.
+    stems_per_hectare, dbh_cm, dbh_sd_cm : of a forest that is drawn: density, mean and standard deviation of diameters.
+    within : polygons outside of which none are drawn.
+    height_m, species : where a table does not say.
+    """
+
+    file: Path | None = None
+    stems_per_hectare: float | None = None
+    dbh_cm: float | None = None
+    dbh_sd_cm: float = 0.0
+    within: Path | None = None
+    height_m: float = HEIGHT_M
+    species: str = KIND
+    extra: Extra = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class SimulationEntry:
     """A simulation as a project states it.
 
     Attributes
     ----------
     models : names, in the order in which they run; none takes those that are compared by default.
-    releases, structures, screens, zones, rolling, friction, seed : see `workflow.simulation.Scenario`.
+    releases, structures, screens, zones, trees, rolling, friction, seed : see `workflow.simulation.Scenario`.
     contact : what of the terrain blocks meet, see `simulation.ground.CONTACTS`.
     observed : impacts.csv that the model observed draws from; None takes what the project has measured.
     posterior : posterior.csv of a back-analysis, from which each block of its model draws its parameters.
@@ -162,6 +194,7 @@ class SimulationEntry:
     screens: tuple[ScreenEntry, ...] = ()
     contact: Contact = "mesh"
     zones: ZonesEntry | None = None
+    trees: TreesEntry | None = None
     rolling: Rolling = "azzoni_1995"
     friction: float = FRICTION
     drag: bool = False
@@ -193,6 +226,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         screens=tuple(map(_read_screen, table.tables("screens"))),
         contact=cast(Contact, table.choice("contact", CONTACTS, "mesh")),
         zones=_read_zones(table.table("zones")) if table.has("zones") else None,
+        trees=_read_trees(table.table("trees")) if table.has("trees") else None,
         rolling=cast(Rolling, table.choice("rolling", ROLLING, "azzoni_1995")),
         friction=table.number("friction", FRICTION, zero_allowed=True),
         drag=table.flag("drag", False),
@@ -227,6 +261,8 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
     if entry.zones is not None:
         own = {"attribute": entry.zones.attribute} if entry.zones.attribute else {}
         content["zones"] = {"file": relative(entry.zones.file)} | own | dict(entry.zones.extra)
+    if entry.trees is not None:
+        content["trees"] = _trees_content(entry.trees, relative)
     if entry.structures:
         content["structures"] = [
             {"name": structure.name, "file": relative(structure.file)} | dict(structure.extra)
@@ -235,6 +271,18 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
     if entry.screens:
         content["screens"] = [_screen_content(screen, relative) for screen in entry.screens]
     return content | dict(entry.extra)
+
+
+def _trees_content(entry: TreesEntry, relative: Callable[[Path], str]) -> dict[str, Any]:
+    content: dict[str, Any] = {} if entry.file is None else {"file": relative(entry.file)}
+    for name in ("stems_per_hectare", "dbh_cm"):
+        if getattr(entry, name) is not None:
+            content[name] = getattr(entry, name)
+    if entry.dbh_sd_cm:
+        content["dbh_sd_cm"] = entry.dbh_sd_cm
+    if entry.within is not None:
+        content["within"] = relative(entry.within)
+    return content | {"height_m": entry.height_m, "species": entry.species} | dict(entry.extra)
 
 
 def _screen_content(entry: ScreenEntry, relative: Callable[[Path], str]) -> dict[str, Any]:
@@ -314,6 +362,28 @@ def _read_law(table: TomlTable, key: str) -> Distribution | None:
 
 def _read_zones(table: TomlTable) -> ZonesEntry:
     return ZonesEntry(table.path("file"), table.text("attribute", ""), table.rest())
+
+
+def _read_trees(table: TomlTable) -> TreesEntry:
+    drawn = ("stems_per_hectare", "dbh_cm", "dbh_sd_cm", "within")
+    if table.has("file"):
+        for key in drawn:
+            if table.has(key):
+                raise table.wrong(key, "is given beside file", "The table has each stem: leave out one of them")
+    else:
+        for key in drawn[:2]:
+            if not table.has(key):
+                raise table.wrong(key, "is missing", "Give a file of trees, or stems_per_hectare and dbh_cm")
+    return TreesEntry(
+        file=table.path("file") if table.has("file") else None,
+        stems_per_hectare=table.optional_number("stems_per_hectare"),
+        dbh_cm=table.optional_number("dbh_cm"),
+        dbh_sd_cm=table.number("dbh_sd_cm", 0.0, zero_allowed=True),
+        within=table.path("within") if table.has("within") else None,
+        height_m=table.number("height_m", HEIGHT_M),
+        species=table.choice("species", tuple(SPECIES), KIND),
+        extra=table.rest(),
+    )
 
 
 def _read_screen(table: TomlTable) -> ScreenEntry:

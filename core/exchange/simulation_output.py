@@ -14,7 +14,7 @@ from .map_output import draw_maps, write_maps
 from .screens import write_screens
 from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
-from .simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary
+from .simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary, write_tree_hits
 
 MAPS = "maps"
 NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
@@ -48,6 +48,8 @@ def write_simulations(
     progress: Progress = silent,
 ) -> list[str]:
     """Write runs.csv, what `record` names, hits.csv and screens.csv where there are such, maps, and summary.json.
+
+    With impacts goes tree_hits.csv where there are trees.
 
     Parameters
     ----------
@@ -105,6 +107,9 @@ def write_tables(
     if IMPACTS in record:
         write_simulated_impacts(simulations, folder / "impacts.csv", progress=progress)
         written.append("impacts.csv")
+    if IMPACTS in record and simulations[0].settings.trees is not None:
+        write_tree_hits(simulations, folder / "tree_hits.csv")
+        written.append("tree_hits.csv")
     if TRAJECTORIES in record:
         write_simulated_trajectories(simulations, folder / "trajectories.csv", progress=progress)
         written.append("trajectories.csv")

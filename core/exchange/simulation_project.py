@@ -35,6 +35,7 @@ from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry
 from .simulation_output import recorded_for
 from .simulation_tables import read_releases
 from .tables import read_impacts
+from .trees import open_trees
 from .zones import open_zones
 
 SAME_TIME_S = 1e-6
@@ -97,6 +98,11 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
             entry.zones.file, entry.zones.attribute, met, models,
             terrain_files=source.files, up=source.up, unit_m=source.unit_m,
         )  # fmt: skip
+    trees = None
+    if entry.trees is not None:
+        progress("Placing the trees", 0, 0)
+        trees, tree_files = open_trees(entry.trees, terrain, entry.seed)
+        inputs |= tree_files
     scenario = Scenario(
         met,
         release_source(project, terrain, entry),
@@ -105,6 +111,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         structures=structures,
         screens=screens_of(entry.screens, terrain.shift),
         zones=zones,
+        trees=trees,
         rolling=entry.rolling,
         friction=entry.friction,
         drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,

@@ -31,6 +31,8 @@ from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.release import Releases, make_releases, overlapping, placed_on
 from ..simulation.release_sources import check_number, check_size
 from ..simulation.results import fell_through, release_names, run_figures
+from ..simulation.tree_hits import tree_hits_of
+from ..simulation.trees import LAW, NOT_KNOWN, Trees
 from ..terrain.cloud import Cloud
 from ..vectors import Mask, norm
 from .csv_text import read_table
@@ -130,7 +132,7 @@ def write_runs(simulations: Sequence[Simulation], path: str | Path) -> None:
     OSError : the file cannot be written.
     """
     parts = in_parts(simulations, lambda one: np.ones(len(one), np.intp), _run_columns)
-    write_decimal_table(path, parts, {"run": 0, "impacts": 0})
+    write_decimal_table(path, parts, {"run": 0, "impacts": 0, "tree_hits": 0})
 
 
 def _run_columns(simulation: Simulation) -> DecimalColumns:
@@ -152,6 +154,42 @@ def _run_columns(simulation: Simulation) -> DecimalColumns:
         "kinetic_max_J": figures.kinetic_max_j,
         "height_max_m": figures.height_max_m,
         "energy_line_deg": np.degrees(figures.energy_line),
+        **({} if simulation.settings.trees is None else {"tree_hits": simulation.tree_hits}),
+    }
+
+
+def write_tree_hits(simulations: Sequence[Simulation], path: str | Path) -> None:
+    """Write tree_hits.csv, 6 decimals: each time that a block meets a stem, and where its centre is then.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    parts = in_parts(simulations, lambda one: one.tree_hits, _tree_hit_columns)
+    write_decimal_table(path, parts, {"run": 0})
+
+
+def _tree_hit_columns(simulation: Simulation) -> DecimalColumns:
+    hits, records, trees = tree_hits_of(simulation), simulation.records, simulation.settings.trees
+    assert trees is not None
+    run = records.run[hits.record]
+    met, which = np.unique(hits.tree, return_inverse=True)
+    return {
+        "tree": Words(which, trees.labels(met)),
+        "dbh_cm": 100 * trees.dbh_m[hits.tree],
+        "run": simulation.number[run],
+        "model": Words(np.zeros_like(run), (simulation.settings.model,)),
+        "time_s": records.time_s[hits.record],
+        **vector_columns(POSITION, simulation.ground.shift.to_survey(records.position[hits.record])),
+        "up_m": hits.up_m,
+        "offset": hits.offset,
+        "v1_mps": norm(records.v1[hits.record]),
+        "v2_mps": norm(records.v2[hits.record]),
+        "kinetic1_J": hits.kinetic1_j,
+        "kinetic2_J": hits.kinetic2_j,
+        "loss_max_J": trees.energy_j[hits.tree],
+        "deviation_deg": np.degrees(hits.deviation),
+        "stands": Words(hits.stands.astype(np.intp), ("0", "1")),
     }
 
 
@@ -234,6 +272,7 @@ def summary(
         "point_spacing_m": {name: round(spacing, 6) for name, spacing in first.ground.spacing_m.items()},
         "triangles_without_area": first.ground.flat,
         "terrain": None if first.ground.faults is None else asdict(first.ground.faults),
+        **({} if settings.trees is None else {"trees": _tree_summary(settings.trees)}),
         "models": {simulation.settings.model: _model_summary(simulation) for simulation in simulations},
         "remarks": to_plain(remarks),
     }
@@ -255,10 +294,21 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
         "ends": {name: int(count) for name, count in zip(simulation.ends, ends, strict=True)},
         "fell_through": int(fell_through(simulation).sum()),
         "impacts": int(simulation.impacts.sum()),
+        **({} if settings.trees is None else {"tree_hits": int(simulation.tree_hits.sum())}),
         "seconds": round(simulation.seconds, 3),
         "blocks_per_s": round(n / simulation.seconds, 1),
         "run_out_m": _known(convergence(run_out)),
         "v_max_mps": _known(convergence(simulation.v_max_mps)),
+    }
+
+
+def _tree_summary(trees: Trees) -> dict[str, Any]:
+    return {
+        "number": len(trees),
+        "dbh_mean_cm": round(float(100 * trees.dbh_m.mean()), 6),
+        "dbh_sd_cm": round(float(100 * trees.dbh_m.std()), 6),
+        "law": LAW,
+        "not_known": NOT_KNOWN,
     }
 
 

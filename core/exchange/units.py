@@ -10,6 +10,7 @@ from ..errors import InputError
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
     "m": {"mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048},
+    "cm": {"mm": 0.1, "m": 100.0, "in": 2.54},
     "s": {"us": 1e-6, "ms": 0.001, "min": 60.0},
     "kg": {"g": 0.001, "t": 1000.0, "lb": 0.45359237},
     "mps": {

@@ -4,7 +4,8 @@
 The greatest loss of energy is that of Dorren and Berger (2006, Tree Physiology 26, 63–71), from real blocks against
 silver firs, E = F 38.7 D^2.31 J with the diameter D at breast height in cm and F = 1 for the fir. How much of it a hit
 beside the axis takes is the sigmoid of Rockyfor3D (Dorren 2016, ecorisQ paper, 5.2, section 3.4). Numbers of both are
-as the description of Rockyfor3D gives them. Where the block goes then is no part of that law: see `against_stem`.
+second-hand, as Rockyfor3D's description is commonly quoted: neither text was at hand. Where the block goes then is no
+part of that law: see `against_stem`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,14 +17,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..terrain.cloud import Cloud, heights_above_points
+from ..terrain.raycast import cast_rays
+from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask, Names
-from .ground import Ground
+from .polygons import Polygon
 
 ENERGY_J, EXPONENT = 38.7, 2.31
 """Of the greatest loss of energy, for a diameter in cm."""
 SPECIES: Mapping[str, float] = {"coniferous": 0.93, "broadleaved": 1.59, "silver_fir": 1.0}
 """Kind of tree → F, its greatest loss beside that of a silver fir of the same diameter; the first two are means."""
 KIND = "coniferous"
+LAW = (
+    "Energy: Dorren and Berger (2006), with the offset of the hit as in Rockyfor3D; direction: along the side of a "
+    "stem that stands, an impulse at right angles to one that gives way."
+)
+NOT_KNOWN = (
+    "Not known to it: stems that an earlier block has broken, that fall or lie, stumps, roots, shrubs and branches; "
+    "the height of the hit, season and health of the tree; rotation that bark gives or takes."
+)
 HEIGHT_M = 10.0
 """Up to which a stem is met where no height is given."""
 THICKEST_M = 5.0
@@ -36,7 +48,7 @@ HECTARE_M2 = 1e4
 
 @dataclass(frozen=True, eq=False)
 class Trees:
-    """t stems on a ground.
+    """t stems on a terrain.
 
     Attributes
     ----------
@@ -59,6 +71,10 @@ class Trees:
 
     def __len__(self) -> int:
         return self.dbh_m.size
+
+    def labels(self, which: Indices) -> tuple[str, ...]:
+        """Names of some; the number from 1 where there is none."""
+        return tuple(str(self.name[i]) or str(i + 1) for i in which.tolist())
 
 
 def greatest_loss(dbh_m: Array, factor: Array | float = 1.0) -> Array:
@@ -88,7 +104,7 @@ def factor_of(species: str) -> float:
 
 
 def placed_trees(
-    ground: Ground,
+    terrain: Surface | Cloud,
     position: Array,
     dbh_m: Array,
     height_m: Array,
@@ -117,8 +133,7 @@ def placed_trees(
             f"A tree has a diameter of {dbh_m.max():g} m",
             advice=f"Diameters are in cm and below {100 * THICKEST_M:g}: is its unit another one?",
         )
-    from_above = ground.highest_m + 1.0
-    foot = from_above - ground.heights_above(np.column_stack([position, np.full(len(position), from_above)]))
+    foot = _heights(terrain, position)
     there: Mask = np.isfinite(foot)
     if not there.any():
         raise InputError("No tree stands on the terrain", advice="Are their coordinates in the terrain's system?")
@@ -134,7 +149,7 @@ def placed_trees(
 
 
 def random_trees(
-    ground: Ground,
+    terrain: Surface | Cloud,
     per_hectare: float,
     mean_dbh_m: float,
     sd_dbh_m: float,
@@ -142,7 +157,7 @@ def random_trees(
     *,
     height_m: float = HEIGHT_M,
     factor: float = SPECIES[KIND],
-    among: Sequence[Any] | None = None,
+    among: Sequence[Polygon] = (),
 ) -> Trees:
     """A forest that is not known stem by stem: its density and the law of its diameters.
 
@@ -153,7 +168,7 @@ def random_trees(
     Parameters
     ----------
     seed : of number, places and diameters; they depend on nothing else but the terrain's extent in plan.
-    among : polygons (`simulation.polygons.Polygon`) outside of which there are none.
+    among : outside of these there are none; without one they are everywhere.
 
     Raises
     ------
@@ -164,7 +179,7 @@ def random_trees(
             raise InputError(f"The {what} is {value:g}", advice="Give a number above zero")
     if not (np.isfinite(sd_dbh_m) and sd_dbh_m >= 0):
         raise InputError(f"The standard deviation of the diameters is {sd_dbh_m:g}", advice="Give zero or more")
-    places = ground.points if not len(ground.vertices) else ground.vertices
+    places = terrain.vertices if isinstance(terrain, Surface) else terrain.points
     low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
     expected = per_hectare * float(np.prod(high - low)) / HECTARE_M2
     if expected > MOST:
@@ -178,16 +193,28 @@ def random_trees(
     if sd_dbh_m > 0:
         shape = (mean_dbh_m / sd_dbh_m) ** 2
         dbh = np.maximum(chance.gamma(shape, mean_dbh_m / shape, number), 1e-3)
-    if among is not None:
+    if among:
         inside = np.zeros(number, np.bool_)
         for polygon in among:
             inside |= polygon.contains(position)
         position, dbh = position[inside], dbh[inside]
     dbh = np.minimum(dbh, THICKEST_M)
-    from_above = ground.highest_m + 1.0
-    on = np.isfinite(ground.heights_above(np.column_stack([position, np.full(len(position), from_above)])))
+    on = np.isfinite(_heights(terrain, position))
     position, dbh = position[on], dbh[on]
-    return placed_trees(ground, position, dbh, np.full(len(dbh), height_m), greatest_loss(dbh, factor))
+    if not len(dbh):
+        raise InputError("No tree was drawn", advice="Give more stems per hectare, or a larger area on the terrain")
+    return placed_trees(terrain, position, dbh, np.full(len(dbh), height_m), greatest_loss(dbh, factor))
+
+
+def _heights(terrain: Surface | Cloud, position: Array) -> Array:
+    """(t,) of the highest ground at places in plan (t, 2), local [m]; NaN where there is none."""
+    points = terrain.vertices if isinstance(terrain, Surface) else terrain.points
+    top = float(points[:, 2].max()) + 1.0
+    above = np.column_stack([position, np.full(len(position), top)])
+    if isinstance(terrain, Cloud):
+        return top - heights_above_points(terrain, above)
+    down: Array = cast_rays(terrain, above, (0, 0, -1)).distance
+    return np.where(np.isfinite(down), top - down, np.nan)
 
 
 def in_cells(trees: Trees | None) -> Any:

@@ -36,6 +36,7 @@ from ..simulation.hits import hits_of
 from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.release import Releases
 from ..simulation.results import fell_through
+from ..simulation.trees import LAW, NOT_KNOWN, Trees
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 
@@ -90,6 +91,7 @@ class Scenario:
     structures : name → walls, fences, roads, houses that stand on the terrain.
     screens : lines at which blocks are measured or held; they change nothing of the runs.
     zones : None for one that is everywhere.
+    trees : stems that blocks meet; None for none.
     rolling, friction, drag, gravity_mps2, seed, most_impacts, most_s : see `Settings`.
     record : what to keep of the motion, see `engine.RECORDED`.
     """
@@ -110,6 +112,7 @@ class Scenario:
     most_s: float = Settings.most_s
     record: Recorded = "all"
     draws: Mapping[str, ParameterDraws] = field(default_factory=dict)
+    trees: Trees | None = None
 
     @property
     def settings(self) -> tuple[Settings, ...]:
@@ -130,6 +133,7 @@ class Scenario:
                 seed=self.seed,
                 most_impacts=self.most_impacts,
                 most_s=self.most_s,
+                trees=self.trees,
             )
             for model, parameters in self.models.items()
         )
@@ -253,11 +257,22 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
     for simulation in simulations:
         remarks += _remarks_of_one(simulation)
     ground = simulations[0].ground
+    remarks += _remarks_of_trees(simulations[0].settings.trees)
     remarks += [*ground.remarks, *simulations[0].releases.remarks]
     remarks += _remarks_of_points(simulations[0])
     remarks += [Remark(text, "note", "terrain") for text in _fault_sentences(ground)]
     remarks += [Remark(f"No block meets {name}.", "note", name) for name in _not_met(simulations)]
     return tuple(gravest_first(remarks))
+
+
+def _remarks_of_trees(trees: Trees | None) -> list[Remark]:
+    """Which trees stand there, and what they stand for."""
+    if trees is None:
+        return []
+    remarks = [Remark(text, "advice", "trees") for text in trees.left_out]
+    mean, thickest = 100 * trees.dbh_m.mean(), 100 * trees.dbh_m.max()
+    text = f"Blocks meet {len(trees)} trees, {mean:.3g} cm thick on average and {thickest:.3g} cm at most. {LAW}"
+    return [*remarks, Remark(f"{text} {NOT_KNOWN}", "note", "trees")]
 
 
 def _fault_sentences(ground: Ground) -> list[str]:
@@ -329,6 +344,12 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     ended = ", ".join(f"{count} {words[name]}" for name, count in ends if count)
     text = f"{n} blocks with {model}, {simulation.impacts.sum()} impacts: {ended}."
     remarks.append(Remark(text, "note", model))
+    if simulation.settings.trees is not None:
+        text = (
+            f"{np.count_nonzero(simulation.tree_hits)} of {n} blocks with {model} hit trees, "
+            f"{simulation.tree_hits.sum()} times."
+        )
+        remarks.append(Remark(text, "note", model))
     remarks += _hit_structures(simulation)
     flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
     text = (

@@ -32,7 +32,7 @@ def plane(slope: float = 0.0, length: float = 400.0):
 def stems(ground, places, dbh: float = 0.4, height: float = 10.0) -> Trees:
     places = np.atleast_2d(places)
     size = np.full(len(places), dbh)
-    return placed_trees(ground, places, size, np.full(len(places), height), greatest_loss(size))
+    return placed_trees(ground.terrain, places, size, np.full(len(places), height), greatest_loss(size))
 
 
 def thrown(y, speed, z: float = 4.0) -> Releases:
@@ -133,7 +133,7 @@ def test_a_stem_that_gives_way_turns_and_slows_the_block_and_is_met_once() -> No
 def test_blocks_meet_as_many_stems_as_the_density_says() -> None:
     """Straight ways through a forest: n (D + 2r) stems a metre, and the way to the first is exponential."""
     ground = plane(length=1000.0)
-    trees = random_trees(ground, 400.0, 0.3, 0.0, seed=4, height_m=50.0)
+    trees = random_trees(ground.terrain, 400.0, 0.3, 0.0, seed=4, height_m=50.0)
     assert abs(len(trees) - 40_000) < 4 * np.sqrt(40_000)
     y = np.arange(10.0, 990.0, 1.2)
     velocity = np.tile([2000.0, 0.0, 0.0], (y.size, 1))
@@ -150,11 +150,11 @@ def test_blocks_meet_as_many_stems_as_the_density_says() -> None:
 
 
 def test_diameters_follow_their_law() -> None:
-    trees = random_trees(plane(), 2500.0, 0.32, 0.12, seed=1)
+    trees = random_trees(plane().terrain, 2500.0, 0.32, 0.12, seed=1)
     assert abs(trees.dbh_m.mean() - 0.32) < 4 * 0.12 / np.sqrt(len(trees))
     assert abs(trees.dbh_m.std() / 0.12 - 1) < 0.03
     np.testing.assert_allclose(trees.energy_j, 0.93 * 38.7 * (100 * trees.dbh_m) ** 2.31, rtol=1e-12)
-    again = random_trees(plane(), 2500.0, 0.32, 0.12, seed=1)
+    again = random_trees(plane().terrain, 2500.0, 0.32, 0.12, seed=1)
     np.testing.assert_array_equal(again.position, trees.position)
 
 
@@ -164,7 +164,7 @@ def slope() -> tuple:
     y = np.linspace(20, 380, 64)
     start = np.column_stack([np.full(64, 5.0), y, np.full(64, 1.0)])
     releases = make_releases(start, diameter_m=0.6, velocity=np.tile([4.0, 0.0, 0.0], (64, 1)))
-    settings = Settings(MODEL, trees=random_trees(ground, 600.0, 0.35, 0.1, seed=3), friction=0.45)
+    settings = Settings(MODEL, trees=random_trees(ground.terrain, 600.0, 0.35, 0.1, seed=3), friction=0.45)
     return ground, releases, settings, simulate(ground, releases, settings, threads=1)
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from ..errors import InputError
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
-from .background import BackgroundMotion, background_motion
+from .background import BackgroundMotion, background_motion, stabilise
 from .plates import Plates
+from .silhouette import outline_offsets
 from .sources import Source
 from .track_scatter import scatter_sigma
 from .tracking_start import Footage, start_at
@@ -76,9 +77,12 @@ def track_block(
     there, around its last place, as an impact may have turned it. A sighting must look like the block: a disc or
     streak of its colour and size in front of the background. It is not looked for beyond a gap of a few frames.
 
-    `sigma_px` tells the scatter from frame to frame. Where one side of the block is in the shade and as dark as the
-    ground, the centre is that of the side that shows: an offset of up to a fifth of the diameter, the same in all
-    frames, which `sigma_px` does not hold; times of impacts hardly feel it.
+    Where one side of the block is in the shade and looks like the ground, the side that shows is followed; the centre
+    is then that of the outline, told by what the block hides on its way (`silhouette`).
+
+    `sigma_px` tells the scatter from frame to frame. Where the block hardly moves before its ground, as at rest, the
+    centre may still be off by a tenth of the diameter, the same in all frames, which `sigma_px` does not hold; times of
+    impacts hardly feel it.
     """
     first, last = 0 if first is None else first, video.time_s.size - 1 if last is None else last
     marks = sorted({int(f): (float(u), float(v)) for f, u, v in [*clicks, (frame, *pixel)]}.items())
@@ -95,7 +99,7 @@ def track_block(
         back, _ = follow(footage, other, start.frame, progress)
         rows += _joined(there, back[::-1])[1:]
     forwards, after = follow(footage, starts[-1], last, progress)
-    return _assembled([*rows, *forwards[1:]], (before, after))
+    return _assembled(motion, [*rows, *forwards[1:]], (before, after))
 
 
 def _check(video: Source, marks: Sequence[tuple[int, tuple[float, float]]], first: int, last: int) -> None:
@@ -124,16 +128,20 @@ def _joined(there: Sequence[Row], back: Sequence[Row]) -> list[Row]:
     return [row for row in there if row.frame <= turn] + [row for row in back if row.frame > turn]
 
 
-def _assembled(rows: Sequence[Row], stopped: tuple[str, str]) -> BlockTrack:
-    time_s, stable = np.array([row.time_s for row in rows]), np.array([row.stable for row in rows])
-    sigma, diameter, score = (
-        np.array([getattr(row.seen, name) for row in rows]) for name in ("sigma_px", "diameter_px", "score")
+def _assembled(motion: BackgroundMotion, rows: Sequence[Row], stopped: tuple[str, str]) -> BlockTrack:
+    time_s, frame = np.array([row.time_s for row in rows]), np.array([row.frame for row in rows], dtype=np.intp)
+    pixel, sigma, diameter, score = (
+        np.array([getattr(row.seen, name) for row in rows]) for name in ("pixel", "sigma_px", "diameter_px", "score")
     )
     score = np.minimum(score, 1.0)
+    stable = np.array([row.stable for row in rows])
+    offset, larger = outline_offsets([row.patch for row in rows], stable, np.array([row.scale_px for row in rows]))
+    pixel, diameter = pixel + offset, diameter * larger
+    stable = stabilise(motion, frame, pixel)
     return BlockTrack(
-        frame=np.array([row.frame for row in rows], dtype=np.intp),
+        frame=frame,
         time_s=time_s,
-        pixel=np.array([row.seen.pixel for row in rows]),
+        pixel=pixel,
         sigma_px=scatter_sigma(time_s, stable, sigma, diameter, score),
         score=score,
         stable=stable,

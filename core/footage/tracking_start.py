@@ -63,7 +63,8 @@ def start_at(footage: Footage, frame: int, click: Array, diameter_px: float | No
     """
     video, motion, plates = footage.video, footage.motion, footage.plates
     low, high = int(motion.frames[0]), int(motion.frames[-1])
-    around = dict(frames(video, range(max(frame - 1, low), min(frame + 1, high) + 1)))
+    others = _beside(frame, low, high)
+    around = dict(frames(video, sorted({frame, *others})))
     found = first_looks(around[frame], frame, plates, click, diameter_px)
     if found is None:
         raise InputError(
@@ -79,31 +80,39 @@ def start_at(footage: Footage, frame: int, click: Array, diameter_px: float | No
     looks = replace(looks, shutter=0.0)
     reach = max(5 * looks.diameter_px, 1.5 * float(np.hypot(*streak)) + 2 * looks.diameter_px, 40.0)
     origin, places = footage.stable(frame, centre), {}
-    for other in (frame - 1, frame + 1):
-        if other in around:
-            here = cover(around[other], other, plates, looks, footage.pixel(other, origin), reach)
-            pixel, score = search(here, looks, streak)
-            good = score > max(ACCEPTED, score.max(initial=0) - 0.2)
-            places[other] = stabilise(motion, np.full(good.sum(), other), pixel[good]), score[good]
+    for other in others:
+        away = reach * abs(other - frame)
+        here = cover(around[other], other, plates, looks, footage.pixel(other, origin), away)
+        pixel, score = search(here, looks, streak)
+        good = score > max(ACCEPTED, score.max(initial=0) - 0.2)
+        places[other] = stabilise(motion, np.full(good.sum(), other), pixel[good]), score[good]
     return Start(frame, centre, looks, _velocity(video.time_s, frame, origin, places, looks.diameter_px))
+
+
+def _beside(frame: int, low: int, high: int) -> tuple[int, ...]:
+    """The frames before and after one; the next two where it is the first or the last."""
+    if low < frame < high:
+        return frame - 1, frame + 1
+    toward = 1 if frame == low else -1
+    return tuple(other for other in (frame + toward, frame + 2 * toward) if low <= other <= high)
 
 
 def _velocity(
     time_s: Array, frame: int, origin: Array, places: dict[int, tuple[Array, Array]], diameter: float
 ) -> Array | None:
-    """(2,) [px/s] that joins the places in the frames before and after best with that in the frame itself."""
+    """(2,) [px/s] that joins the places in two other frames best with that in the frame itself."""
     options = {}
     for other, (place, score) in places.items():
         step = time_s[other] - time_s[frame]
         if step and len(place):
             options[other] = (place - origin) / step, score
     if len(options) == 2:
-        (before, a), (after, b) = options[frame - 1], options[frame + 1]
-        step = abs(time_s[frame + 1] - time_s[frame])
-        differs = np.hypot(*(before[:, None] - after[None]).transpose(2, 0, 1)) * step / diameter
+        (one, a), (two, b) = options.values()
+        step = max(abs(time_s[other] - time_s[frame]) for other in options)
+        differs = np.hypot(*(one[:, None] - two[None]).transpose(2, 0, 1)) * step / diameter
         cost = differs - a[:, None] - b[None]
         i, j = np.unravel_index(int(np.argmin(cost)), cost.shape)
-        return 0.5 * (before[i] + after[j])
+        return 0.5 * (one[i] + two[j])
     for velocity, score in options.values():
         return velocity[int(np.argmax(score))]
     return None

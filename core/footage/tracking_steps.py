@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..progress import Progress
 from ..vectors import Array
+from .silhouette import Patch, patch_of
 from .sources import frames
 from .templates import Appearance, Cover, Sighting, clip_window, cover, fit, learn, search
 from .tracking_start import ACCEPTED, Footage, Start
@@ -35,12 +36,17 @@ KINK_SIGMAS = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A sighting; `stable` is its centre in the reference frame of the background."""
+    """A sighting; `stable` is its centre in the reference frame of the background, `patch` what is seen around it.
+
+    The patch is scaled by `scale_px`, the block's size as it is known by then.
+    """
 
     frame: int
     time_s: float
     seen: Sighting
     stable: Array
+    scale_px: float
+    patch: Patch | None
 
 
 class Place(NamedTuple):
@@ -149,7 +155,12 @@ def _begin(footage: Footage, start: Start, picture: np.ndarray) -> State:
     past: tuple[Place, ...] = (Place(time_s, stable, max(seen.sigma_px, 0.2)),)
     if start.velocity is not None:
         past = (Place(time_s - step_s, stable - velocity * step_s, 0.5 * diameter), *past)
-    return State(looks, (Row(frame, time_s, seen, stable),), past, votes)
+    return State(looks, (_row(footage, frame, picture, seen, stable, looks),), past, votes)
+
+
+def _row(footage: Footage, frame: int, picture: np.ndarray, seen: Sighting, stable: Array, looks: Appearance) -> Row:
+    patch = patch_of(picture, frame, footage.plates, seen.pixel, looks.diameter_px)
+    return Row(frame, float(footage.video.time_s[frame]), seen, stable, looks.diameter_px, patch)
 
 
 def _next(footage: Footage, state: State, frame: int, picture: np.ndarray) -> tuple[State, str]:
@@ -293,7 +304,7 @@ def _accepted(
     if jumped or innovation > KINK_SIGMAS * usual:
         past = (past[-1]._replace(sigma_px=0.3 * seen.diameter_px + 0.3 * float(np.hypot(*step))),)
     past = (*past[1 - MEMORY :], Place(expected.time_s, stable, max(seen.sigma_px, 0.1)))
-    rows = (*state.rows, Row(frame, expected.time_s, seen, stable))
+    rows = (*state.rows, _row(footage, frame, picture, seen, stable, state.looks))
     state = replace(state, missed=0, past=past, rows=rows)
     blurred = float(np.hypot(*step)) * state.looks.shutter > 0.6 * seen.diameter_px
     if seen.score > 0.75 and seen.visible > 0.9 and state.confirmed >= CONFIRMED and not blurred:

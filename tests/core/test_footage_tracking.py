@@ -38,6 +38,7 @@ class Clip:
     shadow: bool = False
     wall: tuple[int, int] | None = None
     walker: bool = False
+    shaded: bool = False
     seed: int = 1
     frames: int = 48
 
@@ -90,6 +91,13 @@ def covered(centres: np.ndarray, diameter: float, squash: float = 1.0) -> np.nda
     return whole
 
 
+def lit(centre: np.ndarray, diameter: float) -> np.ndarray:
+    """(h, w) light on a sphere; the sun stands at the upper left, on this side, and the shade is as the ground."""
+    u, v = (np.arange(WIDTH) + 0.5 - centre[0]) / diameter, (np.arange(HEIGHT)[:, None] + 0.5 - centre[1]) / diameter
+    toward = np.sqrt(np.maximum(0.25 - u**2 - v**2, 0))
+    return np.clip(2.4 * (-0.7 * u - 0.5 * v + 0.5 * toward) / 0.5, 0, 1)
+
+
 def film(clip: Clip) -> tuple[Pictures, np.ndarray]:
     """The pictures, and (f, 2) the true centres."""
     rng = np.random.default_rng(clip.seed)
@@ -123,7 +131,10 @@ def film(clip: Clip) -> tuple[Pictures, np.ndarray]:
             picture = (1 - share) * picture + share * (clip.block - 15)
         share = covered(centres, clip.diameter)
         facets = 8 * np.sin(frame * 0.7 + (np.arange(WIDTH) - centres[:, 0].mean()) / clip.diameter * 4)
-        picture = (1 - share) * picture + share * (clip.block + facets)
+        block = clip.block + facets
+        if clip.shaded:
+            block = clip.ground + lit(centres.mean(axis=0), clip.diameter) * (clip.block - clip.ground)
+        picture = (1 - share) * picture + share * block
         if clip.wall:
             picture[:, slice(*clip.wall)] = ground[margin : margin + HEIGHT, slice(*clip.wall)]
         picture = cv2.GaussianBlur(picture, (0, 0), 0.6) + rng.normal(scale=clip.noise, size=picture.shape)
@@ -165,6 +176,28 @@ def test_made_clips_are_followed_to_the_end(clip: Clip, rms_px: float, wide_px: 
     if clip.frames > 45:
         kinks = find_kinks(track.time_s, track.stable, track.sigma_px)
         assert kinks.time_s == pytest.approx(IMPACTS_S, abs=0.004)
+
+
+@pytest.mark.parametrize("shake", [0.0, 4.0])
+def test_the_centre_is_that_of_the_block_and_not_of_its_sunlit_side(shake: float) -> None:
+    """The shaded side looks like the ground on average, and is told by what it hides."""
+    track, error = follow(Clip(diameter=16.0, shaded=True, shake=shake))
+    assert track.frame.size >= 45
+    assert np.median(np.hypot(*error.T)) < 0.6
+    assert np.hypot(*np.median(error, axis=0)) < 0.5
+    assert np.median(track.diameter_px) == pytest.approx(16, abs=2)
+
+
+@pytest.mark.parametrize("last", [False, True])
+def test_a_clip_that_begins_or_ends_at_the_click_keeps_the_block(last: bool) -> None:
+    clip = Clip(walker=True)
+    pictures, truth = film(clip)
+    some = slice(0, 30) if last else slice(18, 48)
+    cut = Pictures(pictures.images[some], pictures.time_s[some])
+    frame = 29 if last else 0
+    track = track_block(cut, frame, truth[some][frame] + (1.5, -1.0), background=no_motion(0, 29))
+    assert track.frame.size >= 28
+    assert np.abs(track.pixel - truth[some][track.frame]).max() < 2.5
 
 
 def test_a_gap_is_bridged_and_left_empty() -> None:

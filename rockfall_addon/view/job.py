@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from threading import Event, Thread
+from typing import NamedTuple
 
 import bpy
 
@@ -50,6 +51,12 @@ class Work:
     keeps_part: bool = False
     changes: bool = True
     unchanged: str = "Nothing has changed."
+
+
+class _Ended(NamedTuple):
+    step: str
+    label: str
+    problem: str
 
 
 class Job:
@@ -208,8 +215,26 @@ class ROCKFALL_OT_stop_job(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_dismiss_problem(bpy.types.Operator):
+    """Take away the message about work that came to nothing"""
+
+    bl_idname = "rockfall.dismiss_problem"
+    bl_label = "Dismiss Message"
+    bl_options = {"INTERNAL"}
+    looks_only = True
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return bool(_ended)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        _ended.clear()
+        redraw(context)
+        return {"FINISHED"}
+
+
 _running: list[Job] = []  # the one that a person waits for
-_ended: list[tuple[str, str]] = []  # step and words of one that came to nothing
+_ended: list[_Ended] = []  # what came to nothing
 _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
@@ -297,9 +322,13 @@ def draw(context: bpy.types.Context, layout: bpy.types.UILayout, step: str = "")
             box.progress(factor=job.share, text=job.percent)
             paragraph(context, box, f"{job.line}  Esc stops it.", "TIME")
             box.operator("rockfall.stop_job", text="Stop", icon="CANCEL")
-    for other, words in _ended:
-        if step in ("", other):
-            paragraph(context, layout, words, "ERROR")
+    for one in _ended:
+        if step in ("", one.step):
+            box = layout.box()
+            top = box.row()
+            top.label(text=one.label, icon="ERROR")
+            top.operator("rockfall.dismiss_problem", text="", icon="X", emboss=False)
+            paragraph(context, box, one.problem)
 
 
 def _stopped(job: Job) -> str:
@@ -372,7 +401,7 @@ def _end(job: Job, words: str, *, is_problem: bool = False) -> None:
     job.showing = None
     job.at_rest.close()
     if is_problem:
-        _ended.append((job.work.step, words))
+        _ended.append(_Ended(job.work.step, job.label, words))
         print(f"Rockfall: {words}")
     _in_window(lambda window: _say(window, words))
     bpy.app.timers.register(_clear_status, first_interval=LINGER_S, persistent=True)
@@ -437,4 +466,4 @@ def unregister() -> None:
         keymap.keymap_items.remove(item)
 
 
-CLASSES = (ROCKFALL_OT_show_result, ROCKFALL_OT_stop_job)
+CLASSES = (ROCKFALL_OT_show_result, ROCKFALL_OT_stop_job, ROCKFALL_OT_dismiss_problem)

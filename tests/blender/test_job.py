@@ -85,7 +85,7 @@ def test_another_file_leaves_no_lock(job) -> None:
     job.begin(waiting.work, "Wait", bpy.context.scene)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert not job.is_running()
-    assert "another file" in job._ended[0][1]
+    assert "another file" in job._ended[0].problem
     again = Waiting(job)
     job.begin(again.work, "Wait", bpy.context.scene)
     again.end(job)
@@ -98,7 +98,7 @@ def test_a_scene_that_is_gone(job) -> None:
     bpy.data.scenes.remove(other)
     waiting.end(job)
     assert waiting.kept == []
-    assert "its scene was deleted" in job._ended[0][1]
+    assert "its scene was deleted" in job._ended[0].problem
 
 
 def test_what_goes_wrong_is_said(job, part) -> None:
@@ -109,7 +109,10 @@ def test_what_goes_wrong_is_said(job, part) -> None:
         waiting = Waiting(job, result)
         job.begin(waiting.work, "Wait", bpy.context.scene)
         waiting.end(job)
-        assert words in job._ended[0][1]
+        assert words in job._ended[0].problem
         assert waiting.kept == []
         assert not job.is_running()
+        assert bpy.ops.rockfall.dismiss_problem() == {"FINISHED"}
+        assert not job._ended
+        assert not bpy.ops.rockfall.dismiss_problem.poll()
     part("rockfall_addon.scene.problems").forget()

@@ -328,7 +328,8 @@ def test_a_newer_file_is_left_alone(scene: bpy.types.Scene, part) -> None:
 
 LOOK_ONLY = {
     "fit_footage", "go_to_pair", "impact_table", "open_workspace", "show_impact", "show_relief", "sort_impacts",
-    "step_frame", "show_result", "stop_job", "open_graphs", "open_graphs_workspace", "open_motion_graphs",
+    "step_frame", "show_result", "stop_job", "dismiss_problem", "open_graphs",
+    "open_graphs_workspace", "open_motion_graphs",
     "point_in_graph", "leave_graphs", "press_in_motion", "graph_menu", "zoom_graph", "pan_graph", "reset_graphs",
     "show_all_points", "maximise_graph", "save_parameters", "test_groups", "point_in_strip", "leave_strip", "open_keys",
     "frame_trajectory", "select_set_aside", "go_to_spin_mark",

@@ -28,8 +28,8 @@ OVER_GRAPHS = {
     "rockfall.leave_strip",
 }  # fmt: skip
 """What the editors of graphs and the timeline have in menus, keys and panels of its own."""
-BY_ITSELF = {"rockfall.show_result"}
-"""What a background job calls."""
+BY_ITSELF = {"rockfall.show_result", "rockfall.dismiss_problem"}
+"""What a background job calls, or has in its message."""
 LARGEST_WORKSPACE_BYTES = 200_000
 
 

@@ -81,6 +81,6 @@ def classes_of(name: str, values: Array) -> Classes:
     if not limits:
         limits = SERIES[LAYERS[name].unit][0][:1]
     colours = scale_colours(np.linspace(0.0, 1.0, len(limits) + 1), 0.0, 1.0)
-    words = [f"{limit:,.10g}".replace(",", "\u202f") for limit in limits]
+    words = [f"{limit:,.10g}" for limit in limits]
     between = [f"{low} – {high}" for low, high in pairwise(words)]
     return Classes(tuple(limits), colours, (f"below {words[0]}", *between, f"{words[-1]} and more"))

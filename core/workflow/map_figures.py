@@ -172,7 +172,7 @@ def map_figure(
         north_arrow(axes)
         unit = f" [{layer.unit}]" if layer.unit else ""
         axes.set_title(f"{layer.title}{unit}", fontsize=8.5, fontweight="bold", loc="left", pad=16.0)
-        under = f"conditional on the release: {maps.blocks:,} blocks".replace(",", "\u202f")
+        under = f"conditional on the release: {maps.blocks:,} blocks"
         parts = [under, *([said] if said else []), f"cells of {cells.size_m:g} m"]
         axes.annotate(
             "  ·  ".join(parts), (0.0, 1.0), xytext=(0, 5), xycoords="axes fraction", textcoords="offset points",
@@ -198,7 +198,7 @@ def _ticks(axes: "Axes") -> None:
     """Few survey coordinates, in full."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    whole = FuncFormatter(lambda value, _: f"{value:,.0f}".replace(",", "\u202f"))
+    whole = FuncFormatter(lambda value, _: f"{value:,.0f}")
     for axis, count in ((axes.xaxis, 4), (axes.yaxis, 4)):
         axis.set_major_locator(MaxNLocator(count, steps=[1, 2, 5, 10], integer=True))
         axis.set_major_formatter(whole)

@@ -239,7 +239,7 @@ def readings(scene: bpy.types.Scene) -> list[tuple[str, tuple[str, ...]]]:
 
 def grouped(count: int) -> str:
     """A count with its thousands set apart."""
-    return f"{count:,}".replace(",", "\u202f")
+    return f"{count:,}"
 
 
 def _read(obj: bpy.types.Object) -> Surface:

@@ -36,12 +36,19 @@ _registered: list[ModuleType] = []
 
 
 def parts() -> list[ModuleType]:
-    """All modules that register something: first the properties, which the rest reads; then step by step."""
+    """All modules that register something: first the properties, which the rest reads; then step by step.
+
+    Last come those with `OVER_ALL`: what Blender is asked to draw later lies over the rest.
+    """
     first = [settings, model_parameters, comparison_settings, graph_settings, motion_settings]
     found = [*first, *view.PARTS]
     for name in STEPS:
         found += import_module(f".{name}", __name__).PARTS
-    return sorted(found, key=lambda part: part not in first and not part.__name__.endswith(".properties"))
+
+    def turn(part: ModuleType) -> tuple[bool, bool]:
+        return part not in first and not part.__name__.endswith(".properties"), getattr(part, "OVER_ALL", False)
+
+    return sorted(found, key=turn)
 
 
 def classes() -> list[type]:

@@ -104,7 +104,7 @@ def test_coarse_view_draws_a_third_of_the_limit_and_measures_on_all(part, slope)
     assert drawn(ground) == view.drawn_triangles(ground)
     assert terrain.surface_of_scene(scene) is surface
     assert len(scene.objects) == 1, "the coarse mesh is in no scene"
-    assert any("of 20\u202f000 triangles" in said for said in terrain.remarks(scene))
+    assert any("of 20,000 triangles" in said for said in terrain.remarks(scene))
     evaluated = ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     assert evaluated.attributes.active_color_name == "relief"
     assert [slot.name for slot in evaluated.materials] == ["Rockfall terrain"]

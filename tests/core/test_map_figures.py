@@ -56,7 +56,7 @@ def test_a_figure_says_what_it_is_conditional_on(maps: Maps) -> None:
     assert axes.get_title(loc="left") == "Reach probability [%]"
     words = " | ".join(text.get_text() for text in axes.texts)
     for said in (
-        "conditional on the release: 12\u202f000 blocks",
+        "conditional on the release: 12,000 blocks",
         "noel_2017",
         "cells of 2 m",
         "EPSG:2056",

@@ -142,7 +142,7 @@ def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     shading = shade(surface)
     add_terrain(scene, surface, shading)
     size = " × ".join(f"{length:.0f}" for length in surface.bounds[1] - surface.bounds[0])
-    facts = f"{len(surface.faces):,}".replace(",", "\u202f") + f" triangles, {size} m"
+    facts = f"{len(surface.faces):,} triangles, {size} m"
     if shading.thin.any():
         facts += f", thin data on {100 * thin_share(surface, shading):.0f} % of it"
     dressing.set_up_picture(scene, HD, job.engine, title=job.title or job.source.name, subtitle=facts)

@@ -17,6 +17,8 @@ BLOCK, PICK = 16.0, 22.0
 """Diameters of the rings at interface scale 1 [px]; a block that is larger on the screen has none."""
 MOST_NAMES = 12
 DARK = (0.02, 0.02, 0.02)
+OVER_ALL = True
+"""The card of an impact is read, whatever legend is there."""
 
 _handles: list[object] = []
 

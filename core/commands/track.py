@@ -63,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..footage.background import background_motion, no_motion
     from ..footage.kinks import find_kinks
     from ..footage.pictures import draw_track
+    from ..footage.sources import kept
     from ..footage.tracking import track_block
     from ..footage.video import open_video
     from ..opencv import write_picture
@@ -74,12 +75,13 @@ def run(arguments: argparse.Namespace) -> int:
         first = arguments.first or 0
         last = video.frames - 1 if arguments.last is None else arguments.last
         _check(video, clicks, first, last)
+        source = kept(video, first, last)
         if arguments.still:
             motion = no_motion(first, last)
         else:
-            motion, _ = background_motion(video, first=first, last=last, progress=progress)
+            motion, _ = background_motion(source, first=first, last=last, progress=progress)
         track = track_block(
-            video,
+            source,
             clicks[0][0],
             clicks[0][1:],
             clicks=clicks[1:],
@@ -97,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
             write_events(events, folder / "events.csv")
             progress("Drawing the picture")
             labels = [f"{time:.3f} s" for time in kinks.time_s]
-            picture = draw_track(video, track, motion, kinks, labels, clicks[0][0])
+            picture = draw_track(source, track, motion, kinks, labels, clicks[0][0])
             write_picture(folder / "track.png", picture)
     _print_summary(arguments, track, motion, kinks, events)
     return 0

@@ -10,7 +10,7 @@ from ..opencv import opencv
 from ..progress import Progress, silent
 from ..vectors import Array
 from .background import BackgroundMotion
-from .sources import Source, frames
+from .sources import Kept, Source, frames
 
 SAMPLES = 15
 REACH = 300
@@ -24,24 +24,56 @@ WANDERED = 0.1
 NOISE_FLOOR = 2.0
 """Grey levels; compressed video shows none where nothing happens."""
 QUARTILES = (0.5, 0.25, 0.75)
+BORDER = 3
+"""Next to the edge of a part its sigma is another one than in the whole plate [px]."""
+ROOM, LEAST_ROOM = 0.6, 60
+"""Around what is asked for a part is larger by so many times its size, of so many pixels at least."""
+
+type Box = tuple[int, int, int, int]
+"""Left, top, right, bottom [px]."""
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a plate.
+
+    Attributes
+    ----------
+    left, top : where it begins on the plate [px].
+    picture : (h, w, 3) median, uint8.
+    sigma : (h, w) standard deviation of a channel [grey levels], float32.
+    seen : (h, w) uint8, 255 where the background is known.
+    """
+
+    left: int
+    top: int
+    picture: np.ndarray
+    sigma: np.ndarray
+    seen: np.ndarray
+
+    def holds(self, box: Box, size: tuple[int, int]) -> bool:
+        """Whether a box lies inside, away from edges that are none of the plate's (width, height)."""
+        height, width = self.seen.shape
+        low = [0 if start == 0 else start + BORDER for start in (self.left, self.top)]
+        ends = (self.left + width, self.top + height)
+        high = [end if end == whole else end - BORDER for end, whole in zip(ends, size, strict=True)]
+        return box[0] >= low[0] and box[1] >= low[1] and box[2] <= high[0] and box[3] <= high[1]
+
+
+@dataclass(eq=False)
 class Plate:
     """The background as seen in one frame; where the camera moves, with a margin around it.
 
     Attributes
     ----------
     anchor : that frame.
-    picture : (h, w, 3) median, uint8.
-    sigma : (h, w) standard deviation of a channel [grey levels], float32.
-    seen : (h, w) uint8, 255 where the background is known.
+    samples : frames of which it is the median, and their pictures.
+    part : what has been made of it.
     """
 
     anchor: int
-    picture: np.ndarray
-    sigma: np.ndarray
-    seen: np.ndarray
+    samples: list[tuple[int, np.ndarray]]
+    part: Part | None = None
 
 
 class Plates:
@@ -50,7 +82,9 @@ class Plates:
     def __init__(self, source: Source, motion: BackgroundMotion, progress: Progress = silent) -> None:
         self._source, self._motion, self._progress = source, motion, progress
         self._kept: list[Plate] = []
-        self._margin = tuple(int(np.ceil(WANDERED * size)) for size in (source.width, source.height))
+        size = (source.width, source.height)
+        self._margin = (0, 0) if motion.still else (int(np.ceil(WANDERED * size[0])), int(np.ceil(WANDERED * size[1])))
+        self._size = (size[0] + 2 * self._margin[0], size[1] + 2 * self._margin[1])
 
     def window(
         self, frame: int, left: int, top: int, width: int, height: int
@@ -58,43 +92,76 @@ class Plates:
         """Background of a window of a frame: picture (height, width, 3), its sigma, and where it is known (float32)."""
         plate = self._plate(frame)
         if self._motion.still:
-            part = (slice(top, top + height), slice(left, left + width))
-            return tuple(a[part].astype(np.float32) for a in (plate.picture, plate.sigma, plate.seen > 0))  # type: ignore[return-value]
+            part = self._part(plate, (left, top, left + width, top + height))
+            own = (slice(top - part.top, top - part.top + height), slice(left - part.left, left - part.left + width))
+            return tuple(a[own].astype(np.float32) for a in (part.picture, part.sigma, part.seen > 0))  # type: ignore[return-value]
         cv2 = opencv()
         shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
         across = self._onto(frame, plate.anchor) @ shift
+        part = self._part(plate, self._box(across, width, height))
+        across = np.array([[1.0, 0.0, -part.left], [0.0, 1.0, -part.top], [0.0, 0.0, 1.0]]) @ across
         size, flags = (width, height), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        picture = cv2.warpPerspective(plate.picture, across, size, flags=flags)
-        sigma = cv2.warpPerspective(plate.sigma, across, size, flags=flags)
-        seen = cv2.warpPerspective(plate.seen, across, size, flags=flags)
+        picture = cv2.warpPerspective(part.picture, across, size, flags=flags)
+        sigma = cv2.warpPerspective(part.sigma, across, size, flags=flags)
+        seen = cv2.warpPerspective(part.seen, across, size, flags=flags)
         return picture.astype(np.float32), np.maximum(sigma, NOISE_FLOOR), (seen > 250).astype(np.float32)
+
+    def _box(self, across: Array, width: int, height: int) -> Box:
+        """What a window needs of the plate onto which `across` leads: left, top, right, bottom, inside of it."""
+        corners = np.array([[-1.0, -1.0], [width, -1.0], [-1.0, height], [width, height]])
+        there = np.column_stack([corners, np.ones(4)]) @ across.T
+        there = there[:, :2] / there[:, 2:]
+        low = np.clip(np.floor(there.min(axis=0)), 0, self._size).astype(int)
+        high = np.clip(np.ceil(there.max(axis=0)) + 2, 0, self._size).astype(int)
+        return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+    def _part(self, plate: Plate, box: Box) -> Part:
+        """A part of the plate that holds the box: the last one, or a new one with room around it."""
+        if plate.part is None or not plate.part.holds(box, self._size):
+            around = BORDER + int(ROOM * max(box[2] - box[0], box[3] - box[1], LEAST_ROOM))
+            left, top = (max(start - around, 0) for start in box[:2])
+            right, bottom = (
+                max(min(end + around, whole), start + 1)
+                for end, whole, start in zip(box[2:], self._size, (left, top), strict=True)
+            )
+            plate.part = self._made(plate, (min(left, right - 1), min(top, bottom - 1), right, bottom))
+        return plate.part
+
+    def _made(self, plate: Plate, box: Box) -> Part:
+        cv2 = opencv()
+        left, top, right, bottom = box
+        layers, known = [], []
+        for frame, picture in plate.samples:
+            if self._motion.still:
+                layers.append(picture[top:bottom, left:right].copy())
+                continue
+            shift = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
+            across, size = shift @ self._onto(frame, plate.anchor), (right - left, bottom - top)
+            full = np.full(picture.shape[:2], 255, np.uint8)
+            known.append(cv2.warpPerspective(full, across, size) > 250)
+            layers.append(cv2.warpPerspective(picture, across, size))
+        return Part(left, top, *_median(layers, known))
 
     def _plate(self, frame: int) -> Plate:
         for plate in reversed(self._kept):
             near = abs(plate.anchor - frame) <= REACH
             if near and (self._motion.still or self._wandered(frame, plate.anchor) < WANDERED):
                 return plate
-        plate = self._make(frame)
+        plate = Plate(frame, self._samples(frame))
         self._kept = [*self._kept[-1:], plate]
         return plate
 
-    def _make(self, anchor: int) -> Plate:
+    def _samples(self, anchor: int) -> list[tuple[int, np.ndarray]]:
+        """Frames from all over the footage around the anchor, those that need not be decoded if there are enough."""
         self._progress(f"Making the background around frame {anchor}", 0, 0)
         low = max(anchor - REACH, int(self._motion.frames[0]))
         high = min(anchor + REACH, int(self._motion.frames[-1]))
         near = [frame for frame in range(low, high + 1) if self._wandered(frame, anchor) < 1 - SHARED]
+        if isinstance(self._source, Kept):
+            there = [frame for frame in near if self._source.has(frame)]
+            near = there if len(there) >= SAMPLES else near
         chosen = sorted({near[i] for i in np.linspace(0, len(near) - 1, SAMPLES).round().astype(int)})
-        cv2 = opencv()
-        layers, known = [], []
-        for frame, picture in frames(self._source, chosen):
-            if not self._motion.still:
-                size = (picture.shape[1] + 2 * self._margin[0], picture.shape[0] + 2 * self._margin[1])
-                across = self._onto(frame, anchor)
-                full = np.full(picture.shape[:2], 255, np.uint8)
-                known.append(cv2.warpPerspective(full, across, size) > 250)
-                picture = cv2.warpPerspective(picture, across, size)
-            layers.append(picture)
-        return _median(anchor, layers, known)
+        return list(frames(self._source, chosen))
 
     def _wandered(self, frame: int, anchor: int) -> float:
         """How far the corners of a frame lie from those of the anchor, as a share of the picture."""
@@ -121,8 +188,8 @@ def _centred(homography: Array) -> Array:
     return np.linalg.inv(corner) @ homography @ corner
 
 
-def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> Plate:
-    """Median and quartiles; what is not known is sorted to the end."""
+def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Picture, sigma and where it is known, by median and quartiles; what is not known is sorted to the end."""
     for layer, there in zip(layers, known, strict=False):
         layer[~there] = 255
     ordered = _sorted(layers)
@@ -138,7 +205,7 @@ def _median(anchor: int, layers: list[np.ndarray], known: list[np.ndarray]) -> P
             picture[part] = rest[(q * fewer).astype(np.intp), np.arange(fewer.size)]
     spread = (high.astype(np.float32) - low) / IQR_PER_SD
     variance = opencv().blur(np.mean(spread**2, axis=2), (5, 5))
-    return Plate(anchor, middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen)
+    return middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen
 
 
 def _sorted(layers: list[np.ndarray]) -> list[np.ndarray]:

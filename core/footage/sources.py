@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where frames come from: a video file, or pictures that are already in memory."""
+"""Where frames come from: a video file, decoded again or kept, or pictures that are already in memory."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..memory import available_bytes
 from ..vectors import Array
 from .video import Video, read_frames
 
-CHUNK = 48
-"""Frames held at a time while a video is read backwards."""
+CHUNK, CHUNK_BYTES = (12, 48), 300_000_000
+"""Frames held at a time while a video is read backwards: as many as fit, at least and at most."""
+MOST_BYTES, PART_OF_MEMORY = 900_000_000, 0.25
+"""Room for the frames that are kept, and as a part of the memory that is there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +40,60 @@ class Pictures:
         return int(self.images[0].shape[0])
 
 
-Source = Video | Pictures
+class Kept:
+    """A video whose frames, once decoded, are kept in memory: all of a short clip, evenly spaced ones of a longer.
+
+    Following the background, making it without what moves, and following the block all go through the same frames.
+    """
+
+    def __init__(self, video: Video, first: int = 0, last: int | None = None) -> None:
+        last = video.frames - 1 if last is None else last
+        self.video = video
+        self._room = int(min(MOST_BYTES, PART_OF_MEMORY * available_bytes()))
+        self._every = max(-(-(last - first + 1) * self.frame_bytes // max(self._room, 1)), 1)
+        self._pictures: dict[int, np.ndarray] = {}
+
+    @property
+    def time_s(self) -> Array:
+        """(f,) ascending [s]."""
+        return self.video.time_s
+
+    @property
+    def width(self) -> int:
+        """[px]."""
+        return self.video.width
+
+    @property
+    def height(self) -> int:
+        """[px]."""
+        return self.video.height
+
+    @property
+    def frame_bytes(self) -> int:
+        """Of a picture in memory."""
+        return 3 * self.width * self.height
+
+    def has(self, frame: int) -> bool:
+        """Whether a frame is there without decoding it."""
+        return frame in self._pictures
+
+    def ascending(self, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
+        """Index and picture of ascending frames, those decoded that are not there."""
+        missing = [index for index in indices if index not in self._pictures]
+        decoded, kept = read_frames(self.video, missing), dict.fromkeys(missing)
+        for index in indices:
+            picture = next(decoded)[1] if index in kept else self._pictures[index]
+            if index % self._every == 0 and (len(self._pictures) + 1) * self.frame_bytes <= self._room:
+                self._pictures[index] = picture
+            yield index, picture
+
+
+type Source = Video | Pictures | Kept
+
+
+def kept(source: Source, first: int, last: int) -> Pictures | Kept:
+    """The source with its frames from first to last kept in memory, as far as there is room."""
+    return Kept(source, first, last) if isinstance(source, Video) else source
 
 
 def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
@@ -47,8 +103,12 @@ def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.nda
             picture = source.images[index]
             yield index, picture if picture.ndim == 3 else np.repeat(picture[:, :, None], 3, axis=2)
     elif len(indices) > 1 and indices[1] < indices[0]:
-        for start in range(0, len(indices), CHUNK):
-            part = sorted(indices[start : start + CHUNK])
-            yield from reversed(list(read_frames(source, part)))
+        chunk = int(np.clip(CHUNK_BYTES // (3 * source.width * source.height), *CHUNK))
+        for start in range(0, len(indices), chunk):
+            yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]))))
     else:
-        yield from read_frames(source, indices)
+        yield from _ascending(source, indices)
+
+
+def _ascending(source: Video | Kept, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
+    return source.ascending(indices) if isinstance(source, Kept) else read_frames(source, indices)

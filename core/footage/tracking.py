@@ -13,7 +13,7 @@ from ..vectors import Array, Indices
 from .background import BackgroundMotion, background_motion, stabilise
 from .plates import Plates
 from .silhouette import outline_offsets
-from .sources import Source
+from .sources import Source, kept
 from .track_scatter import scatter_sigma
 from .tracking_start import Footage, start_at
 from .tracking_steps import Row, follow
@@ -87,10 +87,11 @@ def track_block(
     first, last = 0 if first is None else first, video.time_s.size - 1 if last is None else last
     marks = sorted({int(f): (float(u), float(v)) for f, u, v in [*clicks, (frame, *pixel)]}.items())
     _check(video, marks, first, last)
+    source = kept(video, first, last)
     motion = (
-        background_motion(video, first=first, last=last, progress=progress)[0] if background is None else background
+        background_motion(source, first=first, last=last, progress=progress)[0] if background is None else background
     )
-    footage = Footage(video, motion, Plates(video, motion, progress))
+    footage = Footage(source, motion, Plates(source, motion, progress))
     starts = [start_at(footage, at, np.array(place), diameter_px) for at, place in marks]
     backwards, before = follow(footage, starts[0], first, progress)
     rows = list(backwards[::-1])

@@ -96,3 +96,15 @@ def test_the_two_latest_plates_are_kept() -> None:
     for frame in (0, 300, 301, 0, 1, 700, 400, 2100, 700, 0):
         plates.window(frame, 0, 0, 2, 2)
     assert made == [f"Making the background around frame {anchor}" for anchor in (0, 301, 700, 2100, 0)]
+
+
+def test_a_part_of_a_plate_is_what_the_whole_plate_shows_there() -> None:
+    texture = np.random.default_rng(5).integers(0, 255, (240, 420, 3), dtype=np.uint8)
+    noise = np.random.default_rng(6).normal(scale=6, size=(12, 240, 400, 3))
+    pictures = [np.clip(texture[:, frame : frame + 400] + noise[frame], 0, 255).astype(np.uint8) for frame in range(12)]
+    source, motion = Pictures(pictures, np.arange(12) / 30), panning(12, 1)
+    whole = Plates(source, motion).window(4, 0, 0, 400, 240)
+    parts = Plates(source, motion)
+    for left, top in ((150, 100), (160, 110), (20, 5), (378, 216)):
+        for part, full in zip(parts.window(4, left, top, 22, 24), whole, strict=True):
+            np.testing.assert_allclose(part, full[top : top + 24, left : left + 22], atol=1e-4)

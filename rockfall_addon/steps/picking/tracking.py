@@ -5,6 +5,7 @@ import bpy
 
 from ....core.errors import RockfallError
 from ....core.footage.background import BackgroundMotion, background_motion
+from ....core.footage.sources import kept
 from ....core.footage.tracking import BlockTrack, track_block
 from ....core.progress import Progress
 from ...scene import alignment, camera_paths, clocks, places, sightings, store, video_files, videos
@@ -44,9 +45,10 @@ class ROCKFALL_OT_track_block(job.InBackground, bpy.types.Operator):
         frame, u, v = clicks[0]
 
         def compute(progress: Progress) -> tuple[BlockTrack, BackgroundMotion]:
-            motion, _ = background_motion(video, first=first, last=last, progress=progress)
+            source = kept(video, first, last)
+            motion, _ = background_motion(source, first=first, last=last, progress=progress)
             more = {"clicks": clicks[1:], "background": motion, "first": first, "last": last}
-            return track_block(video, frame, (u, v), **more, progress=progress), motion
+            return track_block(source, frame, (u, v), **more, progress=progress), motion
 
         def keep(scene: bpy.types.Scene, found: tuple[BlockTrack, BackgroundMotion]) -> str:
             track, motion = found

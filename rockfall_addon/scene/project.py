@@ -45,6 +45,7 @@ from . import (
     screens,
     set_aside_words,
     simulated_sources,
+    simulated_trees,
     simulated_zones,
     simulation_setup,
     store,
@@ -158,6 +159,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             write_attribute_zones(zones, place / "zones.csv")
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
         if stated is not None:
+            stated = replace(stated, trees=simulated_trees.copied(stated.trees, place))
             stated = replace(stated, structures=_write_structures(met, place), screens=tuple(drawn))
         source = TerrainSource(
             (place / "terrain.ply",), (shift.x, shift.y, shift.z), shift.crs, up="z", sigma_m=terrain.accuracy_m(scene)

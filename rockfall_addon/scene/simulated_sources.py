@@ -21,7 +21,7 @@ from ...core.simulation.ground import Contact
 from ...core.simulation.measured_releases import start_times
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ReleaseSource
-from . import drawn_releases, fingerprints, georeference, models, reconstruction, store
+from . import drawn_releases, fingerprints, georeference, models, reconstruction, simulated_trees, store
 from .simulation import Origin
 
 FILMED = ("MEASURED", "PICK")
@@ -57,6 +57,7 @@ def entry_of(scene: bpy.types.Scene) -> SimulationEntry:
         friction=store.double(settings.friction),
         drag=settings.use_drag,
         seed=settings.seed,
+        trees=simulated_trees.entry_of(scene),
     )
 
 
@@ -84,6 +85,7 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
     settings.contact = entry.contact
     settings.rolling, settings.friction, settings.use_drag = entry.rolling, entry.friction, entry.drag
     settings.seed, settings.number = entry.seed, releases.number
+    simulated_trees.keep_entry(scene, entry.trees)
     settings.shape = releases.shape or "sphere"
     if releases.diameter is not None:
         settings.diameter_law, settings.diameter_m = releases.diameter.law, releases.diameter.first

@@ -18,8 +18,9 @@ from ...core.impact_models.registry import find_model
 from ...core.simulation.engine import Simulation
 from ...core.simulation.parabolas import Parabolas, parabolas_of
 from ...core.simulation.results import release_names
+from ...core.simulation.trees import Trees
 from ...core.vectors import Array
-from . import materials, simulated_nodes, simulated_paths, store, timing, trails, trajectories
+from . import materials, simulated_nodes, simulated_paths, simulated_trees, store, timing, trails, trajectories
 
 COLLECTION = "Simulation"
 SINCE, LASTS, RUN, RELEASE = "since_release_s", "lasts_s", "run", "release"
@@ -108,13 +109,17 @@ def show(
     simulations : one of each model, with recorded moments.
     origins : release → when its blocks start; the others start with the scene.
     """
-    return show_prepared(scene, [prepare(simulation) for simulation in simulations], origins)
+    trees = simulations[0].settings.trees if simulations else None
+    return show_prepared(scene, [prepare(simulation) for simulation in simulations], origins, trees)
 
 
 def show_prepared(
-    scene: bpy.types.Scene, prepared: Sequence[Prepared], origins: Mapping[str, Origin] | None = None
+    scene: bpy.types.Scene,
+    prepared: Sequence[Prepared],
+    origins: Mapping[str, Origin] | None = None,
+    trees: Trees | None = None,
 ) -> list[bpy.types.Object]:
-    """`show` what was prepared before."""
+    """`show` what was prepared before, and the trees that the blocks met."""
     if not (store.has_role(scene, store.FLIGHTS_ROLE) or blocks_of(scene)):
         _choose_sizes(scene.rockfall, prepared)
     remove(scene)
@@ -133,6 +138,7 @@ def show_prepared(
             store.link(place, obj)
         store.link(place, _pattern(blocks, each.model))
         shown.append(blocks)
+    simulated_trees.show(scene, store.collection(scene, COLLECTION), trees)
     follow(scene)
     look(scene)
     return shown
@@ -140,7 +146,10 @@ def show_prepared(
 
 def remove(scene: bpy.types.Scene) -> None:
     """Show no simulated blocks."""
-    roles = (store.SIMULATED_BLOCKS_ROLE, store.SIMULATED_PATHS_ROLE, store.SIMULATED_PATTERN_ROLE)
+    roles = (
+        store.SIMULATED_BLOCKS_ROLE, store.SIMULATED_PATHS_ROLE, store.SIMULATED_PATTERN_ROLE,
+        store.SIMULATED_TREES_ROLE,
+    )  # fmt: skip
     store.remove_objects([obj for role in roles for obj in store.with_role(scene, role)])
     store.remove_collection(scene, COLLECTION)
     trails.paint_observed(scene)
@@ -176,6 +185,7 @@ def look(scene: bpy.types.Scene) -> None:
         obj.hide_render = not settings.show_paths
         lines = simulated_paths.lines_of(obj)
         simulated_paths.paint(obj, simulated_paths.colours_of(lines, settings.colour_by, *tops), path_radius(scene))
+    simulated_trees.look(scene)
     trails.paint_observed(scene)
 
 

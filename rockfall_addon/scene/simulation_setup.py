@@ -14,6 +14,7 @@ from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
 from ...core.exchange.simulation_entry import SimulationEntry
 from ...core.exchange.simulation_output import default_records, write_simulations
+from ...core.exchange.trees import open_trees
 from ...core.hazard.barriers import with_barriers
 from ...core.hazard.screens import Screen, check_screens
 from ...core.impact_models.registry import MODELS
@@ -32,6 +33,7 @@ from . import (
     reconstruction,
     screens,
     simulated_sources,
+    simulated_trees,
     simulated_zones,
     simulation,
     store,
@@ -86,6 +88,7 @@ def plan(scene: bpy.types.Scene, entry: SimulationEntry | None = None) -> Plan:
     if any(MODELS[name].draws_from_impacts for name in entry.models):
         good, left_out = reconstruction.reconstruct_good(scene)
         measured = measured_rebounds(good.impacts)
+    trees = None if entry.trees is None else open_trees(entry.trees, surface, entry.seed)[0]
     scenario = Scenario(
         met,
         source,
@@ -98,6 +101,7 @@ def plan(scene: bpy.types.Scene, entry: SimulationEntry | None = None) -> Plan:
         zones=simulated_zones.zones_of(scene, met, list(entry.models)),
         gravity_mps2=how.gravity_mps2,
         seed=entry.seed,
+        trees=trees,
     )
     return Plan(scenario, screens.screens_of(scene), origins, {"print": fingerprint(scene)}, left_out)
 
@@ -200,7 +204,12 @@ def missing(scene: bpy.types.Scene, models: Collection[str] | None = None) -> st
         return "Choose at least one model."
     if "observed" in chosen and not store.has_role(scene, store.PICK_ROLE):
         return "The model of measured rebounds needs measured impacts: pick some, or leave it out."
-    return simulated_sources.missing(scene) or structures.problem(scene) or screens.problem(scene)
+    return (
+        simulated_sources.missing(scene)
+        or simulated_trees.missing(scene)
+        or structures.problem(scene)
+        or screens.problem(scene)
+    )
 
 
 def ground(scene: bpy.types.Scene) -> Surface:

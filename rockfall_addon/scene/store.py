@@ -22,6 +22,7 @@ PICK_ROLE, BLOCK_ROLE, FLIGHTS_ROLE = "pick", "block", "flights"
 SET_ASIDE_ROLE = "pick_set_aside"  # a pick that cannot be used, until it is corrected
 MODEL_BLOCK_ROLE, MODEL_FLIGHTS_ROLE = "twin", "twin_flights"
 SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_paths"
+SIMULATED_TREES_ROLE = "simulated_trees"  # the stems that the shown blocks met
 SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
 MAPS_ROLE = "maps"  # of what passes through the cells of the terrain, of many runs
 RELEASE_ROLE = "release"  # a drawn line, area or points

@@ -149,6 +149,7 @@ BY_ROLE: dict[str, Kept] = {
         {**_model, store.RELEASES: json_of(list, _releases), store.ENDS: json_of(list, _texts)}, do="Simulate again"
     ),
     store.SIMULATED_PATTERN_ROLE: Kept(_model, do="Simulate again"),
+    store.SIMULATED_TREES_ROLE: Kept(do="Simulate again"),
     store.MAPS_ROLE: Kept(
         {
             **_model,

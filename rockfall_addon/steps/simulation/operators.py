@@ -33,7 +33,7 @@ class ROCKFALL_OT_simulate(InBackground, bpy.types.Operator):
             return simulation_setup.run(plan, progress)
 
         def keep(scene: bpy.types.Scene, found: object) -> str:
-            simulation.show_prepared(scene, found.prepared, plan.origins)
+            simulation.show_prepared(scene, found.prepared, plan.origins, plan.scenario.trees)
             simulation_setup.keep(scene, plan.said, found.remarks, found.at_screens)
             return found.remarks[0].text
 

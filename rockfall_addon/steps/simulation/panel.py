@@ -170,6 +170,33 @@ class ROCKFALL_PT_simulation_structures(_Sub, bpy.types.Panel):
         layout.operator("rockfall.use_as_structure", icon="ADD")
 
 
+class ROCKFALL_PT_simulation_trees(_Sub, bpy.types.Panel):
+    bl_label = "Trees"
+    bl_idname = "ROCKFALL_PT_simulation_trees"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.rockfall_simulation
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(settings, "trees")
+        if settings.trees == "NONE":
+            text = "Stems that stand in the way: from a table, or a forest of so many stems per hectare."
+            paragraph(context, layout, text, "INFO")
+            return
+        column = layout.column(align=True)
+        if settings.trees == "TABLE":
+            column.prop(settings, "trees_file")
+        else:
+            column.prop(settings, "stems_per_hectare")
+            column.prop(settings, "dbh_cm")
+            column.prop(settings, "dbh_sd_cm")
+            column.prop(settings, "trees_within")
+        column = layout.column(align=True)
+        column.prop(settings, "tree_height_m")
+        column.prop(settings, "tree_species")
+        paragraph(context, layout, "They take energy by a published law; simulate with and without to compare.", "INFO")
+
+
 class ROCKFALL_PT_simulation_screens(_Sub, bpy.types.Panel):
     bl_label = "Screens and barriers"
     bl_idname = "ROCKFALL_PT_simulation_screens"
@@ -228,6 +255,8 @@ class ROCKFALL_PT_simulation_look(_Sub, bpy.types.Panel):
         column = layout.column(heading="Show", align=True)
         column.prop(settings, "show_paths")
         column.prop(settings, "show_blocks")
+        if store.has_role(context.scene, store.SIMULATED_TREES_ROLE):
+            column.prop(settings, "show_trees")
         layout.prop(context.scene.rockfall, "block_scale")
         layout.prop(context.scene.rockfall, "show_legend")
 
@@ -284,5 +313,6 @@ CLASSES = (
     ROCKFALL_PT_simulation_motion,
     ROCKFALL_PT_simulation_zones,
     ROCKFALL_PT_simulation_structures,
+    ROCKFALL_PT_simulation_trees,
     ROCKFALL_PT_simulation_look,
 )

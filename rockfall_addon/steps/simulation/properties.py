@@ -18,6 +18,7 @@ from ....core.hazard.cells import LEAST_M
 from ....core.hazard.maps import LAYERS
 from ....core.simulation.block_shapes import SHAPES
 from ....core.simulation.engine import FRICTION
+from ....core.simulation.trees import HEIGHT_M, KIND, SPECIES
 from ...scene import drawn_releases, models, simulation, store
 from ...view.reporting import redraw
 
@@ -156,6 +157,51 @@ class SimulationSettings(bpy.types.PropertyGroup):
     use_drag: BoolProperty(name="Air drag", description="Flights with the drag of air (½ρ C_D A v²)", default=False)
 
     zones: CollectionProperty(type=SimulationZone)
+
+    trees: EnumProperty(
+        name="Trees", description="Stems that blocks meet; they take energy and turn blocks away",
+        items=[
+            ("NONE", "None", "Blocks meet no trees"),
+            ("TABLE", "From a table", "Each stem by its place and diameter: x_m, y_m, dbh_cm"),
+            ("DRAWN", "Stems per hectare", "A forest of a density, drawn at random by the seed"),
+        ],
+        default="NONE",
+    )  # fmt: skip
+    trees_file: StringProperty(
+        name="Table", description="Stems in survey coordinates: x_m, y_m, dbh_cm; if known height_m, species, tree",
+        subtype="FILE_PATH",
+    )  # fmt: skip
+    stems_per_hectare: FloatProperty(
+        name="Stems per hectare", description="Density of the forest, in plan",
+        default=400.0, min=0.1, soft_max=3000.0, max=1e6, precision=0,
+    )  # fmt: skip
+    dbh_cm: FloatProperty(
+        name="Diameter [cm]", description="Mean diameter at breast height (DBH)",
+        default=30.0, min=1.0, soft_max=100.0, max=500.0, precision=0,
+    )  # fmt: skip
+    dbh_sd_cm: FloatProperty(
+        name="Deviation [cm]", description="Standard deviation of the diameters (gamma law); 0 makes all alike",
+        default=10.0, min=0.0, soft_max=50.0, max=500.0, precision=0,
+    )  # fmt: skip
+    trees_within: StringProperty(
+        name="Within", description="Polygons outside of which no trees are drawn: GeoJSON, or a table of corners. "
+        "Empty: everywhere on the terrain", subtype="FILE_PATH",
+    )  # fmt: skip
+    tree_height_m: FloatProperty(
+        name="Height", description="Above the ground up to which a stem is met, where a table does not say",
+        default=HEIGHT_M, min=0.1, soft_max=50.0, unit="LENGTH", precision=1,
+    )  # fmt: skip
+    tree_species: EnumProperty(
+        name="Kind", description="How much energy a stem takes beside a silver fir, where a table does not say",
+        items=[
+            (name, name.replace("_", " ").capitalize(), f"{factor:g} times a silver fir of the same diameter")
+            for name, factor in SPECIES.items()
+        ],
+        default=KIND,
+    )  # fmt: skip
+    show_trees: BoolProperty(
+        name="Trees", description="Show the stems that the simulated blocks met", default=True, update=_look_changed
+    )
 
     colour_by: EnumProperty(
         name="Colour by", description="What the colours of the simulated paths mean",

@@ -6,6 +6,7 @@ and in shape, so that they are told apart without colour too.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
+    from PIL.Image import Image
 
 FORMATS = ("png", "svg", "pdf")
 DPI = 300
@@ -172,11 +174,21 @@ def save_named(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
-    for done, (name, figure) in enumerate(figures, start=1):
-        for kind in formats:
-            written.append(folder / f"{name}.{kind}")
-            save_figure(figure, written[-1])
-        progress("Drawing the figures", done, total)
+    with ThreadPoolExecutor(1) as pool:  # packs a picture while the next figure is drawn
+        packed: Future[None] | None = None
+        for done, (name, figure) in enumerate(figures, start=1):
+            for kind in formats:
+                written.append(folder / f"{name}.{kind}")
+                if kind != "png":
+                    save_figure(figure, written[-1])
+                    continue
+                picture = _picture(figure)
+                if packed is not None:
+                    packed.result()
+                packed = pool.submit(_save_picture, picture, written[-1])
+            progress("Drawing the figures", done, total)
+        if packed is not None:
+            packed.result()
     return tuple(written)
 
 
@@ -184,24 +196,31 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
     """Write one figure; the file's ending says the format. The same figure makes the same file."""
     from matplotlib import rc_context
 
+    if Path(path).suffix == ".png":
+        _save_picture(_picture(figure), Path(path))
+        return
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
     with rc_context(STYLE), output_file(path) as draft:
-        if Path(path).suffix == ".png":
-            _save_picture(figure, draft)
-        else:
-            figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated)
+        figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated)
 
 
-def _save_picture(figure: "Figure", path: Path) -> None:
-    """As a PNG file: drawn once, without a place for transparency, where Matplotlib's own way draws twice."""
+def _picture(figure: "Figure") -> "Image":
+    """Drawn once, without a place for transparency, where Matplotlib's own way to a PNG file draws twice."""
+    from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    figure.set_dpi(DPI)
-    canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
-    canvas.draw()
-    picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
-    picture.convert("RGB").save(path, format="png", dpi=(DPI, DPI), compress_level=COMPRESSION)
+    with rc_context(STYLE):
+        figure.set_dpi(DPI)
+        canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
+        canvas.draw()
+        picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
+        return picture.convert("RGB")
+
+
+def _save_picture(picture: "Image", path: Path) -> None:
+    with output_file(path) as draft:
+        picture.save(draft, format="png", dpi=(DPI, DPI), compress_level=COMPRESSION)
 
 
 def _lay_out(figure: "Figure") -> None:

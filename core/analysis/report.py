@@ -23,6 +23,8 @@ from .variables import VARIABLES
 SHOWN = ("rn", "rt", "r", "theta_dev_deg")
 MOST_SHOWN = 3000
 """Impacts that a page's graphs show: more make it slow, and too large to be sent."""
+COMPONENTS = ("bokeh", "bokeh-widgets")
+"""Of Bokeh's scripts, those that the graphs and their menus need."""
 PARTS = {"bias": "bias", "rmse": "RMSE", "energy_distance": "distance"}
 DECIMALS = {"theta_dev_deg": 1}
 
@@ -48,8 +50,6 @@ def write_report(
     """
     demand(PAGES)
     from bokeh.document import Document
-    from bokeh.embed import file_html
-    from bokeh.resources import Resources
 
     first = _nearest_model(scores) or predictions.models[0]
     run = min(1, predictions.replicates)
@@ -68,14 +68,19 @@ def write_report(
         live=False,
         **frame(linked.graphs),
     )
-    html = file_html(
-        document,
-        Resources(mode="inline"),
-        template=template(),
-        template_variables=dict(document.template_variables),
-        _always_new=True,
-    )
-    write_text(path, html)
+    write_text(path, _standing_alone(document, dict(document.template_variables)))
+
+
+def _standing_alone(document: Any, variables: dict[str, Any]) -> str:
+    """A document as a page of its own, as Bokeh's `file_html` makes it, which goes through all models many times."""
+    from bokeh.embed.bundle import bundle_for_objs_and_resources
+    from bokeh.embed.elements import html_page_for_render_items
+    from bokeh.embed.util import standalone_docs_json_and_render_items
+    from bokeh.resources import Resources
+
+    described, places = standalone_docs_json_and_render_items(document)
+    scripts = bundle_for_objs_and_resources(None, Resources(mode="inline", components=list(COMPONENTS)))
+    return html_page_for_render_items(scripts, described, places, document.title, template(), variables)
 
 
 def template() -> str:

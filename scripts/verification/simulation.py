@@ -2,6 +2,7 @@
 """Whole falls against closed forms, scipy, and the impact models themselves."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from checks import Check, compared
@@ -12,15 +13,17 @@ from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import make_releases
+from rockfall.core.simulation.trees import greatest_loss, placed_trees, random_trees
 from rockfall.core.terrain.surface import Surface
 from scipy.integrate import solve_ivp
 
 G = 9.81
 TITLE = "Simulation"
-SUMMARY = "contacts, rolling, drag and energy of whole falls"
+SUMMARY = "contacts, rolling, drag, energy and trees of whole falls"
 INTRODUCTION = (
-    "Blocks that fall on a terrain of triangles: contacts, flights, rolling and sliding, drag and energy. The impact "
-    "models have a chapter of their own. What real runs look like beside simulated ones is in the chapter on real data."
+    "Blocks that fall on a terrain of triangles: contacts, flights, rolling and sliding, drag, energy and "
+    "trees. The impact models have a chapter of their own. What real runs look like beside simulated ones is in the "
+    "chapter on real data."
 )
 ELASTIC, DEAD = {"rn": 1.0, "rt": 1.0}, {"rn": 0.0, "rt": 1.0}
 MODEL = "azimi_desvarreux_1977"
@@ -28,7 +31,7 @@ MODEL = "azimi_desvarreux_1977"
 
 def checks() -> list[Check]:
     """All of this chapter."""
-    return [*_contacts(), *_rolling(), *_drag(), *_energy(), *_drops()]
+    return [*_contacts(), *_rolling(), *_drag(), *_energy(), *_drops(), *_trees()]
 
 
 def plane(degrees: float, length: float = 400.0) -> Ground:
@@ -161,4 +164,39 @@ def _drops() -> list[Check]:
         compared("blocks that hit a plate of 1 000 that drop on it", "all", "closed form", first.size, 1000, 0, "1"),
         compared("their energy ½mv² at the plate", "mgh", "closed form", energy / (releases.mass_kg * G * height), 1.0,
                  1e-6, "1"),
+    ]  # fmt: skip
+
+
+def _trees() -> list[Check]:
+    """Throws past one stem, and straight ways through a forest."""
+    rng, ground, radius, thick = np.random.default_rng(7), plane(0.0), 0.3, 0.4
+    reach, axis = radius + thick / 2, np.array([30.0, 60.0])
+    stem = placed_trees(
+        ground.terrain, axis[None], np.array([thick]), np.array([20.0]), greatest_loss(np.array([thick]))
+    )
+    offset, speed = rng.uniform(0, 0.999, 100), rng.uniform(20, 80, 100)
+    start = np.column_stack([np.full(100, 10.0), 60 + offset * reach, np.full(100, 8.0)])
+    velocity = np.column_stack([speed, np.zeros((100, 2))])
+    releases = make_releases(start, diameter_m=2 * radius, velocity=velocity)
+    records = simulate(ground, releases, Settings(MODEL, gravity_mps2=G, trees=stem)).records
+    hits = np.flatnonzero(records.what == engine.TREE)
+    hits = hits[np.unique(records.run[hits], return_index=True)[1]]
+    before, after = (0.5 * releases.mass_kg * (v[hits] ** 2).sum(axis=1) for v in (records.v1, records.v2))
+    share = np.maximum(-0.046 + (0.98 + 0.046) / (1 + 10 ** ((0.58 - offset) * -8.007)), 0)
+    taken = np.minimum(share * 38.7 * (100 * thick) ** 2.31, before)
+    forest = random_trees(ground.terrain, 4000.0, 0.2, 0.0, seed=5, height_m=50.0)
+    weak = replace(forest, energy_j=np.full(len(forest), 1e-9))
+    ways = np.arange(5.0, 115.0, 0.9)
+    start = np.column_stack([np.full(ways.size, 20.0), ways, np.full(ways.size, 20.0)])
+    straight = make_releases(start, diameter_m=0.6, velocity=np.tile([1000.0, 0.0, 0.0], (ways.size, 1)))
+    crossed = simulate(ground, straight, Settings(MODEL, gravity_mps2=1e-6, trees=weak)).records
+    met = np.count_nonzero((crossed.what == engine.TREE) & (crossed.position[:, 0] < 380.0))
+    expected = 0.4 * (0.2 + 0.6) * 360 * ways.size
+    return [
+        compared("time at which a thrown block meets a stem", "line and circle in plan", "closed form",
+                 records.time_s[hits], (20 - reach * np.sqrt(1 - offset**2)) / speed, 1e-9, "s"),
+        compared("energy ½mv² behind the stem", "38.7 D^2.31 J and Rockyfor3D's sigmoid, second-hand", "closed form",
+                 after, before - taken, 1e-9),
+        compared("stems that straight ways through a forest meet", "n (D + 2r) L, by chance within 4/√n", "closed form",
+                 met / expected, 1.0, 4 / math.sqrt(expected), "1"),
     ]  # fmt: skip

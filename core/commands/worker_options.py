@@ -73,7 +73,7 @@ def simulate_on_workers(
     RockfallError : no workers, or not the right ones; the disk is full.
     """
     from ..exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
-    from ..exchange.simulation_output import write_all_maps
+    from ..exchange.simulation_output import write_all_maps, write_met_trees
     from ..exchange.simulation_tables import summary, write_summary
     from ..interrupts import Interrupt
     from ..output import final_path
@@ -100,6 +100,7 @@ def simulate_on_workers(
         remarks = gravest_first([*remarks_of(simulations, list(scenario.models)), *map_remarks(maps)])
         written = write_chunk_tables(stores, folder, len(releases), progress=progress)
         written += write_all_maps(simulations, maps, folder, progress)
+        written += write_met_trees(simulations, folder)
         write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     except RockfallError:
         if kept.is_dir():

@@ -18,12 +18,14 @@ from ..simulation.engine import Simulation
 from ..simulation.ground import Ground
 from ..simulation.results import impacts_of, release_names, run_figures
 from ..simulation.run_lines import lines_of
+from ..simulation.tree_hits import tree_hits_of
+from ..simulation.trees import Trees
 from ..vectors import Array, norm
 from .geopackage import FeatureLayer, write_geopackage
 from .qgis_styles import line_style, point_style
 
 BLACK, STOP, RELEASE = (0.0, 0.0, 0.0), (0.2, 0.24, 0.3), (1.0, 1.0, 1.0)
-SCREEN = (0.0, 0.45, 0.70)
+SCREEN, TREE = (0.0, 0.45, 0.70), (0.0, 0.45, 0.25)
 MEASURED_STEP_S = 0.05
 """Between the points of a measured trajectory, in which chords are within 3 mm of the parabola."""
 FAINT = 0.4
@@ -74,6 +76,8 @@ def write_simulation_geopackage(
             yield impacts_layer(measured.impacts, "measured_impacts", BLACK)
         if screens:
             yield screens_layer(screens, simulations[0].ground)
+        if simulations[0].settings.trees is not None:
+            yield trees_layer(simulations[0].settings.trees, simulations)
 
     settings = simulations[0].settings
     said = {"seed": str(settings.seed), "blocks": str(len(simulations[0])), **(about or {})}
@@ -123,6 +127,7 @@ def _of_runs(simulation: Simulation) -> dict[str, NDArray[Any]]:
         "time_s": simulation.time_s,
         "length_m": simulation.length_m,
         "impacts": simulation.impacts,
+        **({} if simulation.settings.trees is None else {"tree_hits": simulation.tree_hits}),
         "v_max_mps": simulation.v_max_mps,
         "kinetic_max_kJ": figures.kinetic_max_j / 1000,
         "height_max_m": figures.height_max_m,
@@ -170,6 +175,22 @@ def measured_layer(samples: TrajectorySamples) -> FeatureLayer:
     }
     said = "Measured trajectories of the blocks' centres"
     return FeatureLayer("measured", said, samples.position, first, columns, line_style(BLACK, 0.5))
+
+
+def trees_layer(trees: Trees, simulations: Sequence[Simulation]) -> FeatureLayer:
+    """The stems at their foot, and how often blocks hit each, as far as impacts were recorded."""
+    columns: dict[str, NDArray[Any]] = {
+        "tree": np.array(trees.labels(np.arange(len(trees)))),
+        "dbh_cm": 100 * trees.dbh_m,
+        "height_m": trees.height_m,
+        "loss_max_kJ": trees.energy_j / 1000,
+    }
+    for one in simulations:
+        if one.recorded != "ends":
+            name = f"hits_{one.settings.model}" if len(simulations) > 1 else "hits"
+            columns[name] = np.bincount(tree_hits_of(one).tree, minlength=len(trees))
+    points = np.column_stack([trees.position, trees.foot_m])
+    return FeatureLayer("trees", "Trees that blocks can meet", points, None, columns, point_style(TREE, 0.8))
 
 
 def screens_layer(screens: Sequence[Screen], ground: Ground) -> FeatureLayer:

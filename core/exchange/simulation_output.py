@@ -15,6 +15,7 @@ from .screens import write_screens
 from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
 from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
 from .simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary, write_tree_hits
+from .trees import write_trees
 
 MAPS = "maps"
 NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
@@ -49,7 +50,7 @@ def write_simulations(
 ) -> list[str]:
     """Write runs.csv, what `record` names, hits.csv and screens.csv where there are such, maps, and summary.json.
 
-    With impacts goes tree_hits.csv where there are trees.
+    Where there are trees go trees.csv and, with impacts, tree_hits.csv.
 
     Parameters
     ----------
@@ -72,8 +73,18 @@ def write_simulations(
     if screens:
         write_screens(screens, folder / "screens.csv")
         written.append("screens.csv")
+    written += write_met_trees(simulations, folder)
     write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     return [*written, "summary.json"]
+
+
+def write_met_trees(simulations: Sequence[Simulation], folder: Path) -> list[str]:
+    """Write trees.csv where there are trees; returns its name."""
+    trees = simulations[0].settings.trees
+    if trees is None:
+        return []
+    write_trees(trees, simulations[0].ground.shift, folder / "trees.csv")
+    return ["trees.csv"]
 
 
 def write_all_maps(

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..georeference import GlobalShift
 from ..reading import reader
 from ..simulation.trees import SPECIES, THICKEST_M, Trees, factor_of, greatest_loss, placed_trees, random_trees
 from ..terrain.cloud import Cloud
@@ -20,6 +21,7 @@ from ..terrain.surface import Surface
 from .csv_text import read_table
 from .map_shapes import polygon_of, read_polygons
 from .simulation_entry import TreesEntry
+from .tables import Columns, write_columns
 
 REQUIRED = ("x_m", "y_m", "dbh_cm")
 KNOWN = (*REQUIRED, "height_m", "species", "energy_factor", "tree")
@@ -96,3 +98,22 @@ def read_trees(path: str | Path, terrain: Surface | Cloud, height_m: float, spec
         return placed_trees(terrain, position, dbh, height, greatest_loss(dbh, factor), labels)
     except InputError as error:
         raise InputError(error.problem, file=path, advice=error.advice) from error
+
+
+def write_trees(trees: Trees, shift: GlobalShift, path: str | Path) -> None:
+    """Write the table that `read_trees` reads, those that were drawn too.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    survey = shift.to_survey(np.column_stack([trees.position, trees.foot_m]))
+    columns: Columns = {
+        "tree": trees.labels(np.arange(len(trees))),
+        "x_m": survey[:, 0],
+        "y_m": survey[:, 1],
+        "dbh_cm": trees.dbh_m / CM,
+        "height_m": trees.height_m,
+        "energy_factor": trees.energy_j / greatest_loss(trees.dbh_m),
+    }
+    write_columns(path, columns)

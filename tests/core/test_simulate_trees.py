@@ -3,6 +3,9 @@
 
 import csv
 import json
+import sqlite3
+from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -103,8 +106,21 @@ def test_a_drawn_forest_stands_within_its_polygons_and_is_the_same_in_a_project(
     assert main(["simulate", str(project), "--out", str(tmp_path / "stated")]) == 0
     for table in ("runs.csv", "tree_hits.csv"):
         assert rows_of(tmp_path / "stated" / table) == rows_of(tmp_path / "typed" / table)
+    met = tmp_path / "typed" / "trees.csv"
+    again = ["--seed", "4", "--trees", str(met)]
+    assert main(options(site, tmp_path / "again", *again)) == 0
+    assert [row["tree"] for row in rows_of(tmp_path / "again" / "tree_hits.csv")] == [row["tree"] for row in hits]
     assert main(["simulate", str(project), "--trees", str(site / "trees.csv"), "--out", str(tmp_path / "table")]) == 0
     assert rows_of(tmp_path / "table" / "tree_hits.csv")[0]["tree"].startswith("T")
+
+
+def test_a_geopackage_has_the_trees_and_their_hits(site: Path, tmp_path: Path) -> None:
+    assert main(options(site, tmp_path / "out", "--trees", str(site / "trees.csv"), "--geopackage")) == 0
+    hits = Counter(row["tree"] for row in rows_of(tmp_path / "out" / "tree_hits.csv"))
+    with closing(sqlite3.connect(tmp_path / "out" / "simulation.gpkg")) as database:
+        found = dict(database.execute("SELECT tree, hits FROM trees").fetchall())
+    assert len(found) == 41
+    assert {name: count for name, count in found.items() if count} == hits
 
 
 @pytest.mark.parametrize(

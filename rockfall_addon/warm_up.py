@@ -15,7 +15,7 @@ from ..core.simulation.engine import Settings, simulate
 from ..core.simulation.ground import make_ground
 from ..core.simulation.release import make_releases, placed_on
 from ..core.terrain.orientation import block_scale_normals
-from ..core.terrain.raycast import cast_rays, closest_points
+from ..core.terrain.raycast import cast_ray, cast_rays, closest_point, closest_points
 from ..core.terrain.surface import Surface
 from .scene import models, preparation
 
@@ -37,6 +37,8 @@ def _compile() -> None:
     try:
         cast_rays(plane, above, np.array([[0.0, 0.0, -1.0]]))
         closest_points(plane, above)
+        cast_ray(plane, above[0], (0.0, 0.0, -1.0))
+        closest_point(plane, above[0])
         block_scale_normals(plane, above, 0.3)
         fly(above, above, np.ones(1), GRAVITY_MPS2, np.ones(1))
         prepare_fits()

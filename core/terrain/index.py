@@ -5,6 +5,7 @@ Rays, closest points and simulation walk the same tree with the helpers in `kern
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ class TriangleIndex:
     corners: Array
     face: NDArray[np.int32]
 
-    @property
+    @cached_property
     def tree(self) -> Tree:
         """What the kernels take."""
         return self.bounds, self.first, self.count, self.corners

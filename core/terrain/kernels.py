@@ -121,6 +121,24 @@ def inverse(component):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def along_ray(corners, i, origin, kx, ky, kz, sx, sy, sz):  # type: ignore[no-untyped-def]
+    """Where along a ray triangle ``i`` is hit [m], NaN when it is not: axes and shear as `nearest_hit` says."""
+    az = corners[i, 0, kz] - origin[kz]
+    bz = corners[i, 1, kz] - origin[kz]
+    cz = corners[i, 2, kz] - origin[kz]
+    ax, ay = corners[i, 0, kx] - origin[kx] - sx * az, corners[i, 0, ky] - origin[ky] - sy * az
+    bx, by = corners[i, 1, kx] - origin[kx] - sx * bz, corners[i, 1, ky] - origin[ky] - sy * bz
+    cx, cy = corners[i, 2, kx] - origin[kx] - sx * cz, corners[i, 2, ky] - origin[ky] - sy * cz
+    u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
+    if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
+        return np.nan
+    det = u + v + w
+    if det == 0.0:
+        return np.nan
+    return sz * (u * az + v * bz + w * cz) / det
+
+
+@kernel
 def nearest_hit(tree, stack, origin, direction, limit):  # type: ignore[no-untyped-def]
     """First triangle along a ray: (distance, place in the leaves' order), (inf, -1) when there is none up to ``limit``.
 
@@ -147,19 +165,7 @@ def nearest_hit(tree, stack, origin, direction, limit):  # type: ignore[no-untyp
         node = stack[top]
         if count[node]:
             for i in range(first[node], first[node] + count[node]):
-                az = corners[i, 0, kz] - origin[kz]
-                bz = corners[i, 1, kz] - origin[kz]
-                cz = corners[i, 2, kz] - origin[kz]
-                ax, ay = corners[i, 0, kx] - origin[kx] - sx * az, corners[i, 0, ky] - origin[ky] - sy * az
-                bx, by = corners[i, 1, kx] - origin[kx] - sx * bz, corners[i, 1, ky] - origin[ky] - sy * bz
-                cx, cy = corners[i, 2, kx] - origin[kx] - sx * cz, corners[i, 2, ky] - origin[ky] - sy * cz
-                u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
-                if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
-                    continue
-                det = u + v + w
-                if det == 0.0:
-                    continue
-                t = sz * (u * az + v * bz + w * cz) / det
+                t = along_ray(corners, i, origin, kx, ky, kz, sx, sy, sz)
                 if t >= 0.0 and (t < best or (t == best and found < 0)):
                     best, found = t, i
             continue

@@ -2,14 +2,14 @@
 """Rays, closest points and heights above the terrain, on the surface's spatial index; exact in float64."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import as_rows, in_chunks
 from ..errors import InputError
-from ..vectors import Array, norm
+from ..vectors import Array, Mask, norm
 from .surface import Surface
 
 
@@ -45,6 +45,21 @@ class ClosestPoints:
     distance: Array
 
 
+class Hit(NamedTuple):
+    """Of one ray, or the closest point.
+
+    Attributes
+    ----------
+    distance : from the origin or the point [m].
+    face : of the surface.
+    point : (3,) on the surface, local coordinates [m].
+    """
+
+    distance: float
+    face: int
+    point: Array
+
+
 def cast_rays(surface: Surface, origins: Any, directions: Any, max_distance: float = np.inf) -> RayHits:
     """First hit of each ray, on either side of a face.
 
@@ -61,19 +76,8 @@ def cast_rays(surface: Surface, origins: Any, directions: Any, max_distance: flo
     """
     from . import kernels
 
-    start, towards = _finite_rows(origins, "origin"), _finite_rows(directions, "direction")
-    if len(start) != len(towards) and 1 not in (len(start), len(towards)):
-        raise InputError(f"{len(start)} ray origins and {len(towards)} directions do not match")
-    # Scaling first keeps very short and very long directions from under- or overflowing when squared.
-    largest = np.abs(towards).max(axis=1, initial=0.0, keepdims=True)
-    if (largest == 0).any():
-        row = int(np.flatnonzero(largest[:, 0] == 0)[0])
-        raise InputError(f"The direction of ray {row} has length zero", advice="Give a direction for each ray")
-    towards = towards / largest
-    towards /= norm(towards)[:, None]
-    n = 0 if 0 in (len(start), len(towards)) else max(len(start), len(towards))
-    start = np.ascontiguousarray(np.broadcast_to(start, (n, 3)))
-    towards = np.ascontiguousarray(np.broadcast_to(towards, (n, 3)))
+    start, towards = _rays(origins, directions)
+    n = len(start)
     distance, place = np.empty(n), np.empty(n, np.int64)
     tree, limit = surface.index.tree, float(max_distance)
     in_chunks(lambda i, j: kernels.cast_many(tree, start, towards, limit, distance, place, i, j), n)
@@ -82,6 +86,66 @@ def cast_rays(surface: Surface, origins: Any, directions: Any, max_distance: flo
     point = np.full((n, 3), np.nan)
     point[hit] = start[hit] + distance[hit, None] * towards[hit]
     return RayHits(distance, face, point)
+
+
+def cast_ray(surface: Surface, origin: Any, direction: Any, max_distance: float = np.inf) -> Hit | None:
+    """First hit of one ray, None without one: `cast_rays` for who follows a mouse.
+
+    Parameters
+    ----------
+    origin, direction : (3,) [m]; the direction may have any length.
+
+    Raises
+    ------
+    InputError : as `cast_rays`.
+    """
+    from . import ray_kernels
+
+    (x, y, z), (u, v, w) = _three(origin, "origin"), _three(direction, "direction")
+    index = surface.index
+    distance, face, *point = ray_kernels.first_hit(index.tree, index.face, x, y, z, u, v, w, float(max_distance))
+    if face == ray_kernels.REFUSED:
+        _rays(origin, direction)
+    return Hit(distance, face, np.array(point)) if face >= 0 else None
+
+
+def any_hit(surface: Surface, origins: Any, directions: Any, max_distance: Any = np.inf) -> Mask:
+    """Whether each ray hits the surface at all, (n,): for what is seen or lies in the shade.
+
+    Parameters
+    ----------
+    origins, directions : as `cast_rays`.
+    max_distance : how far to look [m], for all rays or (n,) for each.
+
+    Raises
+    ------
+    InputError : as `cast_rays`.
+    """
+    from . import ray_kernels
+
+    start, towards = _rays(origins, directions)
+    n = len(start)
+    limits = np.ascontiguousarray(np.broadcast_to(np.asarray(max_distance, dtype=np.float64), n))
+    tree, hit = surface.index.tree, np.empty(n, np.bool_)
+    in_chunks(lambda i, j: ray_kernels.any_many(tree, start, towards, limits, hit, i, j), n)
+    return hit
+
+
+def closest_point(surface: Surface, point: Any, max_distance: float = np.inf) -> Hit | None:
+    """The closest point of the surface to one point (3,) [m], None without one that near.
+
+    Raises
+    ------
+    InputError : a coordinate that is not finite.
+    """
+    from . import ray_kernels
+
+    x, y, z = _three(point, "point")
+    index = surface.index
+    distance, face, *found = ray_kernels.closest(index.tree, index.face, x, y, z, float(max_distance))
+    if face == ray_kernels.REFUSED:
+        _finite_rows(point, "point")
+    return Hit(distance, face, np.array(found)) if face >= 0 else None
 
 
 def closest_points(surface: Surface, points: Any, max_distance: float = np.inf) -> ClosestPoints:
@@ -124,6 +188,31 @@ def heights_above(surface: Surface, points: Any) -> Array:
         -np.where(np.isfinite(up.distance), up.distance, nearest),
     )
     return np.where(nearest_face >= 0, height, np.nan)
+
+
+def _rays(origins: Any, directions: Any) -> tuple[Array, Array]:
+    """(n, 3) origins and directions of length 1."""
+    start, towards = _finite_rows(origins, "origin"), _finite_rows(directions, "direction")
+    if len(start) != len(towards) and 1 not in (len(start), len(towards)):
+        raise InputError(f"{len(start)} ray origins and {len(towards)} directions do not match")
+    # Scaling first keeps very short and very long directions from under- or overflowing when squared.
+    largest = np.abs(towards).max(axis=1, initial=0.0, keepdims=True)
+    if (largest == 0).any():
+        row = int(np.flatnonzero(largest[:, 0] == 0)[0])
+        raise InputError(f"The direction of ray {row} has length zero", advice="Give a direction for each ray")
+    towards = towards / largest
+    towards /= norm(towards)[:, None]
+    n = 0 if 0 in (len(start), len(towards)) else max(len(start), len(towards))
+    whole = np.broadcast_to(start, (n, 3)), np.broadcast_to(towards, (n, 3))
+    return np.ascontiguousarray(whole[0]), np.ascontiguousarray(whole[1])
+
+
+def _three(numbers: Any, what: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = numbers.tolist() if isinstance(numbers, np.ndarray) else numbers
+        return float(x), float(y), float(z)
+    except (TypeError, ValueError):
+        raise InputError(f"The {what} needs three numbers, not {numbers!r}") from None
 
 
 def _finite_rows(points: Any, what: str) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 
 from ...core.reconstruction.picks import Picks, make_picks
-from ...core.terrain.raycast import closest_points
+from ...core.terrain.raycast import closest_point
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
 from . import block_keys, georeference, keyframes, materials, pick_names, store, timing
@@ -307,8 +307,10 @@ def resting_place(obj: bpy.types.Object, surface: Surface | None, reach_m: float
         place = stored + _held(obj, held).way
     if surface is None or obj[store.KIND] == "pass":
         return place
-    near = closest_points(surface, np.stack([stored, place]))
-    return near.point[1] if near.distance[0] <= reach_m else place
+    if closest_point(surface, stored, reach_m) is None:
+        return place
+    found = closest_point(surface, place)
+    return place if found is None else found.point
 
 
 def take_edits(scene: bpy.types.Scene, objects: Iterable[bpy.types.Object], edits: block_keys.Edits) -> None:

@@ -11,7 +11,7 @@ from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.triangulation import contact_points, pick_on_terrain
-from ...core.terrain.raycast import cast_rays
+from ...core.terrain.raycast import cast_ray
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
 from . import fingerprints, own_blocks, picks, pictures, reconstruction, store
@@ -138,7 +138,7 @@ def on_ray(scene: bpy.types.Scene, origin: Array, direction: Array, name: str) -
     RockfallError : no terrain, or the ray misses it.
     """
     surface = surface_of(scene)
-    hits = cast_rays(surface, np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64))
-    if hits.face[0] < 0:
+    hit = cast_ray(surface, origin, direction)
+    if hit is None:
         raise RockfallError("There is no terrain under the mouse.")
-    return Place(hits.point[0], surface.face_normals[hits.face[0]], pictures.now(scene, name))
+    return Place(hit.point, surface.face_normals[hit.face], pictures.now(scene, name))

@@ -8,7 +8,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ...core.camera.model import rays
 from ...core.errors import RockfallError
-from ...core.terrain.raycast import cast_rays
+from ...core.terrain.raycast import cast_ray
 from ...core.vectors import Array
 from ..scene import camera_paths, pictures, places, problems, reconstruction, video_files, videos
 from . import drawing, footage_view, image_view, pointing
@@ -54,16 +54,15 @@ def outline(scene: bpy.types.Scene, camera: bpy.types.Object, pixel: Array) -> A
     origin, direction = rays(lens, pixel[None])
     if not np.isfinite(direction).all():
         return None
-    hits = cast_rays(surface, origin, direction)
-    if hits.face[0] < 0:
+    hit = cast_ray(surface, origin[0], direction[0])
+    if hit is None:
         return None
     radius = places.block_of(scene, places.trajectory(scene)).radius_m
     if scene.rockfall_picking.aim == "CONTACT":
-        normal = surface.face_normals[hits.face[0]]
-        centre = hits.point[0] + radius * normal
+        centre = hit.point + radius * surface.face_normals[hit.face]
     else:
-        slope = abs(float(surface.face_normals[hits.face[0]] @ direction[0]))
-        centre = hits.point[0] - radius / max(slope, 0.1) * direction[0]
+        slope = abs(float(surface.face_normals[hit.face] @ direction[0]))
+        centre = hit.point - radius / max(slope, 0.1) * direction[0]
     found = footage_view.ball(lens, centre, radius)
     return found[np.isfinite(found[:, 0])]
 

@@ -8,7 +8,7 @@ from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.cleaning import examine_faces, merge_duplicates
 from rockfall.core.terrain.index import build_index
-from rockfall.core.terrain.raycast import cast_rays, closest_points, heights_above
+from rockfall.core.terrain.raycast import any_hit, cast_ray, cast_rays, closest_point, closest_points, heights_above
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.terrain.winding import orient
 
@@ -184,6 +184,40 @@ def test_bad_rays_are_refused():
     with pytest.raises(InputError, match="shape"):
         closest_points(plane, [[0, 0]])
     assert len(cast_rays(plane, np.empty((0, 3)), [0, 0, 1]).distance) == 0
+
+
+def test_one_ray_and_one_closest_point_on_a_plane():
+    plane = surface_of([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], [[0, 1, 2], [0, 2, 3]])
+    hit = cast_ray(plane, (1, 2, 4), np.array([3, 0, -4]))
+    assert (hit.distance, hit.face) == (pytest.approx(5), 0)
+    np.testing.assert_allclose(hit.point, [4, 2, 0], atol=1e-15)
+    assert cast_ray(plane, (1, 2, 4), (0, 0, 1)) is None
+    assert cast_ray(plane, (1, 2, 4), (0, 0, -1), max_distance=3.9) is None
+    near = closest_point(plane, [12, 2, 4])
+    assert near.distance == pytest.approx(5)
+    np.testing.assert_allclose(near.point, [9, 2, 0], atol=1e-15)
+    assert closest_point(plane, [12, 2, 4], max_distance=4.9) is None
+    with pytest.raises(InputError, match="direction of ray 0 has length zero"):
+        cast_ray(plane, (1, 2, 4), (0, 0, 0))
+    with pytest.raises(InputError, match="not finite"):
+        cast_ray(plane, (1, np.nan, 4), (0, 0, 1))
+    with pytest.raises(InputError, match="point 0 is not finite"):
+        closest_point(plane, (np.inf, 0, 0))
+    with pytest.raises(InputError, match="three numbers"):
+        closest_point(plane, (1, 2))
+
+
+def test_any_hit_agrees_with_brute_force_on_a_random_soup():
+    rng = np.random.default_rng(5)
+    triangles = rng.uniform(-1, 1, (300, 1, 3)) + rng.normal(0, 0.2, (300, 3, 3))
+    soup = surface_of(triangles.reshape(-1, 3), np.arange(900).reshape(-1, 3))
+    origins, directions = rng.uniform(-2, 2, (1000, 3)), rng.normal(0, 1, (1000, 3))
+    unit, limits = directions / np.linalg.norm(directions, axis=1, keepdims=True), rng.uniform(0.1, 3, 1000)
+    first = np.array([brute_force_hits(triangles, o, d) for o, d in zip(origins, unit, strict=True)])
+    hit = any_hit(soup, origins, directions, limits)
+    assert 100 < hit.sum() < 900
+    np.testing.assert_array_equal(hit, first <= limits)
+    np.testing.assert_array_equal(any_hit(soup, origins, directions), np.isfinite(first))
 
 
 def test_heights_above_a_slope_and_around_an_overhang():

@@ -10,7 +10,7 @@ from ....core.camera.blender_lens import pose_from_blender
 from ....core.camera.model import Camera, with_intrinsics
 from ....core.camera.path import rays_at
 from ....core.errors import RockfallError
-from ....core.terrain.raycast import cast_rays
+from ....core.terrain.raycast import cast_ray
 from ....core.vectors import Array
 from ...scene import alignment, camera_paths, georeference, pairs, store, terrain, videos
 
@@ -36,8 +36,8 @@ def meet(scene: bpy.types.Scene, origin: Array, direction: Array) -> Point | Non
     surface = terrain.surface_of_scene(scene)
     if surface is None or not np.isfinite(direction).all():
         return None
-    hits = cast_rays(surface, origin, direction)
-    return tuple(hits.point[0].tolist()) if hits.face[0] >= 0 else None
+    hit = cast_ray(surface, origin[0], direction[0])
+    return tuple(hit.point.tolist()) if hit is not None else None
 
 
 def free_ray(rv3d: bpy.types.RegionView3D, width: float, height: float, x: float, y: float) -> tuple[Array, Array]:

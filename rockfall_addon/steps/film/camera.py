@@ -11,7 +11,7 @@ from ....core.errors import RockfallError
 from ....core.exchange.project import CameraPlacement
 from ....core.film import graphs
 from ....core.film.framing import Margins, Seen, View, downhill_direction, look_at, place_camera
-from ....core.terrain.raycast import cast_rays
+from ....core.terrain.raycast import any_hit
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
 from ...scene import georeference, store, terrain
@@ -99,7 +99,7 @@ def _visibility(surface: Surface, points: Array) -> Seen:
 
     def seen(position: Array) -> Array:
         rays = position - starts
-        return (cast_rays(surface, starts, rays).distance >= norm(rays)).astype(float)
+        return (~any_hit(surface, starts, rays, norm(rays))).astype(float)
 
     return seen
 

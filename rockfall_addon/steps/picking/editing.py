@@ -6,7 +6,7 @@ import numpy as np
 
 from ....core.errors import RockfallError
 from ....core.reconstruction.triangulation import GRAZING_DEG
-from ....core.terrain.raycast import closest_points
+from ....core.terrain.raycast import closest_point
 from ...scene import clicks, pick_names, picks, pictures, places, reconstruction, store, sync, timing, videos
 from ...scene.places import Place
 
@@ -91,7 +91,8 @@ def use_triangulated(scene: bpy.types.Scene, obj: bpy.types.Object) -> float:
         raise RockfallError("Click the same event in a second aligned video first, while this pick is selected.")
     point, seen = found.point[0], obj[store.SEEN].to_dict()
     if obj[store.KIND] != "pass" and any(click.centre for click in clicks.of(obj).values()):
-        point = closest_points(places.surface_of(scene), point).point[0]
+        near = closest_point(places.surface_of(scene), point)
+        point = point if near is None else near.point
     obj[store.POSITION], obj.location = point.tolist(), point
     obj[store.SIGMA_POSITION] = [float(np.sqrt(np.trace(found.covariance[0]) / 3))]
     obj[store.SEEN] = seen | {"position": point.tolist()}

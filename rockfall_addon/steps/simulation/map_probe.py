@@ -11,7 +11,7 @@ from mathutils import Vector
 
 from ....core.errors import RockfallError
 from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES, Maps
-from ....core.terrain.raycast import cast_rays
+from ....core.terrain.raycast import cast_ray
 from ...scene import hazard_maps, problems, simulation_setup
 from ...view import legend
 from . import map_overlay
@@ -66,8 +66,8 @@ def place_under(context: bpy.types.Context, spot: np.ndarray) -> np.ndarray | No
         return None
     origin = np.array(region_2d_to_origin_3d(context.region, context.region_data, Vector(spot)))
     direction = np.array(region_2d_to_vector_3d(context.region, context.region_data, Vector(spot)))
-    hits = cast_rays(surface, origin[None], direction[None])
-    return hits.point[0] if hits.face[0] >= 0 else None
+    hit = cast_ray(surface, origin, direction)
+    return hit.point if hit is not None else None
 
 
 @problems.guarded

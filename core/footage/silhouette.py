@@ -26,7 +26,7 @@ LAG = 3.0
 FEWEST, MOST = 12, 160
 """Pairs of sightings from which an outline is told."""
 DISAGREE = 0.1
-"""Offsets by either half of the pairs differ from that by all by no more than this [diameters]."""
+"""Offsets by either half of the pairs differ from that by all by no more than this [diameters], or than that itself."""
 EVERY, AROUND = 60, 60
 """Sightings from one local estimate to the next, and on either side of each that it rests on. It counts against the one
 of all sightings as its pairs do against this number."""
@@ -95,7 +95,8 @@ def outline_offsets(patches: list[Patch | None], stable: Array, diameter: Array)
     halves = [_outline(patches, first[part::2], second[part::2]) for part in (0, 1)] if whole is not None else []
     if whole is None or np.hypot(*whole.offset) < SLIGHT:
         return nothing
-    if any(half is None or np.hypot(*(half.offset - whole.offset)) > DISAGREE for half in halves):
+    most = max(float(np.hypot(*whole.offset)), DISAGREE)
+    if any(half is None or np.hypot(*(half.offset - whole.offset)) > most for half in halves):
         return nothing
     where = np.linspace(0, count - 1, 1 + max(round(count / EVERY), 1)).round().astype(np.intp)
     offset, size = np.tile(whole.offset, (where.size, 1)), np.full(where.size, whole.diameter)

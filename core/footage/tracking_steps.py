@@ -71,6 +71,8 @@ class State:
     doubtful : what was known before a sighting that may be wrong, None when there is none.
     votes : (k,) for each of `SHUTTERS`.
     leaving : it is expected outside the picture.
+    rivals : places (2,) in the reference frame of the background at which more than one thing looked like it, in the
+        frame before.
     picture : the one before.
     """
 
@@ -82,6 +84,7 @@ class State:
     confirmed: int = CONFIRMED
     doubtful: "State | None" = None
     leaving: bool = False
+    rivals: tuple[Array, ...] = ()
     picture: np.ndarray | None = None
 
     @property
@@ -180,9 +183,13 @@ def _next(footage: Footage, state: State, frame: int, picture: np.ndarray) -> tu
     why = _reason(state, here, expected, found)
     if expected.wide > expected.tight and state.confirmed >= CONFIRMED - 1:
         elsewhere = _elsewhere(footage, state, here, expected, found)
+        places = tuple(footage.stable(frame, seen.pixel) for seen in elsewhere)
+        if len(elsewhere) > 1:
+            elsewhere = [seen for seen, place in zip(elsewhere, places, strict=True) if _moves(state, place)]
         if len(elsewhere) == 1:
             return _accepted(footage, state, picture, here, elsewhere[0], expected, jumped=True), ""
-        why = "ambiguous: more than one thing looks like it" if elsewhere else why
+        why = "ambiguous: more than one thing looks like it" if places else why
+        state = replace(state, rivals=places)
     state = _without_doubtful(state)
     state = replace(state, missed=state.missed + 1)
     return state, _given_up(state, expected, footage.usual_step_s, why)
@@ -233,7 +240,8 @@ def _as_expected(state: State, here: Cover, expected: Expected, found: tuple[Arr
     pixel, score = found
     away = np.hypot(*(pixel - expected.centre).T)
     needed = SURE if state.missed > 2 else ACCEPTED
-    for i in np.argsort(-(score - 0.3 * (away / expected.tight) ** 2)):
+    most = 1.0 if state.confirmed < CONFIRMED else np.inf  # scores above are of faint things
+    for i in np.argsort(-(np.minimum(score, most) - 0.3 * (away / expected.tight) ** 2)):
         if away[i] <= expected.tight and score[i] >= needed - 0.1:
             seen = fit(here, state.looks, pixel[i], expected.step * state.looks.shutter)
             if seen is not None and seen.score >= needed and seen.visible > 0.15 and seen.contrast > CONTRAST:
@@ -277,6 +285,11 @@ def _elsewhere(
     return sightings[:1] + rivals
 
 
+def _moves(state: State, stable: Array) -> bool:
+    """Whether nothing like the block was at this place of the background in the frame before, as dust of an impact."""
+    return all(np.hypot(*(stable - rival)) > 0.35 * state.looks.diameter_px for rival in state.rivals)
+
+
 def _accepted(
     footage: Footage,
     state: State,
@@ -305,7 +318,7 @@ def _accepted(
         past = (past[-1]._replace(sigma_px=0.3 * seen.diameter_px + 0.3 * float(np.hypot(*step))),)
     past = (*past[1 - MEMORY :], Place(expected.time_s, stable, max(seen.sigma_px, 0.1)))
     rows = (*state.rows, _row(footage, frame, picture, seen, stable, state.looks))
-    state = replace(state, missed=0, past=past, rows=rows)
+    state = replace(state, missed=0, past=past, rows=rows, rivals=())
     blurred = float(np.hypot(*step)) * state.looks.shutter > 0.6 * seen.diameter_px
     if seen.score > 0.75 and seen.visible > 0.9 and state.confirmed >= CONFIRMED and not blurred:
         return replace(state, looks=learn(picture, frame, footage.plates, state.looks, seen, LEARNING))

@@ -13,8 +13,9 @@ from rockfall.core.footage import tracking_steps
 from rockfall.core.footage.background import no_motion
 from rockfall.core.footage.kinks import find_kinks
 from rockfall.core.footage.sources import Pictures
-from rockfall.core.footage.templates import Sighting, fit
+from rockfall.core.footage.templates import Appearance, Sighting, fit
 from rockfall.core.footage.tracking import BlockTrack, track_block
+from rockfall.core.footage.tracking_steps import SHUTTERS, State, _moves
 from rockfall.core.footage.video import open_video
 
 BALL = Path(rockfall.__file__).parent / "assets" / "examples" / "bouncing_ball"
@@ -38,6 +39,7 @@ class Clip:
     shadow: bool = False
     wall: tuple[int, int] | None = None
     walker: bool = False
+    dust: bool = False
     shaded: bool = False
     seed: int = 1
     frames: int = 48
@@ -126,6 +128,9 @@ def film(clip: Clip) -> tuple[Pictures, np.ndarray]:
         if clip.shadow:
             share = covered(seen(np.column_stack([path(open_s)[:, 0] + 9, 170 + 0 * open_s])), clip.diameter, 0.4)
             picture *= 1 - 0.45 * share
+        if clip.dust and IMPACTS_S[0] < time < IMPACTS_S[0] + 0.3:
+            share = covered(seen(path(np.full(1, IMPACTS_S[0]))), clip.diameter)
+            picture = (1 - share) * picture + share * (clip.block - 10)
         if clip.walker:
             share = covered(seen(np.column_stack([420 - 160 * open_s, 100 + 40 * open_s])), 1.1 * clip.diameter)
             picture = (1 - share) * picture + share * (clip.block - 15)
@@ -165,6 +170,7 @@ def turned(track: BlockTrack, error: np.ndarray) -> float:
         pytest.param(Clip(diameter=40.0, frames=40), 0.2, 0.6, id="large"),
         pytest.param(Clip(diameter=8.0, shutter=0.9), 0.45, 3.5, id="blurred to a streak"),
         pytest.param(Clip(walker=True), 0.4, 0.3, id="crossed by another thing"),
+        pytest.param(Clip(dust=True), 0.4, 0.3, id="leaves something like it where it hits"),
     ],
 )
 def test_made_clips_are_followed_to_the_end(clip: Clip, rms_px: float, wide_px: float) -> None:
@@ -198,6 +204,13 @@ def test_a_clip_that_begins_or_ends_at_the_click_keeps_the_block(last: bool) -> 
     track = track_block(cut, frame, truth[some][frame] + (1.5, -1.0), background=no_motion(0, 29))
     assert track.frame.size >= 28
     assert np.abs(track.pixel - truth[some][track.frame]).max() < 2.5
+
+
+def test_of_things_that_look_like_the_block_those_at_rest_are_left_out() -> None:
+    looks = Appearance(np.full((4, 3), 200.0), 8.0)
+    state = State(looks, (), (), np.zeros(len(SHUTTERS)), rivals=(np.array([50.0, 60.0]), np.array([90.0, 60.0])))
+    assert not _moves(state, np.array([51.0, 58.5]))
+    assert _moves(state, np.array([54.0, 60.0]))
 
 
 def test_a_gap_is_bridged_and_left_empty() -> None:

@@ -6,7 +6,7 @@ from math import sqrt
 import numpy as np
 
 from ..compiled import kernel
-from ..simulation.motion_kernels import IMPACT, ON_GROUND
+from ..simulation.motion_kernels import IMPACT, ON_GROUND, TREE
 
 
 @kernel
@@ -32,8 +32,9 @@ def contacts(  # type: ignore[no-untyped-def]
             then = v2[i, 0] ** 2 + v2[i, 1] ** 2 + v2[i, 2] ** 2
             spin = inertia * (omega2[i, 0] ** 2 + omega2[i, 1] ** 2 + omega2[i, 2] ** 2)
             square, energy = max(square, then), max(energy, mass * then + spin)
-            before = what[i - 1] == IMPACT or what[i - 1] == ON_GROUND
-            if before and face[i - 1] == face[i] and run[i - 1] == run[i]:  # it has not left the face
+            last = i - 2 if what[i - 1] == TREE else i - 1
+            before = what[last] == ON_GROUND or (what[last] == IMPACT and last == i - 1)
+            if before and face[last] == face[i] and run[last] == run[i]:  # it has not left the face
                 k = count - 1
                 values[k, 0], values[k, 1] = max(values[k, 0], sqrt(square)), max(values[k, 1], energy)
                 values[k, 2] = max(values[k, 2], mass * square)

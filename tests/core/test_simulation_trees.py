@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.hazard.barriers import with_barriers
 from rockfall.core.hazard.cell_tally import passages_of
 from rockfall.core.hazard.cells import cells_over
+from rockfall.core.hazard.face_tally import FaceTally
 from rockfall.core.hazard.screens import Screen, hits_at
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.simulation.engine import ENDS, ON_GROUND, TREE, Settings, Simulation, simulate
@@ -226,6 +228,29 @@ def test_screens_and_maps_behind_a_stem_see_the_block_as_the_stem_left_it() -> N
     speeds = [values[column == x, 0].max() for x in (8, 12)]
     assert np.hypot(*before[:2]) < speeds[0] < 1.001 * np.hypot(*before[:2])
     assert np.hypot(*after[:2]) < speeds[1] < 1.001 * np.hypot(*after[:2])
+
+
+def test_a_barrier_before_a_stem_leaves_it_unhit() -> None:
+    ground = plane()
+    run = simulate(ground, thrown([200.2], [30.0], 6.0), Settings(MODEL, trees=stems(ground, [[20.0, 200.0]])))
+    barrier = Screen("net", np.array([[15.0, 150.0], [15.0, 250.0]]), 20.0, 1e9)
+    held = with_barriers(run, hits_at(run, [barrier]))
+    assert run.tree_hits[0] > 0
+    assert held.tree_hits.tolist() == [0]
+    assert held.position[0, 0] == pytest.approx(15.0)
+
+
+def test_a_stem_on_the_ground_does_not_end_the_stay_on_a_face() -> None:
+    ground = plane(0.8)
+    start = np.array([[25.0, 200.4, -0.8 * 25.0 + 0.3 * np.hypot(1, 0.8)]])
+    releases = make_releases(start, diameter_m=0.6, velocity=np.array([[3.0, 0.0, -2.4]]))
+    run = simulate(ground, releases, Settings(MODEL, trees=stems(ground, [[30.0, 200.0]]), friction=0.3))
+    assert run.tree_hits[0] > 0
+    tally = FaceTally(len(ground.owner))
+    tally.add(run)
+    contacts = tally.layers()["Nr_contacts"]
+    face = run.records.face[hits(run)[0] - 1]
+    assert contacts[face] == 1
 
 
 def test_what_cannot_be_is_said() -> None:

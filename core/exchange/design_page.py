@@ -26,6 +26,7 @@ from ..output import output_file, write_text
 from ..progress import Progress, silent
 from ..remarks import to_plain
 from ..simulation.convergence import Quantile
+from ..simulation.trees import LAW, NOT_KNOWN
 from ..workflow.design_figures import figures_of
 from ..workflow.design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
 from ..workflow.enough import KNOWN_TO
@@ -229,6 +230,7 @@ def provenance(sheet: DesignSheet, inputs: Mapping[str, Path]) -> dict[str, str]
         "Seed": str(settings.seed),
         "Rolling, friction": f"{settings.rolling}, {settings.friction:g}",
         "Drag of air": "yes" if settings.drag is not None else "no",
+        "Trees": "none" if settings.trees is None else f"{len(settings.trees)}. {LAW} {NOT_KNOWN}",
         "Ends": "; ".join(
             f"{_title(one)}: " + ", ".join(f"{name} {n}" for name, n in one.counted.ends.items() if n)
             for one in sheet.models

@@ -286,4 +286,11 @@ def _remarks(sheet: DesignSheet) -> list[Remark]:
                 else f"Too few impacts were measured here to tell how well {model} fits them."
             )
             found.append(Remark(text, "warning", model))
+    trees = sheet.models[0].settings.trees
+    if trees is not None:
+        text = (
+            f"All values count on {len(trees)} trees that stand for every block, and a law that knows little of them: "
+            "compare with a sheet without trees."
+        )
+        found.append(Remark(text, "warning", "trees"))
     return gravest_first(found)

@@ -15,6 +15,7 @@ from rockfall.core.hazard.screens import Screen, ScreenHits
 from rockfall.core.simulation.engine import Settings
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases
+from rockfall.core.simulation.trees import random_trees
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.design_sheet import DesignSheet, design_sheet
 
@@ -158,6 +159,16 @@ def test_the_page_the_pdf_and_the_numbers_say_the_same(sheet: DesignSheet, tmp_p
     assert f"<td>{value:.3g}</td>" in html
     assert "fb1acd44962209a65826621210c03c0a72e392169f52c2f208efbf3f272f09a2" in html
     assert (tmp_path / "design.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_a_sheet_that_counts_on_trees_says_so(ground: Ground, releases: Releases, tmp_path: Path) -> None:
+    forest = random_trees(ground.terrain, 100.0, 0.3, 0.1, seed=2)
+    settings = Settings("noel_2017", seed=3, trees=forest)
+    found = design_sheet(ground, releases, [settings], [Screen("road", LINE)], NONE)
+    assert any(f"count on {len(forest)} trees" in remark.text for remark in found.remarks)
+    write_design(found, tmp_path, {})
+    said = json.loads((tmp_path / "design.json").read_text(encoding="utf-8"))["provenance"]["Trees"]
+    assert said.startswith(f"{len(forest)}. Energy: Dorren and Berger (2006)")
 
 
 def test_it_ends_when_the_values_are_known(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:

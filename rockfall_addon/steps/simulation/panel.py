@@ -187,7 +187,7 @@ class ROCKFALL_PT_simulation_trees(_Sub, bpy.types.Panel):
         if settings.trees == "TABLE":
             column.prop(settings, "trees_file")
         else:
-            column.prop(settings, "stems_per_hectare")
+            column.prop(settings, "stems_per_hectare", text="Stems per ha")
             column.prop(settings, "dbh_cm")
             column.prop(settings, "dbh_sd_cm")
             column.prop(settings, "trees_within")

@@ -25,6 +25,7 @@ from .options import (
 )
 from .progress import PrintedProgress
 from .release_options import add_zone_options, zones_as_asked
+from .tree_options import add_tree_options, trees_said
 
 if TYPE_CHECKING:
     from ..analysis.observed_runs import Observed
@@ -67,6 +68,7 @@ def add_observed_arguments(parser: argparse.ArgumentParser) -> None:
     block.add_argument("--diameter", type=positive, metavar="M", help=f"[m] (default {DIAMETER_M:g})")
     block.add_argument("--density", type=positive, metavar="RHO", help=f"[kg/m³] (default {ROCK_DENSITY_KGPM3:g})")
     add_zone_options(parser)
+    add_tree_options(parser)
     add_figure_options(parser)
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
     add_terrain_options(parser)
@@ -133,6 +135,7 @@ def _of_project(
         friction=entry.friction if arguments.friction is None else arguments.friction,
         drag=arguments.drag or entry.drag,
         seed=entry.seed if arguments.seed is None else arguments.seed,
+        trees=trees_said(arguments, entry.trees),
     )
     scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
     known = model_parameters(arguments, list(scenario.models), scenario.models)
@@ -159,6 +162,7 @@ def _of_table(
     from ..exchange.project import terrain_inputs
     from ..exchange.simulation_tables import read_releases
     from ..exchange.tables import read_picks
+    from ..exchange.trees import open_trees
     from ..exchange.whole_run_tables import read_stops
     from ..impact_models.registry import COMPARED, find_model
     from ..reconstruction.block import Block
@@ -178,6 +182,8 @@ def _of_table(
     density = ROCK_DENSITY_KGPM3 if arguments.density is None else arguments.density
     surface = terrain_as_asked(arguments, arguments.terrain, progress)
     zones, zone_files = zones_as_asked(arguments, surface, [model.name for model in models])
+    entry = trees_said(arguments)
+    trees, tree_files = (None, {}) if entry is None else open_trees(entry, surface, arguments.seed or 0)
     progress(f"Reading {arguments.table}")
     scenario = Scenario(
         surface,
@@ -189,12 +195,13 @@ def _of_table(
         ),
         {model.name: parameters.get(model.name, {}) for model in models},
         zones=zones,
+        trees=trees,
         drag=Drag() if arguments.drag else None,
         gravity_mps2=gravity,
         seed=arguments.seed or 0,
         **given,
     )
-    inputs = {"observed": Path(arguments.table), **terrain_inputs(arguments.terrain), **zone_files}
+    inputs = {"observed": Path(arguments.table), **terrain_inputs(arguments.terrain), **zone_files, **tree_files}
     drawing = [model.name for model in models if model.draws_from_impacts]
     ground = ground_of(scenario)
     if arguments.stops:

@@ -104,7 +104,7 @@ def first_stem(stems, fallen, p, v, a, radius, until):  # type: ignore[no-untype
                     continue
                 then = _moment(way, speed, gain)
                 z = p[2] + (v[2] + 0.5 * a[2] * then) * then
-                if z < stem[k, FOOT]:
+                if z < stem[k, FOOT] - both:  # below on a slope it still meets the stem
                     continue
                 if z > stem[k, TOP]:  # it may come down to the stem's height before it has passed the axis
                     if a[2] >= 0.0:

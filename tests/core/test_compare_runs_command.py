@@ -114,6 +114,13 @@ def test_tables_agree_with_each_other(site: Path, tmp_path: Path, capsys) -> Non
         assert (again / name).read_bytes() == (out / name).read_bytes()
 
 
+def test_runs_among_trees(site: Path, tmp_path: Path) -> None:
+    more = ["--stops", str(site / "stops.csv"), "--number", "5", "--model", "noel_2017", "--tables-only"]
+    forest = ["--stems-per-hectare", "1500", "--dbh-cm", "40"]
+    assert main(asked(site, tmp_path / "out", *more, *forest, observed="releases.csv")) == 0
+    assert sum(int(row["tree_hits"]) for row in rows_of(tmp_path / "out" / "runs.csv")) > 10
+
+
 def test_stops_alone(site: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     more = ["--stops", str(site / "stops.csv"), "--number", "20", "--model", "noel_2017", "--tables-only"]

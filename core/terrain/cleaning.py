@@ -17,23 +17,34 @@ def merge_duplicates(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, 
     The order of the remaining vertices is kept.
     """
     # Sorting one hash per vertex is many times faster than sorting rows; equal hashes are checked below.
+    hashed = np.empty(len(vertices), np.uint64)
+    for start in range(0, len(vertices), CHUNK):
+        hashed[start : start + CHUNK] = _hashes(vertices[start : start + CHUNK])
+    ordered = np.sort(hashed)
+    if not (ordered[1:] == ordered[:-1]).any():
+        return vertices, faces, 0
+    order = np.argsort(hashed, kind="stable").astype(np.int32)
+    first_of_run = np.r_[True, ordered[1:] != ordered[:-1]]
+    original = np.empty(len(vertices), np.int32)
+    original[order] = order[first_of_run][np.cumsum(first_of_run) - 1]
+    del hashed, ordered, order, first_of_run
+    for start in range(0, len(vertices), CHUNK):
+        part = slice(start, start + CHUNK)
+        same = (vertices[original[part]] == vertices[part]).all(axis=1)
+        original[part] = np.where(same, original[part], np.arange(start, start + len(same)))
+    kept = original == np.arange(len(vertices), dtype=np.int32)
+    number = (np.cumsum(kept, dtype=np.int32) - 1)[original]
+    return vertices[kept], number[faces], int((~kept).sum())
+
+
+def _hashes(vertices: Array) -> NDArray[np.uint64]:
+    """(n,) of the bits of vertices (n, 3); −0 has those of 0."""
     bits = (vertices + 0.0).view(np.uint64)
     hashed = np.zeros(len(vertices), np.uint64)
     for axis, factor in enumerate((0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)):
         hashed ^= bits[:, axis] * np.uint64(factor)
         hashed = (hashed ^ (hashed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
-    ordered = np.sort(hashed)
-    if not (ordered[1:] == ordered[:-1]).any():
-        return vertices, faces, 0
-    order = np.argsort(hashed, kind="stable")
-    ordered = hashed[order]
-    first_of_run = np.r_[True, ordered[1:] != ordered[:-1]]
-    original = np.empty(len(vertices), np.int64)
-    original[order] = order[first_of_run][np.cumsum(first_of_run) - 1]
-    original = np.where((vertices[original] == vertices).all(axis=1), original, np.arange(len(vertices)))
-    kept = original == np.arange(len(vertices))
-    number = (np.cumsum(kept) - 1)[original].astype(np.int32)
-    return vertices[kept], number[faces], int((~kept).sum())
+    return hashed
 
 
 def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[Mask, Array, Mask]:

@@ -11,9 +11,11 @@ from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
 from .source import Source, check_face_indices
-from .text import all_numbers, number_table, read_text, shown
+from .text import NumberRows, all_numbers, line_at, line_blocks, shown
 
 BLANK, NEWLINE = 32, 10
+NO_VERTEX = np.iinfo(np.int32).max
+BLOCK_TRIANGLES = 1 << 16
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -24,50 +26,89 @@ def read_obj(path: Path) -> Source:
     ------
     InputError : no vertices or faces, something that is not a number, a vertex that does not exist; with its row.
     """
-    lines = read_text(path).split(b"\n")
-    vertex_rows = [i for i, line in enumerate(lines) if line.startswith((b"v ", b"v\t"))]
-    face_rows = [i for i, line in enumerate(lines) if line.startswith((b"f ", b"f\t"))]
-    if not vertex_rows:
+    vertices, corners = NumberRows(path, "Coordinates"), _Corners(path)
+    before, vertex_row = 0, 0
+    for lines in line_blocks(path):
+        vertex_rows = [i for i, line in enumerate(lines) if line.startswith((b"v ", b"v\t"))]
+        face_rows = [i for i, line in enumerate(lines) if line.startswith((b"f ", b"f\t"))]
+        vertices.add([lines[i][2:] for i in vertex_rows], [before + i + 1 for i in vertex_rows])
+        if vertex_rows and not vertex_row:
+            vertex_row = before + vertex_rows[0] + 1
+        if face_rows:
+            corners.add(
+                [lines[i] for i in face_rows], np.array(face_rows), np.array(vertex_rows, dtype=np.intp), before
+            )
+        corners.vertices += len(vertex_rows)
+        before += len(lines)
+    if not vertex_row:
         raise InputError("The OBJ file has no vertices", file=path, advice="Check its extension or export it again")
-    if not face_rows:
+    if not corners.faces:
         raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
-    points = number_table([lines[i][2:] for i in vertex_rows], [i + 1 for i in vertex_rows], path, "Coordinates")
+    points = vertices.table()
     if points.shape[1] < 3:
-        raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_rows[0] + 1)
-    faces = _obj_faces([lines[i] for i in face_rows], np.array(face_rows), np.array(vertex_rows), path)
-    return Source(np.ascontiguousarray(points[:, :3]), faces)
+        raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_row)
+    return Source(np.ascontiguousarray(points[:, :3]), corners.triangles())
 
 
-def _obj_faces(
-    lines: list[bytes], face_rows: NDArray[np.intp], vertex_rows: NDArray[np.intp], path: Path
-) -> NDArray[np.int32]:
-    """(m, 3) polygons of any number of corners as fans of triangles; corners are counted from the front or back."""
+class _Corners:
+    """The faces of a Wavefront OBJ, which come in blocks of lines: polygons as fans of triangles.
 
-    def wrong(face: int, problem: str, advice: str) -> InputError:
-        return InputError(problem, file=path, row=int(face_rows[face]) + 1, advice=advice)
+    Attributes
+    ----------
+    vertices : how many there were before the block.
+    faces : (k, 3) of each block; −1 for a vertex before the first.
+    rows : (k,) of each block, in the file.
+    """
 
-    text = re.sub(rb"/\S*", b"", b"\n".join(line[2:] for line in lines))
-    number = _whole_numbers(text)
-    if number is None:
-        face = next(i for i, line in enumerate(text.split(b"\n")) if _whole_numbers(line) is None)
-        raise wrong(face, f'"{shown(lines[face])}" is no face', AGAIN)
-    code = np.frombuffer(text, np.uint8)
-    begins = np.flatnonzero((code > BLANK) & np.r_[True, code[:-1] <= BLANK])
-    corners = np.diff(np.searchsorted(begins, [0, *np.flatnonzero(code == NEWLINE).tolist(), code.size]))
-    if (corners < 3).any():
-        raise wrong(int(np.argmax(corners < 3)), "A face needs three vertices", AGAIN)
-    # Numbers count from 1; negative ones count back from the last vertex before the face.
-    of_face = np.repeat(np.arange(len(lines)), corners)
-    vertex = np.where(number > 0, number - 1, np.searchsorted(vertex_rows, face_rows)[of_face] + number)
-    outside = (vertex < 0) | (vertex >= len(vertex_rows)) | (number == 0)
-    if outside.any():
-        face = int(of_face[np.argmax(outside)])
-        advice = f"The file has {len(vertex_rows)} vertices: export it again"
-        raise wrong(face, f'"{shown(lines[face])}" names a vertex that does not exist', advice)
-    triangles = corners - 2
-    first = np.repeat(np.cumsum(corners) - corners, triangles)
-    turn = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
-    return vertex[first[:, None] + np.stack([0 * turn, turn + 1, turn + 2], axis=1)].astype(np.int32)
+    def __init__(self, path: Path) -> None:
+        self.path, self.vertices = path, 0
+        self.faces: list[NDArray[np.int32]] = []
+        self.rows: list[NDArray[np.int32]] = []
+
+    def add(self, lines: list[bytes], face_rows: NDArray[np.intp], vertex_rows: NDArray[np.intp], before: int) -> None:
+        """Faces of a block that begins `before` rows after the file's first one; rows are those in the block."""
+
+        def wrong(face: int, problem: str) -> InputError:
+            return InputError(problem, file=self.path, row=before + int(face_rows[face]) + 1, advice=AGAIN)
+
+        text = re.sub(rb"/\S*", b"", b"\n".join(line[2:] for line in lines))
+        number = _whole_numbers(text)
+        if number is None:
+            face = next(i for i, line in enumerate(text.split(b"\n")) if _whole_numbers(line) is None)
+            raise wrong(face, f'"{shown(lines[face])}" is no face')
+        code = np.frombuffer(text, np.uint8)
+        begins = np.flatnonzero((code > BLANK) & np.r_[True, code[:-1] <= BLANK])
+        corners = np.diff(np.searchsorted(begins, [0, *np.flatnonzero(code == NEWLINE).tolist(), code.size]))
+        if (corners < 3).any():
+            raise wrong(int(np.argmax(corners < 3)), "A face needs three vertices")
+        # Numbers count from 1; negative ones count back from the last vertex before the face.
+        counted = (self.vertices + np.searchsorted(vertex_rows, face_rows)).repeat(corners)
+        vertex = np.where(number > 0, number - 1, np.where(number < 0, counted + number, -1))
+        vertex = np.clip(vertex, -1, NO_VERTEX).astype(np.int32)
+        triangles = corners - 2
+        first = np.repeat(np.cumsum(corners) - corners, triangles)
+        turn = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+        self.faces.append(vertex[first[:, None] + np.stack([0 * turn, turn + 1, turn + 2], axis=1)])
+        self.rows.append((before + 1 + face_rows).astype(np.int32).repeat(triangles))
+
+    def triangles(self) -> NDArray[np.int32]:
+        """(m, 3) all of them.
+
+        Raises
+        ------
+        InputError : one names a vertex that there is not.
+        """
+        for faces, rows in zip(self.faces, self.rows, strict=True):
+            outside = ((faces < 0) | (faces >= self.vertices)).any(axis=1)
+            if outside.any():
+                row = int(rows[np.argmax(outside)])
+                raise InputError(
+                    f'"{shown(line_at(self.path, row))}" names a vertex that does not exist',
+                    file=self.path,
+                    row=row,
+                    advice=f"The file has {self.vertices} vertices: export it again",
+                )
+        return np.concatenate(self.faces)
 
 
 def _whole_numbers(text: bytes) -> Array | None:
@@ -90,18 +131,12 @@ def read_stl(path: Path) -> Source:
     promised = int.from_bytes(beginning[80:84], "little") if len(beginning) == 84 else -1
     # A binary header may begin with "solid" too: the size is what tells.
     if size == 84 + promised * STL_TRIANGLE.itemsize:
-        corners = np.fromfile(path, STL_TRIANGLE, offset=84)["corners"].astype(np.float64)
+        corners = np.empty((promised, 3, 3))
+        for start in range(0, promised, BLOCK_TRIANGLES):
+            part = np.fromfile(path, STL_TRIANGLE, BLOCK_TRIANGLES, offset=84 + start * STL_TRIANGLE.itemsize)
+            corners[start : start + len(part)] = part["corners"]
     elif beginning.lstrip().startswith(b"solid") and b"\0" not in beginning:
-        lines = read_text(path).split(b"\n")
-        rows = [i for i, line in enumerate(lines) if line.lstrip().startswith(b"vertex")]
-        table = number_table([lines[i].strip()[6:] for i in rows], [i + 1 for i in rows], path, "Three coordinates")
-        if len(rows) % 3 or not any(line.lstrip().startswith(b"endsolid") for line in lines[-5:]):
-            raise InputError(
-                "The file is truncated: its solid has no end", file=path, row=len(lines), advice="Export it again"
-            )
-        if len(rows) and table.shape[1] != 3:
-            raise InputError("A corner needs three coordinates", file=path, row=rows[0] + 1)
-        corners = table.reshape(-1, 3, 3)
+        corners = _written_corners(path)
     elif promised >= 0 and size > 84:
         raise InputError(
             f"The file is truncated or not STL: its header promises {promised} triangles, "
@@ -112,4 +147,22 @@ def read_stl(path: Path) -> Source:
     else:
         raise InputError("Not an STL file", file=path, advice="Check its extension or export it again")
     points = corners.reshape(-1, 3)
-    return Source(points, check_face_indices(np.arange(len(points)).reshape(-1, 3), len(points), path))
+    return Source(points, check_face_indices(np.arange(len(points), dtype=np.int32).reshape(-1, 3), len(points), path))
+
+
+def _written_corners(path: Path) -> Array:
+    """(m, 3, 3) of an ascii STL."""
+    found, before, vertices, row = NumberRows(path, "Three coordinates"), 0, 0, 0
+    last: list[bytes] = []
+    for lines in line_blocks(path):
+        rows = [i for i, line in enumerate(lines) if line.lstrip().startswith(b"vertex")]
+        found.add([lines[i].strip()[6:] for i in rows], [before + i + 1 for i in rows])
+        if rows and not row:
+            row = before + rows[0] + 1
+        vertices, before, last = vertices + len(rows), before + len(lines), [*last, *lines][-5:]
+    if vertices % 3 or not any(line.lstrip().startswith(b"endsolid") for line in last):
+        raise InputError("The file is truncated: its solid has no end", file=path, row=before, advice="Export it again")
+    table = found.table()
+    if vertices and table.shape[1] != 3:
+        raise InputError("A corner needs three coordinates", file=path, row=row)
+    return table.reshape(-1, 3, 3)

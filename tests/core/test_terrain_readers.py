@@ -16,6 +16,7 @@ from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
 from rockfall.core.terrain.meshes import read_obj
 from rockfall.core.terrain.opening import READERS
 from rockfall.core.terrain.readers import inspect_terrain, read_terrain
+from rockfall.core.terrain.text import BLOCK_BYTES, line_blocks
 from rockfall.core.terrain.writers import write_ply
 
 DATA = Path(__file__).parents[1] / "data"
@@ -149,6 +150,34 @@ def test_obj_of_several_objects_with_polygons_and_relative_numbers(tmp_path):
     source = read_obj(write(tmp_path / "a.obj", text))
     np.testing.assert_array_equal(source.faces, [[0, 1, 2], [0, 2, 3], [0, 3, 4], [5, 6, 7], [5, 7, 6]])
     np.testing.assert_array_equal(source.points[[3, 7]], [[2, 6, 0], [14, 4, 1]])
+
+
+def test_obj_that_is_read_in_several_blocks_counts_its_corners_and_rows_through(tmp_path):
+    path, quads = tmp_path / "long.obj", 15_000
+    heights = np.random.default_rng(2).uniform(0, 9, 4 * quads)
+    corners = [f"v {i % 4 in (1, 2):d}.25 {i // 4 + (i % 4 > 1)}.5 {z:.9f}" for i, z in enumerate(heights)]
+    lines = [line for i in range(quads) for line in (*corners[4 * i : 4 * i + 4], "f -4 -3 -2 -1")]
+    path.write_bytes("\r\n".join(lines).encode())
+    assert path.stat().st_size > BLOCK_BYTES
+    source = read_obj(path)
+    np.testing.assert_array_equal(source.points[:, 2], np.round(heights, 9))
+    fans = np.array([[0, 1, 2], [0, 2, 3]])
+    np.testing.assert_array_equal(source.faces.reshape(-1, 2, 3), 4 * np.arange(quads)[:, None, None] + fans)
+    for bad, problem in (("f 1 2 60001", "does not exist"), ("v 0 zero 0", "not a number"), ("v 0 0", "2 values")):
+        path.write_text("\n".join([*lines, bad]))
+        with pytest.raises(InputError, match=problem) as caught:
+            read_obj(path)
+        assert caught.value.row == 5 * quads + 1
+
+
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n", b"\r"])
+def test_lines_in_blocks_are_those_of_the_whole_text(tmp_path, newline):
+    path, lines = tmp_path / "a.txt", [b"one", b"", b"three and more", b"4"]
+    for end in (b"", newline):
+        path.write_bytes(newline.join(lines) + end)
+        for size in range(1, 30):
+            found = [line for block in line_blocks(path, size) for line in block]
+            assert found == lines, (size, end)
 
 
 def test_obj_of_polygons_as_trimesh_reads_it(tmp_path):

@@ -95,10 +95,12 @@ def write_all_maps(
     for model, tally in maps.items():
         place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
         drawn, shift = tally.maps(), simulations[0].ground.shift
-        about = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}
+        about, said = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}, model
+        if (trees := simulations[0].settings.trees) is not None:
+            about["TREES"], said = str(len(trees)), f"{model} among {len(trees)} trees"
         write_maps(drawn, place, shift, about, progress)
         releases = simulations[0].releases.position
-        draw_maps(drawn, simulations[0].ground.terrain, place, said=model, releases=releases, progress=progress)
+        draw_maps(drawn, simulations[0].ground.terrain, place, said=said, releases=releases, progress=progress)
         written.append(f"{place.relative_to(folder).as_posix()}/")
     return written
 

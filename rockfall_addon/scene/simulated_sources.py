@@ -138,7 +138,7 @@ def fingerprint(scene: bpy.types.Scene, models: Collection[str], number: int | N
     """
     try:
         entry = entry_of(scene) if number is None else entry_with(scene, models, number)
-        parts: list[object] = [entry]
+        parts: list[object] = [replace(entry, trees=None), *simulated_trees.fingerprint(scene)]
     except RockfallError as error:
         parts = [str(error)]
     if scene.rockfall_simulation.source in FILMED or "observed" in models:

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core.exchange.job_inputs import input_hashes
 from ...core.exchange.simulation_entry import TreesEntry
 from ...core.simulation.trees import Trees
 from ...core.vectors import Array
@@ -56,6 +57,15 @@ def keep_entry(scene: bpy.types.Scene, entry: TreesEntry | None) -> None:
     if entry.stems_per_hectare is not None and entry.dbh_cm is not None:
         settings.stems_per_hectare, settings.dbh_cm = entry.stems_per_hectare, entry.dbh_cm
         settings.dbh_sd_cm = entry.dbh_sd_cm
+
+
+def fingerprint(scene: bpy.types.Scene) -> list[object]:
+    """Of the trees: by the content of their files, wherever these are."""
+    entry = entry_of(scene)
+    if entry is None:
+        return []
+    files = {name: file for name in ("file", "within") if (file := getattr(entry, name)) is not None}
+    return [replace(entry, file=None, within=None), input_hashes(files)]
 
 
 def copied(entry: TreesEntry | None, place: Path) -> TreesEntry | None:

@@ -76,6 +76,23 @@ def test_a_table_of_trees_goes_along_with_a_project(slope: bpy.types.Scene, part
     bpy.data.scenes.remove(other)
 
 
+def test_another_table_under_the_same_name_is_told(slope: bpy.types.Scene, part, tmp_path: Path) -> None:
+    shift = part("rockfall_addon.scene.georeference").read_shift(slope)
+    table, settings = tmp_path / "trees.csv", slope.rockfall_simulation
+    settings.trees, settings.trees_file = "TABLE", str(table)
+    is_stale = part("rockfall_addon.scene.simulation_setup").is_stale
+    for x in (30.0, 40.0):
+        table.write_text(f"x_m,y_m,dbh_cm\n{shift.x + x!r},{shift.y + 60.0!r},50\n", encoding="utf-8")
+        if x > 30:
+            assert is_stale(slope)
+        assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+        assert not is_stale(slope)
+    moved = tmp_path / "elsewhere.csv"
+    table.rename(moved)
+    settings.trees_file = str(moved)
+    assert not is_stale(slope)
+
+
 def test_a_bad_table_is_refused_in_words(slope: bpy.types.Scene, tmp_path: Path) -> None:
     table = tmp_path / "bad.csv"
     table.write_text("x_m,y_m,dbh_cm\n5,5,30\n", encoding="utf-8")

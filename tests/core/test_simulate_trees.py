@@ -115,7 +115,9 @@ def test_a_drawn_forest_stands_within_its_polygons_and_is_the_same_in_a_project(
 
 
 def test_a_geopackage_has_the_trees_and_their_hits(site: Path, tmp_path: Path) -> None:
-    assert main(options(site, tmp_path / "out", "--trees", str(site / "trees.csv"), "--geopackage")) == 0
+    more = ["--trees", str(site / "trees.csv"), "--geopackage", "--cell", "10"]
+    assert main(options(site, tmp_path / "out", *more)) == 0
+    assert b"TREES" in (tmp_path / "out" / "maps" / "Nr_blocks.tif").read_bytes()
     hits = Counter(row["tree"] for row in rows_of(tmp_path / "out" / "tree_hits.csv"))
     with closing(sqlite3.connect(tmp_path / "out" / "simulation.gpkg")) as database:
         found = dict(database.execute("SELECT tree, hits FROM trees").fetchall())

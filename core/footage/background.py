@@ -19,12 +19,20 @@ from .sources import Source, frames
 GRID = (16, 10)
 PER_CELL = 4
 WINDOW_PX = 21
-LEVELS = 4
+LEVELS = 3
+FINE, COARSE = (30, 0.005), (10, 0.03)
+"""Most steps of Lucas and Kanade, and the step that ends them [px]."""
+GUESSED_FROM, GUESS_INLIER_PX = 100, 4.0
+"""So many corners tell about where all have gone."""
+LARGEST = 2_200_000
+"""Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
 FORWARD_BACKWARD_PX = 0.5
 INLIER_PX = 1.5
 FEWEST = 12
 FEWEST_SHARE = 0.25
 RENEW_SHARE = 0.6
+type Steps = tuple[int, float]
+
 STILL_PX = 0.15
 """A tripod: the typical corner never moves further than this."""
 
@@ -96,11 +104,12 @@ def background_motion(
     InputError : the background cannot be followed, with the frame.
     """
     last = source.time_s.size - 1 if last is None else last
+    scale = 1.0
     follower, numbers, homographies, inliers, rms = None, [], [], [], []
     sightings: list[tuple[int, Indices, Array]] = []
     for frame, picture in frames(source, range(first, last + 1)):
         progress("Following the background", frame - first, last - first + 1)
-        grey = opencv().cvtColor(picture, opencv().COLOR_BGR2GRAY)
+        grey, scale = _reduced(opencv().cvtColor(picture, opencv().COLOR_BGR2GRAY))
         if follower is None:
             follower = _Follower(grey, frame)
         else:
@@ -108,8 +117,8 @@ def background_motion(
         numbers.append(frame)
         homographies.append(follower.homography)
         inliers.append(follower.names.size)
-        rms.append(follower.rms)
-        sightings.append((frame, follower.names, follower.pixel))
+        rms.append(scale * follower.rms)
+        sightings.append((frame, follower.names, scale * follower.pixel))
     still = _is_still(sightings)
     count = len(numbers)
     features = TrackedFeatures(
@@ -117,7 +126,7 @@ def background_motion(
         feature=np.concatenate([names for _, names, _ in sightings]),
         pixel=np.concatenate([pixel for _, _, pixel in sightings]) + 0.5,
     )
-    corner = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
+    corner = np.array([[scale, 0, 0.5], [0, scale, 0.5], [0, 0, 1]])
     homography = np.tile(np.eye(3), (count, 1, 1)) if still else corner @ np.array(homographies) @ np.linalg.inv(corner)
     return BackgroundMotion(
         frames=np.array(numbers),
@@ -140,19 +149,17 @@ class _Follower:
         self.pixel = self.reference = np.zeros((0, 2))
         self.count = self.key_count = 0
         self.key, self.key_pixel = grey, self.pixel
-        self.small = opencv().pyrDown(grey)
+        self.small = _quartered(grey)
         self._renew(grey)
         if self.names.size < FEWEST:
             raise _lost(frame, f"only {self.names.size} corners are found in it")
 
     def advance(self, grey: np.ndarray, frame: int) -> None:
         """Follow all corners into the next frame."""
-        small = opencv().pyrDown(grey)
-        coarse, _ = _flow(self.small, small, self.pixel / 2, None, LEVELS)
-        step = 2 * coarse - self.pixel
-        guess = self.pixel + np.where(np.isfinite(step), step, _median(step))
+        small = _quartered(grey)
+        guess = self._guess(small)
         pixel, good = _flow(self.key, grey, self.key_pixel, guess, 1)
-        back, back_good = _flow(grey, self.key, np.where(good[:, None], pixel, guess), self.key_pixel, 1)
+        back, back_good = _flow(grey, self.key, np.where(good[:, None], pixel, guess), self.key_pixel, 0, COARSE)
         good &= back_good & (np.hypot(*(back - self.key_pixel).T) < FORWARD_BACKWARD_PX)
         height, width = grey.shape
         good &= (pixel > 1).all(axis=1) & (pixel < (width - 2, height - 2)).all(axis=1)
@@ -170,6 +177,18 @@ class _Follower:
         if self.names.size < RENEW_SHARE * self.key_count:
             self._renew(grey)
 
+    def _guess(self, small: np.ndarray) -> Array:
+        """(n, 2) about where the corners are in the next frame, from the motion of some of them in a small picture."""
+        some = self.pixel[:: max(len(self.pixel) // GUESSED_FROM, 1)]
+        moved, good = _flow(self.small, small, some / 4, None, LEVELS, COARSE)
+        if good.sum() >= FEWEST:
+            cv2 = opencv()
+            cv2.setRNGSeed(1)
+            across, _ = cv2.findHomography(some[good], 4 * moved[good], cv2.USAC_MAGSAC, GUESS_INLIER_PX)
+            if across is not None:
+                return _through(across, self.pixel)
+        return self.pixel + _median(4 * moved - some)
+
     def _renew(self, grey: np.ndarray) -> None:
         """Make this the frame that corners are compared with, and find new ones where there are few."""
         fresh = _corners(grey, self.pixel)
@@ -178,6 +197,21 @@ class _Follower:
         self.pixel = np.concatenate([self.pixel, fresh])
         self.reference = np.concatenate([self.reference, _through(self.homography, fresh)])
         self.key, self.key_pixel, self.key_count = grey, self.pixel, self.names.size
+
+
+def _reduced(grey: np.ndarray) -> tuple[np.ndarray, float]:
+    """A picture of no more than `LARGEST` pixels, and how many times as wide the whole one is."""
+    scale = 1.0
+    while grey.size > LARGEST:
+        grey, scale = opencv().pyrDown(grey), 2 * scale
+    return grey, scale
+
+
+def _quartered(grey: np.ndarray) -> np.ndarray:
+    """A quarter as wide and high."""
+    cv2 = opencv()
+    small: np.ndarray = cv2.pyrDown(cv2.pyrDown(grey))
+    return small
 
 
 def _corners(grey: np.ndarray, taken: Array) -> Array:
@@ -207,7 +241,7 @@ def _cell(pixel: Array, width: int, height: int) -> Indices:
 
 
 def _flow(
-    before: np.ndarray, after: np.ndarray, pixel: Array, guess: Array | None, levels: int
+    before: np.ndarray, after: np.ndarray, pixel: Array, guess: Array | None, levels: int, steps: Steps = FINE
 ) -> tuple[Array, np.ndarray]:
     """Places in the picture after, NaN where they are lost, and whether they are found."""
     cv2 = opencv()
@@ -218,7 +252,7 @@ def _flow(
         (pixel if guess is None else guess).astype(np.float32),
         winSize=(WINDOW_PX, WINDOW_PX),
         maxLevel=levels,
-        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005),
+        criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, *steps),
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     good = status.ravel().astype(np.bool_)

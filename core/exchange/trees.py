@@ -19,7 +19,7 @@ from ..simulation.trees import SPECIES, THICKEST_M, Trees, factor_of, greatest_l
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 from .csv_text import read_table
-from .map_shapes import polygon_of, read_polygons
+from .map_shapes import GEOJSON, polygon_of, read_polygons
 from .simulation_entry import TreesEntry
 from .tables import Columns, write_columns
 
@@ -71,6 +71,12 @@ def read_trees(path: str | Path, terrain: Surface | Cloud, height_m: float, spec
     ------
     InputError : anything that is wrong with the table, with the row; no tree on the terrain.
     """
+    if Path(path).suffix.lower() in GEOJSON:
+        raise InputError(
+            "Trees are read from a table, not from a map of points",
+            file=path,
+            advice=f"Export it as comma-separated text with {', '.join(REQUIRED)}; polygons go to --trees-within",
+        )
     table = read_table(path, REQUIRED, KNOWN)
     dbh, height = CM * table.numbers("dbh_cm", required=True), table.numbers("height_m")
     height = np.where(np.isnan(height), height_m, height)

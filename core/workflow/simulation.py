@@ -271,7 +271,8 @@ def _remarks_of_trees(trees: Trees | None) -> list[Remark]:
         return []
     remarks = [Remark(text, "advice", "trees") for text in trees.left_out]
     mean, thickest = 100 * trees.dbh_m.mean(), 100 * trees.dbh_m.max()
-    text = f"Blocks meet {len(trees)} trees, {mean:.3g} cm thick on average and {thickest:.3g} cm at most. {LAW}"
+    many = "1 tree" if len(trees) == 1 else f"{len(trees)} trees"
+    text = f"Blocks meet {many}, {mean:.3g} cm thick on average and {thickest:.3g} cm at most. {LAW}"
     return [*remarks, Remark(f"{text} {NOT_KNOWN}", "note", "trees")]
 
 

@@ -153,6 +153,7 @@ def test_a_bad_table_is_refused_where_it_is_bad(site: Path, tmp_path: Path, caps
         (["--dbh-cm", "30"], "no stems per hectare"),
         (["--stems-per-hectare", "400", "--dbh-cm", "thick"], "Write 32, or 32,12"),
         (["--tree-height", "4"], "there are none"),
+        (["--trees", "inventory.geojson"], "not from a map of points"),
         (["--stems-per-hectare", "1e9", "--dbh-cm", "30"], "fit"),
         (["--trees", "x.csv", "--dbh-cm", "30"], "Give --trees, or --stems-per-hectare"),
         (["--stems-per-hectare", "400", "--dbh-cm", "30", "--species", "palm"], "no kind of tree"),

@@ -163,6 +163,10 @@ def _commands(terrain: bytes) -> dict[str, Case]:
         "motion": (two, ("motion", "@project.toml", "--tables-only")),
         "calibrate": (impacts, ("calibrate", "@impacts.csv", *model, "--fit", "rt", "--resamples", "20")),
         "simulate": (falls, ("simulate", "@releases.csv", *onto, *zones, *model, "--drag")),
+        "simulate among trees": (
+            {**slope, "releases.csv": examples.RELEASES, "trees.csv": examples.TREES},
+            ("simulate", "@releases.csv", *onto, "--trees", "@trees.csv", *model),
+        ),
         "simulate a project": (project, ("simulate", "@project.toml")),
     }
     return {

@@ -123,6 +123,11 @@ PICKS = (
         for i in range(5)
     )
 ).encode()
+TREES = b"""\
+tree,x_m,y_m,dbh_cm,height_m,species
+one,988403,6375600,30,18,coniferous
+two,988406,6375596,42,,broadleaved
+"""
 RELEASES = b"""\
 release,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,diameter_m,density_kgpm3,number
 one,988403,6375606,,1,0,0,0.5,2600,2

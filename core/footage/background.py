@@ -24,6 +24,7 @@ FINE, COARSE = (30, 0.005), (10, 0.03)
 """Most steps of Lucas and Kanade, and the step that ends them [px]."""
 GUESSED_FROM, GUESS_INLIER_PX = 100, 4.0
 """So many corners tell about where all have gone."""
+TOGETHER = 0.8
 LARGEST = 2_200_000
 """Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
 FORWARD_BACKWARD_PX = 0.5
@@ -157,8 +158,8 @@ class _Follower:
     def advance(self, grey: np.ndarray, frame: int) -> None:
         """Follow all corners into the next frame."""
         small = _quartered(grey)
-        guess = self._guess(small)
-        pixel, good = _flow(self.key, grey, self.key_pixel, guess, 1)
+        guess, levels = self._guess(small)
+        pixel, good = _flow(self.key, grey, self.key_pixel, guess, levels)
         back, back_good = _flow(grey, self.key, np.where(good[:, None], pixel, guess), self.key_pixel, 0, COARSE)
         good &= back_good & (np.hypot(*(back - self.key_pixel).T) < FORWARD_BACKWARD_PX)
         height, width = grey.shape
@@ -177,17 +178,20 @@ class _Follower:
         if self.names.size < RENEW_SHARE * self.key_count:
             self._renew(grey)
 
-    def _guess(self, small: np.ndarray) -> Array:
-        """(n, 2) about where the corners are in the next frame, from the motion of some of them in a small picture."""
+    def _guess(self, small: np.ndarray) -> tuple[Array, int]:
+        """(n, 2) about where the corners are in the next frame, from the motion of some in a small picture.
+
+        And from which level of the pyramid they are to be looked for: the lowest where nearly all move together.
+        """
         some = self.pixel[:: max(len(self.pixel) // GUESSED_FROM, 1)]
         moved, good = _flow(self.small, small, some / 4, None, LEVELS, COARSE)
         if good.sum() >= FEWEST:
             cv2 = opencv()
             cv2.setRNGSeed(1)
-            across, _ = cv2.findHomography(some[good], 4 * moved[good], cv2.USAC_MAGSAC, GUESS_INLIER_PX)
+            across, agrees = cv2.findHomography(some[good], 4 * moved[good], cv2.USAC_MAGSAC, GUESS_INLIER_PX)
             if across is not None:
-                return _through(across, self.pixel)
-        return self.pixel + _median(4 * moved - some)
+                return _through(across, self.pixel), 0 if agrees.sum() > TOGETHER * len(some) else 1
+        return self.pixel + _median(4 * moved - some), 1
 
     def _renew(self, grey: np.ndarray) -> None:
         """Make this the frame that corners are compared with, and find new ones where there are few."""

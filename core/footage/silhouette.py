@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..least_squares import damped_step
 from ..opencv import opencv
 from ..vectors import Array
 from .plates import Plates
@@ -37,6 +38,9 @@ LIT = 0.12
 SLIGHT = 0.08
 """Offsets below this share of the diameter are left alone: a block is no disc."""
 EDGE_CELLS = 3.0
+FAR = 0.15
+"""Residuals of the hidden share beyond this count less."""
+STEPS = 40
 
 
 class Patch(NamedTuple):
@@ -159,19 +163,25 @@ def _slope(change: np.ndarray, behind: np.ndarray) -> Array:
 
 
 def _disc(hidden: Array, u: Array, v: Array) -> Outline | None:
-    """The disc with a soft edge that fits best what is hidden, by least squares."""
-    from scipy.optimize import least_squares
-
-    def fitted(target: Array, edge: float) -> Array:
-        def gap(values: Array) -> Array:
-            distance = np.hypot(u - values[0], v - values[1])
-            shape = np.clip((0.5 * values[2] - distance) / edge + 0.5, 0.0, 1.0)
-            return np.asarray((values[3] * shape - target).ravel())
-
-        found = least_squares(gap, (0.0, 0.0, float(CELLS), float(target.max())), loss="soft_l1", f_scale=0.15)
-        return np.asarray(found.x, np.float64)
-
-    half = fitted(np.minimum(hidden, HALF_HIDDEN), EDGE_CELLS)
-    whole = fitted(hidden, EDGE_CELLS)
+    """The disc with a soft edge that fits best what is hidden."""
+    half, whole = _fitted(np.minimum(hidden, HALF_HIDDEN), u, v), _fitted(hidden, u, v)
     outside = np.hypot(half[0], half[1]) > 0.6 * CELLS or not 0.6 * CELLS < whole[2] < 2 * CELLS or half[3] < 0.25
     return None if outside else Outline(half[:2] / CELLS, float(whole[2] / CELLS))
+
+
+def _fitted(target: Array, u: Array, v: Array) -> Array:
+    """(4,) centre, diameter [cells] and height of the disc, by damped least squares; residuals far off count less."""
+    values = np.array([0.0, 0.0, float(CELLS), float(target.max())])
+    for _ in range(STEPS):
+        along, down = u - values[0], v - values[1]
+        distance = np.maximum(np.hypot(along, down), 1e-9)
+        inside = (0.5 * values[2] - distance) / EDGE_CELLS + 0.5
+        shape, edge = np.clip(inside, 0.0, 1.0), values[3] * ((inside > 0) & (inside < 1)) / EDGE_CELLS
+        slopes = np.stack([edge * along / distance, edge * down / distance, 0.5 * edge, shape]).reshape(4, -1)
+        gap = (target - values[3] * shape).ravel()
+        weighted = slopes / np.sqrt(1 + (gap / FAR) ** 2)
+        step = damped_step(weighted @ slopes.T, weighted @ gap, 0.05)
+        values = values + np.clip(step, -1.5, 1.5)
+        if np.abs(step).max() < 1e-4:
+            break
+    return values

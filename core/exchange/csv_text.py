@@ -18,6 +18,7 @@ from ..errors import InputError, readable
 from ..plausibility import implausible, limits
 from ..reading import reader
 from ..vectors import Array, Names
+from .plain_cells import PlainCells, plain_rows
 from .units import OtherUnit, if_in_unit, other_units, unknown_unit, unknown_units
 
 BLOCK_ROWS, BETWEEN = 20_000, "\0"
@@ -68,13 +69,15 @@ class TextTable:
         """
         if name not in self.columns:
             return np.full(len(self), np.nan)
-        blocks = [_numbers(self._with_points(block).split(BETWEEN), required) for block in self.columns[name]]
+        plain = self.columns.numbers(name, required) if isinstance(self.columns, PlainCells) else None
+        texts = self.columns[name] if plain is None else ()
+        blocks = [_numbers(self._with_points(block).split(BETWEEN), required) for block in texts]
         good = [block for block in blocks if block is not None]
         if len(good) < len(blocks):
             cells = self.cells(name)
             there = self.converted[name].name if name in self.converted else name
             raise next(error for i in range(len(self)) if (error := self._mistake(there, i, cells[i], required)))
-        values = np.concatenate(good)
+        values = np.concatenate(good) if plain is None else plain
         values = values * self.converted[name].factor if name in self.converted else values
         least, greatest = limits(name)
         amount = np.abs(values)
@@ -145,6 +148,9 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     path = Path(path)
     data = _checked(path, path.read_bytes())
     separator = _separator(data)
+    plain = plain_rows(data) if separator == "," else None
+    if plain is not None:
+        return _plain_table(path, *plain, required, known)
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True, delimiter=separator)
     header: list[str] = []
     blocks: list[list[str]] = []
@@ -181,10 +187,22 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         raise InputError("The table has a header but no rows", file=path, advice="Add rows below it")
     _add_block(blocks, rows)
     columns = {name: texts for name, texts in zip(header, blocks, strict=True) if name}
-    table = TextTable(path, columns, numbers, converted, _decimal(data, separator))
+    return _in_known_units(TextTable(path, columns, numbers, converted, _decimal(data, separator)), header, known, top)
+
+
+def _plain_table(
+    path: Path, names: list[str], data: bytes, begins: np.ndarray, required: Sequence[str], known: Sequence[str]
+) -> TextTable:
+    header, converted = _in_our_units(path, names, known, 1)
+    _check_header(path, header, required, known, 1)
+    cells = PlainCells(np.frombuffer(data, np.uint8), begins, header, BLOCK_ROWS, BETWEEN)
+    return _in_known_units(TextTable(path, cells, range(2, len(begins) + 1), converted), header, known, 1)
+
+
+def _in_known_units(table: TextTable, header: list[str], known: Sequence[str], row: int) -> TextTable:
     for name, ours in unknown_units(header, known).items():
         if table.has_numbers(name):
-            raise unknown_unit(path, name, ours, top)
+            raise unknown_unit(table.source, name, ours, row)
     return table
 
 

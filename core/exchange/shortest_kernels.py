@@ -147,28 +147,31 @@ def _write_number(out, k, digits, power):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def write_double(out, k, bits):  # type: ignore[no-untyped-def]
+    """Write a double, given by its bits, from place k on; returns the place behind it. NaN is nothing."""
+    mantissa = bits & MANTISSA
+    raised = np.int64((bits >> BEHIND) & np.uint64(0x7FF))
+    if raised == 0x7FF and mantissa:
+        return k
+    if bits >> SIGN:
+        out[k] = MINUS
+        k += 1
+    if raised == 0x7FF:
+        out[k], out[k + 1], out[k + 2] = 105, 110, 102
+        return k + 3
+    if raised == 0 and mantissa == NONE:
+        out[k], out[k + 1], out[k + 2] = ZERO, POINT, ZERO
+        return k + 3
+    digits, power = _decimal(mantissa, raised)
+    return _write_number(out, k, digits, power)
+
+
+@kernel
 def write_shortest(bits, out):  # type: ignore[no-untyped-def]
     """Write n doubles, given by their bits (n,), each on a line; returns how many bytes. NaN is an empty line."""
     k = 0
     for i in range(bits.size):
-        mantissa = bits[i] & MANTISSA
-        raised = np.int64((bits[i] >> BEHIND) & np.uint64(0x7FF))
-        if raised == 0x7FF and mantissa:
-            out[k] = BETWEEN
-            k += 1
-            continue
-        if bits[i] >> SIGN:
-            out[k] = MINUS
-            k += 1
-        if raised == 0x7FF:
-            out[k], out[k + 1], out[k + 2] = 105, 110, 102
-            k += 3
-        elif raised == 0 and mantissa == NONE:
-            out[k], out[k + 1], out[k + 2] = ZERO, POINT, ZERO
-            k += 3
-        else:
-            digits, power = _decimal(mantissa, raised)
-            k = _write_number(out, k, digits, power)
+        k = write_double(out, k, bits[i])
         out[k] = BETWEEN
         k += 1
     return k

@@ -2,6 +2,7 @@
 """picks.csv, impacts.csv and trajectories.csv. Positions in files are survey coordinates."""
 
 import csv
+import io
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -19,7 +20,7 @@ from ..reconstruction.sampling import TrajectorySamples
 from ..vectors import Array, Indices, Mask, Names, dot
 from . import take_offs
 from .csv_text import read_table
-from .number_text import shortest_texts
+from .number_text import COMPILED, shortest_texts
 
 POSITION = ("x_m", "y_m", "z_m")
 VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
@@ -340,18 +341,48 @@ def write_tables(path: str | Path, tables: Iterable[Columns]) -> None:
 
     Some rows at a time: their text takes many times the memory of the numbers.
     """
-    with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
+    with output_stream(path, binary=True) as stream:
         for i, columns in enumerate(tables):
             if i == 0:
-                writer.writerow(columns)
+                stream.write(_quoted_rows([columns]))
             for start in range(0, min(map(len, columns.values())), WRITTEN_ROWS):
                 cells = [values[start : start + WRITTEN_ROWS] for values in columns.values()]
-                lines = zip(*map(_texts, cells), strict=True)
                 if any(map(_must_be_quoted, cells)):
-                    writer.writerows(lines)
-                else:  # six times quicker
-                    stream.writelines(f"{line}\n" for line in map(",".join, lines))
+                    stream.write(_quoted_rows(zip(*map(_texts, cells), strict=True)))
+                elif sum(map(len, cells)) < COMPILED:
+                    lines = map(",".join, zip(*map(_texts, cells), strict=True))
+                    stream.write("".join(f"{line}\n" for line in lines).encode())
+                else:
+                    stream.write(_plain_rows(cells))
+
+
+def _quoted_rows(rows: Iterable[Iterable[str]]) -> bytes:
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue().encode()
+
+
+def _plain_rows(cells: Sequence[Cells]) -> memoryview:
+    """Rows without anything to quote, by compiled code."""
+    from .row_kernels import write_full_rows
+    from .shortest_kernels import LONGEST
+
+    rows = min(map(len, cells))
+    numbers: list[Array] = []
+    texts: list[bytes] = []
+    places, size = [], 0
+    for values in cells:
+        if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+            places.append(len(numbers))
+            numbers.append(values[:rows].astype(np.float64))
+        else:
+            places.append(-1 - size)
+            texts.append("\n".join([*_texts(values)[:rows], ""]).encode())
+            size += len(texts[-1])
+    bits = (np.stack(numbers) if numbers else np.empty((0, rows))).view(np.uint64)
+    out = np.empty(bits.size * LONGEST + size + rows * len(cells), np.uint8)
+    written = write_full_rows(bits, np.frombuffer(b"".join(texts) or b" ", np.uint8), np.array(places, np.int64), out)
+    return memoryview(out)[:written]
 
 
 def _must_be_quoted(cells: Cells) -> bool:

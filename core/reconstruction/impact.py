@@ -199,10 +199,10 @@ class Impacts:
     def flag_text(self) -> list[str]:
         """(n,) the flags as they are written, joined by ";"."""
         marked = np.array([self.flags[name] for name in FLAGS])
-        texts = [""] * len(self)
-        for i in np.flatnonzero(marked.any(axis=0)):
-            texts[i] = ";".join(name for name, here in zip(FLAGS, marked[:, i], strict=True) if here)
-        return texts
+        code = (1 << np.arange(len(FLAGS))) @ marked  # there are few different ones
+        different, which = np.unique(code, return_inverse=True)
+        texts = [";".join(name for i, name in enumerate(FLAGS) if one >> i & 1) for one in different.tolist()]
+        return [texts[i] for i in which.tolist()]
 
 
 def fall_numbers(impacts: Impacts) -> Indices:

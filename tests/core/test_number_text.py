@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Numbers of large tables are written as Python writes them: the shortest text that reads back as the same number."""
 
+import csv
+
 import numpy as np
 from rockfall.core.exchange.number_text import COMPILED, shortest_texts
+from rockfall.core.exchange.tables import WRITTEN_ROWS, write_columns
 
 
 def python_writes(values: np.ndarray) -> list[str]:
@@ -33,3 +36,22 @@ def test_where_the_neighbours_are_not_equally_far_and_where_the_notation_changes
 def test_a_column_of_a_wider_table() -> None:
     table = np.random.default_rng(5).normal(size=(COMPILED, 3))
     assert shortest_texts(table[:, 1]) == python_writes(table[:, 1])
+
+
+def test_a_table_is_written_as_the_csv_module_writes_it(tmp_path) -> None:
+    rng, n = np.random.default_rng(6), 2 * WRITTEN_ROWS + 7
+    columns = {
+        "trajectory": np.array([f"Blöck {i % 9}" for i in range(n)]),
+        "x_m": np.where(rng.random(n) < 0.2, np.nan, rng.normal(size=n)),
+        "impact": np.arange(n),
+        "note": ["" if i % 3 else "a, b" if i == n - 1 else "plain" for i in range(n)],
+        "y_m": rng.integers(0, 99, n) / 4,
+    }
+    write_columns(tmp_path / "a.csv", columns)
+    cells = [
+        python_writes(values) if values is columns["x_m"] or values is columns["y_m"] else list(map(str, values))
+        for values in columns.values()
+    ]
+    with (tmp_path / "b.csv").open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*cells, strict=True)])
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()

@@ -190,6 +190,8 @@ def _centred(homography: Array) -> Array:
 
 def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Picture, sigma and where it is known, by median and quartiles; what is not known is sorted to the end."""
+    if all(there.all() for there in known):
+        known = []
     for layer, there in zip(layers, known, strict=False):
         layer[~there] = 255
     ordered = _sorted(layers)
@@ -204,7 +206,7 @@ def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarr
         for picture, q in zip((middle, low, high), QUARTILES, strict=True):
             picture[part] = rest[(q * fewer).astype(np.intp), np.arange(fewer.size)]
     spread = (high.astype(np.float32) - low) / IQR_PER_SD
-    variance = opencv().blur(np.mean(spread**2, axis=2), (5, 5))
+    variance = opencv().blur(np.einsum("ijk,ijk->ij", spread, spread) / np.float32(3), (5, 5))
     return middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen
 
 

@@ -96,7 +96,9 @@ def plain_rows(data: bytes) -> tuple[list[str], bytes, np.ndarray] | None:
 
     Plain is one with commas, without quotes, empty rows, or rows with other numbers of cells than the header.
     """
-    if len(data) < FEWEST_BYTES or b'"' in data or data.count(b"\r") != data.count(b"\r\n"):
+    if len(data) < FEWEST_BYTES or b'"' in data:
+        return None
+    if b"\r" in data and data.count(b"\r") != data.count(b"\r\n"):
         return None
     from .cell_kernels import count_rows
 

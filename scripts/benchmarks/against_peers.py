@@ -27,6 +27,8 @@ OURS = "rockfall"
 RAYS = 100_000
 STEPS = ("rays", "closest points", "one ray", "one closest point", "read impacts.csv", "write impacts.csv")
 SINGLE = 300
+type Row = tuple[str, int, str, str, float, float, float]
+"""Step, size, of what, library, seconds of processor time of one thing, MB, ratio of our time to theirs."""
 
 
 def mesh_file(path: Path, triangles: int) -> None:
@@ -142,8 +144,8 @@ def installed(place: Path) -> dict[str, str]:
     return there
 
 
-def compared(path: Path, size: int, what: str, whom: dict[str, str], repeats: int) -> list[str]:
-    """Rows of the table for one file."""
+def compared(path: Path, size: int, what: str, whom: dict[str, str], repeats: int) -> list[Row]:
+    """What was measured on one file."""
     results = {}
     for who, python in whom.items():
         command = [python, __file__, "--measure", who, str(path), "--repeats", str(repeats)]
@@ -156,12 +158,40 @@ def compared(path: Path, size: int, what: str, whom: dict[str, str], repeats: in
     for step in STEPS:
         for who, found in results.items():
             if step in found and step in results.get(OURS, {}):
-                seconds, memory = found[step]
-                ratio = results[OURS][step][0] / seconds
-                rows.append(
-                    f"| {step} | {size:,} {what} | {who} | {1e6 * seconds:.2f} µs | {memory:.0f} MB | {ratio:.2f} |"
-                )
+                rows.append((step, size, what, who, *found[step], results[OURS][step][0] / found[step][0]))
     return rows
+
+
+def as_table(rows: list[Row]) -> str:
+    """In Markdown."""
+    lines = ["| step | size | library | each | process | ours / theirs |", "|---|---|---|---|---|---|"]
+    for step, size, what, who, seconds, memory, ratio in rows:
+        each = f"{1e6 * seconds:.2f} µs | {memory:.0f} MB | {ratio:.2f}"
+        lines.append(f"| {step} | {size:,} {what} | {who} | {each} |")
+    return "\n".join([*lines, ""])
+
+
+def plot(rows: list[Row], path: Path) -> None:
+    """Time of one thing, and memory below it, against size; a column for each step."""
+    from matplotlib.figure import Figure
+
+    steps = [step for step in STEPS if any(row[0] == step for row in rows)]
+    figure = Figure(figsize=(3 * len(steps), 5.5), layout="constrained")
+    axes = figure.subplots(2, len(steps), squeeze=False, sharex="col")
+    libraries = list(dict.fromkeys(row[3] for row in rows))
+    for column, step in enumerate(steps):
+        for who in libraries:
+            mine = [row for row in rows if row[0] == step and row[3] == who]
+            look = {"color": f"C{libraries.index(who)}", "label": who}
+            if mine:
+                axes[0, column].loglog([row[1] for row in mine], [1e6 * row[4] for row in mine], "o-", **look)
+                axes[1, column].loglog([row[1] for row in mine], [row[5] for row in mine], "o-", **look)
+        axes[0, column].set_title(step)
+        axes[0, column].legend(frameon=False)
+        axes[1, column].set_xlabel(next(row[2] for row in rows if row[0] == step))
+    axes[0, 0].set_ylabel("processor time of one [µs]")
+    axes[1, 0].set_ylabel("memory of the process [MB]")
+    figure.savefig(path, dpi=150)
 
 
 def main() -> None:
@@ -172,13 +202,14 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--peers", type=Path, default=ROOT / "build" / "peers", help="the environment of the peers")
     parser.add_argument("--out", type=Path, help="write the table here, as Markdown")
+    parser.add_argument("--plot", type=Path, help="draw time and memory against size here")
     parser.add_argument("--measure", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.measure:
         measure(arguments.measure[0], Path(arguments.measure[1]), arguments.repeats)
         return
     there = installed(arguments.peers)
-    rows = ["| step | size | library | each | process | ours / theirs |", "|---|---|---|---|---|---|"]
+    rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         for size in arguments.triangles:
             path = Path(folder) / "mesh.npz"
@@ -193,9 +224,11 @@ def main() -> None:
             write_impacts(made_impacts(size // 10, 10), path)
             whom = {OURS: sys.executable} | {name: there[name] for name in ("pyarrow", "polars") if name in there}
             rows += compared(path, size, "impacts", whom, arguments.repeats)
-    print("\n".join(rows))
+    print(as_table(rows))
     if arguments.out is not None:
-        arguments.out.write_text("\n".join([*rows, ""]), encoding="utf-8")
+        arguments.out.write_text(as_table(rows), encoding="utf-8")
+    if arguments.plot is not None:
+        plot(rows, arguments.plot)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ process so far, input and compiled code included. Ratios are those of one run; e
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import tempfile
@@ -115,6 +114,15 @@ def tables(who: str, path: Path) -> dict[str, tuple[Callable[[], object], int]]:
     return {"read impacts.csv": (read, frame.height), "write impacts.csv": (write, frame.height)}
 
 
+def greatest_memory_mb() -> float:
+    """Of this process so far. What `resource` says begins with the memory of the process that started this one."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM"))
+        return int(line.split()[1]) * 1024 / 1e6
+    return float("nan")
+
+
 def measure(who: str, path: Path, repeats: int) -> None:
     """Print step → [seconds of processor time of one thing, MB] as JSON; the first repetition is not counted."""
     found = {}
@@ -125,7 +133,7 @@ def measure(who: str, path: Path, repeats: int) -> None:
             begin = time.process_time()
             work()
             best = min(best, time.process_time() - begin)
-        found[step] = best / count, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+        found[step] = best / count, greatest_memory_mb()
     print(json.dumps(found))
 
 
@@ -174,6 +182,7 @@ def as_table(rows: list[Row]) -> str:
 def plot(rows: list[Row], path: Path) -> None:
     """Time of one thing, and memory below it, against size; a column for each step."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     steps = [step for step in STEPS if any(row[0] == step for row in rows)]
     figure = Figure(figsize=(3 * len(steps), 5.5), layout="constrained")
@@ -186,6 +195,11 @@ def plot(rows: list[Row], path: Path) -> None:
             if mine:
                 axes[0, column].loglog([row[1] for row in mine], [1e6 * row[4] for row in mine], "o-", **look)
                 axes[1, column].loglog([row[1] for row in mine], [row[5] for row in mine], "o-", **look)
+        for axis in axes[:, column]:
+            low, high = axis.get_ylim()
+            axis.set_ylim(low / 3, high * 3)
+            axis.xaxis.set_minor_formatter(NullFormatter())
+            axis.yaxis.set_minor_formatter(NullFormatter())
         axes[0, column].set_title(step)
         axes[0, column].legend(frameon=False)
         axes[1, column].set_xlabel(next(row[2] for row in rows if row[0] == step))

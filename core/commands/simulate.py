@@ -53,8 +53,6 @@ if TYPE_CHECKING:
     from ..terrain.surface import Surface
     from ..workflow.simulation import Scenario
 
-GEOPACKAGE = "simulation.gpkg"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
@@ -145,7 +143,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, write the tables, print the summary."""
     from ..exchange.simulation_entry import RECORDS
-    from ..exchange.simulation_geopackage import write_simulation_geopackage
+    from ..exchange.simulation_geopackage import GEOPACKAGE, write_simulation_geopackage
     from ..exchange.simulation_output import default_records, recorded_for, write_simulations
     from ..output import output_folder
     from ..remarks import gravest_first
@@ -174,16 +172,14 @@ def run(arguments: argparse.Namespace) -> int:
             record = default_records(len(releases)) if asked.record is None else asked.record
         kept: tuple[ChunkStore, ...] = ()
         if on_workers:
-            if arguments.geopackage:
+            if arguments.until_known is not None:
                 raise InputError(
-                    "No GeoPackage is written of blocks on workers", advice="Leave out --workers or --geopackage"
+                    "Workers do not ask what is known already", advice="Leave out --workers or --until-known"
                 )
-            if screens:
-                raise InputError("Screens are not counted on workers", advice="Leave out --workers or --screen")
             written, remarks, kept = simulate_on_workers(
                 arguments, scenario, ground, releases,
-                record=record, cell_m=asked.cell_m, first_run=first_run, folder=folder, inputs=asked.inputs,
-                progress=progress,
+                record=record, cell_m=asked.cell_m, screens=screens, first_run=first_run, measured=asked.measured,
+                folder=folder, inputs=asked.inputs | screen_files, progress=progress,
             )  # fmt: skip
         else:
             maps: dict[str, CellTally] = {}

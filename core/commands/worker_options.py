@@ -13,6 +13,8 @@ from .progress import PrintedProgress, stopped_by_interrupt
 
 if TYPE_CHECKING:
     from ..exchange.chunk_store import ChunkStore
+    from ..hazard.screens import Screen
+    from ..reconstruction.trajectory import Reconstruction
     from ..remarks import Remark
     from ..simulation.ground import Ground
     from ..simulation.release import Releases
@@ -57,7 +59,9 @@ def simulate_on_workers(
     *,
     record: Collection[str],
     cell_m: float | None,
+    screens: "Sequence[Screen]",
     first_run: int,
+    measured: "Reconstruction | None",
     folder: Path,
     inputs: Mapping[str, Path],
     progress: PrintedProgress,
@@ -73,6 +77,7 @@ def simulate_on_workers(
     RockfallError : no workers, or not the right ones; the disk is full.
     """
     from ..exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
+    from ..exchange.simulation_geopackage import GEOPACKAGE, write_simulation_geopackage
     from ..exchange.simulation_output import write_all_maps, write_met_trees
     from ..exchange.simulation_tables import summary, write_summary
     from ..interrupts import Interrupt
@@ -81,9 +86,15 @@ def simulate_on_workers(
     from ..remarks import gravest_first
     from ..workflow.dask_pool import DaskPool
     from ..workflow.maps import map_remarks
+    from ..workflow.screens import screen_remarks
     from ..workflow.simulation import check_models, remarks_of
 
     check_models(ground, scenario.settings)
+    if arguments.geopackage and record:
+        raise InputError(
+            "Blocks on workers leave no paths and impacts for a GeoPackage",
+            advice="Give --record none, for one with the releases, stops and screens, or leave out --workers",
+        )
     out = final_path(Path(arguments.out).absolute())
     kept = out.with_name(f"{out.name}{CHUNKS}")
     goes_on = f"what is finished is kept in {kept}, and the same command goes on with the rest"
@@ -91,16 +102,22 @@ def simulate_on_workers(
     try:
         with stopped_by_interrupt(progress) as counted, DaskPool(arguments.scheduler, arguments.workers or 1) as pool:
             try:
-                simulations, maps, stores = simulate_in_chunks(
+                simulations, maps, passed, stores = simulate_in_chunks(
                     ground, releases, scenario.settings, pool, kept,
-                    record=record, cell_m=cell_m, first_run=first_run, progress=counted,
+                    record=record, cell_m=cell_m, screens=screens, first_run=first_run, progress=counted,
                 )  # fmt: skip
             except CancelledError as error:
                 raise Interrupt(said=goes_on) from error
-        remarks = gravest_first([*remarks_of(simulations, list(scenario.models)), *map_remarks(maps)])
-        written = write_chunk_tables(stores, folder, len(releases), progress=progress)
+        said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(passed))
+        remarks = gravest_first([*said])
+        written = write_chunk_tables(stores, folder, simulations, passed, progress=progress)
         written += write_all_maps(simulations, maps, folder, progress)
         written += write_met_trees(simulations, folder)
+        if arguments.geopackage:
+            write_simulation_geopackage(
+                simulations, folder / GEOPACKAGE, measured=measured, screens=screens, progress=progress
+            )
+            written.append(GEOPACKAGE)
         write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
     except RockfallError:
         if kept.is_dir():

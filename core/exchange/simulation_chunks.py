@@ -2,7 +2,7 @@
 """A simulation in chunks on several workers, with the same tables as one in one piece."""
 
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +13,8 @@ import numpy as np
 from ..hazard.cell_tally import CellTally
 from ..hazard.cells import cells_over
 from ..hazard.run_tally import COLUMNS, RunTally
+from ..hazard.screen_tally import ScreenTally
+from ..hazard.screens import Screen, check_screens
 from ..hazard.tally import Tally
 from ..progress import Progress, silent
 from ..simulation.engine import Recorded, Records, Settings, Simulation
@@ -23,9 +25,12 @@ from ..versions import versions
 from ..workflow.ensembles import CHUNK, Pool, Tables, Work, run_ensemble
 from .chunk_store import ChunkStore
 from .content_digest import content_digest
+from .screens import write_screens
 from .simulation_output import MAPS, recorded_for, write_tables
+from .simulation_tables import append_screen_hits
 
-RUNS = "runs"
+RUNS, SCREENS = "runs", "screens"
+HITS = "hits.csv"
 KEY_LETTERS = 16
 
 
@@ -51,10 +56,11 @@ def simulate_in_chunks(
     *,
     record: Collection[str],
     cell_m: float | None = None,
+    screens: Sequence[Screen] = (),
     first_run: int = 0,
     size: int = CHUNK,
     progress: Progress = silent,
-) -> tuple[tuple[Simulation, ...], dict[str, CellTally], tuple[ChunkStore, ...]]:
+) -> tuple[tuple[Simulation, ...], dict[str, CellTally], dict[str, ScreenTally], tuple[ChunkStore, ...]]:
     """Let the same blocks fall once for each of the settings, chunk by chunk.
 
     Parameters
@@ -66,8 +72,8 @@ def simulate_in_chunks(
 
     Returns
     -------
-    The simulations, without the moments of their motion; of each model what its maps are made of; and what has the
-    tables, for `write_chunk_tables`.
+    The simulations, without the moments of their motion; of each model what its maps are made of, and what passes its
+    screens; and what has the tables, for `write_chunk_tables`.
 
     Raises
     ------
@@ -78,16 +84,23 @@ def simulate_in_chunks(
     tallies: dict[str, Tally] = {RUNS: RunTally()}
     if cell_m is not None:
         tallies[MAPS] = CellTally(cells_over(ground.surface, cell_m))
+    if screens:
+        check_screens(screens, ground)
+        tallies[SCREENS] = ScreenTally(screens)
+    if len(tallies) > 1:
         recorded = "all"
-    simulations, maps, stores = [], dict[str, CellTally](), []
+    simulations, stores = [], []
+    maps, passed = dict[str, CellTally](), dict[str, ScreenTally]()
     for one in settings:
         began = time.perf_counter()
-        decides = (ground, releases, one, first_run, size, tables, cell_m, versions())
+        decides = (ground, releases, one, first_run, size, tables, cell_m, tuple(screens), versions())
         store = ChunkStore(kept / content_digest(*decides)[:KEY_LETTERS])
         work = Work(ground, one, tallies, recorded, tables)
         found = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)
         if cell_m is not None:
             maps[one.model] = cast(CellTally, found[MAPS])
+        if screens:
+            passed[one.model] = cast(ScreenTally, found[SCREENS])
         ends = found[RUNS].arrays()
         columns = {name: ends[name].astype(np.intp if kind is np.int32 else kind) for name, kind in COLUMNS.items()}
         simulations.append(
@@ -97,18 +110,28 @@ def simulate_in_chunks(
             )
         )  # fmt: skip
         stores.append(store)
-    return tuple(simulations), maps, tuple(stores)
+    return tuple(simulations), maps, passed, tuple(stores)
 
 
 def write_chunk_tables(
-    stores: Sequence[ChunkStore], folder: Path, runs: int, *, size: int = CHUNK, progress: Progress = silent
+    stores: Sequence[ChunkStore],
+    folder: Path,
+    simulations: Sequence[Simulation],
+    screens: Mapping[str, ScreenTally],
+    *,
+    size: int = CHUNK,
+    progress: Progress = silent,
 ) -> list[str]:
     """Write the tables of `simulate_in_chunks`; returns their names."""
     progress("Writing the tables", 0, 0)
     names = stores[0].tables()
     for name in names:
         for store in stores:
-            store.write_table(name, -(-runs // size), folder / name)
+            store.write_table(name, -(-len(simulations[0]) // size), folder / name)
+    if screens:
+        append_screen_hits(screens, simulations[0].ground.shift, folder / HITS)
+        write_screens(screens, folder / "screens.csv")
+        names = [*(name for name in names if name != HITS), HITS, "screens.csv"]
     return names
 
 

@@ -24,6 +24,7 @@ from ..vectors import Array, norm
 from .geopackage import FeatureLayer, write_geopackage
 from .qgis_styles import line_style, point_style
 
+GEOPACKAGE = "simulation.gpkg"
 BLACK, STOP, RELEASE = (0.0, 0.0, 0.0), (0.2, 0.24, 0.3), (1.0, 1.0, 1.0)
 SCREEN, TREE = (0.0, 0.45, 0.70), (0.0, 0.45, 0.25)
 MEASURED_STEP_S = 0.05

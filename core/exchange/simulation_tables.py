@@ -3,11 +3,12 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from shutil import copyfileobj
 from types import MappingProxyType
 from typing import Any
 
@@ -208,9 +209,30 @@ def write_hits(
     OSError : the file cannot be written.
     """
     parts = in_parts(simulations, lambda one: one.impacts, _hit_columns)
-    shift = simulations[0].ground.shift
-    parts += [partial(_screen_hit_columns, model, tally, shift) for model, tally in at_screens.items()]
+    parts += _screen_hits(at_screens, simulations[0].ground.shift)
     write_decimal_table(path, parts, {"run": 0})
+
+
+def append_screen_hits(at_screens: Mapping[str, ScreenTally], shift: GlobalShift, path: Path) -> None:
+    """Write what `write_hits` writes of screens behind the rows of a table, which is made where there is none.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    own = path.with_name(f"{path.name}.screens")
+    write_decimal_table(own, _screen_hits(at_screens, shift), {"run": 0})
+    if not path.exists():
+        own.replace(path)
+        return
+    with own.open("rb") as rows, path.open("ab") as table:
+        rows.readline()  # the header
+        copyfileobj(rows, table)
+    own.unlink()
+
+
+def _screen_hits(at_screens: Mapping[str, ScreenTally], shift: GlobalShift) -> list[Callable[[], DecimalColumns]]:
+    return [partial(_screen_hit_columns, model, tally, shift) for model, tally in at_screens.items()]
 
 
 def _screen_hit_columns(model: str, tally: ScreenTally, shift: GlobalShift) -> DecimalColumns:

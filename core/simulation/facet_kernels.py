@@ -12,7 +12,8 @@ the triangle. That is
   those across the edges left out.
 
 Whether a sphere is clear depends on the triangles alone, whichever sphere was looked up before, in whichever thread:
-each number is known or 0, and a thread that finds a 0 looks up all four.
+each number is known or 0, a thread that finds a 0 looks up all four, and a triangle that is too far to be looked at
+limits no sphere that is as small as the one that asked.
 """
 
 from math import inf, sqrt
@@ -157,6 +158,17 @@ def _beyond(corners, i, j, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _apart(corners, i, j):  # type: ignore[no-untyped-def]
+    """How far two triangles are from each other at least: along one of the axes."""
+    most = 0.0
+    for axis in range(3):
+        a, b, c = corners[i, 0, axis], corners[i, 1, axis], corners[i, 2, axis]
+        d, e, f = corners[j, 0, axis], corners[j, 1, axis], corners[j, 2, axis]
+        most = max(most, max(min(min(a, b), c) - max(max(d, e), f), min(min(d, e), f) - max(max(a, b), c)))
+    return most
+
+
+@kernel
 def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
     """Look up what a sphere on triangle i is clear of; returns the first of the four numbers."""
     bounds, first, count, corners = tree[:4]
@@ -165,6 +177,7 @@ def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
     reach = 2.0 * (1.0 + 1e-5) * asked
     n = upward(corners, i)
     base = corner(corners, i, 0)
+    flat = 1e-9 * sqrt(dot(minus(corner(corners, i, 1), base), minus(corner(corners, i, 1), base)))
     low_x = min(min(corners[i, 0, 0], corners[i, 1, 0]), corners[i, 2, 0]) - reach
     low_y = min(min(corners[i, 0, 1], corners[i, 1, 1]), corners[i, 2, 1]) - reach
     low_z = min(min(corners[i, 0, 2], corners[i, 1, 2]), corners[i, 2, 2]) - reach
@@ -197,11 +210,11 @@ def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
                         break
                 else:
                     rise = max(rise, dot(minus(q, base), n))
-            if j == i or shared == 3 or rise <= 1e-9 * radius:
+            if j == i or shared == 3 or rise <= flat:
                 continue
             if shared == 0:
                 gap = max(_beyond(corners, i, j, n), _beyond(corners, j, i, n))
-                limit = min(limit, max(gap * gap / (2.0 * rise), 0.5 * gap))
+                limit = min(limit, max(gap * gap / (2.0 * rise), 0.5 * max(gap, _apart(corners, i, j))))
             elif shared == 1:
                 c = _around_corner(corners, i, at, j, there, n)
                 around = (

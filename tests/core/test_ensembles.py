@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,10 @@ from rockfall.core.errors import InputError
 from rockfall.core.exchange.chunk_store import ChunkStore
 from rockfall.core.exchange.content_digest import content_digest
 from rockfall.core.exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
-from rockfall.core.exchange.simulation_output import write_tables
+from rockfall.core.exchange.simulation_output import write_simulations, write_tables
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.run_tally import RunTally
+from rockfall.core.hazard.screens import Screen
 from rockfall.core.progress import CancelledError
 from rockfall.core.simulation.blocks import Blocks
 from rockfall.core.simulation.engine import Settings, simulate
@@ -27,6 +29,7 @@ from rockfall.core.simulation.release_sources import on_points
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow import ensembles
 from rockfall.core.workflow.ensembles import HereAlone, Work, run_ensemble
+from rockfall.core.workflow.maps import map_models
 
 SETTINGS = Settings("noel_2017", seed=5)
 SIZE, RUNS = 7, 45  # the last chunk is not full
@@ -122,6 +125,26 @@ def test_a_chunk_that_was_merged_and_not_yet_removed_counts_once(work, ground, t
     assert same(ends(work, releases, store=store), ends(work, releases))
 
 
+def test_screens_on_workers_are_those_of_one_process(ground, tmp_path):
+    releases = blocks_on(ground)
+    screens = [
+        Screen("road", np.array([[12.0, 1.0], [12.0, 59.0]])),
+        Screen("net", np.array([[14.0, 1.0], [14.0, 59.0]]), 2.0, 300.0),
+    ]
+    settings = [SETTINGS, replace(SETTINGS, model="pfeiffer_bowen_1989")]
+    one, many = tmp_path / "one", tmp_path / "many"
+    one.mkdir(), many.mkdir()
+    simulations, _, passed = map_models(ground, releases, settings, None, screens)
+    written = write_simulations(simulations, one, record=[], inputs={}, screens=passed)
+    ended, _, same_passed, stores = simulate_in_chunks(
+        ground, releases, settings, Backwards(), tmp_path / "kept", record=[], screens=screens, size=SIZE
+    )
+    assert passed[SETTINGS.model].figures()[0].hits > 10
+    assert [*write_chunk_tables(stores, many, ended, same_passed, size=SIZE), "summary.json"] == written
+    for name in ("runs.csv", "hits.csv", "screens.csv"):
+        assert (many / name).read_bytes() == (one / name).read_bytes(), name
+
+
 @pytest.mark.skipif(os.name == "nt", reason="there is no SIGKILL")
 def test_work_that_is_killed_goes_on_and_gives_the_same_tables(ground, tmp_path):
     kept, releases = tmp_path / "kept", blocks_on(ground)
@@ -146,12 +169,14 @@ def test_work_that_is_killed_goes_on_and_gives_the_same_tables(ground, tmp_path)
     process.send_signal(signal.SIGKILL)
     process.wait()
     pool = Counting()
-    simulations, _, stores = simulate_in_chunks(ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE)
+    simulations, _, _, stores = simulate_in_chunks(
+        ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE
+    )
     assert pool.computed == [3, 4, 5, 6]
     out, whole = tmp_path / "out", tmp_path / "whole"
     out.mkdir()
     whole.mkdir()
-    assert write_chunk_tables(stores, out, RUNS, size=SIZE) == ["runs.csv", "impacts.csv"]
+    assert write_chunk_tables(stores, out, simulations, {}, size=SIZE) == ["runs.csv", "impacts.csv"]
     write_tables([simulate(ground, releases, SETTINGS, record="impacts")], whole, record=["impacts"])
     for name in ("runs.csv", "impacts.csv"):
         assert (out / name).read_bytes() == (whole / name).read_bytes()

@@ -8,9 +8,11 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
+from rockfall.core.simulation.facet_kernels import _look_about
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import make_releases
 from rockfall.core.terrain.cloud import Cloud
+from rockfall.core.terrain.kernels import STACK_SIZE
 from rockfall.core.terrain.raycast import closest_points
 from rockfall.core.terrain.surface import Surface
 
@@ -109,6 +111,24 @@ def test_what_a_sphere_is_clear_of_does_not_depend_on_who_asked_before() -> None
 
     forth, back = ends(make_ground(surface), [*range(40)]), ends(make_ground(surface), [*range(39, -1, -1)])
     assert forth == back
+
+
+def test_whether_a_sphere_is_clear_is_the_same_after_a_lookup_for_a_larger_one() -> None:
+    """On a steep, rough slope: triangles high above the plane of another are looked at by large spheres only."""
+    line, rng = np.arange(0.0, 20.0, 0.4), np.random.default_rng(3)
+    surface = sheet(line, line, lambda x, y: -2.0 * x + rng.normal(0.0, 0.1, np.shape(x)))
+    found = {}
+    for radius in (0.15, 0.3, 0.8):
+        ground = make_ground(surface)
+        stack = np.empty(STACK_SIZE, np.int64)
+        for i in range(len(ground.faces)):
+            _look_about(ground.tree[:4], stack, ground.facets, i, radius)
+        found[radius] = ground.facets[2]
+    small = np.abs(found[0.15][:, 0]) >= 0.15
+    assert 0.02 < small.mean() < 0.98
+    for radius in (0.3, 0.8):
+        np.testing.assert_array_equal(np.abs(found[radius][:, 0]) >= 0.15, small)
+        np.testing.assert_array_equal(found[radius][:, 1:], found[0.15][:, 1:])
 
 
 @pytest.mark.parametrize(("law", "part"), [("azzoni_1995", 5 / 7), ("coulomb", 1.0)])

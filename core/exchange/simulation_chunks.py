@@ -27,7 +27,7 @@ from .chunk_store import ChunkStore
 from .content_digest import content_digest
 from .screens import write_screens
 from .simulation_output import MAPS, recorded_for, write_tables
-from .simulation_tables import append_screen_hits
+from .simulation_tables import append_screen_hits, drawn_names
 
 RUNS, SCREENS = "runs", "screens"
 HITS = "hits.csv"
@@ -36,14 +36,19 @@ KEY_LETTERS = 16
 
 @dataclass(frozen=True)
 class TablesOf:
-    """Makes the tables of a chunk, on the worker; `record` as in `write_simulations`, `recorded` what they need."""
+    """Makes the tables of a chunk, on the worker.
+
+    `record` is as in `write_simulations`, `recorded` what they need, `drawn` as in `write_runs`.
+    """
 
     record: tuple[str, ...]
     recorded: Recorded
+    drawn: tuple[str, ...] = ()
 
     def __call__(self, simulation: Simulation) -> Tables:
         with TemporaryDirectory() as folder:
-            names = write_tables([simulation.with_records(self.recorded)], Path(folder), record=self.record)
+            less = simulation.with_records(self.recorded)
+            names = write_tables([less], Path(folder), record=self.record, drawn=self.drawn)
             return {name: (Path(folder) / name).read_bytes() for name in names}
 
 
@@ -80,7 +85,7 @@ def simulate_in_chunks(
     InputError, CancelledError : see `run_ensemble`.
     """
     recorded = recorded_for(record, bool(ground.structures))
-    tables = TablesOf(tuple(sorted(record)), recorded)
+    tables = TablesOf(tuple(sorted(record)), recorded, drawn_names(settings))
     tallies: dict[str, Tally] = {RUNS: RunTally()}
     if cell_m is not None:
         tallies[MAPS] = CellTally(cells_over(ground.surface, cell_m))

@@ -111,11 +111,12 @@ def write_tables(
     *,
     record: Collection[str],
     screens: Mapping[str, ScreenTally] = NO_SCREENS,
+    drawn: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> list[str]:
-    """Write the tables of `write_simulations` but for screens.csv and summary.json."""
+    """Write the tables of `write_simulations` but for screens.csv and summary.json; `drawn` as in `write_runs`."""
     progress("Writing the tables", 0, 0)
-    write_runs(simulations, folder / "runs.csv")
+    write_runs(simulations, folder / "runs.csv", drawn)
     written = ["runs.csv"]
     if IMPACTS in record:
         write_simulated_impacts(simulations, folder / "impacts.csv", progress=progress)

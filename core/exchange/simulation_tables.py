@@ -25,7 +25,7 @@ from ..reading import reader
 from ..remarks import Remark, to_plain
 from ..simulation.blocks import Blocks, draw_blocks
 from ..simulation.convergence import Convergence, convergence
-from ..simulation.engine import Simulation
+from ..simulation.engine import Settings, Simulation
 from ..simulation.ground import Ground
 from ..simulation.hits import hits_of
 from ..simulation.parameter_draws import ParameterDraws
@@ -35,7 +35,7 @@ from ..simulation.results import fell_through, release_names, run_figures
 from ..simulation.tree_hits import tree_hits_of
 from ..simulation.trees import LAW, NOT_KNOWN, Trees
 from ..terrain.cloud import Cloud
-from ..vectors import Mask, norm
+from ..vectors import Array, Mask, norm
 from .csv_text import read_table
 from .decimal_tables import DecimalColumns, Words, write_decimal_table
 from .simulation_parts import all_digits, in_parts
@@ -125,18 +125,28 @@ def read_releases(path: str | Path, ground: Ground, blocks: Blocks, number: int 
     return releases
 
 
-def write_runs(simulations: Sequence[Simulation], path: str | Path) -> None:
+def drawn_names(settings: Sequence[Settings]) -> tuple[str, ...]:
+    """What blocks draw for themselves, with any of some models."""
+    return tuple(dict.fromkeys(name for one in settings if one.draws is not None for name in one.draws.names))
+
+
+def write_runs(simulations: Sequence[Simulation], path: str | Path, drawn: Sequence[str] | None = None) -> None:
     """Write runs.csv: one row per block and model; sizes and masses with all digits, other numbers with 6 decimals.
+
+    Parameters
+    ----------
+    drawn : the parameters that have a column; None for those of the simulations, see `drawn_names`.
 
     Raises
     ------
     OSError : the file cannot be written.
     """
-    parts = in_parts(simulations, lambda one: np.ones(len(one), np.intp), _run_columns)
+    names = drawn_names([one.settings for one in simulations]) if drawn is None else drawn
+    parts = in_parts(simulations, lambda one: np.ones(len(one), np.intp), partial(_run_columns, names))
     write_decimal_table(path, parts, {"run": 0, "impacts": 0, "tree_hits": 0})
 
 
-def _run_columns(simulation: Simulation) -> DecimalColumns:
+def _run_columns(drawn: Sequence[str], simulation: Simulation) -> DecimalColumns:
     releases, figures = simulation.releases, run_figures(simulation)
     shift, each = simulation.ground.shift, np.arange(len(simulation))
     return {
@@ -156,7 +166,18 @@ def _run_columns(simulation: Simulation) -> DecimalColumns:
         "height_max_m": figures.height_max_m,
         "energy_line_deg": np.degrees(figures.energy_line),
         **({} if simulation.settings.trees is None else {"tree_hits": simulation.tree_hits}),
+        **{f"drawn_{name}": _drawn(simulation, name) for name in drawn},
     }
+
+
+def _drawn(simulation: Simulation, name: str) -> Array:
+    """(n,) what each block drew of a parameter; NaN where its model draws none."""
+    draws = simulation.settings.draws
+    if draws is None or name not in draws.names:
+        return np.full(len(simulation), np.nan)
+    which = draws.set_of(simulation.settings.seed, simulation.number - 1)
+    values: Array = draws.values[which, draws.names.index(name)]
+    return values
 
 
 def write_tree_hits(simulations: Sequence[Simulation], path: str | Path) -> None:

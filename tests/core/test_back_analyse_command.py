@@ -163,6 +163,11 @@ def test_blocks_draw_their_parameters_from_the_posterior(site: Path, analysed: P
     assert drawn["rt"]["low"] < drawn["rt"]["mean"] < drawn["rt"]["high"]
     assert summary["inputs"]["posterior"]["file"] == "posterior.csv"
     everywhere = run_outs(tmp_path / "all")
+    with (tmp_path / "all" / "runs.csv").open(encoding="utf-8", newline="") as stream:
+        own = np.array([[float(row["drawn_rn"]), float(row["drawn_rt"])] for row in csv.DictReader(stream)])
+    away = np.abs(own[:, None] - draws.values[None]).max(axis=2).min(axis=1)
+    assert away.max() < 1e-6
+    assert len(np.unique(own, axis=0)) > 10
     assert main(simulated(site, tmp_path / "part", *posterior, "--number", "20", "--runs", "61-120")) == 0
     np.testing.assert_array_equal(run_outs(tmp_path / "part"), everywhere[60:])
     one = tmp_path / "one.csv"
@@ -171,6 +176,7 @@ def test_blocks_draw_their_parameters_from_the_posterior(site: Path, analysed: P
     assert main(simulated(site, tmp_path / "drawn", "--posterior", str(one), *posterior[2:])) == 0
     assert main(simulated(site, tmp_path / "set", *fixed)) == 0
     np.testing.assert_array_equal(run_outs(tmp_path / "drawn"), run_outs(tmp_path / "set"))
+    assert "drawn_" not in (tmp_path / "set" / "runs.csv").read_text(encoding="utf-8")
 
 
 def test_a_project_names_its_posterior(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:

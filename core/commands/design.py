@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="lines across the slope, GeoJSON or a table of points; with the properties height_m and capacity_kJ a "
+        help="lines across the slope, GeoJSON, a GeoPackage or a table; with the properties height_m and capacity_kJ a "
         "barrier that stands there (a project can state its own: [[simulation.screens]])",
     )
     parser.add_argument(

@@ -26,7 +26,9 @@ def add_release_options(parser: argparse.ArgumentParser) -> None:
     """Sources of releases, blocks and zones, beside the table RELEASES."""
     source = parser.add_argument_group("where blocks start, in place of a table of releases")
     source.add_argument(
-        "--from-line", metavar="FILE", help="anywhere along lines: GeoJSON, or a table of points name, x_m, y_m, z_m"
+        "--from-line",
+        metavar="FILE",
+        help="anywhere along lines: GeoJSON, a GeoPackage, or a table name, x_m, y_m, z_m",
     )
     source.add_argument("--evenly", action="store_true", help="evenly along the lines, not at random")
     source.add_argument(

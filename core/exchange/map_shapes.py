@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lines and polygons by name, from GeoJSON or a table of their points, in survey coordinates.
+"""Lines and polygons by name, from GeoJSON, a GeoPackage or a table of their points, in survey coordinates.
 
     name,x_m,y_m,z_m
     cliff,2600010.0,1200040.0,
@@ -11,7 +11,7 @@ else is there is a property of the shape: the first cell of each that is not emp
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -26,11 +26,12 @@ from ..simulation.polygons import Polygon
 from ..terrain.crs import surely_different
 from ..vectors import Array
 from .csv_text import read_table
+from .geopackage_shapes import read_features
 
 Kind = Literal["line", "polygon"]
 REQUIRED = ("x_m", "y_m")
 KNOWN = (*REQUIRED, "z_m", "name")
-GEOJSON = (".geojson", ".json")
+GEOJSON, GEOPACKAGE = (".geojson", ".json"), (".gpkg",)
 GEOMETRIES: Mapping[str, Kind] = {
     "LineString": "line",
     "MultiLineString": "line",
@@ -61,8 +62,8 @@ def read_lines(path: str | Path, shift: GlobalShift) -> tuple[MapShape, ...]:
 
     Raises
     ------
-    InputError : no such file, neither GeoJSON nor a table, polygons in it, none at all, another coordinate system,
-        coordinates that are no numbers.
+    InputError : no such file, neither GeoJSON nor a GeoPackage nor a table, polygons in it, none at all, another
+        coordinate system, coordinates that are no numbers.
     """
     return _read(Path(path), "line", shift)
 
@@ -87,7 +88,12 @@ def polygon_of(shape: MapShape, path: str | Path) -> Polygon:
 
 
 def _read(path: Path, kind: Kind, shift: GlobalShift) -> tuple[MapShape, ...]:
-    shapes = _read_geojson(path, kind, shift) if path.suffix.lower() in GEOJSON else _read_points(path, kind, shift)
+    if path.suffix.lower() in GEOJSON:
+        shapes = _read_geojson(path, kind, shift)
+    elif path.suffix.lower() in GEOPACKAGE:
+        shapes = _shapes(*read_features(path, GEOMETRIES, kind), path, kind, shift)
+    else:
+        shapes = _read_points(path, kind, shift)
     least = 2 if kind == "line" else 3
     for shape in shapes:
         for part in shape.parts:
@@ -125,13 +131,22 @@ def _read_points(path: Path, kind: Kind, shift: GlobalShift) -> tuple[MapShape, 
 
 def _read_geojson(path: Path, kind: Kind, shift: GlobalShift) -> tuple[MapShape, ...]:
     content = _json(path)
-    crs = _crs(content)
+    return _shapes(_crs(content), _geometries(content, path, {}), path, kind, shift)
+
+
+def _shapes(
+    crs: str,
+    features: Iterable[tuple[dict[str, Any], Mapping[str, object]]],
+    path: Path,
+    kind: Kind,
+    shift: GlobalShift,
+) -> tuple[MapShape, ...]:
     if surely_different(crs, shift.crs):
         raise InputError(
             f"The file is in {crs}, the terrain in {shift.crs}", file=path, advice="Export it in the terrain's system"
         )
     shapes = []
-    for number, (geometry, properties) in enumerate(_geometries(content, path, {}), start=1):
+    for number, (geometry, properties) in enumerate(features, start=1):
         type_ = geometry.get("type")
         where = f"The geometry {number}"
         if GEOMETRIES.get(str(type_)) != kind:

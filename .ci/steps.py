@@ -66,6 +66,12 @@ ls -s out/in_blender/tables/impacts.csv out/in_blender/film/rockfall.mp4
 status=0
 .ci/blender --command rockfall render no_such_project.toml --out out/in_blender/nothing || status=$?
 [ "$status" -eq 1 ] && [ ! -e out/in_blender/nothing ]
+mkdir -p out/in_blender/sites/good out/in_blender/sites/bad
+cp -r assets/demo/. out/in_blender/sites/good
+printf 'schema = 1\n[terrain]\nfile = "nowhere.ply"\n' > out/in_blender/sites/bad/project.toml
+status=0
+.ci/blender --command rockfall batch out/in_blender/sites reconstruct --jobs 2 --out out/in_blender/batch || status=$?
+[ "$status" -eq 1 ] && ls -s out/in_blender/batch/good/impacts.csv && grep -q '"failed": 1' out/in_blender/batch/summary.json
 """
 
 

@@ -71,7 +71,9 @@ cp -r assets/demo/. out/in_blender/sites/good
 printf 'schema = 1\n[terrain]\nfile = "nowhere.ply"\n' > out/in_blender/sites/bad/project.toml
 status=0
 .ci/blender --command rockfall batch out/in_blender/sites reconstruct --jobs 2 --out out/in_blender/batch || status=$?
-[ "$status" -eq 1 ] && ls -s out/in_blender/batch/good/impacts.csv && grep -q '"failed": 1' out/in_blender/batch/summary.json
+[ "$status" -eq 1 ]
+ls -s out/in_blender/batch/good/impacts.csv
+grep -q '"failed": 1' out/in_blender/batch/summary.json
 """
 
 

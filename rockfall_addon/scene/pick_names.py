@@ -52,6 +52,12 @@ def follow(picks: Sequence[bpy.types.Object]) -> bool:
     return bool(wrong)
 
 
+def follow_with(pick: bpy.types.Object) -> None:
+    """`follow` for the trajectory of a pick at once: the undo step of the field that changed it comes next."""
+    for scene in pick.users_scene:
+        follow(store.of_role(scene, store.PICK_ROLE, pick.get(store.TRAJECTORY)))
+
+
 def _is_numbered(held: str, name: str) -> bool:
     """Whether a name is another one with the number that Blender puts behind a name that is taken."""
     return held.startswith(f"{name}.") and held[len(name) + 1 :].isdecimal()

@@ -26,7 +26,10 @@ def _get_kind(self: bpy.types.PropertyGroup) -> int:
 
 
 def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
+    from ...scene import pick_names
+
     self.id_data[store.KIND] = KINDS[value]
+    pick_names.follow_with(self.id_data)
     _edited(self.id_data)
 
 
@@ -73,10 +76,11 @@ def _get_time(self: bpy.types.PropertyGroup) -> str:
 
 
 def _set_time(self: bpy.types.PropertyGroup, value: str) -> None:
-    from ...scene import sync
+    from ...scene import pick_names, sync
 
     if value.strip() != _get_time(self):
         sync.retime(self.id_data, value)
+        pick_names.follow_with(self.id_data)
 
 
 class PickProperties(bpy.types.PropertyGroup):

@@ -48,6 +48,7 @@ COMMANDS = {
     "design": "what barriers at screens must have, with the evidence → design.html, design.pdf, screens.csv",
     "batch": "a command for each project of a folder, or each combination of a sweep → a folder each, summary.json",
     "render": "the animation of a project, through Blender",
+    "prepare": "compiles now what is compiled when first needed; the set-up and Blender do it themselves",
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
 }
 """Name → help, in the order of the work; the module of the same name in `commands`, with _ for -, does it."""

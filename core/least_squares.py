@@ -6,7 +6,6 @@ with N scaled to a diagonal of ones.
 """
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from .vectors import Array, Indices
 
@@ -35,9 +34,11 @@ def damped_step(normal: Array, right: Array, damping: Array | float = 0.0) -> Ar
     scaled[..., one, one] = 1.0 + np.asarray(damping)[..., None]
     if normal.ndim > 2:
         return np.linalg.solve(scaled, (right / size)[..., None])[..., 0] / size
+    from scipy.linalg import cho_factor, cho_solve
+
     try:
         step = cho_solve(cho_factor(scaled, check_finite=False), right / size, check_finite=False)
-    except LinAlgError:
+    except np.linalg.LinAlgError:
         step = np.linalg.lstsq(scaled, right / size, rcond=None)[0]
     return np.asarray(step / size, dtype=np.float64)
 

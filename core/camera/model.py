@@ -11,7 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import null_space
 
 from ..errors import InputError
 from ..georeference import GlobalShift
@@ -159,6 +158,8 @@ def look_at(
     if norm(right) < 1e-9 * norm(upright):
         right = cross(forward, np.array([0.0, 1.0, 0.0]))
     if norm(right) < 1e-9:
+        from scipy.linalg import null_space
+
         right = null_space(forward[None])[:, 0]
     right = unit(right)
     rotation = np.stack([right, cross(forward, right), forward])

@@ -8,7 +8,6 @@ all features at once, by least squares with weights that fall to nothing (Geman 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from ..least_squares import BELIEVED, believed_scatter, damped_step, sums_by
 from ..vectors import Array, Indices, Mask, across, cross, norm, perpendicular, unit
@@ -164,6 +163,8 @@ def _together(
         directions = unit(directions + np.einsum("ikj,ik->ij", base, shift))
     covariance = np.zeros((frames, 3, 3))
     if unknown.size:
+        from scipy.linalg import cho_factor, cho_solve
+
         believed = np.where(length < BELIEVED * scatter, 1 / sigma**2, 0.0)
         normal = _reduced(believed, gap, frame, feature, directions, base, frames, features)[0]
         normal = normal[np.ix_(unknown, unknown)]

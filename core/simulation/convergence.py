@@ -4,7 +4,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from ..vectors import Array
 
@@ -58,6 +57,8 @@ class Quantile:
 
 def quantile(values: Array, share: float) -> Quantile:
     """A quantile of (n,) values, n ≥ 1, with its interval."""
+    from scipy import stats
+
     n, ordered = values.size, np.sort(values)
     below, above = stats.binom.ppf([(1 - LEVEL) / 2, (1 + LEVEL) / 2], n, share).astype(int)
     return Quantile(

@@ -6,7 +6,6 @@ import numpy as np
 from ..compiled import in_chunks
 from ..terrain.surface import Surface
 from ..vectors import Array, Mask
-from .polygon_kernels import inside_many
 
 
 def rims_of_holes(surface: Surface) -> Array:
@@ -39,6 +38,8 @@ def rims_of_holes(surface: Surface) -> Array:
 
 def within_rims(rims: Array, places: Array) -> Mask:
     """(n,) whether places (n, 2) are within the rim of a hole, by the even–odd rule."""
+    from .polygon_kernels import inside_many
+
     result = np.zeros(len(places), np.bool_)
     if len(rims):
         points = np.ascontiguousarray(places)

@@ -8,7 +8,6 @@ import numpy as np
 from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..vectors import Array, Indices
-from .chance_kernels import PARAMETERS, fill_runs
 
 FRICTION_NAME = "friction"
 """The coefficient μ of the motion on the ground, beside the names of the model's parameters."""
@@ -57,6 +56,8 @@ class ParameterDraws:
         """(n,) the set of each of the runs (n,), whose numbers are from 0."""
         if self.runs_each is not None:
             return np.asarray((runs // self.runs_each) % len(self), dtype=np.intp)
+        from .chance_kernels import PARAMETERS, fill_runs
+
         uniform = np.empty((runs.size, 1))
         fill_runs(seed, runs, PARAMETERS, uniform)
         up_to = np.cumsum(self.weight)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...core.colours import rounded_top
 from ...core.impact_models.registry import find_model
@@ -306,6 +305,8 @@ def _pattern(blocks: bpy.types.Object, model: str) -> bpy.types.Object:
 
 def _turns(parabolas: Parabolas) -> Array:
     """(k, 4) how the blocks are turned at the start of each piece, from any turn on: w, x, y, z."""
+    from scipy.spatial.transform import Rotation
+
     k = len(parabolas)
     turn = np.zeros((k, 4))
     first = np.searchsorted(parabolas.run, parabolas.run)

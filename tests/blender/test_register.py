@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Enabling, disabling, and what a person sees when a library is missing."""
 
+import subprocess
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import bpy
@@ -50,6 +52,25 @@ def test_disabling_forgets_the_modules(clean_blender: None, installation) -> Non
     installation.enable()
     assert installation.part("core.errors") is not first
     installation.disable()
+
+
+def test_registering_loads_no_large_library() -> None:
+    """Each takes a good part of a second, at every start of Blender, whether Rockfall is used or not."""
+    large = {"numba", "scipy", "cv2", "trimesh", "laspy", "tifffile", "matplotlib", "startinpy"}
+    name = "bl_ext.user_default.rockfall" if bpy.app.binary_path else "rockfall"
+    look = f"print('loaded:', sorted({large!r} & sys.modules.keys()), flush=True)"
+    if bpy.app.binary_path:
+        code = f"import sys; assert {name!r} in sys.modules; {look}"
+        start = [bpy.app.binary_path, "--background", "--factory-startup", "--addons", name, "--python-expr", code]
+    else:
+        code = (
+            "import os, sys, bpy, rockfall\n"
+            f"bpy.context.preferences.addons.new().module = {name!r}\n"
+            f"rockfall.register()\nassert hasattr(bpy.types, {PANEL!r})\n{look}\nos._exit(0)"
+        )
+        start = [sys.executable, "-c", code]
+    done = subprocess.run(start, capture_output=True, text=True, check=False, cwd=Path(__file__).parent)
+    assert "loaded: []" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("kind", ["package not found", "library cannot be loaded"])

@@ -53,7 +53,7 @@ CORE_FLOORS = (
 )
 """A module imports from the floors below its own; rooms of the lowest floor also from each other."""
 
-ADDON_FLOORS = ({"scene"}, {"view"}, {"steps"}, {"preferences", "handlers", "menus", "commands", "warm_up"})
+ADDON_FLOORS = ({"scene"}, {"view"}, {"steps"}, {"preferences"}, {"handlers", "menus", "commands", "warm_up"})
 
 
 def modules_of(package: str) -> Iterator[Path]:

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from ...remarks import Remark
 from ...vectors import Array, norm
@@ -225,6 +224,8 @@ def _on_redundancy(found: Geometry) -> Iterator[Remark]:
 
 
 def _on_cover(found: Geometry) -> Iterator[Remark]:
+    from scipy.spatial import ConvexHull
+
     cover = ConvexHull(found.pixels).volume / (found.camera.width * found.camera.height)
     if cover >= SMALL_COVER:
         return

@@ -6,7 +6,6 @@ together with the stated one).
 """
 
 import numpy as np
-from scipy.special import fdtri
 
 from ...errors import RockfallError
 from ...least_squares import inverse
@@ -172,6 +171,8 @@ def _suspicion(problem: Problem, solution: Solution, used: Mask) -> Array:
     The variance is that of the others, together with the stated one as if `PRIOR_FREEDOM` observations had shown it,
     and no less than the stated one.
     """
+    from scipy.special import fdtri
+
     spread = inverse(solution.normal)
     around = solution.slopes @ spread @ np.swapaxes(solution.slopes, 1, 2)
     expected = solution.noise + np.where(used, -1.0, 1.0)[:, None, None] * around

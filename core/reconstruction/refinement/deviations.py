@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from ...least_squares import inverse
 from ...vectors import Array, Indices
@@ -16,7 +15,7 @@ from .held_poses import spread_of_poses
 from .problem import NODE, Problem
 from .search import Rival
 from .setup import Setup
-from .solver import UNEXPLAINED, Solution
+from .solver import Solution, unexplained
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
         count += rows.residual.size
     spare = count - setup.problem.columns.size
     scale = 1.0
-    if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare):
+    if spare > 0 and squares > unexplained(spare):
         scale = float(np.sqrt(squares / spare))
     independent = inverse(solution.information, partly=True)
     tracks = tuple(track_noise(setup.problem, solution, independent))

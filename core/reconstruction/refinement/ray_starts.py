@@ -10,7 +10,6 @@ tell, through gravity, how far away its two ends are: together a chain whose lik
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ...vectors import Array, Indices, norm, perpendicular, unit
 from .problem import Evaluation, Problem, Unknowns, evaluate, ground_distances
@@ -188,6 +187,8 @@ def _alternatives(
         (aa, ab), (_, bb) = curve.square[segment]
         sa, sb = curve.slope[segment]
         tables.append(0.5 * aa * a**2 + ab * a * b + 0.5 * bb * b**2 + sa * a + sb * b)
+    from scipy.signal import find_peaks
+
     forward, came = [cost[nodes[0]]], list[Indices]()
     for i, table in enumerate(tables):
         through = forward[-1][:, None] + table

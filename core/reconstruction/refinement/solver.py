@@ -4,7 +4,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from ...least_squares import damped_step, inverse
 from ...progress import Progress, silent
@@ -125,13 +124,20 @@ def _search(
     return Solution(state, here, weight, outlier, information, iteration, settled)
 
 
+def unexplained(spare: float) -> float:
+    """The sum of squares with `spare` degrees of freedom that chance does not explain: a quantile of χ²."""
+    from scipy.special import gammaincinv
+
+    return float(2 * gammaincinv(spare / 2, UNEXPLAINED))
+
+
 def pixel_noise(problem: Problem, solution: Solution) -> float:
     """By how much the pixels scatter more than stated; 1 where chance may explain it."""
     squares = float(solution.weight @ (solution.evaluation.pixels.residual**2).sum(axis=1))
     of_pixels, _ = normal_equations(problem, replace(solution.evaluation, others=()), solution.weight)
     told = float((inverse(solution.information, partly=True) * of_pixels).sum())  # unknowns that pixels determine
     spare = 2 * int((solution.weight > 0).sum()) - told
-    return float(np.sqrt(squares / spare)) if spare > 0 and squares > chi2.ppf(UNEXPLAINED, spare) else 1.0
+    return float(np.sqrt(squares / spare)) if spare > 0 and squares > unexplained(spare) else 1.0
 
 
 def objective(solution: Solution, loss: Loss) -> float:

@@ -9,6 +9,7 @@ FIGURES = ("figures", "Figures", "matplotlib")
 PAGES = ("explore", "The interactive graphs", "bokeh")
 E57 = ("e57", "E57 files", "pye57")
 CLUSTER = ("cluster", "Several workers", "distributed")
+PARQUET = ("parquet", "Parquet files", "pyarrow")
 """The optional extra of the package, what it is for, and the import name of its library."""
 
 

@@ -116,7 +116,7 @@ def set_up() -> None:
         "install",
         "--quiet",
         "--editable",
-        ".[blender,figures,explore,e57,cluster,dev]",
+        ".[blender,figures,explore,e57,parquet,cluster,dev]",
     ]
     command += ["--constraint", str(ROOT / "scripts" / "constraints.txt")]
     for attempt in (1, 2):

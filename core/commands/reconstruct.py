@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
+from ..extras import PARQUET, demand
 from ..reconstruction.sampling import STEP_S
 from .options import add_out, add_terrain_files, add_terrain_options, naming, not_negative, positive, terrain_as_asked
 from .progress import PrintedProgress
@@ -39,6 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=STEP_S,
         metavar="S",
         help="time step of trajectories.csv [s] (default %(default)s)",
+    )
+    parser.add_argument(
+        "--parquet", action="store_true", help="also impacts.parquet, with the columns of impacts.csv (needs pyarrow)"
     )
     parser.add_argument(
         "--eq10",
@@ -88,16 +92,20 @@ def run(arguments: argparse.Namespace) -> int:
     from ..reconstruction.sampling import sample_trajectories
     from ..reconstruction.summary import summarise
 
+    if arguments.parquet:
+        demand(PARQUET)
+    names = ["impacts.csv", "trajectories.csv", *(["impacts.parquet"] if arguments.parquet else [])]
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.picks}")
         made = _of_project if arguments.picks.endswith(".toml") else _of_table
         surface, reconstruction, turned = made(arguments, progress)
         progress("Writing the tables")
-        write_impacts(reconstruction.impacts, folder / "impacts.csv")
+        for name in names[:1] + names[2:]:
+            write_impacts(reconstruction.impacts, folder / name)
         write_trajectories(sample_trajectories(reconstruction, arguments.step, surface), folder / "trajectories.csv")
     for sentence in (*(surface.summary if surface else ()), *turned, *summarise(reconstruction)):
         print(sentence)
-    print(f"Written: impacts.csv, trajectories.csv in {arguments.out}")
+    print(f"Written: {', '.join(names)} in {arguments.out}")
     return 0
 
 
@@ -145,7 +153,7 @@ def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Ma
     plain = vars(parser.parse_args([arguments.picks, "--out", arguments.out]))
     for action in parser._actions:
         given = getattr(arguments, action.dest, None) != plain.get(action.dest)
-        if given and action.dest not in ("out", "step"):
+        if given and action.dest not in ("out", "step", "parquet"):
             raise InputError(
                 f"{action.option_strings[0]} is what a project says itself", advice="Write it into the project"
             )

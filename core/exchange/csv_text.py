@@ -18,7 +18,8 @@ from ..errors import InputError, readable
 from ..plausibility import implausible, limits
 from ..reading import reader
 from ..vectors import Array, Names
-from .plain_cells import PlainCells, plain_rows
+from .parquet_cells import SUFFIX, read_cells, renamed
+from .plain_cells import Cells, PlainCells, plain_rows
 from .units import OtherUnit, if_in_unit, other_units, unknown_unit, unknown_units
 
 BLOCK_ROWS, BETWEEN = 20_000, "\0"
@@ -36,7 +37,7 @@ class TextTable:
     ----------
     source : the file.
     columns : name → texts of some rows each, see `BLOCK_ROWS`.
-    row : (n,) row in a text editor, the header being row 1.
+    row : (n,) row in a text editor, the header being row 1; in a Parquet file from 1, for it has no header.
     converted : the columns whose numbers are in another unit in the file.
     decimal : mark of its numbers, a comma where other programs wrote semicolons or tabs between cells.
     """
@@ -69,7 +70,7 @@ class TextTable:
         """
         if name not in self.columns:
             return np.full(len(self), np.nan)
-        plain = self.columns.numbers(name, required) if isinstance(self.columns, PlainCells) else None
+        plain = self.columns.numbers(name, required) if isinstance(self.columns, Cells) else None
         texts = self.columns[name] if plain is None else ()
         blocks = [_numbers(self._with_points(block).split(BETWEEN), required) for block in texts]
         good = [block for block in blocks if block is not None]
@@ -132,7 +133,7 @@ class TextTable:
 
 @reader("table", EXPORT_ADVICE)
 def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
-    """Read a table separated by commas, semicolons or tabs, its columns in the units of `known`.
+    """Read a table separated by commas, semicolons or tabs, or a Parquet file; its columns in the units of `known`.
 
     Parameters
     ----------
@@ -144,8 +145,11 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     ------
     InputError : no such file, no text, an empty file, a required column missing, a column twice, a
         row with too many or too few cells, no rows, numbers in a unit that is not known.
+    DependencyError : a Parquet file, and pyarrow is not installed.
     """
     path = Path(path)
+    if path.suffix.lower() == SUFFIX:
+        return _parquet_table(path, required, known)
     data = _checked(path, path.read_bytes())
     separator = _separator(data)
     plain = plain_rows(data) if separator == "," else None
@@ -197,6 +201,14 @@ def _plain_table(
     _check_header(path, header, required, known, 1)
     cells = PlainCells(np.frombuffer(data, np.uint8), begins, header, BLOCK_ROWS, BETWEEN)
     return _in_known_units(TextTable(path, cells, range(2, len(begins) + 1), converted), header, known, 1)
+
+
+def _parquet_table(path: Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
+    cells = read_cells(path, BLOCK_ROWS, BETWEEN)
+    header, converted = _in_our_units(path, list(cells), known, 1)
+    _check_header(path, header, required, known, 1)
+    rows = range(1, cells.table.num_rows + 1)
+    return _in_known_units(TextTable(path, renamed(cells, header), rows, converted), header, known, 1)
 
 
 def _in_known_units(table: TextTable, header: list[str], known: Sequence[str], row: int) -> TextTable:

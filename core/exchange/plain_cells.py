@@ -2,6 +2,7 @@
 """Large tables of plain text (commas, nothing in quotes): their cells stay where they are until they are asked for."""
 
 import csv
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from threading import Lock
 
@@ -16,7 +17,15 @@ ROWS, MOST_HARD = 16_384, 4096
 """Rows that are read at a time, and how many of their numbers may be left to Python."""
 
 
-class PlainCells(Mapping[str, Sequence[str]]):
+class Cells(Mapping[str, Sequence[str]]):
+    """The columns of a table as texts of some rows each, which are also there as numbers."""
+
+    @abstractmethod
+    def numbers(self, name: str, required: bool) -> Array | None:
+        """(n,) a column, NaN where a cell is empty; None when there is anything else, or an empty one if `required`."""
+
+
+class PlainCells(Cells):
     """The columns of a table as texts of some rows each, made when they are asked for; and as numbers.
 
     Parameters

@@ -21,6 +21,7 @@ from ..vectors import Array, Indices, Mask, Names, dot
 from . import take_offs
 from .csv_text import read_table
 from .number_text import COMPILED, shortest_texts
+from .parquet_cells import SUFFIX, write_parquet
 
 POSITION = ("x_m", "y_m", "z_m")
 VELOCITY = ("vx_mps", "vy_mps", "vz_mps")
@@ -339,8 +340,11 @@ def write_columns(path: str | Path, columns: Columns) -> None:
 def write_tables(path: str | Path, tables: Iterable[Columns]) -> None:
     """Write tables of the same columns, one below the other.
 
-    Some rows at a time: their text takes many times the memory of the numbers.
+    Some rows at a time: their text takes many times the memory of the numbers. As Parquet where the name ends in that.
     """
+    if Path(path).suffix == SUFFIX:
+        write_parquet(path, tables)
+        return
     with output_stream(path, binary=True) as stream:
         for i, columns in enumerate(tables):
             if i == 0:

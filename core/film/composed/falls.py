@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a composed film shows of blocks: where each is at every moment, how it is turned, and where it hits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...camera.model import rotation_from_vector
+from ...reconstruction.block import Block
+from ...reconstruction.sampling import TrajectorySamples, sample_trajectories
+from ...reconstruction.trajectory import Reconstruction
+from ...vectors import Array, norm
+from .look import MEASURED, Colour
+
+STEP_S = 1 / 120
+"""Between the points of a path: half a pixel where a block of 20 m/s crosses 50 px a metre as straight pieces."""
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """The k impacts of a fall.
+
+    Attributes
+    ----------
+    number : (k,) as tables count them.
+    time_s : (k,) [s].
+    position : (k, 3) of the block's centre, or its contact point where the flights join these [m].
+    speed1_mps, speed2_mps : (k,) before and after [m/s]; NaN where undefined.
+    energy1_j, energy2_j : (k,) translational [J].
+    rn : (k,) [-].
+    """
+
+    number: Array
+    time_s: Array
+    position: Array
+    speed1_mps: Array
+    speed2_mps: Array
+    energy1_j: Array
+    energy2_j: Array
+    rn: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Fall:
+    """One block.
+
+    Attributes
+    ----------
+    name : of the trajectory, or of the simulated run.
+    group : whose blocks have its colour: "" for the measured ones, else the title of a model.
+    colour : sRGB.
+    time_s : (n,) ascending [s]; an impact has two rows.
+    position, velocity : (n, 3) [m], [m/s].
+    chain : (n,) number of the stretch that is known without a gap.
+    diameters_m : (3,) of the block [m].
+    mass_kg : [kg].
+    hits : its impacts; None where they are not shown.
+    """
+
+    name: str
+    group: str
+    colour: Colour
+    time_s: Array
+    position: Array
+    velocity: Array
+    chain: Array
+    diameters_m: Array
+    mass_kg: float
+    hits: Hits | None = None
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether it is what the video shows."""
+        return not self.group
+
+    @property
+    def radius_m(self) -> float:
+        """Half the mean diameter [m]."""
+        return float(self.diameters_m.mean()) / 2
+
+    def state(self, moment_s: float) -> tuple[Array, Array] | None:
+        """Position and velocity (3,) at a moment; None before, after and in gaps.
+
+        Notes
+        -----
+        Between rows by the cubic through both places and velocities, which is the parabola of a free flight.
+        """
+        after = int(np.searchsorted(self.time_s, moment_s, side="right"))
+        if after == 0 or moment_s > self.time_s[-1]:
+            return None
+        i = after - 1
+        if after == self.time_s.size or self.time_s[i] == moment_s:
+            return self.position[i], self.velocity[i]
+        if self.chain[i] != self.chain[after]:
+            return None
+        length = self.time_s[after] - self.time_s[i]
+        s, (p0, p1), (v0, v1) = (moment_s - self.time_s[i]) / length, self.position[i : i + 2], self.velocity[i : i + 2]
+        m0, m1, step = length * v0, length * v1, p1 - p0
+        place = p0 + s * (m0 + s * (3 * step - 2 * m0 - m1 + s * (m0 + m1 - 2 * step)))
+        return place, v0 + s * (v1 - v0)
+
+    def path(self, until_s: float) -> tuple[Array, Array]:
+        """Times (m,) and places (m, 3) up to a moment, which is the last; a NaN row between stretches."""
+        known = int(np.searchsorted(self.time_s, until_s, side="right"))
+        time, place, chain = self.time_s[:known], self.position[:known], self.chain[:known]
+        now = self.state(until_s)
+        if now is not None and known and time[-1] < until_s:
+            time, place, chain = np.r_[time, until_s], np.vstack([place, now[0]]), np.r_[chain, chain[-1]]
+        breaks = np.flatnonzero(np.diff(chain)) + 1
+        return np.insert(time, breaks, np.nan), np.insert(place, breaks, np.nan, axis=0)
+
+    def turn(self, moment_s: float) -> Array:
+        """(3, 3) from the block's axes to the world, as if it rolled with its speed over ground: that is not measured."""
+        i = int(np.clip(np.searchsorted(self.time_s, moment_s, side="right") - 1, 0, self.time_s.size - 1))
+        more = (np.clip(moment_s, self.time_s[0], self.time_s[-1]) - self.time_s[i]) * self._rolling(self.velocity[i])
+        return rotation_from_vector(more) @ self._turns[i]
+
+    def _rolling(self, velocity: Array) -> Array:
+        """Angular velocity of rolling on level ground [rad/s]."""
+        return np.cross(UP, velocity) / self.radius_m
+
+    @cached_property
+    def _turns(self) -> Array:
+        """(n, 3, 3) at each row."""
+        steps = rotation_from_vector(np.diff(self.time_s)[:, None] * self._rolling(self.velocity[:-1]))
+        turns = np.empty((self.time_s.size, 3, 3))
+        turns[0] = np.eye(3)
+        for i, step in enumerate(steps):
+            turns[i + 1] = step @ turns[i]
+        return turns
+
+
+def measured_falls(result: Reconstruction, trajectories: Sequence[str] | None = None) -> tuple[Fall, ...]:
+    """The measured blocks of a reconstruction, or some of them, with their impacts."""
+    samples = sample_trajectories(result, STEP_S)
+    falls = falls_of(samples, _blocks(result), "", MEASURED)
+    wanted = None if trajectories is None else set(trajectories)
+    return tuple(
+        _with_hits(fall, result) for fall in falls if wanted is None or fall.name in wanted
+    )
+
+
+def falls_of(samples: TrajectorySamples, blocks: dict[str, Block], group: str, colour: Colour) -> tuple[Fall, ...]:
+    """The blocks of a table of motion: for measured ones a run is a stretch without gaps, for simulated ones a block."""
+    keys = samples.trajectory if not group else np.char.add(np.char.add(samples.trajectory.astype(str), " "), samples.run.astype(str))
+    _, first, which = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    ends = np.cumsum(np.bincount(which))
+    made = []
+    for begin, end, row in zip(np.r_[0, ends[:-1]], ends, first, strict=True):
+        rows = order[begin:end]
+        block = blocks[str(samples.trajectory[row])]
+        made.append(
+            Fall(
+                str(keys[row]), group, colour, samples.time_s[rows], samples.position[rows], samples.velocity[rows],
+                samples.run[rows], np.array([block.d1, block.d2, block.d3]), block.mass_kg,
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _blocks(result: Reconstruction) -> dict[str, Block]:
+    names = dict.fromkeys(result.picks.trajectory.tolist())
+    one = result.block
+    return {name: one if isinstance(one, Block) else one[name] for name in names}
+
+
+def _with_hits(fall: Fall, result: Reconstruction) -> Fall:
+    impacts = result.impacts
+    rows = np.flatnonzero(impacts.trajectory == fall.name)
+    places = [fall.state(float(time)) for time in impacts.time_s[rows]]
+    position = np.array([impacts.position[row] if at is None else at[0] for row, at in zip(rows, places, strict=True)])
+    return replace(
+        fall,
+        hits=Hits(
+            impacts.impact[rows], impacts.time_s[rows], position.reshape(-1, 3), norm(impacts.v1[rows]), norm(impacts.v2[rows]),
+            impacts.kinetic1_j[rows], impacts.kinetic2_j[rows], impacts.rn[rows],
+        ),
+    )  # fmt: skip

@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a composed film shows of blocks: where each is at every moment, how it is turned, and where it hits."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ...analysis.predicted_flights import PredictedFlights
 from ...camera.model import rotation_from_vector
 from ...reconstruction.block import Block
 from ...reconstruction.sampling import TrajectorySamples, sample_trajectories
 from ...reconstruction.trajectory import Reconstruction
-from ...vectors import Array, norm
+from ...simulation.engine import Simulation
+from ...simulation.results import sample_runs
+from ...vectors import Array, Indices, norm
 from .look import MEASURED, Colour
 
 STEP_S = 1 / 120
+SIMULATED_STEP_S = 1 / 30
+STILL_S = 1e-3
 """Between the points of a path: half a pixel where a block of 20 m/s crosses 50 px a metre as straight pieces."""
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -58,6 +63,7 @@ class Fall:
     diameters_m : (3,) of the block [m].
     mass_kg : [kg].
     hits : its impacts; None where they are not shown.
+    spin : (n, 3) angular velocity from each row to the next [rad/s], NaN where it is not known; None for nowhere.
     """
 
     name: str
@@ -70,6 +76,7 @@ class Fall:
     diameters_m: Array
     mass_kg: float
     hits: Hits | None = None
+    spin: Array | None = None
 
     @property
     def is_measured(self) -> bool:
@@ -113,34 +120,105 @@ class Fall:
         return np.insert(time, breaks, np.nan), np.insert(place, breaks, np.nan, axis=0)
 
     def turn(self, moment_s: float) -> Array:
-        """(3, 3) from the block's axes to the world, as if it rolled with its speed over ground: that is not measured."""
+        """(3, 3) from the block's axes to the world: by its spin where that is known, else as if it rolled over ground."""
         i = int(np.clip(np.searchsorted(self.time_s, moment_s, side="right") - 1, 0, self.time_s.size - 1))
-        more = (np.clip(moment_s, self.time_s[0], self.time_s[-1]) - self.time_s[i]) * self._rolling(self.velocity[i])
+        more = (np.clip(moment_s, self.time_s[0], self.time_s[-1]) - self.time_s[i]) * self._turning[i]
         return rotation_from_vector(more) @ self._turns[i]
 
-    def _rolling(self, velocity: Array) -> Array:
-        """Angular velocity of rolling on level ground [rad/s]."""
-        return np.cross(UP, velocity) / self.radius_m
+    @property
+    def has_known_spin(self) -> bool:
+        """Whether it is known how it turns, at least for a part of its way."""
+        return self.spin is not None and bool(np.isfinite(self.spin).all(axis=1).any())
+
+    @cached_property
+    def _turning(self) -> Array:
+        """(n, 3) [rad/s]; rolling is about the level axis across the velocity."""
+        rolling = np.cross(UP, self.velocity) / self.radius_m
+        if self.spin is None:
+            return rolling
+        return np.where(np.isfinite(self.spin).all(axis=1)[:, None], self.spin, rolling)
 
     @cached_property
     def _turns(self) -> Array:
         """(n, 3, 3) at each row."""
-        steps = rotation_from_vector(np.diff(self.time_s)[:, None] * self._rolling(self.velocity[:-1]))
+        steps = rotation_from_vector(np.diff(self.time_s)[:, None] * self._turning[:-1])
         turns = np.empty((self.time_s.size, 3, 3))
         turns[0] = np.eye(3)
         for i, step in enumerate(steps):
             turns[i + 1] = step @ turns[i]
         return turns
 
+    def moved(self, by_s: float) -> "Fall":
+        """The same one, so much later [s]."""
+        hits = None if self.hits is None else replace(self.hits, time_s=self.hits.time_s + by_s)
+        return replace(self, time_s=self.time_s + by_s, hits=hits)
+
 
 def measured_falls(result: Reconstruction, trajectories: Sequence[str] | None = None) -> tuple[Fall, ...]:
-    """The measured blocks of a reconstruction, or some of them, with their impacts."""
+    """The measured blocks of a reconstruction, or some of them, with their impacts and their measured spin."""
     samples = sample_trajectories(result, STEP_S)
     falls = falls_of(samples, _blocks(result), "", MEASURED)
     wanted = None if trajectories is None else set(trajectories)
     return tuple(
-        _with_hits(fall, result) for fall in falls if wanted is None or fall.name in wanted
+        _with_spin(_with_hits(fall, result), result) for fall in falls if wanted is None or fall.name in wanted
     )
+
+
+def simulated_falls(
+    simulation: Simulation, starts_s: Mapping[str, float], group: str, colour: Colour
+) -> tuple[Fall, ...]:
+    """The blocks of a simulation, on the clock of the measured ones.
+
+    Parameters
+    ----------
+    starts_s : release → when it begins [s]; 0 for those that are not named.
+    """
+    samples, records, releases = sample_runs(simulation, SIMULATED_STEP_S), simulation.records, simulation.releases
+    run = np.searchsorted(simulation.number, samples.run)
+    ends = np.cumsum(np.bincount(run, minlength=len(releases)))
+    falls = []
+    for i, (begin, end) in enumerate(zip(np.r_[0, ends[:-1]], ends, strict=True)):
+        if end <= begin:
+            continue
+        own = np.flatnonzero(records.run == i)
+        time = samples.time_s[begin:end]
+        # A row's spin is that of the last record up to it; of two at one time, the later.
+        at = own[np.clip(np.searchsorted(records.time_s[own], time, side="right") - 1, 0, own.size - 1)]
+        name = str(samples.trajectory[begin])
+        falls.append(
+            Fall(
+                f"{name} {samples.run[begin]}", group, colour, time + starts_s.get(name, 0.0), samples.position[begin:end],
+                samples.velocity[begin:end], np.zeros(end - begin, np.intp), releases.axes_m[i],
+                float(releases.mass_kg[i]), None, records.omega2[at],
+            )
+        )  # fmt: skip
+    return tuple(falls)
+
+
+def predicted_falls(
+    flights: PredictedFlights, rows: Indices, blocks: Mapping[str, Block], titles: Mapping[str, str], colours: Mapping[str, Colour]
+) -> tuple[Fall, ...]:
+    """Blocks that leave measured impacts as models say, to where they land.
+
+    Parameters
+    ----------
+    rows : of the flights that are wanted.
+    titles, colours : of each model.
+    """
+    falls = []
+    for row in rows.tolist():
+        model, duration, block = str(flights.model[row]), float(flights.duration_s[row]), blocks[str(flights.trajectory[row])]
+        since = np.linspace(0.0, duration, max(int(np.ceil(duration / STEP_S)), 1) + 1) if duration > 0 else np.zeros(2)
+        start = float(flights.time_s[row])
+        place, velocity = flights.states(np.full(since.size, row), start + since)
+        time = start + since if duration > 0 else start + np.array([0.0, STILL_S])
+        falls.append(
+            Fall(
+                f"{model} {flights.impact[row]}", titles[model], colours[model], time, place, velocity,
+                np.zeros(since.size, np.intp), np.array([block.d1, block.d2, block.d3]), block.mass_kg,
+            )
+        )  # fmt: skip
+    return tuple(falls)
 
 
 def falls_of(samples: TrajectorySamples, blocks: dict[str, Block], group: str, colour: Colour) -> tuple[Fall, ...]:
@@ -166,6 +244,16 @@ def _blocks(result: Reconstruction) -> dict[str, Block]:
     names = dict.fromkeys(result.picks.trajectory.tolist())
     one = result.block
     return {name: one if isinstance(one, Block) else one[name] for name in names}
+
+
+def _with_spin(fall: Fall, result: Reconstruction) -> Fall:
+    own = result.flights.trajectory == fall.name
+    spin = result.picks.angular_velocity[result.flights.last_pick[own]]
+    if not np.isfinite(spin).any():
+        return fall
+    middle = np.r_[(fall.time_s[:-1] + fall.time_s[1:]) / 2, fall.time_s[-1]]
+    flight = np.clip(np.searchsorted(result.flights.start_time_s[own], middle, side="right") - 1, 0, len(spin) - 1)
+    return replace(fall, spin=spin[flight])
 
 
 def _with_hits(fall: Fall, result: Reconstruction) -> Fall:

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The terrain in a composed film: every pixel is a ray, so that a lens bends it as it bends the footage."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...camera.model import Camera, project, rays
+from ...opencv import opencv
+from ...terrain.raycast import any_hit, cast_rays
+from ...terrain.surface import Surface
+from ...vectors import Array, Mask, dot, norm
+from .canvas import Picture
+
+ROCK = np.array([0.70, 0.67, 0.62])
+"""sRGB of the ground that no photograph shows."""
+SKY_TOP, SKY_LOW = np.array([0.52, 0.63, 0.74]), np.array([0.86, 0.89, 0.91])
+AMBIENT = 0.38
+LIFT_M = 0.05
+"""Above the ground, where it is asked whether the sun is seen: scans have noise."""
+EDGE = 0.01
+"""A pixel whose neighbours are further away by more than this part is at an edge, and gets more rays."""
+EDGE_RAYS = 3
+NEAREST_M = 1.0
+FLATTEST = 0.12
+"""Sine of the angle at which a photograph meets the ground: below it, it is smeared."""
+BORDER = 0.03
+"""Part of a photograph at its border over which it fades out."""
+ROWS = 64
+"""Of a picture that are cast at once: memory stays small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A terrain that is ready to be drawn.
+
+    Attributes
+    ----------
+    surface : the terrain.
+    colours : (n, 3) sRGB of its vertices, light and shadow included, 0…1.
+    """
+
+    surface: Surface
+    colours: Array
+
+    @cached_property
+    def bgr(self) -> np.ndarray:
+        """(n, 3) float32, 0…255, blue first."""
+        return np.ascontiguousarray((255 * self.colours[:, ::-1]).astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class Photograph:
+    """A picture of the slope and the camera that took it.
+
+    Attributes
+    ----------
+    picture : (h, w, 3) BGR uint8, without moving things.
+    camera : of that picture.
+    """
+
+    picture: Picture
+    camera: Camera
+
+
+def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...] = ()) -> Ground:
+    """A terrain in the light of the sun; where a photograph shows it, in its colours, which have their own light.
+
+    Parameters
+    ----------
+    sun : (3,) unit vector towards it.
+    photographs : where several show a place, the one that looks at it most squarely.
+    """
+    normals = np.nan_to_num(surface.vertex_normals, nan=0.0)
+    faces_sun = normals @ sun
+    places = surface.vertices + LIFT_M * normals
+    lit = np.zeros(len(places))
+    towards = faces_sun > 0
+    lit[towards] = ~any_hit(surface, places[towards], np.broadcast_to(sun, (int(towards.sum()), 3)))
+    lit = _smoothed(surface, lit)
+    light = AMBIENT + (1 - AMBIENT) * np.clip(faces_sun, 0, 1) * lit
+    # Curved ground from above is lighter than hollows: a little sky light, which shows relief in the shade.
+    light *= 0.82 + 0.18 * np.clip(normals[:, 2], 0, 1)
+    colours = np.clip(ROCK * (1.12 * light)[:, None], 0, 1)
+    best = np.full(len(places), FLATTEST)
+    for photograph in photographs:
+        seen, weight, square = _photographed(surface, normals, photograph)
+        better = weight * (square > best)
+        colours += better[:, None] * (seen - colours)
+        best = np.where(better > 0.5, square, best)
+    return Ground(surface, colours)
+
+
+def _photographed(surface: Surface, normals: Array, photograph: Photograph) -> tuple[Array, Array, Array]:
+    """For each vertex: the photograph's colour (n, 3), how much it counts (n,), how squarely it looks (n,)."""
+    camera, (height, width) = photograph.camera, photograph.picture.shape[:2]
+    where = project(camera, surface.vertices)
+    inside = np.isfinite(where).all(axis=1) & (where > 0).all(axis=1) & (where < [width, height]).all(axis=1)
+    away = surface.vertices - camera.position
+    distance = norm(away)
+    square = np.where(inside, -dot(normals, away) / np.maximum(distance, 1e-9), 0.0)
+    asked = np.flatnonzero(inside & (square > 0))
+    hidden = any_hit(surface, camera.position, away[asked], np.maximum(distance[asked] - 4 * LIFT_M, 0.0))
+    seen = np.zeros(len(where), dtype=bool)
+    seen[asked[~hidden]] = True
+    grid = np.nan_to_num(where, nan=-1.0).astype(np.float32)
+    colour = opencv().remap(photograph.picture, grid[:, :1] - 0.5, grid[:, 1:] - 0.5, opencv().INTER_LINEAR)
+    border = np.minimum(where, [width, height] - where).min(axis=1) / (BORDER * min(width, height))
+    weight = np.where(seen, np.clip(border, 0, 1) * np.clip(square / (2 * FLATTEST), 0, 1), 0.0)
+    return colour[:, 0, ::-1].astype(np.float64) / 255, _smoothed(surface, np.nan_to_num(weight)), square
+
+
+def _smoothed(surface: Surface, values: Array) -> Array:
+    """Values of vertices, mixed with those around them: the borders of shadows are soft."""
+    corners = surface.faces.ravel()
+    number = np.maximum(np.bincount(corners, minlength=len(values)), 1)
+    for _ in range(2):
+        of_faces = np.repeat(values[surface.faces].mean(axis=1), 3)
+        values = np.where(number > 0, np.bincount(corners, of_faces, len(values)) / number, values)
+    return values
+
+
+def ground_picture(ground: Ground, camera: Camera) -> tuple[Picture, Array]:
+    """What a camera sees of a terrain, before the sky.
+
+    Returns
+    -------
+    (h, w, 3) BGR uint8, and (h, w) distances along the rays [m], inf where there is sky.
+    """
+    width, height = camera.width, camera.height
+    colour, distance = np.empty((height, width, 3), np.float32), np.empty((height, width))
+    columns = np.arange(width) + 0.5
+    for top in range(0, height, ROWS):
+        rows = np.arange(top, min(top + ROWS, height)) + 0.5
+        at = np.column_stack([np.tile(columns, rows.size), np.repeat(rows, width)])
+        shown, far = _cast(ground, camera, at)
+        colour[top : top + ROWS] = shown.reshape(-1, width, 3)
+        distance[top : top + ROWS] = far.reshape(-1, width)
+    edge = _edges(distance)
+    if edge.any():
+        row, column = np.nonzero(edge)
+        steps = (np.arange(EDGE_RAYS) + 0.5) / EDGE_RAYS
+        offset = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        at = (np.column_stack([column, row])[:, None] + offset).reshape(-1, 2)
+        colour[edge] = _cast(ground, camera, at)[0].reshape(-1, EDGE_RAYS**2, 3).mean(axis=1)
+    return np.clip(colour + 0.5, 0, 255).astype(np.uint8), distance
+
+
+def _cast(ground: Ground, camera: Camera, at: Array) -> tuple[np.ndarray, Array]:
+    """(n, 3) float32 colours and (n,) distances through pixels (n, 2)."""
+    surface = ground.surface
+    origins, directions = rays(camera, at)
+    hits = cast_rays(surface, origins, directions)
+    met = np.flatnonzero(hits.face >= 0)
+    colour = _sky(directions)
+    faces = surface.faces[hits.face[met]]
+    a, b, c = (surface.vertices[faces[:, i]] for i in range(3))
+    first, second, within = b - a, c - a, hits.point[met] - a
+    d11, d12, d22 = dot(first, first), dot(first, second), dot(second, second)
+    d1, d2 = dot(within, first), dot(within, second)
+    area = np.maximum(d11 * d22 - d12 * d12, 1e-300)
+    u, v = (d22 * d1 - d12 * d2) / area, (d11 * d2 - d12 * d1) / area
+    shares = np.clip(np.column_stack([1 - u - v, u, v]), 0, 1).astype(np.float32)
+    colour[met] = np.einsum("ij,ijk->ik", shares, ground.bgr[faces])
+    distance = np.full(len(at), np.inf)
+    distance[met] = hits.distance[met]
+    return colour, distance
+
+
+def _sky(directions: Array) -> np.ndarray:
+    up = np.clip(directions[:, 2] / np.maximum(norm(directions), 1e-12), 0, 0.5)[:, None] / 0.5
+    return (255 * (SKY_LOW + (SKY_TOP - SKY_LOW) * up))[:, ::-1].astype(np.float32)
+
+
+def _edges(distance: Array) -> Mask:
+    """(h, w) whether the next pixel across or down is much further away, or nearer."""
+    edge = np.zeros(distance.shape, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        for axis in (0, 1):
+            a = distance[:-1] if axis == 0 else distance[:, :-1]
+            b = distance[1:] if axis == 0 else distance[:, 1:]
+            step = (np.abs(a - b) > EDGE * np.minimum(a, b)) & (np.isfinite(a) | np.isfinite(b))
+            if axis == 0:
+                edge[:-1] |= step
+                edge[1:] |= step
+            else:
+                edge[:, :-1] |= step
+                edge[:, 1:] |= step
+    return edge
+
+
+def sharper(camera: Camera, times: int) -> Camera:
+    """The same view with so many times the pixels across and down."""
+    return replace(
+        camera, width=times * camera.width, height=times * camera.height, fx=times * camera.fx, fy=times * camera.fy,
+        cx=times * camera.cx, cy=times * camera.cy,
+    )  # fmt: skip

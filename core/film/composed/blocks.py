@@ -16,6 +16,7 @@ from ...vectors import Array, norm, unit
 from .canvas import Canvas
 from .look import INK, Colour
 from .sight import LEAST_SLACK_M
+from .solids import ROUND
 
 AMBIENT = 0.42
 SHADOW = 0.6
@@ -102,7 +103,7 @@ def draw_block(
     left, top, right, bottom = box
     fine = 1 if right - left > LARGEST_WINDOW else SUBPIXELS if len(poses) == 1 else BLURRED_SUBPIXELS
     origins, directions = _rays_of(camera, box, fine)
-    smooth = len(solid.vertices) > 100
+    smooth = solid.name == ROUND
     light, cover = np.zeros(len(origins)), np.zeros(len(origins))
     for pose in poses:
         hits = cast_rays(solid, (origins - pose.place) @ pose.turn, directions @ pose.turn)

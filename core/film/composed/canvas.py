@@ -85,6 +85,13 @@ class Canvas:
         self.look = Look(picture.shape[1], picture.shape[0])
         self.written: list[Written] = []
 
+    @classmethod
+    def copied(cls, other: "Canvas") -> "Canvas":
+        """The same picture, to be drawn on further."""
+        made = cls(other.picture.copy())
+        made.written = list(other.written)
+        return made
+
     def lines(self, paths: Iterable[Array], colour: Colour, width: int, opacity: float = 1.0) -> None:
         """Lines through points, each (n, 2) [px]; they end, and begin again, where a point is NaN.
 
@@ -173,6 +180,14 @@ class Canvas:
         opencv().putText(mask, text, at, 255, _face(), size, weight)
         self._blend(mask, box, colour, opacity)
         return line
+
+    def paste(self, other: "Canvas", left: int, top: int) -> None:
+        """Another picture, whole inside this one, with what is written on it."""
+        height, width = other.picture.shape[:2]
+        self.picture[top : top + height, left : left + width] = other.picture
+        for one in other.written:
+            box = one.box
+            self.written.append(Written(one.text, Box(box.left + left, box.top + top, box.right + left, box.bottom + top)))
 
     def _mask(self, box: tuple[int, int, int, int]) -> tuple[np.ndarray, Array]:
         left, top, right, bottom = box

@@ -3,15 +3,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
 from ...camera.model import Camera, project
 from ...terrain.surface import Surface
-from ...vectors import Array
+from ...vectors import Array, Mask
 from ..simulated import path_opacity
 from .blocks import Pose, block_pixels, draw_block, draw_shadow, sun_direction
-from .canvas import Box, Canvas, text_width
+from .canvas import Anchor, Box, Canvas, text_width
 from .falls import Fall
 from .look import INK, MEASURED, PAPER, STRONG, Colour
 from .sight import pixel_size, visible
@@ -25,6 +26,8 @@ EXPOSURE = 0.5
 BLUR_MOMENTS = 6
 BLUR_FROM_PX = 1.5
 """A block that moves less during the exposure is drawn sharp."""
+LEAST_SOLID_PX = 2.5
+"""A simulated block of a smaller radius is a disc."""
 PERSON_M = 1.75
 PERSON = (
     # Half of the outline of somebody who stands: across and up, in heights.
@@ -46,6 +49,7 @@ class Scene:
     kind : of solid, see `solids`.
     sun : (3,) unit vector towards it.
     seed : of angular blocks.
+    body : the scanned block that stands for all.
     """
 
     terrain: Surface | None
@@ -53,6 +57,34 @@ class Scene:
     kind: str = "rock"
     sun: Array = field(default_factory=lambda: sun_direction(315.0, 50.0))
     seed: int = 0
+    body: Surface | None = None
+    _traced: "_Traced" = field(default_factory=lambda: _Traced())
+
+    def solid_of(self, fall: Fall) -> Surface:
+        """What is drawn for a block."""
+        return self.body if self.body is not None else _solid(self.kind, tuple(fall.diameters_m.tolist()), self.seed)
+
+
+@cache
+def _solid(kind: str, diameters_m: tuple[float, ...], seed: int) -> Surface:
+    return solid(kind, np.array(diameters_m), seed)
+
+
+class _Traced:
+    """Where the paths lie in the picture of the camera that was asked for last."""
+
+    def __init__(self) -> None:
+        self.camera: Camera | None = None
+        self.paths: dict[int, tuple[Array, Mask]] = {}
+
+    def of(self, scene: Scene, camera: Camera, fall: Fall) -> tuple[Array, Mask]:
+        """Pixels (n, 2) of the rows of a fall, and which of them are seen."""
+        if camera is not self.camera:
+            self.camera, self.paths = camera, {}
+        if id(fall) not in self.paths:
+            places = fall.position
+            self.paths[id(fall)] = project(camera, places), visible(scene.terrain, camera, places, fall.radius_m)
+        return self.paths[id(fall)]
 
 
 def draw_paths(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) -> None:
@@ -75,11 +107,16 @@ def draw_paths(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) ->
 
 def _seen_path(canvas: Canvas, camera: Camera, scene: Scene, fall: Fall, moment_s: float) -> tuple[Array, Array]:
     """Pixels (m, 2) of a path where it is seen, NaN elsewhere; and where it is hidden."""
-    _, places = fall.path(moment_s)
-    if not len(places):
+    known = int(np.searchsorted(fall.time_s, moment_s, side="right"))
+    if not known:
         return np.empty((0, 2)), np.empty((0, 2))
-    where = project(camera, places)
-    seen = visible(scene.terrain, camera, places, fall.radius_m)
+    where, seen = (values[:known] for values in scene._traced.of(scene, camera, fall))
+    chain, now = fall.chain[:known], fall.state(moment_s)
+    if now is not None and fall.time_s[known - 1] < moment_s:
+        where, seen = np.vstack([where, project(camera, now[0][None])]), np.r_[seen, seen[-1]]
+        chain = np.r_[chain, chain[-1]]
+    breaks = np.flatnonzero(np.diff(chain)) + 1
+    where, seen = np.insert(where, breaks, np.nan, axis=0), np.insert(seen, breaks, False)
     joined = seen.copy()  # the first hidden point ends the line that is seen, so that no gap opens
     joined[1:] |= seen[:-1]
     hidden = np.where((~seen & np.isfinite(where[:, 0]))[:, None], where, np.nan)
@@ -100,16 +137,22 @@ def draw_blocks(
     for fall in scene.falls:
         state = fall.state(moment_s)
         if state is not None:
-            now.append((fall, state[0], solid(scene.kind, fall.diameters_m, scene.seed)))
+            now.append((fall, state[0], scene.solid_of(fall)))
     if scene.terrain is not None:
         for fall, place, body in now:
-            if measured or not fall.is_measured:
+            solid_is_drawn = measured or not fall.is_measured
+            if solid_is_drawn and block_pixels(camera, place, fall.radius_m)[1] > LEAST_SOLID_PX:
                 draw_shadow(canvas, camera, scene.terrain, body, Pose(place, fall.turn(moment_s)), scene.sun)
     for fall, place, body in sorted(now, key=lambda one: -float(np.linalg.norm(one[1] - camera.position))):
         centre, radius = block_pixels(camera, place, fall.radius_m)
         if not np.isfinite(centre).all():
             continue
         seen = bool(visible(scene.terrain, camera, place[None], fall.radius_m)[0])
+        if radius <= LEAST_SOLID_PX and not fall.is_measured:
+            if seen:
+                canvas.disc(centre, max(radius, 1.2 * look.thin) + look.thin, INK, HALO_OPACITY)
+                canvas.disc(centre, max(radius, 1.2 * look.thin), fall.colour)
+            continue
         if measured or not fall.is_measured:
             draw_block(canvas, camera, scene.terrain, body, _poses(camera, fall, moment_s, frame_s), fall.colour, scene.sun)
         small = radius < look.least_mark
@@ -251,3 +294,89 @@ def scale_length(camera: Camera, place: Array, wanted_px: float) -> tuple[float,
     return length, length * size
 
 
+
+
+def draw_scale(canvas: Canvas, camera: Camera, place: Array, words: Texts) -> Box | None:
+    """A bar of a round length as it is at a place, at the upper right; None where it cannot be said."""
+    look = canvas.look
+    length, size = scale_length(camera, place, 0.16 * canvas.look.width)
+    if not np.isfinite(size):
+        return None
+    right, y = canvas.look.width - look.margin, look.margin + 2.6 * look.body
+    ends = np.array([[right - size, y], [right, y]])
+    ticks = [np.array([end - [0, 0.3 * look.body], end + [0, 0.3 * look.body]]) for end in ends]
+    for colour, width in ((INK, look.line + 2 * look.thin + 1), (PAPER, look.line)):
+        canvas.lines([ends, *ticks], colour, width, 0.9 if colour is PAPER else HALO_OPACITY)
+    text = words.say("metres", length=words.number(length, 2))
+    box = Box(right - size, y - 1.6 * look.body, right, y + look.body)
+    _haloed(canvas, text, right, y - 0.5 * look.body, look.small, "right")
+    return box
+
+
+def draw_north(canvas: Canvas, camera: Camera, place: Array, words: Texts) -> None:
+    """An arrow that leads north, at the upper right."""
+    way = north_on_picture(camera, place)
+    if way is None:
+        return
+    look = canvas.look
+    size = 1.5 * look.body
+    centre = np.array([canvas.look.width - look.margin - size, look.margin + 4.6 * look.body + size])
+    aside = np.array([-way[1], way[0]])
+    tip = centre + 0.8 * size * way
+    head = np.array([tip, tip - 0.55 * size * way + 0.28 * size * aside, tip - 0.4 * size * way, tip - 0.55 * size * way - 0.28 * size * aside])
+    tail = np.array([tip - 0.4 * size * way, centre - 0.8 * size * way])
+    for colour, grow, opacity in ((INK, 2 * look.thin + 1, HALO_OPACITY), (PAPER, 0, 0.95)):
+        canvas.lines([tail], colour, look.line + grow, opacity)
+        if grow:
+            canvas.lines([np.vstack([head, head[:1]])], colour, look.line + grow, opacity)
+        else:
+            canvas.area([head], colour, opacity)
+    at = tip + 0.6 * look.body * way
+    _haloed(canvas, words.say("north"), float(at[0]), float(at[1]) + 0.35 * look.small, look.small, "middle")
+
+
+def _haloed(canvas: Canvas, text: str, x: float, baseline: float, size: int, anchor: Anchor) -> None:
+    """Type that is read on any ground without a panel."""
+    before = len(canvas.written)
+    for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1), (1, 1), (-1, -1)):
+        canvas.text(text, x + dx * canvas.look.thin, baseline + dy * canvas.look.thin, size, INK, weight=STRONG, anchor=anchor, opacity=0.45)
+    del canvas.written[before:]
+    canvas.text(text, x, baseline, size, PAPER, weight=STRONG, anchor=anchor)
+
+
+DUST: Colour = (0.80, 0.74, 0.65)
+DUST_S, DUST_PUFFS = 0.9, 7
+
+
+def draw_dust(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) -> None:
+    """Dust that hard impacts raise: drawn by a rule, not measured. It grows and thins out within a second."""
+    for fall in scene.falls:
+        if fall.hits is None:
+            continue
+        since = moment_s - fall.hits.time_s
+        for i in np.flatnonzero((since >= 0) & (since < DUST_S)).tolist():
+            place = fall.hits.position[i]
+            lost = fall.hits.energy1_j[i] - np.nan_to_num(fall.hits.energy2_j[i])
+            if not (np.isfinite(lost) and lost > 0 and visible(scene.terrain, camera, place[None], 2 * fall.radius_m)[0]):
+                continue
+            random = np.random.default_rng([scene.seed, i])
+            age = float(since[i]) / DUST_S
+            size_m = fall.radius_m * (1.2 + 4.5 * age**0.5) * min(max((lost / 500.0) ** 0.25, 0.6), 2.0)
+            for way in random.normal(size=(DUST_PUFFS, 3)) * [1, 1, 0.4] + [0, 0, 0.5]:
+                at = project(camera, (place + 0.45 * size_m * (0.3 + age) * way)[None])[0]
+                px = size_m * pixel_size(camera, place)
+                if np.isfinite(at).all() and np.isfinite(px):
+                    _puff(canvas, at, px, 0.30 * (1 - age) ** 1.5)
+
+
+def _puff(canvas: Canvas, at: Array, radius: float, opacity: float) -> None:
+    """A soft disc."""
+    height, width = canvas.picture.shape[:2]
+    low = np.clip(np.floor(at - radius), 0, (width, height)).astype(int)
+    high = np.clip(np.ceil(at + radius), 0, (width, height)).astype(int)
+    if (high <= low).any():
+        return
+    x, y = np.arange(low[0], high[0]) + 0.5 - at[0], np.arange(low[1], high[1]) + 0.5 - at[1]
+    away = (x[None] ** 2 + y[:, None] ** 2) / max(radius, 1.0) ** 2
+    mask = (255 * np.clip(1 - away, 0, 1) ** 2).astype(np.uint8)
+    canvas.shade(mask, int(low[0]), int(low[1]), DUST, opacity)

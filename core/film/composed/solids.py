@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solid that stands for a block in a composed film: made by rule, or scanned; its size is the block's."""
 
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,6 +13,8 @@ from ...vectors import Array
 
 type Solid = Literal["sphere", "ellipsoid", "box", "rock", "eota_111", "eota_221"]
 SOLIDS: tuple[str, ...] = get_args(Solid.__value__)
+ROUND = "ellipsoid"
+"""Name of a surface that is drawn smooth."""
 ROUND_POINTS = 600
 ROCK_POINTS = 34
 """Corners of an angular block of limestone, about: what of them lies inside the hull is none."""
@@ -47,7 +50,7 @@ def solid(kind: str, diameters_m: Array, seed: int = 0) -> Surface:
     if kind == "rock":
         return _scaled(_hull(_rock(seed)), axes)
     diameters = axes if kind == "ellipsoid" else np.full(3, axes.mean())
-    return _scaled(_hull(0.5 * _even(ROUND_POINTS)), diameters)
+    return replace(_scaled(_hull(0.5 * _even(ROUND_POINTS)), diameters), name=ROUND)
 
 
 def _even(n: int) -> Array:

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is asked of a composed film."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from ...impact_models.machinery.parameters import Value
+from ..simulated import NUMBER
+
+SUN_DEG = (315.0, 50.0)
+
+
+@dataclass(frozen=True)
+class FilmRequest:
+    """A film and how it is to be.
+
+    Attributes
+    ----------
+    film : its name in the catalogue.
+    project : project.toml.
+    width, height : of the picture [px].
+    fps : frames per second.
+    language : "en", "fr" or "de".
+    rate : seconds of the fall in a second of film; None for the film's own.
+    slow_at : impacts at which it slows down and stands still; None for the film's own.
+    freeze_s : how long it stands there [s].
+    video : which of the project's; empty for the first that has a camera.
+    trajectories : which are shown; none for all, in footage those that fall while it lasts.
+    models : impact models whose blocks fly beside the real ones, and fall.
+    number, seed : of simulated blocks for each measured one and model, and of their random numbers.
+    parameters : model → parameter → value, where it is not the default.
+    graphs : "impacts", "motion" or empty.
+    solid : what stands for the block, see `solids`; or the file of a scanned one.
+    sun_deg : azimuth from north and elevation.
+    dust : whether impacts raise some; it is drawn, not measured.
+    """
+
+    film: str
+    project: Path
+    width: int = 1280
+    height: int = 720
+    fps: float = 25.0
+    language: str = "en"
+    rate: float | None = None
+    slow_at: tuple[int, ...] | None = None
+    freeze_s: float = 0.5
+    video: str = ""
+    trajectories: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
+    number: int = NUMBER
+    seed: int = 0
+    parameters: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    graphs: str = ""
+    solid: str = "rock"
+    sun_deg: tuple[float, float] = SUN_DEG
+    dust: bool = False
+
+    def to_json(self) -> str:
+        """As text, the same for the same request."""
+        return json.dumps({**asdict(self), "project": str(self.project)}, sort_keys=True)

@@ -9,6 +9,7 @@ from ..film.engines import ENGINES
 from ..film.job import AS_SET_UP, BLEND, GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
+from . import render_film
 from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, whole
 from .progress import PrintedProgress
 
@@ -55,8 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "or of the motion (speed, height above ground, energy)",
     )
     parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
+    render_film.add_arguments(parser)
     picture = parser.add_mutually_exclusive_group()
-    picture.add_argument("--still", action="store_true", help="one picture instead: of the last frame, or of frame A")
+    picture.add_argument("--still", action="store_true", help="one picture instead: of the last frame (with --film of the middle one), or of frame A")
     picture.add_argument("--slope", action="store_true", help="one picture instead: of the whole slope with all paths")
 
 
@@ -69,6 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
     from ..film.presets import PREVIEW, find_preset
     from ..output import output_folder
 
+    if arguments.film is not None:
+        return render_film.run(arguments)
+    render_film.refuse_without_film(arguments)
     if arguments.project.suffix.lower() == BLEND:
         return _render_scene(arguments)
     models = models_as_asked(arguments.model)

@@ -47,6 +47,25 @@ def check_film(path: Path, frames: int, size: tuple[int, int], progress: Progres
         raise _damaged(path, f"{count} of its {frames} frames can be read")
 
 
+def check_index(path: Path, frames: int, size: tuple[int, int]) -> None:
+    """Compare what a film says of itself, where only Blender can decode it (AV1).
+
+    Raises
+    ------
+    RockfallError : it is not there, or says something else.
+    """
+    _check_there(path)
+    with quiet_opencv() as cv2:
+        film = cv2.VideoCapture(str(path))
+        try:
+            count = round(film.get(cv2.CAP_PROP_FRAME_COUNT))
+            found = (round(film.get(cv2.CAP_PROP_FRAME_WIDTH)), round(film.get(cv2.CAP_PROP_FRAME_HEIGHT)))
+        finally:
+            film.release()
+    if (count, found) != (frames, size):
+        raise _damaged(path, f"it says that it has {count} frames of {found[0]} × {found[1]} pixels")
+
+
 def check_picture(path: Path, size: tuple[int, int]) -> None:
     """Decode a PNG.
 

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from ..impact_models.machinery.parameters import Value
 from .simulated import NUMBER
 
-Kind = Literal["film", "still", "slope", "terrain"]
+Kind = Literal["film", "still", "slope", "terrain", "frames"]
 GraphKind = Literal["impacts", "motion"]
 AS_SET_UP, BLEND = "", ".blend"
 GRAPH_KINDS: tuple[GraphKind, ...] = get_args(GraphKind)
@@ -23,8 +23,9 @@ class FilmJob:
     Attributes
     ----------
     kind : "film" (MP4); "still" (one frame of the film, PNG); "slope" (the whole slope with all trajectories, PNG);
-        "terrain" (a terrain file without trajectories, PNG).
-    source : the project; a .blend, whose film or still is as its settings say; for "terrain" the terrain file.
+        "terrain" (a terrain file without trajectories, PNG); "frames" (pictures of a folder, named by their number, MP4).
+    source : the project; a .blend, whose film or still is as its settings say; for "terrain" the terrain file, for
+        "frames" the folder.
     out : the file to write.
     preset : name of the render preset.
     engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen; `AS_SET_UP` of a .blend.
@@ -36,6 +37,7 @@ class FilmJob:
     parameters : model → parameter → value, where it is not the default.
     graphs : which stand in a film or still and follow its time; None for none.
     title : written into the picture of a terrain; empty for the name of its file.
+    fps, codec, size : of "frames": frames per second, "h264", "h265" or "av1", width and height [px].
     scene : of a .blend; empty for the one that was open when it was saved.
     """
 
@@ -50,6 +52,9 @@ class FilmJob:
     title: str = ""
     scene: str = ""
     graphs: GraphKind | None = None
+    fps: float = 25.0
+    codec: str = "h264"
+    size: tuple[int, int] = (0, 0)
     models: tuple[str, ...] = ()
     simulate: tuple[str, ...] = ()
     number: int = NUMBER
@@ -69,5 +74,6 @@ class FilmJob:
         values = json.loads(text)
         frames, models, simulate = values.pop("frames"), tuple(values.pop("models")), tuple(values.pop("simulate"))
         source, out = Path(values.pop("source")), Path(values.pop("out"))
+        values["size"] = tuple(values["size"])
         span = None if frames is None else (frames[0], frames[1])
         return cls(source=source, out=out, frames=span, models=models, simulate=simulate, **values)

@@ -21,6 +21,7 @@ FINE = 4
 FAR = 30_000
 """Places further away than this overflow OpenCV's numbers."""
 CENTRE = 0.5
+SUBSCRIPT, LOWER = 0.68, 0.2
 ROUND = 0.35
 """Radius of a panel's corners, in heights of its type."""
 
@@ -168,7 +169,7 @@ class Canvas:
         ----------
         left : of the text, or its middle or right end, as `anchor` says [px].
         """
-        width = text_width(text, size, weight)
+        pieces, width = _pieces_of(text, size), text_width(text, size, weight)
         start = round(left - {"left": 0.0, "middle": width / 2, "right": width}[anchor])
         line = Box(start, baseline - size, start + width, baseline + 0.25 * size)
         self.written.append(Written(text, line))
@@ -176,8 +177,10 @@ class Canvas:
         if not text or opacity <= 0 or box is None:
             return line
         mask, corner = self._mask(box)
-        at = (start - int(corner[0]), round(baseline) - int(corner[1]))
-        opencv().putText(mask, text, at, 255, _face(), size, weight)
+        x = start - int(corner[0])
+        for piece, high, drop in pieces:
+            opencv().putText(mask, piece, (x, round(baseline + drop) - int(corner[1])), 255, _face(), high, weight)
+            x += _piece_width(piece, high, weight)
         self._blend(mask, box, colour, opacity)
         return line
 
@@ -225,11 +228,27 @@ def _face() -> Any:
     return cv2.FontFace("sans")
 
 
-@cache
 def text_width(text: str, size: int, weight: int = REGULAR) -> int:
     """How wide a line of type is [px]."""
-    if not text:
-        return 0
+    return sum(_piece_width(piece, high, weight) for piece, high, _ in _pieces_of(text, size))
+
+
+def _pieces_of(text: str, size: int) -> list[tuple[str, int, float]]:
+    """A line in pieces, each with its size and how much lower it stands: R_N has its N lower and smaller."""
+    first, *later = text.split("_")
+    pieces = [(first, size, 0.0)] if first else []
+    for part in later:
+        pieces.append((part[:1], round(SUBSCRIPT * size), LOWER * size))
+        if part[1:]:
+            pieces.append((part[1:], size, 0.0))
+    return pieces
+
+
+@cache
+def _piece_width(text: str, size: int, weight: int) -> int:
+    if not text.strip():
+        # The space at the end of a line has no width of its own.
+        return _piece_width(f"n{text}n", size, weight) - _piece_width("nn", size, weight) if text else 0
     left, _, width, _ = opencv().getTextSize((FAR, FAR), text, (0, 0), _face(), size, weight)
     return int(left + width)
 

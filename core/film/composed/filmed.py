@@ -14,7 +14,6 @@ from .canvas import Picture
 
 AHEAD = 12
 """So many frames are decoded one after the other rather than sought."""
-BACKGROUND_FRAMES = 21
 
 
 class Footage:
@@ -65,13 +64,6 @@ class Footage:
     def camera(self, moment_s: float) -> Camera:
         """Where the camera was, and how it sees."""
         return camera_at(self.path, float(self.clock.to_video(moment_s)))
-
-    def background(self, frames: tuple[int, int]) -> Picture:
-        """What stands still in a video of a camera that does: the median of some of the frames from one to another."""
-        chosen = np.unique(np.linspace(*frames, min(BACKGROUND_FRAMES, frames[1] - frames[0] + 1)).astype(np.intp))
-        pictures = np.array([picture for _, picture in read_frames(self.video, chosen)])
-        median: Picture = np.median(pictures, axis=0).astype(np.uint8)
-        return median
 
 
 def warped(picture: Picture, matrix: np.ndarray, size: tuple[int, int]) -> Picture:

@@ -16,7 +16,7 @@ from .canvas import Picture
 ROCK = np.array([0.70, 0.67, 0.62])
 """sRGB of the ground that no photograph shows."""
 SKY_TOP, SKY_LOW = np.array([0.52, 0.63, 0.74]), np.array([0.86, 0.89, 0.91])
-AMBIENT = 0.38
+AMBIENT = 0.46
 LIFT_M = 0.05
 """Above the ground, where it is asked whether the sun is seen: scans have noise."""
 EDGE = 0.01
@@ -25,8 +25,10 @@ EDGE_RAYS = 3
 NEAREST_M = 1.0
 FLATTEST = 0.12
 """Sine of the angle at which a photograph meets the ground: below it, it is smeared."""
+LEAST_WEIGHT = 0.02
 BORDER = 0.03
 """Part of a photograph at its border over which it fades out."""
+ROW = 4096
 ROWS = 64
 """Of a picture that are cast at once: memory stays small."""
 
@@ -70,7 +72,7 @@ def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...]
     Parameters
     ----------
     sun : (3,) unit vector towards it.
-    photographs : where several show a place, the one that looks at it most squarely.
+    photographs : where several show a place, the median of them: what moves is gone where three do.
     """
     normals = np.nan_to_num(surface.vertex_normals, nan=0.0)
     faces_sun = normals @ sun
@@ -83,17 +85,18 @@ def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...]
     # Curved ground from above is lighter than hollows: a little sky light, which shows relief in the shade.
     light *= 0.82 + 0.18 * np.clip(normals[:, 2], 0, 1)
     colours = np.clip(ROCK * (1.12 * light)[:, None], 0, 1)
-    best = np.full(len(places), FLATTEST)
-    for photograph in photographs:
-        seen, weight, square = _photographed(surface, normals, photograph)
-        better = weight * (square > best)
-        colours += better[:, None] * (seen - colours)
-        best = np.where(better > 0.5, square, best)
+    if photographs:
+        shown = [_photographed(surface, normals, photograph) for photograph in photographs]
+        weights = np.array([weight for _, weight in shown])
+        known = weights > LEAST_WEIGHT
+        each = np.where(known[:, :, None], np.array([colour for colour, _ in shown]), np.nan)
+        seen = known.any(axis=0)
+        colours[seen] += weights.max(axis=0)[seen, None] * (np.nanmedian(each[:, seen], axis=0) - colours[seen])
     return Ground(surface, colours)
 
 
-def _photographed(surface: Surface, normals: Array, photograph: Photograph) -> tuple[Array, Array, Array]:
-    """For each vertex: the photograph's colour (n, 3), how much it counts (n,), how squarely it looks (n,)."""
+def _photographed(surface: Surface, normals: Array, photograph: Photograph) -> tuple[np.ndarray, Array]:
+    """For each vertex: the photograph's colour (n, 3), and how much it counts (n,)."""
     camera, (height, width) = photograph.camera, photograph.picture.shape[:2]
     where = project(camera, surface.vertices)
     inside = np.isfinite(where).all(axis=1) & (where > 0).all(axis=1) & (where < [width, height]).all(axis=1)
@@ -104,11 +107,18 @@ def _photographed(surface: Surface, normals: Array, photograph: Photograph) -> t
     hidden = any_hit(surface, camera.position, away[asked], np.maximum(distance[asked] - 4 * LIFT_M, 0.0))
     seen = np.zeros(len(where), dtype=bool)
     seen[asked[~hidden]] = True
-    grid = np.nan_to_num(where, nan=-1.0).astype(np.float32)
-    colour = opencv().remap(photograph.picture, grid[:, :1] - 0.5, grid[:, 1:] - 0.5, opencv().INTER_LINEAR)
+    colour = _sampled(photograph.picture, np.nan_to_num(where, nan=-1.0))
     border = np.minimum(where, [width, height] - where).min(axis=1) / (BORDER * min(width, height))
     weight = np.where(seen, np.clip(border, 0, 1) * np.clip(square / (2 * FLATTEST), 0, 1), 0.0)
-    return colour[:, 0, ::-1].astype(np.float64) / 255, _smoothed(surface, np.nan_to_num(weight)), square
+    return colour[:, ::-1].astype(np.float32) / 255, _smoothed(surface, np.nan_to_num(weight))
+
+
+def _sampled(picture: Picture, where: Array) -> Picture:
+    """(n, 3) of a picture at pixels (n, 2), in rows that are not too long for OpenCV."""
+    cv2, n = opencv(), len(where)
+    grid = np.resize(where - 0.5, (-(-n // ROW), ROW, 2)).astype(np.float32)
+    found: Picture = cv2.remap(picture, np.ascontiguousarray(grid[..., 0]), np.ascontiguousarray(grid[..., 1]), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return found.reshape(-1, 3)[:n]
 
 
 def _smoothed(surface: Surface, values: Array) -> Array:

@@ -9,6 +9,7 @@ from ...vectors import Array
 from ..graphs import FilmGraph, FilmGraphs
 from .canvas import Box, Canvas, text_width
 from .look import PAPER, QUIET, Colour
+from .texts import Texts
 
 CURSOR: Colour = (1.0, 0.82, 0.25)
 GRID: Colour = (0.45, 0.48, 0.52)
@@ -25,12 +26,19 @@ class Inset:
     graphs : in pixels of a picture of their own, counted from its lower left corner.
     height : of that picture [px].
     left, top : where the upper left corner of that picture lies in the film [px].
+    words : in whose language the labels are; None for English.
     """
 
     graphs: FilmGraphs
     height: float
     left: float = 0.0
     top: float = 0.0
+    words: Texts | None = None
+
+    def _said(self, label: str) -> str:
+        """A label in the film's language, its unit kept."""
+        name, bracket, unit = label.partition(" [")
+        return label if self.words is None else self.words.words.get(f"axis {name}", name) + bracket + unit
 
     def places(self, points: Array) -> Array:
         """(…, 2) of the graphs' picture → of the film."""
@@ -63,10 +71,11 @@ class Inset:
             canvas.lines([np.array([[left, y], [right, y]])], GRID, 1, GRID_OPACITY)
             canvas.text(words, left - 0.4 * size, y + 0.35 * size, size, QUIET, anchor="right")
         canvas.lines([np.array([[left, top], [left, bottom], [right, bottom]])], QUIET, 1, 0.8)
-        label = axes.y.label if text_width(axes.y.label, size) < right - left else axes.y.symbol
+        label = self._said(axes.y.label)
+        label = label if text_width(label, size) < right - left else axes.y.symbol
         canvas.text(label, left, top - 0.45 * size, size, PAPER)
         if graph.shows_x:
-            canvas.text(axes.x.label, right, bottom + 2.4 * size, size, PAPER, anchor="right")
+            canvas.text(self._said(axes.x.label), right, bottom + 2.4 * size, size, PAPER, anchor="right")
 
     def _content(self, canvas: Canvas, graph: FilmGraph, moment_s: float) -> None:
         for strokes in graph.strokes:

@@ -25,7 +25,6 @@ from ...vectors import Array
 from ...workflow.simulation import remarks_of
 from ..falls import fall_beside
 from ..job import FilmJob
-from ..simulated import group_name
 from .blocks import sun_direction
 from .falls import Fall, measured_falls, predicted_falls, simulated_falls
 from .filmed import Footage
@@ -38,6 +37,8 @@ from .texts import Texts, texts
 BEFORE_S, AFTER_S = 0.8, 1.0
 """So much of the footage is shown before the first moment of a block and after its last."""
 STORY_MODELS = 3
+PHOTOGRAPHS = 7
+"""Frames of the footage that colour the terrain."""
 CREDITS, DOI = "credits", "doi"
 """Keys of a project's [site] that a film shows."""
 
@@ -125,9 +126,12 @@ class Material:
         """The terrain, lit, with the colours of the footage where it shows it."""
         self.progress("Lighting the terrain", 0, 0)
         photographs: tuple[Photograph, ...] = ()
-        if self.footage is not None and self.footage.path.is_fixed:
-            frames = self.footage.frame(self.span_s[0]), self.footage.frame(self.span_s[1])
-            photographs = (Photograph(self.footage.background(frames), self.footage.camera(self.span_s[0])),)
+        if self.footage is not None:
+            first, last = (self.footage.frame(moment) for moment in self.span_s)
+            frames = np.unique(np.linspace(first, last, PHOTOGRAPHS).astype(np.intp)).tolist()
+            photographs = tuple(
+                Photograph(self.footage.picture(frame), self.footage.camera(self.footage.moment(frame))) for frame in frames
+            )
         return lit_ground(self.terrain, self.sun, photographs)
 
     @cached_property
@@ -192,7 +196,8 @@ class Material:
         falls: list[Fall] = []
         for simulation in simulations:
             model = find_model(simulation.settings.model)
-            falls += simulated_falls(simulation, starts, group_name(model), model.colour)
+            group = model.title if model.is_random else self.words.say("without_chance", model=model.title)
+            falls += simulated_falls(simulation, starts, group, model.colour)
         return tuple(fall for fall in falls if fall.name.rpartition(" ")[0] in starts)
 
     def scene(self, falls: Sequence[Fall]) -> Scene:

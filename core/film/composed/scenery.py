@@ -196,7 +196,7 @@ def draw_person(canvas: Canvas, camera: Camera, foot: Array, words: Texts) -> Bo
         return None
     up = ends[1] - ends[0]
     height = float(np.hypot(*up))
-    if height < 1.5 * canvas.look.small / 2:
+    if height < canvas.look.body:
         return None
     aside = np.array([-up[1], up[0]])
     half = np.array(PERSON)
@@ -234,7 +234,7 @@ def keys_of(scene: Scene, words: Texts) -> tuple[Key, ...]:
     """The legend: measured first, then each model that is shown, and that it is simulated."""
     made = [Key(MEASURED, words.say("measured"))] if any(fall.is_measured for fall in scene.falls) else []
     groups = dict.fromkeys((fall.group, fall.colour) for fall in scene.falls if fall.group)
-    return (*made, *(Key(colour, f"{words.say('simulated')}: {group}") for group, colour in groups))
+    return (*made, *(Key(colour, words.say("simulated_by", model=group)) for group, colour in groups))
 
 
 def draw_keys(canvas: Canvas, keys: Sequence[Key], left: float, bottom: float) -> Box:
@@ -307,7 +307,7 @@ def draw_scale(canvas: Canvas, camera: Camera, place: Array, words: Texts) -> Bo
     ticks = [np.array([end - [0, 0.3 * look.body], end + [0, 0.3 * look.body]]) for end in ends]
     for colour, width in ((INK, look.line + 2 * look.thin + 1), (PAPER, look.line)):
         canvas.lines([ends, *ticks], colour, width, 0.9 if colour is PAPER else HALO_OPACITY)
-    text = words.say("metres", length=words.number(length, 2))
+    text = words.say("metres", length=words.number(length, 1))
     box = Box(right - size, y - 1.6 * look.body, right, y + look.body)
     _haloed(canvas, text, right, y - 0.5 * look.body, look.small, "right")
     return box

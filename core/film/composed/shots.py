@@ -7,10 +7,10 @@ from math import floor
 
 import numpy as np
 
-from .canvas import Canvas, Picture
+from .canvas import Canvas
 
 FADE_S = 0.4
-"""Over which one shot goes into the next [s of film]."""
+"""Over which one shot goes into the next, through black, so that no text lies over another [s of film]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,18 +71,13 @@ class ComposedFilm:
         at, begins = frame / self.fps, self.begins_s
         current = max(i for i, begin in enumerate(begins) if begin <= at + 1e-9)
         since = at - begins[current]
-        drawn = self.shots[current].draw(min(since, self.shots[current].duration_s))
         if current == 0 or since >= self.fade_s:
-            return drawn
+            return self.shots[current].draw(min(since, self.shots[current].duration_s))
         before = self.shots[current - 1]
-        old = before.draw(min(at - begins[current - 1], before.duration_s))
         share = float(np.clip(since / self.fade_s, 0, 1))
-        drawn.picture[...] = _mixed(old.picture, drawn.picture, share)
+        if share < 0.5:
+            drawn = before.draw(min(at - begins[current - 1], before.duration_s))
+        else:
+            drawn = self.shots[current].draw(min(since, self.shots[current].duration_s))
+        drawn.picture[...] = drawn.picture * abs(2 * share - 1)
         return drawn
-
-
-def _mixed(old: Picture, new: Picture, share: float) -> Picture:
-    from ...opencv import opencv
-
-    mixed: Picture = opencv().addWeighted(old, 1 - share, new, share, 0.0)
-    return mixed

@@ -13,7 +13,7 @@ from ...terrain.raycast import any_hit, heights_above
 from ...vectors import Array, norm, unit
 from ..framing import Margins, View, downhill_direction, place_camera
 from ..graphs import FILMED, FilmGraphs, impact_graphs, motion_graphs
-from .canvas import Canvas, Picture
+from .canvas import Box, Canvas, Picture
 from .falls import Fall
 from .filmed import Footage, warped
 from .ground import Ground, ground_picture
@@ -190,12 +190,12 @@ class Stage:
     numbers: bool = True
     inset: Inset | None = None
 
-    def draw(self, seen: Seen, moment_s: float, rate: float, film_rate: float | None = None) -> Canvas:
+    def draw(self, seen: Seen, moment_s: float, rate: float | None) -> Canvas:
         """Everything at a moment of the fall [s].
 
         Parameters
         ----------
-        rate : seconds of the fall in a second of film, which is said.
+        rate : seconds of the fall in a second of film, which is said; None where no time passes.
         """
         canvas, camera = seen
         look, words, size = canvas.look, self.material.words, (seen[0].look.width, seen[0].look.height)
@@ -203,16 +203,20 @@ class Stage:
             draw_paths(canvas, camera, self.scene, moment_s)
         if self.impacts:
             draw_impacts(canvas, camera, self.scene, moment_s)
-        draw_blocks(canvas, camera, self.scene, moment_s, self.material.frame_s(rate), measured=self.solids)
+        draw_blocks(canvas, camera, self.scene, moment_s, self.material.frame_s(rate or 0.0), measured=self.solids)
         if self.material.request.dust:
             draw_dust(canvas, camera, self.scene, moment_s)
-        if self.scale:
-            self._draw_scale(canvas, camera)
+        if self.scale and self.inset is None:
+            draw_north(canvas, camera, self.middle, words)
+            draw_scale(canvas, camera, self.middle, words)
         if self.heading:
             draw_heading(canvas, self.heading, self.note)
         draw_keys(canvas, keys_of(self.scene, words), look.margin, size[1] - look.margin)
-        lines = [words.pace(rate), *(self.number_lines(moment_s) if self.numbers else [])]
-        draw_badge(canvas, lines, size[0] - look.margin, size[1] - look.margin)
+        if rate is not None:
+            lines = [words.pace(rate), *(self.number_lines(moment_s) if self.numbers and self.inset is None else [])]
+            draw_badge(canvas, lines, size[0] - look.margin, size[1] - look.margin)
+        if self.scale:
+            self._draw_person(canvas, camera)
         if self.inset is not None:
             self.inset.draw(canvas, moment_s)
         return canvas
@@ -235,10 +239,11 @@ class Stage:
                 lines.append(f"{words.say('height')} {words.number(height, 2)} m")
         return lines
 
-    def _draw_scale(self, canvas: Canvas, camera: Camera) -> None:
+    def draw_size(self, canvas: Canvas, camera: Camera) -> None:
+        """How large things are, and where north is."""
         draw_north(canvas, camera, self.middle, self.material.words)
-        if not self._draw_person(canvas, camera):
-            draw_scale(canvas, camera, self.middle, self.material.words)
+        draw_scale(canvas, camera, self.middle, self.material.words)
+        self._draw_person(canvas, camera)
 
     @cached_property
     def middle(self) -> Array:
@@ -257,6 +262,10 @@ class Stage:
         foot = fall.hits.position[len(fall.hits.position) // 2] + PERSON_ASIDE_M * aside
         drop = float(heights_above(surface, (foot + [0, 0, 5.0])[None])[0])
         if not np.isfinite(drop):
+            return False
+        where = project(camera, np.array([foot + [0, 0, 5.0 - drop]]))[0]
+        around = Box(where[0], where[1], where[0], where[1]).grown(2 * canvas.look.body)
+        if not np.isfinite(where).all() or any(one.box.meets(around) for one in canvas.written):
             return False
         return draw_person(canvas, camera, foot + [0, 0, 5.0 - drop], self.material.words) is not None
 
@@ -284,7 +293,7 @@ def inset_of(material: Material, size: tuple[int, int], falls: Sequence[Fall]) -
     else:
         courses = [c for c in motion_courses(result, material.surface, quantities=FILMED) if c.trajectory in names]
         made = _since(material.span_s[0], courses, offsets, size)
-    return Inset(made, size[1])
+    return Inset(made, size[1], words=material.words)
 
 
 def _since(begin_s: float, courses: Sequence[MotionCourse], names: Iterable[str], size: tuple[int, int]) -> FilmGraphs:

@@ -30,7 +30,11 @@ class Texts:
 
     def say(self, key: str, **values: object) -> str:
         """A text, its braces filled in."""
-        return self.words[key].format(version=versions()["rockfall"], **values)
+        return self.words[key].format(version=_version(), **values)
+
+    def whole(self, value: int) -> str:
+        """A whole number, thousands apart."""
+        return f"{value:,}".replace(",", THIN_SPACE)
 
     def number(self, value: float, digits: int = 3) -> str:
         """A number with so many significant digits, never in powers of ten, thousands apart."""
@@ -60,9 +64,15 @@ class Texts:
             return self.say("stands")
         if abs(rate - 1.0) < 0.02:
             return f"1× {self.say('real_time')}"
-        if rate < 1:
-            return self.say("slower", factor=self.number(1 / rate, 2))
-        return self.say("faster", factor=self.number(rate, 2))
+        factor = self.whole(round(max(rate, 1 / rate)))
+        if factor == "1":
+            return self.say("nearly_real_time")
+        return self.say("slower" if rate < 1 else "faster", factor=factor)
+
+
+@lru_cache
+def _version() -> str:
+    return versions()["rockfall"]
 
 
 @lru_cache

@@ -17,7 +17,7 @@ from ....core.simulation.measured_releases import start_times
 from ....core.workflow.simulation import remarks_of
 from ...scene import models, simulation
 from ...scene.project import load_project
-from . import dressing, saved
+from . import dressing, encoding, saved
 from .engine import engine_of, use_engine
 
 
@@ -29,6 +29,9 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     RockfallError : the project is bad, has nothing to show, or the file cannot be written.
     """
     scene, remarks = bpy.context.scene, ()
+    if job.kind == "frames":
+        encoding.encode(job, progress)
+        return remarks
     if job.source.suffix.lower() == BLEND:
         scene = saved.open_film(job)
     elif job.kind == "terrain":
@@ -67,7 +70,7 @@ def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | No
     if first > scene.frame_end:
         raise InputError(f"The film has no frame {first}", advice=f"Its last frame is {scene.frame_end}")
     scene.frame_start, scene.frame_end = first, min(last, scene.frame_end)
-    use_movie(scene, path)
+    encoding.use_movie(scene, path)
     total, done = scene.frame_end - first + 1, 0
 
     def written(*_: object) -> None:
@@ -85,16 +88,6 @@ def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | No
     if done != total:
         raise RockfallError(f"Blender rendered {done} of {total} frames of the film.")
     check_film(path, total, _size(scene), progress)
-
-
-def use_movie(scene: bpy.types.Scene, path: Path) -> None:
-    """Output of the scene: an MP4 with H.264."""
-    render = scene.render
-    render.filepath, render.use_file_extension = str(path), True
-    render.image_settings.media_type = "VIDEO"
-    render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.audio_codec = "MPEG4", "H264", "NONE"
-    render.ffmpeg.constant_rate_factor, render.ffmpeg.ffmpeg_preset = "HIGH", "GOOD"
-    render.ffmpeg.gopsize = 25
 
 
 def render_picture(scene: bpy.types.Scene, path: Path) -> None:

@@ -97,14 +97,32 @@ def beside(canvas: Canvas, at: Array, lines: list[str]) -> Box:
     pad, step = look.gap, round(1.38 * look.body)
     width = max(text_width(line, look.body, STRONG if i == 0 else 400) for i, line in enumerate(lines)) + 2.5 * pad
     height, away = len(lines) * step + pad, 2.6 * look.body
-    right = at[0] + away + width < look.width - look.margin
-    left = at[0] + away if right else max(at[0] - away - width, look.margin)
-    top = float(np.clip(at[1] - height - away / 2, look.margin + 3.2 * look.body, look.height - height - 6 * look.body))
-    box = Box(float(left), top, float(left) + width, top + height)
-    end = np.array([box.left if right else box.right, np.clip(at[1], box.top + pad, box.bottom - pad)])
+    box = _free_box(canvas, at, width, height, away)
+    side = box.left if box.left > at[0] else box.right if box.right < at[0] else (box.left + box.right) / 2
+    end = np.array([side, np.clip(at[1], box.top + pad, box.bottom - pad)])
     canvas.lines([np.array([at, end])], INK, look.line + 2 * look.thin, 0.5)
     canvas.lines([np.array([at, end])], PAPER, max(look.thin, 1), 0.95)
     canvas.panel(box, opacity=0.78)
     for i, line in enumerate(lines):
         canvas.text(line, box.left + 1.25 * pad, box.top + pad / 2 + (i + 0.74) * step, look.body, weight=STRONG if i == 0 else 400)
     return box
+
+
+def _free_box(canvas: Canvas, at: Array, width: float, height: float, away: float) -> Box:
+    """A box beside a place, inside the picture and where nothing is written yet, if there is such a place."""
+    look = canvas.look
+    taken = [one.box.grown(look.gap) for one in canvas.written]
+    lefts = (at[0] + away, at[0] - away - width, at[0] - width / 2, look.margin, look.width - look.margin - width)
+    tops = (at[1] - height - away / 2, at[1] + away / 2, at[1] - 1.6 * height, at[1] - 2.4 * height, at[1] - height / 2, look.margin, at[1] + 2 * away)
+    best, least = None, np.inf
+    for left in lefts:
+        for top in tops:
+            x = float(np.clip(left, look.margin, max(look.width - look.margin - width, look.margin)))
+            y = float(np.clip(top, look.margin, max(look.height - look.margin - height, look.margin)))
+            box = Box(x, y, x + width, y + height)
+            covers = box.left < at[0] < box.right and box.top < at[1] < box.bottom
+            cost = sum(box.meets(other) for other in taken) + 2 * covers + 0.01 * (abs(x - left) + abs(y - top)) / height
+            if cost < least:
+                best, least = box, cost
+    assert best is not None
+    return best

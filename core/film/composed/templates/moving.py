@@ -4,8 +4,8 @@
 import numpy as np
 
 from ....camera.model import Camera, look_at
-from ....terrain.raycast import heights_above
-from ....vectors import Array, unit
+from ....terrain.raycast import any_hit, heights_above
+from ....vectors import Array, norm, unit
 from ..canvas import Canvas
 from ..falls import Fall
 from ..material import Material
@@ -15,6 +15,8 @@ from .timing import nice_rate, shown_clock
 
 TURN_S, TURN_DEG = 14.0, 360.0
 FLIGHT_S = 14.0
+ELEVATIONS_DEG = (22.0, 28.0, 34.0, 40.0, 46.0, 52.0, 58.0, 64.0)
+WATCHED, SIDES, NEARLY_ALL = 60, 24, 0.9
 LEAST_ABOVE_M = 1.5
 FOLLOW_S = 0.9
 """Over which the way of the block is smoothed for the camera."""
@@ -28,18 +30,36 @@ def turntable(material: Material) -> ComposedFilm:
     end = max(float(fall.time_s[-1]) for fall in falls)
     first = slope_camera(material, falls, material.size)
     middle = _middle(falls)
-    away = first.position - middle
+    reach = float(norm(first.position - middle))
+    start = float(np.arctan2(*(first.position - middle)[1::-1]))
+    lift = _clear_elevation(material, falls, middle, reach)
     stage = Stage(material, material.scene(falls), solids=True, heading=material.title, note=words.say("turntable"), numbers=False)
 
     def camera(film_s: float) -> Camera:
-        angle = np.radians(TURN_DEG) * (film_s / TURN_S)
-        c, s = np.cos(angle), np.sin(angle)
-        turned = np.array([c * away[0] - s * away[1], s * away[0] + c * away[1], abs(away[2])])
-        place = _above(material, middle + turned)
+        place = _above(material, _around(middle, reach, start + np.radians(TURN_DEG) * (film_s / TURN_S), lift))
         return look_at(*material.size, place, middle, focal_px=first.fx)
 
     moving = Moving(material.ground, camera)
-    return _film(material, Shot("turntable", TURN_S, lambda film_s: stage.draw(moving.at(film_s), end, 1.0)))
+    return _film(material, Shot("turntable", TURN_S, lambda film_s: stage.draw(moving.at(film_s), end, None)))
+
+
+def _around(middle: Array, reach: float, angle: float, elevation_deg: float) -> Array:
+    up = np.radians(elevation_deg)
+    return middle + reach * np.array([np.cos(angle) * np.cos(up), np.sin(angle) * np.cos(up), np.sin(up)])
+
+
+def _clear_elevation(material: Material, falls: tuple[Fall, ...], middle: Array, reach: float) -> float:
+    """The lowest elevation from which nearly all of the ways is seen from nearly all sides [°]."""
+    points = np.vstack([fall.position for fall in falls])
+    points = points[:: max(len(points) // WATCHED, 1)] + [0.0, 0.0, 0.5]
+    for elevation in ELEVATIONS_DEG:
+        seen = []
+        for angle in np.linspace(0, 2 * np.pi, SIDES, endpoint=False):
+            away = _around(middle, reach, float(angle), elevation) - points
+            seen.append(float((~any_hit(material.terrain, points, away, norm(away))).mean()))
+        if np.quantile(seen, 0.15) > NEARLY_ALL:
+            return elevation
+    return ELEVATIONS_DEG[-1]
 
 
 def fly_along(material: Material) -> ComposedFilm:

@@ -22,9 +22,13 @@ STEPS_S = (0.02, 0.04, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 MOST_BLOCKS, APART = 60, 1.6
 """In a stroboscopic picture: how many, and the least distance between them, in diameters."""
 BACKGROUND_FRAMES = 21
+AROUND = 0.12
+"""Part of a stroboscopic picture that stays free at each side of the block's way."""
+LEAST_SCALE, MOST_SCALE = 0.5, 3.0
 ROUND = 1.7
 """How much of the frame about the block is taken, in its radii."""
 SKY_M = 1e5
+COARSE, FAR_PX = 4, -1e4
 MOST_CELLS = 12
 CELL_PX_OF_BLOCK = 7.0
 """Width of a picture of the contact sheet, in diameters of the block, at least."""
@@ -39,18 +43,17 @@ def stroboscopic(material: Material) -> Canvas:
     frame is asked what it saw there.
     """
     footage, fall, words = material.filmed, material.falls[0], material.words
-    window = whole(footage.size, material.size)
     begin, end = max(float(fall.time_s[0]), footage.span_s[0]), min(float(fall.time_s[-1]), footage.span_s[1])
     if not begin < end:
         raise InputError(f"The video {footage.name!r} does not show {fall.name}", advice="Name another one with --video")
     middle = footage.frame((begin + end) / 2)
-    mosaic = Mosaic(material, footage, window, middle)
+    mosaic = Mosaic(material, footage, _about(material, footage, fall, (begin, end), middle), middle)
     first, last = footage.frame(begin), footage.frame(end)
     frames = np.unique(np.linspace(first, last, min(BACKGROUND_FRAMES, last - first + 1)).astype(np.intp))
-    shown = np.array([mosaic.frame(int(frame)) for frame in frames])
-    known = shown.any(axis=3, keepdims=True)
-    background = np.nanmedian(np.where(known, shown, np.nan).astype(np.float32), axis=0) if not known.all() else np.median(shown, axis=0)
-    picture: Picture = np.nan_to_num(background).astype(np.uint8)
+    picture = median_picture(np.array([mosaic.frame(int(frame)) for frame in frames]))
+    if mosaic.beyond is not None:
+        unknown = ~picture.any(axis=2)
+        picture[unknown] = mosaic.beyond[unknown]
     step = _step(material, mosaic, fall, begin, end)
     for moment in np.arange(begin, end, step):
         frame = footage.frame(float(moment))
@@ -66,8 +69,39 @@ def stroboscopic(material: Material) -> Canvas:
     draw_impacts(canvas, mosaic.camera, scene, np.inf)
     draw_heading(canvas, material.title, words.say("stroboscopic", step=words.number(step, 2)))
     draw_keys(canvas, keys_of(scene, words), look.margin, look.height - look.margin)
-    Stage(material, scene, solids=False)._draw_scale(canvas, mosaic.camera)
+    Stage(material, scene, solids=False).draw_size(canvas, mosaic.camera)
     return canvas
+
+
+def median_picture(shown: np.ndarray) -> Picture:
+    """The median of pictures (k, h, w, 3), where a black pixel knows nothing."""
+    known = shown.any(axis=3)
+    picture: Picture = np.partition(shown, len(shown) // 2, axis=0)[len(shown) // 2]
+    some = ~known.all(axis=0)
+    if some.any():
+        each = np.where(known[:, some][:, :, None], shown[:, some].astype(np.float32), np.nan)
+        there = known[:, some].any(axis=0)
+        values = np.zeros((each.shape[1], 3), np.uint8)
+        values[there] = np.nanmedian(each[:, there], axis=0)
+        picture[some] = values
+    return picture
+
+
+def _about(material: Material, footage: Footage, fall: Fall, span_s: tuple[float, float], middle: int) -> Window:
+    """The window of the middle frame that shows all of the block's way, also what lies beyond that frame."""
+    camera = footage.camera(footage.moment(middle))
+    rows = (fall.time_s >= span_s[0]) & (fall.time_s <= span_s[1])
+    where = project(camera, fall.position[rows])
+    where = where[np.isfinite(where).all(axis=1)]
+    size = np.array(material.size, dtype=np.float64)
+    if not len(where):
+        return whole(footage.size, material.size)
+    low, high = where.min(axis=0), where.max(axis=0)
+    scale = float(min((1 - 2 * AROUND) * size / np.maximum(high - low, 1.0)))
+    fits = min(size[i] / footage.size[i] for i in range(2))
+    scale = float(np.clip(scale, LEAST_SCALE * fits, MOST_SCALE * max(fits, 1.0)))
+    corner = size / 2 - scale * (low + high) / 2
+    return Window(scale, float(corner[0]), float(corner[1]), *material.size)
 
 
 def contact_sheet(material: Material) -> Canvas:
@@ -90,7 +124,7 @@ def contact_sheet(material: Material) -> Canvas:
     sheet.text(f"{words.say('contact_sheet')}: {words.say('measured')}. {material.block_words()}", look.margin,
                look.margin + look.heading + 1.5 * look.body, look.body, QUIET)  # fmt: skip
     columns, lines = _grid(len(rows), width / (height - top))
-    gap = look.gap
+    gap = 2 * look.gap
     caption = round(2 * 1.4 * look.small + look.gap)
     cell = (width - 2 * look.margin - (columns - 1) * gap) // columns, (height - top - look.margin - (lines - 1) * gap) // lines
     for i, (fall, row) in enumerate(rows):
@@ -136,6 +170,7 @@ class Mosaic:
     Attributes
     ----------
     camera : of that view.
+    beyond : the terrain in that view, for what no frame shows; None where each shows all.
     """
 
     def __init__(self, material: Material, footage: Footage, window: Window, reference: int) -> None:
@@ -143,14 +178,19 @@ class Mosaic:
         moment = footage.moment(reference)
         self.camera = window.camera(footage.camera(moment))
         self.places: Array | None = None
+        self.beyond: Picture | None = None
         if not footage.path.is_fixed:
             from ....camera.model import rays
 
-            distance = ground_picture(material.ground, self.camera)[1]
-            v, u = np.mgrid[0 : window.height, 0 : window.width] + 0.5
-            origin, direction = rays(self.camera, np.column_stack([u.ravel(), v.ravel()]))
-            far = np.where(np.isfinite(distance.ravel()), distance.ravel(), SKY_M)
-            self.places = origin + far[:, None] * direction
+            self.beyond, distance = ground_picture(material.ground, self.camera)
+            # Cameras that are held by hand hardly change their place: what is between the samples is smooth.
+            v, u = np.mgrid[0 : window.height : COARSE, 0 : window.width : COARSE]
+            origin, direction = rays(self.camera, np.column_stack([u.ravel(), v.ravel()]) + 0.5)
+            far = distance[v.ravel(), u.ravel()]
+            self.places = origin + np.where(np.isfinite(far), far, SKY_M)[:, None] * direction
+            self.shape = u.shape
+            width, height = np.arange(window.width), np.arange(window.height)
+            self.lookup = np.meshgrid((width / COARSE).astype(np.float32), (height / COARSE).astype(np.float32))
 
     def frame(self, frame: int) -> Picture:
         """A frame in that view; black where it saw nothing."""
@@ -158,9 +198,13 @@ class Mosaic:
         size = window.width, window.height
         if self.places is None:
             return warped(picture, window.matrix, size)
-        where = project(self.footage.camera(self.footage.moment(frame)), self.places).reshape(size[1], size[0], 2)
-        grid = np.nan_to_num(where - 0.5, nan=-1e4).astype(np.float32)
-        made: Picture = opencv().remap(picture, grid[:, :, 0], grid[:, :, 1], opencv().INTER_LINEAR)
+        cv2 = opencv()
+        where = project(self.footage.camera(self.footage.moment(frame)), self.places).reshape(*self.shape, 2)
+        coarse = np.nan_to_num(where - 0.5, nan=FAR_PX).astype(np.float32)
+        grid = cv2.remap(coarse, *self.lookup, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        made: Picture = cv2.remap(picture, grid, None, cv2.INTER_LINEAR)
+        inside = (grid > 0).all(axis=2) & (grid < np.array(self.footage.size) - 2.0).all(axis=2)
+        made[~inside] = 0
         return made
 
 

@@ -5,11 +5,12 @@ import numpy as np
 
 from ....errors import InputError
 from ....vectors import Array, norm
+from ...framing import Margins
 from ..canvas import Canvas
 from ..envelope import envelope
 from ..falls import Fall
 from ..film_clock import FilmClock, Freeze, film_clock
-from ..look import INK, PAPER, STRONG
+from ..look import INK
 from ..material import Material
 from ..scenery import Key, draw_badge, draw_heading, draw_keys, draw_paths, keys_of
 from ..shots import ComposedFilm, Shot
@@ -17,12 +18,13 @@ from ..sight import pixels
 from ..stage import Plate, Stage, inset_of, slope_camera, whole_footage
 from .cards import beside, draw_hit_card, end_card, title_card
 from .footage import STANDS, path_shot
-from .timing import hardest, nice_rate, shown_clock
+from .timing import hardest, lasting_clock, nice_rate
 
 FOOTAGE_S, PATH_S, MODELS_S, FALLS_S, ALL_S = 8.0, 12.0, 6.5, 8.0, 4.5
 STOPS = 3
+ABOVE_LEGEND = Margins(0.06, 0.06, 0.27, 0.14)
 MODELS_STAND_S = 2.0
-ENVELOPE = (0.35, 0.72, 1.0)
+ENVELOPE = (0.86, 0.87, 0.88)
 LATEST = 0.98
 """The falls' chapter ends when this part of the simulated blocks has come to its end."""
 
@@ -54,9 +56,7 @@ def _video(material: Material) -> list[Shot]:
         draw_badge(canvas, [words.pace(raw_clock.rate_at(film_s))], look.width - look.margin, look.height - look.margin)
         return canvas
 
-    stops = hardest(fall, STOPS, *span)
-    freezes = len(stops) * material.request.freeze_s
-    clock = shown_clock(material, fall, span, nice_rate(span[1] - span[0], PATH_S, freezes), stops)
+    clock = lasting_clock(material, fall, span, PATH_S, hardest(fall, STOPS, *span))
     stage = Stage(
         material, scene, solids=False, heading=words.say("chapter_path"), note=words.say("reconstruction"),
         inset=inset_of(material, material.size, material.falls),
@@ -148,7 +148,7 @@ def _draw_links(material: Material, canvas: Canvas, camera: object, fall: Fall, 
         canvas.dashes(np.array([here, there]), INK, look.line + 2 * look.thin, 4.0 * look.line, 0.6)
         canvas.dashes(np.array([here, there]), model.colour, look.line, 4.0 * look.line)
         apart = float(norm(place - state[0]))
-        lines.append(f"{model.group}: {words.say('off_by', distance=words.number(apart, 2))}")
+        lines.append(words.say("off_by", model=model.group, distance=words.number(apart, 2)))
     if lines:
         beside(canvas, here, [words.say("measured"), *lines])
 
@@ -168,9 +168,9 @@ def _falls(material: Material) -> list[Shot]:
     end = float(np.quantile([float(fall.time_s[-1]) for fall in simulated], LATEST))
     end = max(end, max(float(fall.time_s[-1]) for fall in material.falls))
     clock: FilmClock = film_clock(begin, end, rate=nice_rate(end - begin, FALLS_S))
-    plate = Plate(material.ground, slope_camera(material, falls, material.size))
+    plate = Plate(material.ground, slope_camera(material, falls, material.size, ABOVE_LEGEND))
     scene = material.scene(falls)
-    note = words.say("blocks", number=words.number(len(simulated), 6))
+    note = words.say("blocks", number=words.whole(len(simulated)))
     stage = Stage(material, scene, solids=True, heading=words.say("chapter_falls"), note=note, impacts=False, numbers=False)
 
     def draw(film_s: float) -> Canvas:
@@ -192,15 +192,16 @@ def all_traces(material: Material, plate: Plate, falls: tuple[Fall, ...]) -> Can
     if outline is not None:
         where = pixels(camera, outline)
         where = where[np.isfinite(where).all(axis=1)]
-        canvas.area([where], ENVELOPE, 0.18)
-        canvas.lines([np.vstack([where, where[:1]])], ENVELOPE, look.line, 0.9)
+        canvas.area([where], ENVELOPE, 0.16)
+        canvas.lines([np.vstack([where, where[:1]])], INK, look.line + look.thin, 0.4)
+        canvas.dashes(np.vstack([where, where[:1]]), ENVELOPE, look.line, 5.0 * look.line)
         keys.append(Key(ENVELOPE, words.say("envelope")))
     draw_paths(canvas, camera, scene, np.inf)
     stage = Stage(material, scene, solids=True)
-    stage._draw_scale(canvas, camera)
-    number = words.say("blocks", number=words.number(sum(not fall.is_measured for fall in falls), 6))
+    stage.draw_size(canvas, camera)
+    number = words.say("blocks", number=words.whole(sum(not fall.is_measured for fall in falls)))
     draw_heading(canvas, words.say("chapter_all"), f"{material.title}. {number}")
     draw_keys(canvas, keys, look.margin, look.height - look.margin)
     credit = " · ".join([*material.credit_lines, words.say("made_with")])
-    canvas.text(credit, look.width - look.margin, look.height - look.margin, look.small, PAPER, weight=STRONG, anchor="right")
+    draw_badge(canvas, [credit], look.width - look.margin, look.height - look.margin, strong=False)
     return canvas

@@ -9,14 +9,13 @@ from ..film_clock import FilmClock, Freeze, Slow, film_clock
 from ..material import Material
 
 NICE_RATES = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125)
-SLOW_PART = 0.25
+SLOW_PART = 0.5
 """Slow motion at an impact is by this part of the film's rate."""
 
 
-def nice_rate(fall_s: float, film_s: float, freezes_s: float = 0.0) -> float:
+def nice_rate(fall_s: float, film_s: float) -> float:
     """The rate that reads well at which so many seconds of the fall take about so many of the film."""
-    wanted = fall_s / max(film_s - freezes_s, 0.25 * film_s)
-    return min(NICE_RATES, key=lambda rate: abs(np.log(rate / wanted)))
+    return min(NICE_RATES, key=lambda rate: abs(np.log(rate * film_s / fall_s)))
 
 
 def shown_clock(
@@ -29,6 +28,14 @@ def shown_clock(
     times = hit_times(fall, stops, material)
     slow = [Slow(time, SLOW_PART * rate) for time in times]
     return film_clock(begin_s, end_s, rate=rate, slow=slow, freezes=[Freeze(time, request.freeze_s) for time in times])
+
+
+def lasting_clock(
+    material: Material, fall: Fall, span_s: tuple[float, float], film_s: float, stops: tuple[int, ...]
+) -> FilmClock:
+    """The clock with stops whose film lasts about so long, of those whose rates read well."""
+    clocks = [shown_clock(material, fall, span_s, rate, stops) for rate in NICE_RATES]
+    return min(clocks, key=lambda clock: abs(np.log(clock.duration_s / film_s)))
 
 
 def hit_times(fall: Fall, impacts: tuple[int, ...], material: Material) -> list[float]:

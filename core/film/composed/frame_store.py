@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The frames of a film as pictures in a folder, which a render that was ended goes on with.
+
+A frame is there as a whole or not at all. The folder says of what it is; frames of anything else are removed.
+"""
+
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ...errors import InputError
+from ...file_locks import try_lock
+from ...opencv import opencv
+from ...output import write_bytes, write_text
+from ...progress import Progress
+from .canvas import Picture
+
+STATED = "film.json"
+LOCK = ".lock"
+COMPRESSION = 1
+"""Of PNG: a film's frames are written once and read once."""
+
+
+class FrameStore:
+    """A folder of frames; made by `frame_store`.
+
+    Attributes
+    ----------
+    folder : where they lie.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def file(self, frame: int) -> Path:
+        """Of a frame."""
+        return self.folder / f"{frame:06d}.png"
+
+    def fill(self, frames: Sequence[int], draw: Callable[[int], Picture], progress: Progress) -> int:
+        """Draw the frames that are missing.
+
+        Returns
+        -------
+        How many were there.
+
+        Raises
+        ------
+        InputError : a frame cannot be written: the disk is full. Those that are finished stay.
+        """
+        missing = [frame for frame in frames if not self.file(frame).is_file()]
+        there = len(frames) - len(missing)
+        for done, frame in enumerate(missing, start=there + 1):
+            _, data = opencv().imencode(".png", draw(frame), [opencv().IMWRITE_PNG_COMPRESSION, COMPRESSION])
+            try:
+                write_bytes(self.file(frame), data.tobytes())
+            except InputError as error:
+                kept = f"{done - 1} of {len(frames)} frames are finished and kept in {self.folder}: run it again to go on"
+                raise InputError(f"{error.problem}. {kept}", file=error.file, advice=error.advice) from error
+            progress("Drawing frames", done, len(frames))
+        return there
+
+    def remove(self) -> None:
+        """Remove the frames and the folder."""
+        for file in self.folder.glob("[0-9]*.png"):
+            file.unlink()
+        (self.folder / STATED).unlink(missing_ok=True)
+        with suppress(OSError):
+            (self.folder / LOCK).unlink()
+            self.folder.rmdir()
+
+
+@contextmanager
+def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]:
+    """The frames of a film in a folder, for this process alone.
+
+    Parameters
+    ----------
+    states : all that decides the frames.
+
+    Raises
+    ------
+    InputError : the folder cannot be made or holds other things, or another process is drawing into it.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
+    except OSError as error:
+        raise InputError(f"The frames cannot be written ({error.strerror})", file=folder, advice="Choose another folder with --out") from error
+    try:
+        if not try_lock(lock):
+            raise InputError("Another run of Rockfall is drawing these frames", file=folder, advice="Wait until it has ended")
+        _prepare(folder, json.dumps(states, indent=2, sort_keys=True))
+        yield FrameStore(folder)
+    finally:
+        os.close(lock)
+
+
+def _prepare(folder: Path, states: str) -> None:
+    stated = folder / STATED
+    strangers = [file.name for file in folder.iterdir() if not (file.name in (STATED, LOCK) or (file.stem.isdigit() and file.suffix == ".png"))]
+    if strangers and not stated.is_file():
+        raise InputError(f"The folder for the frames holds other files ({strangers[0]})", file=folder, advice="Choose another folder with --out")
+    try:
+        same = stated.read_text(encoding="utf-8") == states
+    except (OSError, UnicodeDecodeError):
+        same = False
+    if not same:
+        for file in folder.glob("[0-9]*.png"):
+            file.unlink()
+        write_text(stated, states)

@@ -58,7 +58,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
     render_film.add_arguments(parser)
     picture = parser.add_mutually_exclusive_group()
-    picture.add_argument("--still", action="store_true", help="one picture instead: of the last frame (with --film of the middle one), or of frame A")
+    picture.add_argument(
+        "--still",
+        action="store_true",
+        help="one picture instead: of the last frame (with --film of the middle one), or of frame A",
+    )
     picture.add_argument("--slope", action="store_true", help="one picture instead: of the whole slope with all paths")
 
 

@@ -26,18 +26,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "drawn without Blender, which only encodes them (default preset: 720p)",
     )
     group.add_argument("--language", metavar="LANG", help="of the texts: en (the default), fr or de")
-    group.add_argument("--rate", type=positive, metavar="R", help="seconds of the fall in a second of film (0.25: four times slower)")
-    group.add_argument("--slow-at", type=_impacts, metavar="N,N", help='impacts at which the film slows down and stands still; "none" for none')
-    group.add_argument("--freeze", type=not_negative, metavar="S", help="how long it stands still there [s] (default 0.5)")
+    group.add_argument(
+        "--rate", type=positive, metavar="R", help="seconds of the fall in a second of film (0.25: four times slower)"
+    )
+    group.add_argument(
+        "--slow-at",
+        type=_impacts,
+        metavar="N,N",
+        help='impacts at which the film slows down and stands still; "none" for none',
+    )
+    group.add_argument(
+        "--freeze", type=not_negative, metavar="S", help="how long it stands still there [s] (default 0.5)"
+    )
     group.add_argument("--video", metavar="NAME", help="of the project (default: the first with a camera)")
     group.add_argument("--trajectory", action="append", metavar="NAME", help="show only this one; may be repeated")
     group.add_argument(
-        "--block", metavar="SOLID", help="what stands for the block: rock (the default), sphere, ellipsoid, box, eota_111, eota_221, or the file of a scanned one"
+        "--block",
+        metavar="SOLID",
+        help="what stands for the block: rock (the default), sphere, ellipsoid, box, eota_111, eota_221, "
+        "or the file of a scanned one",
     )
-    group.add_argument("--sun", type=_sun, metavar="AZ,EL", help="azimuth from north and elevation of the sun [°] (default 315,50)")
+    group.add_argument(
+        "--sun", type=_sun, metavar="AZ,EL", help="azimuth from north and elevation of the sun [°] (default 315,50)"
+    )
     group.add_argument("--dust", action="store_true", help="impacts raise dust: drawn, not measured")
     group.add_argument("--codec", metavar="CODEC", help="h264 (the default), h265 or av1, where this Blender writes it")
-    group.add_argument("--images", action="store_true", help="keep the frames as pictures, in a folder, instead of a film")
+    group.add_argument(
+        "--images", action="store_true", help="keep the frames as pictures, in a folder, instead of a film"
+    )
 
 
 def refuse_without_film(arguments: argparse.Namespace) -> None:
@@ -49,7 +65,9 @@ def refuse_without_film(arguments: argparse.Namespace) -> None:
     """
     for name in OWN:
         if getattr(arguments, name) not in (None, False):
-            raise InputError(f"--{name.replace('_', '-')} is of composed films", advice="Add --film and a name, as --film overlay")
+            raise InputError(
+                f"--{name.replace('_', '-')} is of composed films", advice="Add --film and a name, as --film overlay"
+            )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,7 +76,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     for name in ("simulate", "slope", "engine"):
         if getattr(arguments, name):
-            raise InputError(f"--{name} is not of composed films", advice="Leave it out; --model names the models of --film")
+            raise InputError(
+                f"--{name} is not of composed films", advice="Leave it out; --model names the models of --film"
+            )
     request = _request(arguments)
     with PrintedProgress() as progress:
         made = make_film(
@@ -69,7 +89,10 @@ def run(arguments: argparse.Namespace) -> int:
         print(remark)
     if made.kept:
         print(f"{made.kept} of {made.frames} frames were there from an earlier run")
-    print(f"{made.size[0]}×{made.size[1]}" + (f", {made.frames} frames, {made.frames / request.fps:.1f} s" if made.frames > 1 else ""))
+    print(
+        f"{made.size[0]}×{made.size[1]}"
+        + (f", {made.frames} frames, {made.frames / request.fps:.1f} s" if made.frames > 1 else "")
+    )
     print(f"Written: {made.file}")
     return 0
 

@@ -11,18 +11,21 @@ from ..footage.clock import Clock
 from ..georeference import GlobalShift
 from ..reconstruction.picks import Picks
 from ..reconstruction.refinement.views import View
+from ..reconstruction.trajectory import Reconstruction
+from ..remarks import Remark
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices
 from ..workflow.first_picks import first_picks
 from ..workflow.sightings import NO_EVENTS, NO_SIGHTINGS, SeenVideo
 from .cameras import CameraFile
 from .footage_tables import EventTable, Track, read_events, read_track
-from .opening import block_of, read_project_camera
+from .opening import block_of, read_project_camera, reconstruct_project
 from .project import Project, VideoEntry
 
 MARGIN = 0.1
 """A tracked block may leave the image by this part of its size."""
 
+UNREFINED = "The project has no picks: its paths join the impacts seen in the videos, and are not refined."
 EXAMPLE = 'name = "left", camera = "camera.toml", track = "track.csv", offset_s = 0.0'
 
 
@@ -163,6 +166,19 @@ def picks_from_footage(project: Project, surface: Surface | None, *, name: str =
             'velocity nowhere: add [picks] file = "picks.csv", or events = "events.csv" to its [[videos]].'
         )
     return found.picks
+
+
+def measured_in(project: Project, surface: Surface | None) -> Reconstruction:
+    """As `reconstruct_project`; where there are no picks, from the impacts seen in the videos, which a remark says.
+
+    Raises
+    ------
+    RockfallError : see `reconstruct_project` and `picks_from_footage`.
+    """
+    if project.picks is not None or all(video.events is None for video in project.videos):
+        return reconstruct_project(project, surface)
+    made = reconstruct_project(project, surface, picks_from_footage(project, surface))
+    return replace(made, remarks=(Remark(UNREFINED, about="picks"), *made.remarks))
 
 
 def clock_of(entry: VideoEntry, frame: Indices, time_s: Array) -> Clock:

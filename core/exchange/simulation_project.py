@@ -26,6 +26,7 @@ from ..terrain.opening import HowToRead
 from ..terrain.readers import read_structure, read_tile_points
 from ..terrain.surface import Surface
 from ..workflow.simulation import ReleaseSource, Scenario
+from .footage import measured_in
 from .opening import open_terrain, read_project_picks, reconstruct_project
 from .parameters import checked_parameters
 from .posterior_tables import posteriors_of
@@ -169,7 +170,7 @@ def placed_source(entry: SimulationEntry, block: BlockEntry) -> ReleaseSource:
 
 def _measured(project: Project, terrain: Surface, entry: ReleaseEntry) -> Reconstruction:
     if not entry.trajectory:
-        return reconstruct_project(project, terrain)
+        return measured_in(project, terrain)
     picks, _ = read_project_picks(project, terrain)
     onward = picks.trajectory == entry.trajectory
     if not onward.any():

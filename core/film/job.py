@@ -23,7 +23,7 @@ class FilmJob:
     Attributes
     ----------
     kind : "film" (MP4); "still" (one frame of the film, PNG); "slope" (the whole slope with all trajectories, PNG);
-        "terrain" (a terrain file without trajectories, PNG); "frames" (pictures of a folder, named by their number, MP4).
+        "terrain" (a terrain file without trajectories, PNG); "frames" (numbered pictures of a folder, MP4).
     source : the project; a .blend, whose film or still is as its settings say; for "terrain" the terrain file, for
         "frames" the folder.
     out : the file to write.

@@ -12,7 +12,7 @@ import numpy as np
 from ...camera.model import Camera, project, rays
 from ...terrain.raycast import any_hit, cast_rays
 from ...terrain.surface import Surface
-from ...vectors import Array, norm, unit
+from ...vectors import Array, cross, norm, unit
 from .canvas import Canvas
 from .look import INK, Colour
 from .sight import LEAST_SLACK_M
@@ -26,6 +26,7 @@ SUN_POINTS = 5
 SUBPIXELS, BLURRED_SUBPIXELS = 4, 2
 """Rays across and down a pixel; where the block moves, less for each of the moments."""
 ROUND_RIM = 48
+UPRIGHT = 0.9
 LARGEST_WINDOW = 900
 """A block that fills more pixels across is drawn with one ray a pixel."""
 
@@ -136,9 +137,9 @@ def _squares(solid: Surface) -> Array:
 
 def _circle(axis: Array, points: int = ROUND_RIM) -> Array:
     """(n, 3) unit vectors at right angles to an axis."""
-    aside = unit(np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0]))
+    aside = unit(cross(axis, np.eye(3)[2 if abs(axis[2]) < UPRIGHT else 0]))
     angle = np.linspace(0.0, 2 * np.pi, points, endpoint=False)[:, None]
-    return np.cos(angle) * aside + np.sin(angle) * np.cross(axis, aside)
+    return np.cos(angle) * aside + np.sin(angle) * cross(axis, aside)
 
 
 def _pixels_about(seen: Array, around: float, canvas: Canvas) -> tuple[int, int, int, int] | None:

@@ -56,10 +56,7 @@ class Box:
     def meets(self, other: "Box") -> bool:
         """Whether they share a place."""
         return (
-            self.left < other.right
-            and other.left < self.right
-            and self.top < other.bottom
-            and other.top < self.bottom
+            self.left < other.right and other.left < self.right and self.top < other.bottom and other.top < self.bottom
         )
 
 
@@ -140,11 +137,18 @@ class Canvas:
         height, width = mask.shape
         self._blend(mask, (left, top, left + width, top + height), colour, opacity)
 
-    def panel(self, box: Box, colour: Colour = INK, opacity: float = PANEL_OPACITY, radius: float | None = None) -> None:
+    def panel(
+        self, box: Box, colour: Colour = INK, opacity: float = PANEL_OPACITY, radius: float | None = None
+    ) -> None:
         """A rectangle with round corners, on which text is read on any picture."""
         r = min(ROUND * self.look.body if radius is None else radius, box.width / 2, box.height / 2)
         quarter = np.linspace(0.0, np.pi / 2, 7)
-        corners = ((box.right - r, box.top + r), (box.left + r, box.top + r), (box.left + r, box.bottom - r), (box.right - r, box.bottom - r))
+        corners = (
+            (box.right - r, box.top + r),
+            (box.left + r, box.top + r),
+            (box.left + r, box.bottom - r),
+            (box.right - r, box.bottom - r),
+        )
         outline = [
             np.array(centre) + r * np.column_stack([np.cos(quarter + i * np.pi / 2), -np.sin(quarter + i * np.pi / 2)])
             for i, centre in enumerate(corners)
@@ -190,7 +194,9 @@ class Canvas:
         self.picture[top : top + height, left : left + width] = other.picture
         for one in other.written:
             box = one.box
-            self.written.append(Written(one.text, Box(box.left + left, box.top + top, box.right + left, box.bottom + top)))
+            self.written.append(
+                Written(one.text, Box(box.left + left, box.top + top, box.right + left, box.bottom + top))
+            )
 
     def _mask(self, box: tuple[int, int, int, int]) -> tuple[np.ndarray, Array]:
         left, top, right, bottom = box

@@ -45,13 +45,15 @@ class FilmKind:
 
 
 FILMS = (
-    FilmKind("story", "Story", "About 40 s: the footage, the path, the same impact by models, whole simulated falls, all traces",
+    FilmKind("story", "Story", "Footage, path, the same impact by models, whole falls, all traces",
              compose=story),
     FilmKind("overlay", "Overlay", "The path of the block over the footage", needs_terrain=False, compose=overlay),
-    FilmKind("side_by_side", "Side by Side", "Footage and reconstruction, seen by the same camera", compose=side_by_side),
+    FilmKind("side_by_side", "Side by Side", "Footage and reconstruction, seen by the same camera",
+             compose=side_by_side),
     FilmKind("fly_along", "Fly Along", "Behind the block, down the slope", needs_footage=False, compose=fly_along),
     FilmKind("turntable", "Turntable", "Once around the site", needs_footage=False, compose=turntable),
-    FilmKind("vertical", "Vertical", "9:16 for phones: the footage follows the block, the site below", compose=vertical),
+    FilmKind("vertical", "Vertical", "9:16 for phones: the footage follows the block, the site below",
+             compose=vertical),
     FilmKind("contact_sheet", "Contact Sheet", "A picture: each impact as the video shows it, with its numbers",
              needs_terrain=False, draw=contact_sheet),
     FilmKind("stroboscopic", "Stroboscopic Picture", "A picture: the block at successive times", draw=stroboscopic),

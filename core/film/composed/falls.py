@@ -38,7 +38,7 @@ class Hits:
     rn : (k,) [-].
     """
 
-    number: Array
+    number: Indices
     time_s: Array
     position: Array
     speed1_mps: Array
@@ -72,7 +72,7 @@ class Fall:
     time_s: Array
     position: Array
     velocity: Array
-    chain: Array
+    chain: Indices
     diameters_m: Array
     mass_kg: float
     hits: Hits | None = None
@@ -120,7 +120,7 @@ class Fall:
         return np.insert(time, breaks, np.nan), np.insert(place, breaks, np.nan, axis=0)
 
     def turn(self, moment_s: float) -> Array:
-        """(3, 3) from the block's axes to the world: by its spin where that is known, else as if it rolled over ground."""
+        """(3, 3) from the block's axes to the world: by its spin where that is known, else rolling."""
         i = int(np.clip(np.searchsorted(self.time_s, moment_s, side="right") - 1, 0, self.time_s.size - 1))
         more = (np.clip(moment_s, self.time_s[0], self.time_s[-1]) - self.time_s[i]) * self._turning[i]
         return rotation_from_vector(more) @ self._turns[i]
@@ -136,7 +136,8 @@ class Fall:
         rolling = np.cross(UP, self.velocity) / self.radius_m
         if self.spin is None:
             return rolling
-        return np.where(np.isfinite(self.spin).all(axis=1)[:, None], self.spin, rolling)
+        known = np.asarray(np.isfinite(self.spin).all(axis=1))
+        return np.where(known[:, None], self.spin, rolling)
 
     @cached_property
     def _turns(self) -> Array:
@@ -187,7 +188,8 @@ def simulated_falls(
         name = str(samples.trajectory[begin])
         falls.append(
             Fall(
-                f"{name} {samples.run[begin]}", group, colour, time + starts_s.get(name, 0.0), samples.position[begin:end],
+                f"{name} {samples.run[begin]}", group, colour, time + starts_s.get(name, 0.0),
+                samples.position[begin:end],
                 samples.velocity[begin:end], np.zeros(end - begin, np.intp), releases.axes_m[i],
                 float(releases.mass_kg[i]), None, records.omega2[at],
             )
@@ -196,7 +198,11 @@ def simulated_falls(
 
 
 def predicted_falls(
-    flights: PredictedFlights, rows: Indices, blocks: Mapping[str, Block], titles: Mapping[str, str], colours: Mapping[str, Colour]
+    flights: PredictedFlights,
+    rows: Indices,
+    blocks: Mapping[str, Block],
+    titles: Mapping[str, str],
+    colours: Mapping[str, Colour],
 ) -> tuple[Fall, ...]:
     """Blocks that leave measured impacts as models say, to where they land.
 
@@ -207,7 +213,11 @@ def predicted_falls(
     """
     falls = []
     for row in rows.tolist():
-        model, duration, block = str(flights.model[row]), float(flights.duration_s[row]), blocks[str(flights.trajectory[row])]
+        model, duration, block = (
+            str(flights.model[row]),
+            float(flights.duration_s[row]),
+            blocks[str(flights.trajectory[row])],
+        )
         since = np.linspace(0.0, duration, max(int(np.ceil(duration / STEP_S)), 1) + 1) if duration > 0 else np.zeros(2)
         start = float(flights.time_s[row])
         place, velocity = flights.states(np.full(since.size, row), start + since)
@@ -222,8 +232,12 @@ def predicted_falls(
 
 
 def falls_of(samples: TrajectorySamples, blocks: dict[str, Block], group: str, colour: Colour) -> tuple[Fall, ...]:
-    """The blocks of a table of motion: for measured ones a run is a stretch without gaps, for simulated ones a block."""
-    keys = samples.trajectory if not group else np.char.add(np.char.add(samples.trajectory.astype(str), " "), samples.run.astype(str))
+    """The blocks of a table of motion: a run is a stretch without gaps of a measured one, or a simulated one."""
+    keys = (
+        samples.trajectory
+        if not group
+        else np.char.add(np.char.add(samples.trajectory.astype(str), " "), samples.run.astype(str))
+    )
     _, first, which = np.unique(keys, return_index=True, return_inverse=True)
     order = np.argsort(which, kind="stable")
     ends = np.cumsum(np.bincount(which))
@@ -264,7 +278,8 @@ def _with_hits(fall: Fall, result: Reconstruction) -> Fall:
     return replace(
         fall,
         hits=Hits(
-            impacts.impact[rows], impacts.time_s[rows], position.reshape(-1, 3), norm(impacts.v1[rows]), norm(impacts.v2[rows]),
+            impacts.impact[rows], impacts.time_s[rows], position.reshape(-1, 3), norm(impacts.v1[rows]),
+            norm(impacts.v2[rows]),
             impacts.kinetic1_j[rows], impacts.kinetic2_j[rows], impacts.rn[rows],
         ),
     )  # fmt: skip

@@ -110,7 +110,10 @@ def film_clock(
     """
     slow = tuple(slow)
     if not (np.isfinite([start_s, end_s]).all() and end_s > start_s):
-        raise InputError(f"A film from {start_s:g} to {end_s:g} s of the fall shows nothing", advice="Give it an end later than its start")
+        raise InputError(
+            f"A film from {start_s:g} to {end_s:g} s of the fall shows nothing",
+            advice="Give it an end later than its start",
+        )
     wrong = [one for one in (rate, *(each.rate for each in slow)) if not (np.isfinite(one) and one > 0)]
     if wrong:
         raise InputError(f"A film cannot run at {wrong[0]:g} times the speed of the fall", advice="Give a rate above 0")

@@ -80,5 +80,4 @@ def warped(picture: Picture, matrix: np.ndarray, size: tuple[int, int]) -> Pictu
             inner[i, 2] = corner + (inner[i, i] - 1) / 2
         made: Picture = cv2.warpAffine(small, inner, size, flags=cv2.INTER_LINEAR)
         return made
-    made = cv2.warpAffine(picture, matrix, size, flags=cv2.INTER_CUBIC)
-    return made
+    return cv2.warpAffine(picture, matrix, size, flags=cv2.INTER_CUBIC)

@@ -56,7 +56,9 @@ class FrameStore:
             try:
                 write_bytes(self.file(frame), data.tobytes())
             except InputError as error:
-                kept = f"{done - 1} of {len(frames)} frames are finished and kept in {self.folder}: run it again to go on"
+                kept = (
+                    f"{done - 1} of {len(frames)} frames are finished and kept in {self.folder}: run it again to go on"
+                )
                 raise InputError(f"{error.problem}. {kept}", file=error.file, advice=error.advice) from error
             progress("Drawing frames", done, len(frames))
         return there
@@ -87,10 +89,14 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
         folder.mkdir(parents=True, exist_ok=True)
         lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
     except OSError as error:
-        raise InputError(f"The frames cannot be written ({error.strerror})", file=folder, advice="Choose another folder with --out") from error
+        raise InputError(
+            f"The frames cannot be written ({error.strerror})", file=folder, advice="Choose another folder with --out"
+        ) from error
     try:
         if not try_lock(lock):
-            raise InputError("Another run of Rockfall is drawing these frames", file=folder, advice="Wait until it has ended")
+            raise InputError(
+                "Another run of Rockfall is drawing these frames", file=folder, advice="Wait until it has ended"
+            )
         _prepare(folder, json.dumps(states, indent=2, sort_keys=True))
         yield FrameStore(folder)
     finally:
@@ -99,9 +105,17 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
 
 def _prepare(folder: Path, states: str) -> None:
     stated = folder / STATED
-    strangers = [file.name for file in folder.iterdir() if not (file.name in (STATED, LOCK) or (file.stem.isdigit() and file.suffix == ".png"))]
+    strangers = [
+        file.name
+        for file in folder.iterdir()
+        if not (file.name in (STATED, LOCK) or (file.stem.isdigit() and file.suffix == ".png"))
+    ]
     if strangers and not stated.is_file():
-        raise InputError(f"The folder for the frames holds other files ({strangers[0]})", file=folder, advice="Choose another folder with --out")
+        raise InputError(
+            f"The folder for the frames holds other files ({strangers[0]})",
+            file=folder,
+            advice="Choose another folder with --out",
+        )
     try:
         same = stated.read_text(encoding="utf-8") == states
     except (OSError, UnicodeDecodeError):

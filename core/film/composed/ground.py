@@ -117,7 +117,13 @@ def _sampled(picture: Picture, where: Array) -> Picture:
     """(n, 3) of a picture at pixels (n, 2), in rows that are not too long for OpenCV."""
     cv2, n = opencv(), len(where)
     grid = np.resize(where - 0.5, (-(-n // ROW), ROW, 2)).astype(np.float32)
-    found: Picture = cv2.remap(picture, np.ascontiguousarray(grid[..., 0]), np.ascontiguousarray(grid[..., 1]), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    found: Picture = cv2.remap(
+        picture,
+        np.ascontiguousarray(grid[..., 0]),
+        np.ascontiguousarray(grid[..., 1]),
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
     return found.reshape(-1, 3)[:n]
 
 

@@ -114,4 +114,8 @@ def _span(film: ComposedFilm, frames: tuple[int, int] | None) -> tuple[int, int]
 def _states(request: FilmRequest) -> dict[str, object]:
     """All that decides the frames."""
     hashes = input_hashes(input_files(request.project, [request.solid]))
-    return {"request": request.to_json(), "inputs": hashes, "digest": digest_of("render", [request.to_json()], hashes, versions())}
+    return {
+        "request": request.to_json(),
+        "inputs": hashes,
+        "digest": digest_of("render", [request.to_json()], hashes, versions()),
+    }

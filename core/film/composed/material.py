@@ -11,8 +11,8 @@ import numpy as np
 from ...analysis.comparison import compare
 from ...analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...errors import InputError
-from ...exchange.footage import clock_of
-from ...exchange.opening import blocks_of, open_project, read_project_camera
+from ...exchange.footage import UNREFINED, clock_of, measured_in
+from ...exchange.opening import blocks_of, open_terrain, read_project_camera
 from ...exchange.project import Project, VideoEntry, read_project
 from ...footage.video import open_video
 from ...impact_models.registry import COMPARED, find_model
@@ -130,7 +130,8 @@ class Material:
             first, last = (self.footage.frame(moment) for moment in self.span_s)
             frames = np.unique(np.linspace(first, last, PHOTOGRAPHS).astype(np.intp)).tolist()
             photographs = tuple(
-                Photograph(self.footage.picture(frame), self.footage.camera(self.footage.moment(frame))) for frame in frames
+                Photograph(self.footage.picture(frame), self.footage.camera(self.footage.moment(frame)))
+                for frame in frames
             )
         return lit_ground(self.terrain, self.sun, photographs)
 
@@ -225,7 +226,9 @@ def open_material(request: FilmRequest, progress: Progress = silent) -> Material
     progress("Reading the project", 0, 0)
     words = texts(request.language)
     project = read_project(request.project)
-    surface, result = open_project(project)
+    surface = open_terrain(project)
+    result = measured_in(project, surface)
+    remarks = [UNREFINED] if any(remark.text == UNREFINED for remark in result.remarks) else []
     footage = _footage(project, surface, request.video, progress)
     known = list(dict.fromkeys(result.picks.trajectory.tolist()))
     wrong = [name for name in request.trajectories if name not in known]
@@ -244,7 +247,7 @@ def open_material(request: FilmRequest, progress: Progress = silent) -> Material
             f"There is no solid and no file {request.solid!r}",
             advice=f"Give --block one of {', '.join(SOLIDS)}, or the file of a scanned block",
         )
-    material = Material(request, project, surface, result, falls, footage, words, progress)
+    material = Material(request, project, surface, result, falls, footage, words, progress, remarks)
     if footage is not None and not any(overlaps(fall, footage) for fall in falls):
         raise InputError(
             f"The video {footage.name!r} shows none of the measured blocks: it lasts from {footage.span_s[0]:.2f} to "
@@ -280,7 +283,8 @@ def _footage(project: Project, surface: Surface | None, asked: str, progress: Pr
     if (camera.path.reference.width, camera.path.reference.height) != (video.width, video.height):
         ours = camera.path.reference
         raise InputError(
-            f"The camera is of a picture of {ours.width} × {ours.height} pixels, the video has {video.width} × {video.height}",
+            f"The camera is of a picture of {ours.width} × {ours.height} pixels, "
+            f"the video has {video.width} × {video.height}",
             file=entry.camera, advice="Align the video again, or name the other file",
         )  # fmt: skip
     return Footage(entry.name, video, camera.path, clock_of(entry, np.arange(video.frames), video.time_s))

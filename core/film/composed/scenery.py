@@ -13,7 +13,7 @@ from ...vectors import Array, Mask
 from ..simulated import path_opacity
 from .blocks import Pose, block_pixels, draw_block, draw_shadow, sun_direction
 from .canvas import Anchor, Box, Canvas, text_width
-from .falls import Fall
+from .falls import UP, Fall
 from .look import INK, MEASURED, PAPER, STRONG, Colour
 from .sight import pixel_size, visible
 from .solids import solid
@@ -28,6 +28,7 @@ BLUR_FROM_PX = 1.5
 """A block that moves less during the exposure is drawn sharp."""
 LEAST_SOLID_PX = 2.5
 """A simulated block of a smaller radius is a disc."""
+NORTH = np.array([0.0, 1.0, 0.0])
 PERSON_M = 1.75
 PERSON = (
     # Half of the outline of somebody who stands: across and up, in heights.
@@ -50,6 +51,7 @@ class Scene:
     sun : (3,) unit vector towards it.
     seed : of angular blocks.
     body : the scanned block that stands for all.
+    traced : where the paths lie in a picture.
     """
 
     terrain: Surface | None
@@ -58,7 +60,7 @@ class Scene:
     sun: Array = field(default_factory=lambda: sun_direction(315.0, 50.0))
     seed: int = 0
     body: Surface | None = None
-    _traced: "_Traced" = field(default_factory=lambda: _Traced())
+    traced: "Traced" = field(default_factory=lambda: Traced())
 
     def solid_of(self, fall: Fall) -> Surface:
         """What is drawn for a block."""
@@ -70,7 +72,7 @@ def _solid(kind: str, diameters_m: tuple[float, ...], seed: int) -> Surface:
     return solid(kind, np.array(diameters_m), seed)
 
 
-class _Traced:
+class Traced:
     """Where the paths lie in the picture of the camera that was asked for last."""
 
     def __init__(self) -> None:
@@ -97,7 +99,9 @@ def draw_paths(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) ->
     for colour in dict.fromkeys(fall.colour for fall in others):
         shown = [_seen_path(canvas, camera, scene, fall, moment_s)[0] for fall in others if fall.colour == colour]
         many = len(shown) > 3
-        canvas.lines(shown, colour, look.thin if many else look.line, max(path_opacity(len(shown)), 0.12) if many else 0.9)
+        canvas.lines(
+            shown, colour, look.thin if many else look.line, max(path_opacity(len(shown)), 0.12) if many else 0.9
+        )
     for fall in (fall for fall in scene.falls if fall.is_measured):
         seen, hidden = _seen_path(canvas, camera, scene, fall, moment_s)
         canvas.dashes(hidden, fall.colour, look.thin, 6.0 * look.line, HIDDEN_OPACITY)
@@ -110,11 +114,12 @@ def _seen_path(canvas: Canvas, camera: Camera, scene: Scene, fall: Fall, moment_
     known = int(np.searchsorted(fall.time_s, moment_s, side="right"))
     if not known:
         return np.empty((0, 2)), np.empty((0, 2))
-    where, seen = (values[:known] for values in scene._traced.of(scene, camera, fall))
+    where, seen = scene.traced.of(scene, camera, fall)
+    where, seen = where[:known], seen[:known]
     chain, now = fall.chain[:known], fall.state(moment_s)
     if now is not None and fall.time_s[known - 1] < moment_s:
-        where, seen = np.vstack([where, project(camera, now[0][None])]), np.r_[seen, seen[-1]]
-        chain = np.r_[chain, chain[-1]]
+        where, seen = np.vstack([where, project(camera, now[0][None])]), np.append(seen, seen[-1])
+        chain = np.append(chain, chain[-1])
     breaks = np.flatnonzero(np.diff(chain)) + 1
     where, seen = np.insert(where, breaks, np.nan, axis=0), np.insert(seen, breaks, False)
     joined = seen.copy()  # the first hidden point ends the line that is seen, so that no gap opens
@@ -154,7 +159,9 @@ def draw_blocks(
                 canvas.disc(centre, max(radius, 1.2 * look.thin), fall.colour)
             continue
         if measured or not fall.is_measured:
-            draw_block(canvas, camera, scene.terrain, body, _poses(camera, fall, moment_s, frame_s), fall.colour, scene.sun)
+            draw_block(
+                canvas, camera, scene.terrain, body, _poses(camera, fall, moment_s, frame_s), fall.colour, scene.sun
+            )
         small = radius < look.least_mark
         if small or (fall.is_measured and not measured):
             size = max(radius + 1.5 * look.line, look.least_mark if fall.is_measured else 0.6 * look.least_mark)
@@ -183,7 +190,10 @@ def draw_impacts(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) 
         if fall.hits is None or not len(fall.hits.time_s):
             continue
         past = fall.hits.time_s <= moment_s + 1e-6
-        where, seen = project(camera, fall.hits.position), visible(scene.terrain, camera, fall.hits.position, 2 * fall.radius_m)
+        where, seen = (
+            project(camera, fall.hits.position),
+            visible(scene.terrain, camera, fall.hits.position, 2 * fall.radius_m),
+        )
         for place in where[past & seen & np.isfinite(where[:, 0])]:
             canvas.disc(place, 2.2 * look.line, INK, 0.7)
             canvas.disc(place, 1.5 * look.line, fall.colour)
@@ -191,7 +201,7 @@ def draw_impacts(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) 
 
 def draw_person(canvas: Canvas, camera: Camera, foot: Array, words: Texts) -> Box | None:
     """Somebody of 1.75 m who stands at a place (3,), with the height beside; None where too small to be read."""
-    ends = project(camera, np.array([foot, foot + [0.0, 0.0, PERSON_M]]))
+    ends = project(camera, np.array([foot, foot + PERSON_M * UP]))
     if not np.isfinite(ends).all():
         return None
     up = ends[1] - ends[0]
@@ -216,7 +226,7 @@ def draw_person(canvas: Canvas, camera: Camera, foot: Array, words: Texts) -> Bo
 
 def north_on_picture(camera: Camera, place: Array, length_m: float = 1.0) -> Array | None:
     """(2,) unit vector of the picture that leads north from a place; None where it leads straight away."""
-    ends = project(camera, np.array([place, place + [0.0, length_m, 0.0]]))
+    ends = project(camera, np.array([place, place + length_m * NORTH]))
     step = ends[1] - ends[0]
     size = float(np.hypot(*step))
     return step / size if np.isfinite(size) and size > 1e-6 else None
@@ -262,7 +272,9 @@ def draw_badge(canvas: Canvas, lines: Sequence[str], right: float, bottom: float
     box = Box(right - width - pad, bottom - len(lines) * step - pad, right, bottom)
     canvas.panel(box)
     for i, (line, weight) in enumerate(zip(lines, weights, strict=True)):
-        canvas.text(line, box.right - 1.5 * pad, box.top + pad / 2 + (i + 0.72) * step, look.body, weight=weight, anchor="right")
+        canvas.text(
+            line, box.right - 1.5 * pad, box.top + pad / 2 + (i + 0.72) * step, look.body, weight=weight, anchor="right"
+        )
     return box
 
 
@@ -294,8 +306,6 @@ def scale_length(camera: Camera, place: Array, wanted_px: float) -> tuple[float,
     return length, length * size
 
 
-
-
 def draw_scale(canvas: Canvas, camera: Camera, place: Array, words: Texts) -> Box | None:
     """A bar of a round length as it is at a place, at the upper right; None where it cannot be said."""
     look = canvas.look
@@ -304,7 +314,7 @@ def draw_scale(canvas: Canvas, camera: Camera, place: Array, words: Texts) -> Bo
         return None
     right, y = canvas.look.width - look.margin, look.margin + 2.6 * look.body
     ends = np.array([[right - size, y], [right, y]])
-    ticks = [np.array([end - [0, 0.3 * look.body], end + [0, 0.3 * look.body]]) for end in ends]
+    ticks = [end + 0.3 * look.body * np.array([[0.0, -1.0], [0.0, 1.0]]) for end in ends]
     for colour, width in ((INK, look.line + 2 * look.thin + 1), (PAPER, look.line)):
         canvas.lines([ends, *ticks], colour, width, 0.9 if colour is PAPER else HALO_OPACITY)
     text = words.say("metres", length=words.number(length, 1))
@@ -323,7 +333,14 @@ def draw_north(canvas: Canvas, camera: Camera, place: Array, words: Texts) -> No
     centre = np.array([canvas.look.width - look.margin - size, look.margin + 4.6 * look.body + size])
     aside = np.array([-way[1], way[0]])
     tip = centre + 0.8 * size * way
-    head = np.array([tip, tip - 0.55 * size * way + 0.28 * size * aside, tip - 0.4 * size * way, tip - 0.55 * size * way - 0.28 * size * aside])
+    head = np.array(
+        [
+            tip,
+            tip - 0.55 * size * way + 0.28 * size * aside,
+            tip - 0.4 * size * way,
+            tip - 0.55 * size * way - 0.28 * size * aside,
+        ]
+    )
     tail = np.array([tip - 0.4 * size * way, centre - 0.8 * size * way])
     for colour, grow, opacity in ((INK, 2 * look.thin + 1, HALO_OPACITY), (PAPER, 0, 0.95)):
         canvas.lines([tail], colour, look.line + grow, opacity)
@@ -339,7 +356,16 @@ def _haloed(canvas: Canvas, text: str, x: float, baseline: float, size: int, anc
     """Type that is read on any ground without a panel."""
     before = len(canvas.written)
     for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1), (1, 1), (-1, -1)):
-        canvas.text(text, x + dx * canvas.look.thin, baseline + dy * canvas.look.thin, size, INK, weight=STRONG, anchor=anchor, opacity=0.45)
+        canvas.text(
+            text,
+            x + dx * canvas.look.thin,
+            baseline + dy * canvas.look.thin,
+            size,
+            INK,
+            weight=STRONG,
+            anchor=anchor,
+            opacity=0.45,
+        )
     del canvas.written[before:]
     canvas.text(text, x, baseline, size, PAPER, weight=STRONG, anchor=anchor)
 
@@ -357,7 +383,9 @@ def draw_dust(canvas: Canvas, camera: Camera, scene: Scene, moment_s: float) -> 
         for i in np.flatnonzero((since >= 0) & (since < DUST_S)).tolist():
             place = fall.hits.position[i]
             lost = fall.hits.energy1_j[i] - np.nan_to_num(fall.hits.energy2_j[i])
-            if not (np.isfinite(lost) and lost > 0 and visible(scene.terrain, camera, place[None], 2 * fall.radius_m)[0]):
+            if not (
+                np.isfinite(lost) and lost > 0 and visible(scene.terrain, camera, place[None], 2 * fall.radius_m)[0]
+            ):
                 continue
             random = np.random.default_rng([scene.seed, i])
             age = float(since[i]) / DUST_S

@@ -79,5 +79,5 @@ class ComposedFilm:
             drawn = before.draw(min(at - begins[current - 1], before.duration_s))
         else:
             drawn = self.shots[current].draw(min(since, self.shots[current].duration_s))
-        drawn.picture[...] = drawn.picture * abs(2 * share - 1)
+        drawn.picture[...] = drawn.picture * abs(2 * share - 1) + 0.5
         return drawn

@@ -33,7 +33,7 @@ class Window:
 
     @property
     def matrix(self) -> Array:
-        """(2, 3) from pixels of the video to those of the film, both counted from the centre of the first, as OpenCV."""
+        """(2, 3) from pixels of the video to those of the film, both from the centre of the first, as OpenCV."""
         shift = (self.scale - 1) / 2
         return np.array([[self.scale, 0.0, self.left + shift], [0.0, self.scale, self.top + shift]])
 
@@ -79,7 +79,7 @@ def visible(surface: Surface | None, camera: Camera, points: Array, slack_m: flo
     ----------
     slack_m : terrain so near to a point does not hide it.
     """
-    known = np.isfinite(points).all(axis=1)
+    known: Mask = np.asarray(np.isfinite(points).all(axis=1))
     if surface is None or not known.any():
         return known
     away = points[known] - camera.position

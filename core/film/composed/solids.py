@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...georeference import GlobalShift
@@ -20,7 +21,7 @@ ROCK_POINTS = 34
 """Corners of an angular block of limestone, about: what of them lies inside the hull is none."""
 ROUGH = 0.12
 EOTA_EDGE = 1 / 3
-"""Side of the squares of the norm block, in parts of its outer size (EAD 340059-00-0106, formerly ETAG 027, annex A)."""
+"""Side of the squares of the norm block, in parts of its outer size (EAD 340059-00-0106, annex A)."""
 
 
 def solid(kind: str, diameters_m: Array, seed: int = 0) -> Surface:
@@ -46,7 +47,9 @@ def solid(kind: str, diameters_m: Array, seed: int = 0) -> Surface:
         wanted = float(np.pi / 6 * axes.prod())
         return _scaled(unit_solid, side * (wanted / (_volume(unit_solid) * side.prod())) ** (1 / 3))
     if kind == "box":
-        return _scaled(_hull(np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])), axes)
+        return _scaled(
+            _hull(np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])), axes
+        )
     if kind == "rock":
         return _scaled(_hull(_rock(seed)), axes)
     diameters = axes if kind == "ellipsoid" else np.full(3, axes.mean())
@@ -82,8 +85,9 @@ def _hull(points: Array) -> Surface:
     from scipy.spatial import ConvexHull
 
     hull = ConvexHull(points)
-    used, faces = np.unique(hull.simplices, return_inverse=True)
-    vertices, faces = points[used], faces.reshape(-1, 3).astype(np.int32)
+    used, corners = np.unique(hull.simplices, return_inverse=True)
+    vertices = points[used]
+    faces: NDArray[np.int32] = np.asarray(corners.reshape(-1, 3), dtype=np.int32)
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inward] = faces[inward][:, ::-1]

@@ -10,20 +10,30 @@ import numpy as np
 from ...analysis.motion_graphs import MotionCourse, motion_courses
 from ...camera.model import Camera, look_at, project
 from ...terrain.raycast import any_hit, heights_above
-from ...vectors import Array, norm, unit
+from ...vectors import Array, cross, norm, unit
 from ..framing import Margins, View, downhill_direction, place_camera
 from ..graphs import FILMED, FilmGraphs, impact_graphs, motion_graphs
 from .canvas import Box, Canvas, Picture
-from .falls import Fall
+from .falls import UP, Fall
 from .filmed import Footage, warped
 from .ground import Ground, ground_picture
 from .inset import Inset
 from .look import MEASURED
 from .material import Material
 from .scenery import (
-    Scene, draw_badge, draw_blocks, draw_dust, draw_heading, draw_impacts, draw_keys, draw_north, draw_paths, draw_person,
-    draw_scale, keys_of,
-)  # fmt: skip
+    Scene,
+    draw_badge,
+    draw_blocks,
+    draw_dust,
+    draw_heading,
+    draw_impacts,
+    draw_keys,
+    draw_north,
+    draw_paths,
+    draw_person,
+    draw_scale,
+    keys_of,
+)
 from .sight import Window, centred, whole
 
 Seen = tuple[Canvas, Camera]
@@ -48,7 +58,7 @@ class Filmed:
     _fixed: dict[Window, Camera] = field(default_factory=dict)
 
     def at(self, moment_s: float) -> Seen:
-        """The frame on display, and its camera for the pixels of the film; drawn blocks are those of the frame's moment."""
+        """The frame on display, and its camera for the pixels of the film."""
         window, frame = self.window(moment_s), self.footage.frame(moment_s)
         picture = warped(self.footage.picture(frame), window.matrix, (window.width, window.height))
         if self.footage.path.is_fixed:
@@ -131,11 +141,14 @@ def block_track(material: Material) -> tuple[Array, Array]:
     times = np.arange(begin, end + 1e-9, 1 / 15)
     states = [fall.state(float(np.clip(t, fall.time_s[0], fall.time_s[-1]))) for t in times]
     places = np.array([np.full(3, np.nan) if state is None else state[0] for state in states])
-    pixels = np.array([project(footage.camera(float(t)), place[None])[0] for t, place in zip(times, places, strict=True)])
+    pixels = np.array(
+        [project(footage.camera(float(t)), place[None])[0] for t, place in zip(times, places, strict=True)]
+    )
     known = np.isfinite(pixels).all(axis=1)
     if not known.any():
         return np.array([begin, end]), np.tile(np.array(footage.size) / 2, (2, 1))
-    return times, np.column_stack([np.interp(times, times[known], pixels[known, i]) for i in range(2)])
+    where: Array = np.column_stack([np.interp(times, times[known], pixels[known, i]) for i in range(2)])
+    return np.asarray(times, dtype=np.float64), where
 
 
 def slope_camera(
@@ -149,7 +162,7 @@ def slope_camera(
     points = points[((points >= low) & (points <= high)).all(axis=1)]
     starts, ends = (np.array([fall.position[i] for fall in falls]) for i in (0, -1))
     surface = material.terrain
-    watched = points[:: max(len(points) // WATCHED_POINTS, 1)] + [0.0, 0.0, LIFT_M]
+    watched = points[:: max(len(points) // WATCHED_POINTS, 1)] + np.array([0.0, 0.0, LIFT_M])
 
     def seen(position: Array) -> Array:
         away = position - watched
@@ -258,20 +271,27 @@ class Stage:
         fall = next((fall for fall in self.scene.falls if fall.is_measured), None)
         if fall is None or fall.hits is None or not len(fall.hits.time_s):
             return False
-        aside = unit(np.cross(camera.position - self.middle, [0.0, 0.0, 1.0]))
+        aside = unit(cross(camera.position - self.middle, UP))
         foot = fall.hits.position[len(fall.hits.position) // 2] + PERSON_ASIDE_M * aside
-        drop = float(heights_above(surface, (foot + [0, 0, 5.0])[None])[0])
+        drop = float(heights_above(surface, (foot + FROM_ABOVE_M * UP)[None])[0])
         if not np.isfinite(drop):
             return False
-        where = project(camera, np.array([foot + [0, 0, 5.0 - drop]]))[0]
+        where = project(camera, np.array([foot + (FROM_ABOVE_M - drop) * UP]))[0]
         around = Box(where[0], where[1], where[0], where[1]).grown(2 * canvas.look.body)
-        if not np.isfinite(where).all() or any(one.box.meets(around) for one in canvas.written):
+        look = canvas.look
+        inside = (
+            around.left > 0
+            and around.top > 0
+            and around.right + 2 * look.body < look.width
+            and around.bottom < look.height
+        )
+        if not inside or any(one.box.meets(around) for one in canvas.written):
             return False
-        return draw_person(canvas, camera, foot + [0, 0, 5.0 - drop], self.material.words) is not None
+        return draw_person(canvas, camera, foot + (FROM_ABOVE_M - drop) * UP, self.material.words) is not None
 
 
 HEIGHT_SAID_M = 0.05
-PERSON_ASIDE_M = 1.6
+PERSON_ASIDE_M, FROM_ABOVE_M = 1.6, 5.0
 
 
 def inset_of(material: Material, size: tuple[int, int], falls: Sequence[Fall]) -> Inset | None:
@@ -289,7 +309,9 @@ def inset_of(material: Material, size: tuple[int, int], falls: Sequence[Fall]) -
         models = material.request.models
         own = {name: values for name, values in material.request.parameters.items() if name in models}
         predictions = compare(result.impacts, models, own) if models else None
-        made: FilmGraphs = impact_graphs(result.impacts, offsets, size, predictions, row=row if row.size < len(result.impacts) else None)
+        made: FilmGraphs = impact_graphs(
+            result.impacts, offsets, size, predictions, row=row if row.size < len(result.impacts) else None
+        )
     else:
         courses = [c for c in motion_courses(result, material.surface, quantities=FILMED) if c.trajectory in names]
         made = _since(material.span_s[0], courses, offsets, size)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What films say, in the language that is asked for: words from ``assets/film/texts.toml``, numbers as it writes them."""
+"""What films say, in the language that is asked for: words from ``assets/film/texts.toml``, and numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

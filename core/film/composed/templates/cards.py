@@ -22,8 +22,7 @@ def _dimmed(picture: Picture) -> Canvas:
     """A picture as the ground of a card: blurred and dark."""
     side = min(picture.shape[:2])
     soft = opencv().GaussianBlur(picture, (0, 0), max(side / 60, 1))
-    canvas = Canvas((soft * (1 - DARK)).astype(np.uint8))
-    return canvas
+    return Canvas((soft * (1 - DARK)).astype(np.uint8))
 
 
 def title_card(material: Material, behind: Picture, subtitle: str) -> Shot:
@@ -36,7 +35,9 @@ def title_card(material: Material, behind: Picture, subtitle: str) -> Shot:
     for line in wrapped(material.title, size, width, STRONG):
         card.text(line, look.margin, y, size, PAPER, weight=STRONG)
         y += 1.2 * size
-    card.lines([np.array([[look.margin, y - 0.7 * size], [look.margin + 0.12 * width, y - 0.7 * size]])], PAPER, look.line, 0.9)
+    card.lines(
+        [np.array([[look.margin, y - 0.7 * size], [look.margin + 0.12 * width, y - 0.7 * size]])], PAPER, look.line, 0.9
+    )
     y += 0.35 * look.heading
     for text in (subtitle, material.project.site.description):
         for line in wrapped(text, look.body, width)[:4]:
@@ -104,7 +105,13 @@ def beside(canvas: Canvas, at: Array, lines: list[str]) -> Box:
     canvas.lines([np.array([at, end])], PAPER, max(look.thin, 1), 0.95)
     canvas.panel(box, opacity=0.78)
     for i, line in enumerate(lines):
-        canvas.text(line, box.left + 1.25 * pad, box.top + pad / 2 + (i + 0.74) * step, look.body, weight=STRONG if i == 0 else 400)
+        canvas.text(
+            line,
+            box.left + 1.25 * pad,
+            box.top + pad / 2 + (i + 0.74) * step,
+            look.body,
+            weight=STRONG if i == 0 else 400,
+        )
     return box
 
 
@@ -113,7 +120,15 @@ def _free_box(canvas: Canvas, at: Array, width: float, height: float, away: floa
     look = canvas.look
     taken = [one.box.grown(look.gap) for one in canvas.written]
     lefts = (at[0] + away, at[0] - away - width, at[0] - width / 2, look.margin, look.width - look.margin - width)
-    tops = (at[1] - height - away / 2, at[1] + away / 2, at[1] - 1.6 * height, at[1] - 2.4 * height, at[1] - height / 2, look.margin, at[1] + 2 * away)
+    tops = (
+        at[1] - height - away / 2,
+        at[1] + away / 2,
+        at[1] - 1.6 * height,
+        at[1] - 2.4 * height,
+        at[1] - height / 2,
+        look.margin,
+        at[1] + 2 * away,
+    )
     best, least = None, np.inf
     for left in lefts:
         for top in tops:
@@ -121,7 +136,9 @@ def _free_box(canvas: Canvas, at: Array, width: float, height: float, away: floa
             y = float(np.clip(top, look.margin, max(look.height - look.margin - height, look.margin)))
             box = Box(x, y, x + width, y + height)
             covers = box.left < at[0] < box.right and box.top < at[1] < box.bottom
-            cost = sum(box.meets(other) for other in taken) + 2 * covers + 0.01 * (abs(x - left) + abs(y - top)) / height
+            cost = (
+                sum(box.meets(other) for other in taken) + 2 * covers + 0.01 * (abs(x - left) + abs(y - top)) / height
+            )
             if cost < least:
                 best, least = box, cost
     assert best is not None

@@ -25,7 +25,8 @@ def overlay(material: Material) -> ComposedFilm:
     clock = shown_clock(material, material.falls[0], material.span_s, 1.0)
     stage = Stage(
         material, material.scene((*material.falls, *asked_models(material))), solids=False,
-        heading=material.title, note=material.words.say("overlay"), inset=inset_of(material, material.size, material.falls),
+        heading=material.title, note=material.words.say("overlay"),
+        inset=inset_of(material, material.size, material.falls),
     )  # fmt: skip
     return _film(material, [path_shot(material, whole_footage(material), stage, clock)])
 
@@ -42,8 +43,10 @@ def side_by_side(material: Material) -> ComposedFilm:
         material, material.scene(material.falls), solids=False, heading=words.say("footage"),
         note=words.say("measured"), paths=False, impacts=False, scale=False, numbers=False,
     )  # fmt: skip
-    right = Stage(material, material.scene((*material.falls, *models)), solids=True, heading=words.say("reconstruction"),
-                  note=words.say("same_camera"))  # fmt: skip
+    right = Stage(
+        material, material.scene((*material.falls, *models)), solids=True, heading=words.say("reconstruction"),
+        note=words.say("same_camera"),
+    )  # fmt: skip
     plate = _SameCamera(material, backdrop)
 
     def draw(film_s: float) -> Canvas:
@@ -68,7 +71,12 @@ def vertical(material: Material) -> ComposedFilm:
         material, material.scene(material.falls), solids=False, heading=material.title, note=words.say("footage"),
         scale=False, numbers=False,
     )  # fmt: skip
-    site = Stage(material, material.scene((*material.falls, *asked_models(material))), solids=True, heading=words.say("reconstruction"))
+    site = Stage(
+        material,
+        material.scene((*material.falls, *asked_models(material))),
+        solids=True,
+        heading=words.say("reconstruction"),
+    )
     plate = Plate(material.ground, slope_camera(material, material.falls, lower))
 
     def draw(film_s: float) -> Canvas:

@@ -7,7 +7,7 @@ from ....camera.model import Camera, look_at
 from ....terrain.raycast import any_hit, heights_above
 from ....vectors import Array, norm, unit
 from ..canvas import Canvas
-from ..falls import Fall
+from ..falls import UP, Fall
 from ..material import Material
 from ..shots import ComposedFilm, Shot
 from ..stage import Moving, Stage, slope_camera
@@ -17,10 +17,11 @@ TURN_S, TURN_DEG = 14.0, 360.0
 FLIGHT_S = 14.0
 ELEVATIONS_DEG = (22.0, 28.0, 34.0, 40.0, 46.0, 52.0, 58.0, 64.0)
 WATCHED, SIDES, NEARLY_ALL = 60, 24, 0.9
-LEAST_ABOVE_M = 1.5
+LEAST_ABOVE_M, FROM_ABOVE_M = 1.5, 500.0
 FOLLOW_S = 0.9
 """Over which the way of the block is smoothed for the camera."""
 BEHIND_M, ABOVE_M = 11.0, 5.5
+FLATTER = np.array([1.0, 1.0, 0.35])
 FOV_DEG = 55.0
 
 
@@ -33,7 +34,9 @@ def turntable(material: Material) -> ComposedFilm:
     reach = float(norm(first.position - middle))
     start = float(np.arctan2(*(first.position - middle)[1::-1]))
     lift = _clear_elevation(material, falls, middle, reach)
-    stage = Stage(material, material.scene(falls), solids=True, heading=material.title, note=words.say("turntable"), numbers=False)
+    stage = Stage(
+        material, material.scene(falls), solids=True, heading=material.title, note=words.say("turntable"), numbers=False
+    )
 
     def camera(film_s: float) -> Camera:
         place = _above(material, _around(middle, reach, start + np.radians(TURN_DEG) * (film_s / TURN_S), lift))
@@ -51,7 +54,7 @@ def _around(middle: Array, reach: float, angle: float, elevation_deg: float) -> 
 def _clear_elevation(material: Material, falls: tuple[Fall, ...], middle: Array, reach: float) -> float:
     """The lowest elevation from which nearly all of the ways is seen from nearly all sides [°]."""
     points = np.vstack([fall.position for fall in falls])
-    points = points[:: max(len(points) // WATCHED, 1)] + [0.0, 0.0, 0.5]
+    points = points[:: max(len(points) // WATCHED, 1)] + 0.5 * UP
     for elevation in ELEVATIONS_DEG:
         seen = []
         for angle in np.linspace(0, 2 * np.pi, SIDES, endpoint=False):
@@ -74,9 +77,15 @@ def fly_along(material: Material) -> ComposedFilm:
     smooth = weight @ way
     heading = weight @ unit(np.gradient(smooth, axis=0) + 1e-9)
     reach = max(BEHIND_M, 22 * fall.radius_m)
-    behind = smooth - reach * unit(heading * [1, 1, 0.35]) + [0, 0, max(ABOVE_M, 11 * fall.radius_m)]
+    behind = smooth - reach * unit(heading * FLATTER) + max(ABOVE_M, 11 * fall.radius_m) * UP
     behind = weight @ np.array([_above(material, place) for place in behind])
-    stage = Stage(material, material.scene(material.together), solids=True, heading=material.title, note=material.words.say("fly_along"))
+    stage = Stage(
+        material,
+        material.scene(material.together),
+        solids=True,
+        heading=material.title,
+        note=material.words.say("fly_along"),
+    )
 
     def camera(film_s: float) -> Camera:
         t = float(clock.fall_at(film_s)[0])
@@ -104,12 +113,15 @@ def _middle(falls: tuple[Fall, ...]) -> Array:
 def _place(fall: Fall, moment_s: float) -> Array:
     """Where a block is; in a gap, where it was last."""
     state = fall.state(moment_s)
-    return fall.position[max(int(np.searchsorted(fall.time_s, moment_s, side="right")) - 1, 0)] if state is None else state[0]
+    return (
+        fall.position[max(int(np.searchsorted(fall.time_s, moment_s, side="right")) - 1, 0)]
+        if state is None
+        else state[0]
+    )
 
 
 def _above(material: Material, place: Array) -> Array:
     """A place, lifted until the terrain is well below."""
-    high = place + [0.0, 0.0, 500.0]
-    height = float(heights_above(material.terrain, high[None])[0]) - 500.0
-    return place + [0.0, 0.0, max(LEAST_ABOVE_M - height, 0.0)] if np.isfinite(height) else place
-
+    high = place + FROM_ABOVE_M * UP
+    height = float(heights_above(material.terrain, high[None])[0]) - FROM_ABOVE_M
+    return place + max(LEAST_ABOVE_M - height, 0.0) * UP if np.isfinite(height) else place

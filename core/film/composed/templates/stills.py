@@ -2,6 +2,7 @@
 """Pictures for reports: the block at successive times in one picture, and its impacts side by side."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....camera.model import project
 from ....errors import InputError
@@ -45,7 +46,9 @@ def stroboscopic(material: Material) -> Canvas:
     footage, fall, words = material.filmed, material.falls[0], material.words
     begin, end = max(float(fall.time_s[0]), footage.span_s[0]), min(float(fall.time_s[-1]), footage.span_s[1])
     if not begin < end:
-        raise InputError(f"The video {footage.name!r} does not show {fall.name}", advice="Name another one with --video")
+        raise InputError(
+            f"The video {footage.name!r} does not show {fall.name}", advice="Name another one with --video"
+        )
     middle = footage.frame((begin + end) / 2)
     mosaic = Mosaic(material, footage, _about(material, footage, fall, (begin, end), middle), middle)
     first, last = footage.frame(begin), footage.frame(end)
@@ -75,7 +78,7 @@ def stroboscopic(material: Material) -> Canvas:
 
 def median_picture(shown: np.ndarray) -> Picture:
     """The median of pictures (k, h, w, 3), where a black pixel knows nothing."""
-    known = shown.any(axis=3)
+    known: NDArray[np.bool_] = np.asarray(shown.any(axis=3))
     picture: Picture = np.partition(shown, len(shown) // 2, axis=0)[len(shown) // 2]
     some = ~known.all(axis=0)
     if some.any():
@@ -126,7 +129,10 @@ def contact_sheet(material: Material) -> Canvas:
     columns, lines = _grid(len(rows), width / (height - top))
     gap = 2 * look.gap
     caption = round(2 * 1.4 * look.small + look.gap)
-    cell = (width - 2 * look.margin - (columns - 1) * gap) // columns, (height - top - look.margin - (lines - 1) * gap) // lines
+    cell = (
+        (width - 2 * look.margin - (columns - 1) * gap) // columns,
+        (height - top - look.margin - (lines - 1) * gap) // lines,
+    )
     for i, (fall, row) in enumerate(rows):
         left, upper = look.margin + (i % columns) * (cell[0] + gap), top + (i // columns) * (cell[1] + gap)
         _cell(material, sheet, fall, row, Box(left, upper, left + cell[0], upper + cell[1]), caption)
@@ -157,7 +163,9 @@ def _cell(material: Material, sheet: Canvas, fall: Fall, row: int, box: Box, cap
     before, after = float(hits.speed1_mps[row]), float(hits.speed2_mps[row])
     sheet.text(name, box.left, y, look.small, PAPER, weight=STRONG)
     if np.isfinite([before, after]).all():
-        sheet.text(f"{words.number(before, 2)} → {words.number(after, 2)} m/s", box.right, y, look.small, PAPER, anchor="right")
+        sheet.text(
+            f"{words.number(before, 2)} → {words.number(after, 2)} m/s", box.right, y, look.small, PAPER, anchor="right"
+        )
     second = words.energy(float(hits.energy1_j[row])) if np.isfinite(hits.energy1_j[row]) else ""
     restitution = f"R_N {words.number(float(hits.rn[row]), 2)}" if np.isfinite(hits.rn[row]) else ""
     sheet.text(second, box.left, y + 1.4 * look.small, look.small, QUIET)

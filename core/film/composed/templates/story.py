@@ -65,10 +65,12 @@ def _video(material: Material) -> list[Shot]:
 
 
 def _models(material: Material) -> Shot | None:
-    """The block after one impact, and what models make of that impact, on one clock; None where no model can be asked."""
+    """The block after one impact, and what models make of it, on one clock; None where no model can be asked."""
     chosen = _impact_to_compare(material)
     if chosen is None:
-        material.remarks.append("No impact is known well enough to be compared with models: the film has no such chapter.")
+        material.remarks.append(
+            "No impact is known well enough to be compared with models: the film has no such chapter."
+        )
         return None
     fall, row, until = chosen
     assert fall.hits is not None
@@ -100,7 +102,9 @@ def _models(material: Material) -> Shot | None:
 def _impact_to_compare(material: Material) -> tuple[Fall, int, float] | None:
     """The impact whose flight after it is the longest of those that models can be asked about, and when that ends."""
     best: tuple[Fall, int, float] | None = None
-    asked = {(str(t), int(i)) for t, i in zip(material.predictions.trajectory, material.predictions.impact, strict=True)}
+    asked = {
+        (str(t), int(i)) for t, i in zip(material.predictions.trajectory, material.predictions.impact, strict=True)
+    }
     for fall in material.falls:
         if fall.hits is None:
             continue
@@ -108,7 +112,9 @@ def _impact_to_compare(material: Material) -> tuple[Fall, int, float] | None:
             if (fall.name, int(fall.hits.number[row])) not in asked or not np.isfinite(fall.hits.rn[row]):
                 continue
             start, until = float(fall.hits.time_s[row]), float(fall.hits.time_s[row + 1])
-            if fall.state((start + until) / 2) is not None and (best is None or until - start > best[2] - float(_hit(best))):
+            if fall.state((start + until) / 2) is not None and (
+                best is None or until - start > best[2] - float(_hit(best))
+            ):
                 best = fall, row, until
     return best
 
@@ -130,7 +136,9 @@ def _part(fall: Fall, begin_s: float, end_s: float) -> Fall:
                    chain=fall.chain[rows], hits=None, spin=None if fall.spin is None else fall.spin[rows])  # fmt: skip
 
 
-def _draw_links(material: Material, canvas: Canvas, camera: object, fall: Fall, models: tuple[Fall, ...], moment: float) -> None:
+def _draw_links(
+    material: Material, canvas: Canvas, camera: object, fall: Fall, models: tuple[Fall, ...], moment: float
+) -> None:
     """From the real block to those of models, with how far they are apart."""
     from ....camera.model import Camera
 
@@ -171,7 +179,9 @@ def _falls(material: Material) -> list[Shot]:
     plate = Plate(material.ground, slope_camera(material, falls, material.size, ABOVE_LEGEND))
     scene = material.scene(falls)
     note = words.say("blocks", number=words.whole(len(simulated)))
-    stage = Stage(material, scene, solids=True, heading=words.say("chapter_falls"), note=note, impacts=False, numbers=False)
+    stage = Stage(
+        material, scene, solids=True, heading=words.say("chapter_falls"), note=note, impacts=False, numbers=False
+    )
 
     def draw(film_s: float) -> Canvas:
         moment = float(clock.fall_at(film_s)[0])

@@ -14,7 +14,7 @@ from ..simulated import path_opacity
 from .blocks import Pose, block_pixels, draw_block, draw_shadow, sun_direction
 from .canvas import Anchor, Box, Canvas, text_width
 from .falls import UP, Fall
-from .look import INK, MEASURED, PAPER, STRONG, Colour
+from .look import INK, MEASURED, PAPER, REGULAR, STRONG, Colour
 from .sight import pixel_size, visible
 from .solids import solid
 from .texts import Texts
@@ -263,13 +263,19 @@ def draw_keys(canvas: Canvas, keys: Sequence[Key], left: float, bottom: float) -
     return box
 
 
+def badge_width(canvas: Canvas, lines: Sequence[str], strong: bool = True) -> float:
+    """How wide `draw_badge` makes its panel [px]."""
+    size = canvas.look.body
+    widths = [text_width(line, size, STRONG if strong and i == 0 else REGULAR) for i, line in enumerate(lines)]
+    return max(widths) + 3 * canvas.look.gap
+
+
 def draw_badge(canvas: Canvas, lines: Sequence[str], right: float, bottom: float, strong: bool = True) -> Box:
     """Lines on a panel whose lower right corner is given; the first one is strong."""
     look = canvas.look
     step, pad = round(1.4 * look.body), look.gap
-    weights = [STRONG if strong and i == 0 else 400 for i in range(len(lines))]
-    width = max(text_width(line, look.body, weight) for line, weight in zip(lines, weights, strict=True)) + 2 * pad
-    box = Box(right - width - pad, bottom - len(lines) * step - pad, right, bottom)
+    weights = [STRONG if strong and i == 0 else REGULAR for i in range(len(lines))]
+    box = Box(right - badge_width(canvas, lines, strong), bottom - len(lines) * step - pad, right, bottom)
     canvas.panel(box)
     for i, (line, weight) in enumerate(zip(lines, weights, strict=True)):
         canvas.text(

@@ -22,6 +22,7 @@ from .look import MEASURED
 from .material import Material
 from .scenery import (
     Scene,
+    badge_width,
     draw_badge,
     draw_blocks,
     draw_dust,
@@ -224,10 +225,13 @@ class Stage:
             draw_scale(canvas, camera, self.middle, words)
         if self.heading:
             draw_heading(canvas, self.heading, self.note)
-        draw_keys(canvas, keys_of(self.scene, words), look.margin, size[1] - look.margin)
+        legend = draw_keys(canvas, keys_of(self.scene, words), look.margin, size[1] - look.margin)
         if rate is not None:
             lines = [words.pace(rate), *(self.number_lines(moment_s) if self.numbers and self.inset is None else [])]
-            draw_badge(canvas, lines, size[0] - look.margin, size[1] - look.margin)
+            room = size[0] - look.margin - legend.right - look.gap
+            wide = badge_width(canvas, lines) > room
+            bottom = legend.top - look.gap if wide else size[1] - look.margin
+            draw_badge(canvas, lines, size[0] - look.margin, bottom)
         if self.scale:
             self._draw_person(canvas, camera)
         if self.inset is not None:

@@ -49,7 +49,7 @@ def encode(job: FilmJob, progress: Progress) -> None:
         try:
             bpy.ops.render.render(animation=True, scene=scene.name)
         except RuntimeError as error:
-            reason = _lacking(job.codec) if not written else f"Blender could not write the film: {error}"
+            reason = _lacking(job.codec, str(error)) if not written else f"Blender could not write the film: {error}"
             raise RockfallError(reason) from error
         finally:
             bpy.app.handlers.render_write.remove(count)
@@ -75,7 +75,7 @@ def _strip(scene: bpy.types.Scene, job: FilmJob, first: int, last: int) -> None:
     strip = editor.strips.new_image("frames", str(job.source / f"{first:06d}.png"), 1, 1)
     for frame in range(first + 1, last + 1):
         strip.elements.append(f"{frame:06d}.png")
-    strip.frame_final_duration = last - first + 1
+    strip.duration = last - first + 1
 
 
 def _read_again(job: FilmJob, frames: int) -> None:
@@ -90,8 +90,9 @@ def _read_again(job: FilmJob, frames: int) -> None:
         raise RockfallError(_lacking(job.codec))
 
 
-def _lacking(codec: str) -> str:
+def _lacking(codec: str, reason: str = "") -> str:
+    said = f" ({reason.removeprefix('Error: ').strip().rstrip('.')})" if reason else ""
     return (
-        f"This Blender cannot write {CODECS[codec]}. Choose another codec with --codec: h264 is written by all, "
+        f"This Blender cannot write {CODECS[codec]} here{said}. Choose another codec with --codec: h264 is written by all, "
         "--images keeps the frames as pictures."
     )

@@ -82,9 +82,16 @@ def _models(material: Material) -> Shot | None:
         Freeze(start, material.request.freeze_s), Freeze(min(until, end), MODELS_STAND_S)
     ])  # fmt: skip
     near = _part(fall, begin, until)
-    plate = Plate(material.ground, slope_camera(material, (near, *models), material.size))
+    plate = Plate(material.ground, slope_camera(material, (near, *models), material.size, ABOVE_LEGEND))
     scene = material.scene((fall, *models))
-    stage = Stage(material, scene, solids=True, heading=words.say("chapter_models"), note=words.say("before_impact"))
+    stage = Stage(
+        material,
+        scene,
+        solids=True,
+        heading=words.say("chapter_models"),
+        note=words.say("before_impact"),
+        numbers=False,
+    )
 
     def draw(film_s: float) -> Canvas:
         moment, rate = float(clock.fall_at(film_s)[0]), clock.rate_at(film_s)

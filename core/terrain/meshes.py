@@ -2,6 +2,7 @@
 """Meshes in Wavefront OBJ and STL."""
 
 import re
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
-from .source import Source, check_face_indices
+from .cleaning import merge_duplicates
+from .source import Source, check_face_indices, check_finite
 from .text import NumberRows, all_numbers, line_at, line_blocks, shown
 
 BLANK, NEWLINE = 32, 10
@@ -117,7 +119,7 @@ def _whole_numbers(text: bytes) -> Array | None:
 
 
 def read_stl(path: Path) -> Source:
-    """Read a binary or ascii STL; a soup of triangles, whose corners are merged later.
+    """Read a binary or ascii STL: a soup of triangles, whose corners are merged some at a time.
 
     Raises
     ------
@@ -131,12 +133,13 @@ def read_stl(path: Path) -> Source:
     promised = int.from_bytes(beginning[80:84], "little") if len(beginning) == 84 else -1
     # A binary header may begin with "solid" too: the size is what tells.
     if size == 84 + promised * STL_TRIANGLE.itemsize:
-        corners = np.empty((promised, 3, 3))
-        for start in range(0, promised, BLOCK_TRIANGLES):
-            part = np.fromfile(path, STL_TRIANGLE, BLOCK_TRIANGLES, offset=84 + start * STL_TRIANGLE.itemsize)
-            corners[start : start + len(part)] = part["corners"]
+        corners: Iterator[Array] = (
+            np.fromfile(path, STL_TRIANGLE, BLOCK_TRIANGLES, offset=84 + start * STL_TRIANGLE.itemsize)["corners"]
+            for start in range(0, promised, BLOCK_TRIANGLES)
+        )
     elif beginning.lstrip().startswith(b"solid") and b"\0" not in beginning:
-        corners = _written_corners(path)
+        written = _written_corners(path)
+        corners = (written[i : i + BLOCK_TRIANGLES] for i in range(0, len(written), BLOCK_TRIANGLES))
     elif promised >= 0 and size > 84:
         raise InputError(
             f"The file is truncated or not STL: its header promises {promised} triangles, "
@@ -146,8 +149,29 @@ def read_stl(path: Path) -> Source:
         )
     else:
         raise InputError("Not an STL file", file=path, advice="Check its extension or export it again")
-    points = corners.reshape(-1, 3)
-    return Source(points, check_face_indices(np.arange(len(points), dtype=np.int32).reshape(-1, 3), len(points), path))
+    points, faces, merged = _merged(corners, path)
+    return Source(points, check_face_indices(faces, len(points), path), merged=merged)
+
+
+def _merged(corners: Iterable[Array], path: Path) -> tuple[Array, NDArray[np.int32], int]:
+    """Vertices and faces of triangles (m, 3, 3) that come some at a time, and how many vertices fewer there are.
+
+    Those of one part and those of the next are merged later, with what other formats store more than once.
+
+    Raises
+    ------
+    InputError : a coordinate that is not finite.
+    """
+    vertices, faces, before, seen = [np.empty((0, 3))], [np.empty((0, 3), np.int32)], 0, 0
+    for part in corners:
+        soup = part.reshape(-1, 3).astype(np.float64)
+        check_finite(soup, "mesh", path, seen)
+        seen += len(soup)
+        kept, numbers, _ = merge_duplicates(soup, np.arange(len(soup), dtype=np.int32).reshape(-1, 3))
+        vertices.append(kept)
+        faces.append(numbers + np.int32(before))
+        before += len(kept)
+    return np.concatenate(vertices), np.concatenate(faces), seen - before
 
 
 def _written_corners(path: Path) -> Array:

@@ -16,7 +16,7 @@ from ..vectors import Array
 from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, ptx
 from .crs import surely_different
 from .ground_filter import filter_ground
-from .source import Source
+from .source import Source, check_finite
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".ply": ply.read_ply,
@@ -226,19 +226,9 @@ def placed(source: Source, how: HowToRead, path: Path) -> Source:
     if not (np.isfinite(unit_m) and unit_m > 0):
         raise InputError(f"The unit of {unit_m} m is no length", file=path, advice="Give 0.001 for millimetres")
     points = source.points
-    finite = np.isfinite(points)
-    if source.kind == "grid":
-        finite = finite[:, :2]
-        if np.isinf(points[:, 2]).any():
-            points = np.where(np.isinf(points), np.nan, points)
-    if not finite.all():
-        row = int(np.flatnonzero(~finite.all(axis=1))[0])
-        what, plural = ("vertex", "vertices") if source.kind == "mesh" else ("point", "points")
-        raise InputError(
-            f"The {what} {row} (counted from 0) is not finite: {points[row].tolist()}",
-            file=path,
-            advice=f"Remove {plural} with NaN or infinite coordinates and export again",
-        )
+    if source.kind == "grid" and np.isinf(points[:, 2]).any():
+        points = np.column_stack([points[:, :2], np.where(np.isinf(points[:, 2]), np.nan, points[:, 2])])
+    check_finite(points, source.kind, path)
     if unit_m != 1.0:
         points = points * unit_m
     reach = float(np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0))
@@ -250,7 +240,7 @@ def placed(source: Source, how: HowToRead, path: Path) -> Source:
         )
     notes, turned = list(source.notes), False
     if source.faces is not None:
-        notes.append(f"Mesh of {len(points):,} vertices and {len(source.faces):,} faces.")
+        notes.append(f"Mesh of {len(points) + source.merged:,} vertices and {len(source.faces):,} faces.")
     if up == "y" or (up == "auto" and source.up == "y"):
         points, turned = z_up(points), True
         notes.append(

@@ -201,9 +201,9 @@ def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Su
             before = (overhangs.sentence(shift), said, *before)
     else:
         meshed = triangulation.Meshed(source.points, source.faces, ())
-    kind, turned = source.kind, source.turned
+    kind, turned, merged = source.kind, source.turned, source.merged
     del source, opened  # their points are as large as what follows
-    vertices, faces, done = _cleaned(meshed, kind)
+    vertices, faces, done = _cleaned(meshed, kind, merged)
     return Surface(vertices, faces, shift, name, (*before, *meshed.notes, *done, *after), left_out, turned)
 
 
@@ -222,7 +222,7 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
         source = placed(Source(box, crs=crs, geographic=geographic, notes=said), how, path)
     else:
         source = read_placed(path, how)
-        count = len(source.points)
+        count = len(source.points) + source.merged
     points = source.points
     heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
     low, high = box_of(points[heights], path, count)
@@ -238,12 +238,12 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     return TerrainInfo(path.name, source.kind, low, high, count, faces, source.crs, shift, notes, y_up)
 
 
-def _cleaned(meshed: triangulation.Meshed, kind: str) -> tuple[Array, NDArray[np.int32], list[str]]:
+def _cleaned(meshed: triangulation.Meshed, kind: str, already: int) -> tuple[Array, NDArray[np.int32], list[str]]:
     vertices, faces, notes = meshed.points, meshed.faces, []
     if kind == "mesh":
         vertices, faces, merged = cleaning.merge_duplicates(vertices, faces)
-        if merged:
-            notes.append(f"Merged {merged:,} vertices that were stored more than once.")
+        if merged + already:
+            notes.append(f"Merged {merged + already:,} vertices that were stored more than once.")
     degenerate, total, (any_up, any_down) = cleaning.examine_faces(vertices, faces)
     if degenerate.any():
         faces = faces[~degenerate]

@@ -26,6 +26,7 @@ class Source:
     up : axis that points up by the format's standard.
     turned : y was up, and the points were turned.
     notes : sentences for the summary.
+    merged : so many vertices more are in the file, at the places of others.
     """
 
     points: Array
@@ -37,6 +38,7 @@ class Source:
     turned: bool = False
     notes: tuple[str, ...] = ()
     vertical: str = ""
+    merged: int = 0
 
     @property
     def kind(self) -> str:
@@ -62,6 +64,24 @@ def check_face_indices(faces: NDArray[np.integer], vertex_count: int, path: Path
             advice="Export the mesh again: the file is damaged",
         )
     return np.ascontiguousarray(faces, dtype=np.int32)
+
+
+def check_finite(points: Array, kind: str, path: Path, before: int = 0) -> None:
+    """Whether all coordinates (n, 3) are finite; heights of a grid need not be. `before` points came before these.
+
+    Raises
+    ------
+    InputError : one is not.
+    """
+    finite = np.isfinite(points[:, :2] if kind == "grid" else points)
+    if not finite.all():
+        row = int(np.flatnonzero(~finite.all(axis=1))[0])
+        what, plural = ("vertex", "vertices") if kind == "mesh" else ("point", "points")
+        raise InputError(
+            f"The {what} {before + row} (counted from 0) is not finite: {points[row].tolist()}",
+            file=path,
+            advice=f"Remove {plural} with NaN or infinite coordinates and export again",
+        )
 
 
 def triangulated(polygons: list[list[int]]) -> NDArray[np.int64]:

@@ -49,6 +49,8 @@ COMMANDS = {
     "batch": "a command for each project of a folder, or each combination of a sweep → a folder each, summary.json",
     "render": "the animation of a project, through Blender",
     "prepare": "compiles now what is compiled when first needed; the set-up and Blender do it themselves",
+    "export": "the animation of a project for other programs, through Blender → animation.glb, .usdc, .abc",
+    "web": "a page of a project in three dimensions, site and moving blocks in one file without network → site.html",
     "models": "the impact models, their parameters, units, ranges, defaults and sources",
 }
 """Name → help, in the order of the work; the module of the same name in `commands`, with _ for -, does it."""

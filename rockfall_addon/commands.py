@@ -12,6 +12,7 @@ from ..core import cli
 from ..core.children import rockfall_command
 from ..core.film.job import FilmJob
 from ..core.film.maker import FilmMaker, inside_blender
+from ..core.outreach import animator
 from ..core.progress import Progress
 
 _handles: list[object] = []
@@ -28,6 +29,9 @@ def unregister() -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
+    from .steps.share.beside import animator_command
+
+    animating = animator.inside_blender.set(animator_command())
     token = inside_blender.set(FilmMaker(_make, _probe_command()))
     blender = bpy.app.binary_path  # none where Blender is a module: there Python itself runs the command line
     again = (blender, "--background", "--command", "rockfall") if blender else rockfall_command.get()
@@ -36,6 +40,7 @@ def run(arguments: list[str]) -> int:
         return cli.main(arguments)
     finally:
         rockfall_command.reset(told)
+        animator.inside_blender.reset(animating)
         inside_blender.reset(token)
 
 

@@ -71,7 +71,8 @@ STEPS = (
     )),
     ("share", "10  Share", (
         "rockfall.export_tables", "rockfall.export_graphs", "rockfall.export_simulation",
-        "rockfall.design_sheet", "rockfall.export_project",
+        "rockfall.design_sheet", "rockfall.export_project", None,
+        "rockfall.export_web_page", "rockfall.export_animation",
     )),
 )  # fmt: skip
 """Name, title and entries of each menu: an operator, or an operator with its text and properties; None is a line."""
@@ -91,6 +92,8 @@ EXPORTS = (
     ("rockfall.export_tables", "Rockfall Tables (.csv)", {}),
     ("rockfall.export_simulation", "Rockfall Simulation (.csv)", {}),
     ("rockfall.export_project", "Rockfall Project (.toml)", {}),
+    ("rockfall.export_web_page", "Rockfall Web Page (.html)", {}),
+    ("rockfall.export_animation", "Rockfall Animation (.glb/.usdc/.abc)", {}),
 )
 
 Entry = str | tuple[str, str, dict[str, object]] | None

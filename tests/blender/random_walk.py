@@ -17,6 +17,7 @@ DEMO = ("load_demo", "load_footage_demo", "open_project")
 SLOW = {
     "render_film", "preview_film", "calibrate", "find_equivalent", "simulate", "track_block", "follow_background",
     "refine", "build_proxy", "export_graphs", "propose_pairs", "propose_impacts", "compute_maps", "export_maps",
+    "export_web_page", "export_animation",
 }  # fmt: skip
 """Operators that may take more than a second."""
 REPLACES = {"import_picks", "load_demo", "open_project", "load_footage_demo"}

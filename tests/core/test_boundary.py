@@ -47,6 +47,7 @@ CORE_FLOORS = (
     {"workflow"},
     {"exchange"},
     {"film"},
+    {"outreach"},
     {"commands"},
     {"cli"},
     {"start"},

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Step 9: what leaves Blender: tables and the project."""
+"""Step 10: what leaves Blender: tables, the project, a web page, the animation."""
 
-from . import graphs, operators, panel
+from . import graphs, operators, panel, shown
 
-PARTS = (graphs, operators, panel)
+PARTS = (graphs, operators, shown, panel)

@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import store
 from ...view import job
-from ...view.panel import RockfallPanel, State, advise
+from ...view.panel import RockfallPanel, State, advise, paragraph
 
 
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
@@ -27,6 +27,10 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
         self.layout.operator("rockfall.export_simulation", icon="EXPORT")
         self.layout.operator("rockfall.design_sheet", icon="TEXT")
         self.layout.operator("rockfall.export_project", icon="FILE_FOLDER")
+        self.layout.separator()
+        paragraph(context, self.layout, "For others to look at:")
+        self.layout.operator("rockfall.export_web_page", icon="URL")
+        self.layout.operator("rockfall.export_animation", icon="RENDER_ANIMATION")
         job.draw(context, self.layout, "share")
 
 

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of animations are written by Blender, in a process of its own; they are staged like all output."""
+
+import importlib.util
+import json
+import sys
+from collections.abc import Sequence
+from contextvars import ContextVar
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from ..dependencies import require_blender_libraries
+from ..errors import DependencyError, InputError, RockfallError
+from ..film.maker import run_job
+from ..output import output_folder
+from ..progress import Progress, silent
+from .animation import Animation, save_animation
+
+LEAST_BYTES = 200
+"""No file of an animation is smaller: Blender on a full disk may leave a piece."""
+
+inside_blender: ContextVar[tuple[str, ...] | None] = ContextVar("animator_inside_blender", default=None)
+"""The command that runs the other Blender; set by the add-on while Blender itself runs a command."""
+
+
+def animator_command() -> tuple[str, ...]:
+    """What runs Blender to write files.
+
+    Raises
+    ------
+    DependencyError : this Python has no Blender.
+    """
+    inside = inside_blender.get()
+    if inside is not None:
+        return inside
+    if importlib.util.find_spec("bpy") is None:
+        raise DependencyError(
+            "glTF, USD and Alembic are written by Blender, which this Python does not have. "
+            "Install it with: pip install rockfall[blender]"
+        )
+    require_blender_libraries()
+    package = __name__.partition(".core.")[0]
+    return sys.executable, "-m", f"{package}.rockfall_addon.steps.share"
+
+
+def write_animation(
+    animation: Animation,
+    files: Sequence[Path],
+    command: Sequence[str],
+    progress: Progress = silent,
+) -> None:
+    """Write an animation in the formats of the files' endings; they appear together when all are whole.
+
+    Parameters
+    ----------
+    files : in one folder; their endings are of `FORMATS`.
+    command : what runs Blender, see `animator_command`.
+
+    Raises
+    ------
+    RockfallError : Blender cannot write one; no file is there, or the old ones are as they were.
+    """
+    with TemporaryDirectory(prefix="rockfall_") as name, output_folder(files[0].parent) as folder:
+        source = Path(name) / "animation.npz"
+        try:
+            save_animation(animation, source)
+        except OSError as error:
+            raise InputError(
+                f"The temporary folder cannot be written ({error.strerror})",
+                file=name,
+                advice="Make room there, or set TMPDIR to a folder with room",
+            ) from error
+        drafts = [folder / file.name for file in files]
+        job = json.dumps({"source": str(source), "files": [str(draft.absolute()) for draft in drafts]})
+        run_job([*command, job], ", ".join(file.name for file in files), progress)
+        for draft in drafts:
+            if not draft.is_file() or draft.stat().st_size < LEAST_BYTES:
+                raise RockfallError(
+                    f"Blender has not written {draft.name}. Make room on the disk, or choose another folder."
+                )

@@ -5,7 +5,8 @@
   const show = JSON.parse(document.getElementById("show").textContent);
   const $ = (id) => document.getElementById(id);
   const KINDS = { uint8: Uint8Array, uint16: Uint16Array, uint32: Uint32Array, float32: Float32Array };
-  const LINGER_S = 0.4, RATES = [0.25, 0.5, 1], NEAR_PX = 26;
+  const LINGER_S = 0.4, RATES = [0.25, 0.5, 1], RATE_NAMES = ["¼×", "½×", "1×"], NEAR_PX = 26;
+  const ICONS = { view: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5", info: "M12 11v6M12 7.2v.1M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18z" };
   const state = { time: 0, rate: 1, playing: false, chosen: -1, language: show.language, hidden: new Set(), dirty: true };
 
   // ---- tables -------------------------------------------------------------------------------------------------
@@ -391,8 +392,6 @@
     small.textContent = pace;
     $("clock").append(document.createElement("br"), small);
   }
-  const RATE_NAMES = ["¼×", "½×", "1×"];
-  const ICONS = { view: "M4 9V4h5M20 9V4h-5M4 15v5h5M20 15v5h-5", info: "M12 11v6M12 7.2v.1M12 3a9 9 0 1 0 0 18 9 9 0 0 0 0-18z" };
   function hintGone() { $("hint").classList.add("gone"); }
 
   function words() {

@@ -19,7 +19,8 @@ from ..progress import Progress, silent
 from .engines import choose_engine
 from .job import AS_SET_UP, FilmJob
 
-CRASHED = "Blender stopped while it made {name} (status {status}).{said} Try the engine Cycles (--engine cycles)."
+CRASHED = "Blender stopped while it made {name} (status {status}).{said} {advice}"
+OTHER_ENGINE = "Try the engine Cycles (--engine cycles)."
 LINES_TOLD, MOST_KEPT = 5, 200
 OURS = "rockfall "
 """Begins the lines that are ours: other add-ons print on the same standard output while Blender starts."""
@@ -82,10 +83,10 @@ inside_blender: ContextVar[FilmMaker | None] = ContextVar("inside_blender", defa
 """Set by the add-on while Blender itself runs a command."""
 
 
-def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str, ...]:
+def run_job(command: Sequence[str], name: str, progress: Progress, advice: str = OTHER_ENGINE) -> tuple[str, ...]:
     """Run a process that makes the file `name`; its standard output tells how far it is (see `film/__main__.py`).
 
-    Returns its remarks.
+    advice : what to do when it crashes. Returns its remarks.
 
     Raises
     ------
@@ -123,7 +124,7 @@ def run_job(command: Sequence[str], name: str, progress: Progress) -> tuple[str,
     if status != 0:
         lines = [line.strip() for line in said if line.strip() and "EGL" not in line][-LINES_TOLD:]
         words = f" It said: {' / '.join(lines)}." if lines else ""
-        raise RockfallError(CRASHED.format(name=name, status=status, said=words))
+        raise RockfallError(CRASHED.format(name=name, status=status, said=words, advice=advice))
     return tuple(remarks)
 
 

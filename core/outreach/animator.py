@@ -16,6 +16,7 @@ from ..output import output_folder
 from ..progress import Progress, silent
 from .animation import Animation, save_animation
 
+ROOM = "Make room on the disk, or choose another folder."
 LEAST_BYTES = 200
 """No file of an animation is smaller: Blender on a full disk may leave a piece."""
 
@@ -72,9 +73,26 @@ def write_animation(
             ) from error
         drafts = [folder / file.name for file in files]
         job = json.dumps({"source": str(source), "files": [str(draft.absolute()) for draft in drafts]})
-        run_job([*command, job], ", ".join(file.name for file in files), progress)
+        run_job([*command, job], ", ".join(file.name for file in files), progress, ROOM)
         for draft in drafts:
-            if not draft.is_file() or draft.stat().st_size < LEAST_BYTES:
-                raise RockfallError(
-                    f"Blender has not written {draft.name}. Make room on the disk, or choose another folder."
-                )
+            if not _is_whole(draft):
+                raise RockfallError(f"What Blender has written of {draft.name} is not whole. {ROOM}")
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a file has what its format writes last: on a full disk Blender may end early, and say nothing."""
+    if not file.is_file():
+        return False
+    size, ending = file.stat().st_size, file.suffix
+    with file.open("rb") as stream:
+        head = stream.read(24)
+        if size < LEAST_BYTES:
+            return False
+        if ending == ".glb":
+            return head[:4] == b"glTF" and int.from_bytes(head[8:12], "little") == size
+        if ending == ".usdc":  # the place of the table of contents, which is written last
+            return head[:8] == b"PXR-USDC" and 24 <= int.from_bytes(head[16:24], "little") < size
+        if ending == ".abc":  # the byte that says that the archive was closed
+            return head[:6] == b"Ogawa\xff"
+        stream.seek(-4, 2)
+        return stream.read().strip().endswith(b"}")

@@ -25,7 +25,7 @@ from ..progress import Progress, silent
 from ..terrain.decimation import decimate
 from ..terrain.raycast import any_hit, cast_rays
 from ..terrain.surface import Surface
-from ..vectors import Array, norm, unit
+from ..vectors import Array, Mask, norm, unit
 from ..versions import versions
 from .packing import Packing, in_reading_order, quantise
 from .show import CREDITS, DOI, Show
@@ -37,6 +37,7 @@ MOST_FACES = 250_000
 LEAST_FACES = 2_000
 MEASURED_STEP_S, SIMULATED_STEP_S = 1 / 60, 0.1
 """Between the rows of a path: the cubic between them is a free flight in any case."""
+KEPT_M = 5e-4
 COARSER = 0.6
 SUN_LEFT_DEG, SUN_UP_DEG = 60.0, 45.0
 """Where the sun stands: so far to the left of whoever looks at the slope first, which shows its relief."""
@@ -117,7 +118,7 @@ def _page(show: Show, language: str, most_faces: int) -> Page:
     packing, view = Packing(), _view(show)
     sun = _sun(view)
     groups = list(dict.fromkeys(fall.group for fall in show.falls))
-    falls = [replace_rows(fall, SIMULATED_STEP_S if fall.group else MEASURED_STEP_S) for fall in show.falls]
+    falls = [thinned(fall, SIMULATED_STEP_S if fall.group else MEASURED_STEP_S) for fall in show.falls]
     terrain = _terrain(show.surface, most_faces, sun, packing)
     blocks = _blocks(falls, groups, show, packing)
     body = solid("rock", np.ones(3))
@@ -158,21 +159,35 @@ def _page(show: Show, language: str, most_faces: int) -> Page:
     return Page(text, 0 if terrain is None else int(terrain["faces"]), len(falls))
 
 
-def replace_rows(fall: Fall, step_s: float) -> Fall:
-    """A fall with rows at least a step apart, but for those at which its motion changes: impacts, ends, gaps."""
-    time, n = fall.time_s, fall.time_s.size
+def thinned(fall: Fall, step_s: float) -> Fall:
+    """A fall with rows about a step apart, which gives all places to `KEPT_M`.
+
+    Rows at which its motion changes stay: impacts, ends, gaps, another spin, and where the cubic between the others
+    would not pass through them, as on the ground.
+    """
+    time = fall.time_s
     jump = np.r_[True, (np.diff(time) <= 0) | (np.diff(fall.chain) != 0)]
     kept = jump | np.r_[jump[1:], True]
     if fall.spin is not None:
-        other = np.any(np.nan_to_num(np.diff(fall.spin, axis=0)) != 0, axis=1)
-        kept |= np.r_[False, other]
+        kept |= np.r_[False, np.any(np.nan_to_num(np.diff(fall.spin, axis=0)) != 0, axis=1)]
     last = -np.inf
-    for i in range(n):
+    for i in range(time.size):
         if kept[i] or time[i] - last >= step_s * (1 - 1e-6):
             kept[i], last = True, time[i]
+    few = _rows(fall, kept)
+    rows = np.flatnonzero(kept)
+    for i in np.flatnonzero(~kept).tolist():
+        place = few.state(float(time[i]))
+        if place is None or np.abs(place[0] - fall.position[i]).max() > KEPT_M:
+            before = int(np.searchsorted(rows, i))
+            kept[rows[before - 1] : rows[min(before, rows.size - 1)]] = True
+    return _rows(fall, kept)
+
+
+def _rows(fall: Fall, kept: Mask) -> Fall:
     return replace(
         fall,
-        time_s=time[kept],
+        time_s=fall.time_s[kept],
         position=fall.position[kept],
         velocity=fall.velocity[kept],
         chain=fall.chain[kept],
@@ -245,7 +260,7 @@ def _view(show: Show) -> dict[str, Any]:
         away = raised - position
         far = norm(away)
         hidden = any_hit(surface, np.broadcast_to(position, raised.shape), away / far[:, None], far)
-        return 1.0 - hidden
+        return np.where(hidden, 0.0, 1.0)
 
     view = place_camera(points, downhill, ASPECT, None if surface is None else seen)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2

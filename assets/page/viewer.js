@@ -30,7 +30,7 @@
 
   // ---- motion: the same cubic between rows as in the core -----------------------------------------------------
   const T = tables();
-  const quaternion = new THREE.Quaternion(), step = new THREE.Quaternion(), axis = new THREE.Vector3();
+  const where = new THREE.Vector3(), quaternion = new THREE.Quaternion(), step = new THREE.Quaternion(), axis = new THREE.Vector3();
 
   function turnsOf(block) { // quaternions at each row, from the spin of each row to the next
     const turns = new Float64Array(4 * (block.rows[1] - block.rows[0]));
@@ -107,6 +107,7 @@
   sun.position.fromArray(show.sun);
   scene.add(sun);
 
+  let ground = null;
   if (show.terrain) {
     const { low, step: grid } = show.terrain, count = T.vertices.length / 3, places = new Float32Array(3 * count);
     for (let i = 0; i < places.length; i++) places[i] = low[i % 3] + grid[i % 3] * T.vertices[i];
@@ -115,7 +116,8 @@
     geometry.setAttribute("color", new THREE.BufferAttribute(T.colours, 3, true));
     geometry.setIndex(new THREE.BufferAttribute(T.faces, 1));
     const material = { vertexColors: true, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 };
-    scene.add(new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ ...material, side: THREE.FrontSide })));
+    ground = new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ ...material, side: THREE.FrontSide }));
+    scene.add(ground);
     const below = new THREE.MeshBasicMaterial({ color: 0x55524d, side: 1, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
     scene.add(new THREE.Mesh(geometry, below)); // the underside is plain: nobody takes it for a slope
   }
@@ -258,6 +260,25 @@
   }
   new ResizeObserver(resize).observe($("stage"));
 
+  // Turning and zooming is about the ground under the pointer: else one would zoom through it.
+  const caster = new THREE.Raycaster(), pointer = new THREE.Vector2();
+  let anchored = -1e9;
+  function anchor(event) {
+    const now = performance.now();
+    if (!ground || now - anchored < 400) { if (event.type === "wheel") anchored = now; return; }
+    anchored = now;
+    const box = $("canvas").getBoundingClientRect();
+    pointer.set((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
+    camera.updateMatrixWorld();
+    caster.setFromCamera(pointer, camera);
+    const hit = caster.intersectObject(ground, false)[0];
+    if (!hit) return;
+    camera.getWorldDirection(sight);
+    const depth = where.copy(hit.point).sub(camera.position).dot(sight);
+    if (depth > controls.minDistance) controls.target.copy(camera.position).addScaledVector(sight, depth);
+  }
+  for (const kind of ["wheel", "pointerdown"]) $("canvas").addEventListener(kind, anchor, { capture: true, passive: true });
+
   const onScreen = new THREE.Vector3();
   function screen(place) { // pixels from the upper left corner; null behind the camera
     onScreen.fromArray(place).project(camera);
@@ -266,7 +287,7 @@
   const pixelsPerMetre = (distance) => size.y / (2 * Math.tan((camera.fov * Math.PI) / 360) * Math.max(distance, 1e-6));
 
   // ---- a moment -----------------------------------------------------------------------------------------------
-  const matrix = new THREE.Matrix4(), where = new THREE.Vector3(), stretch = new THREE.Vector3();
+  const matrix = new THREE.Matrix4(), stretch = new THREE.Vector3();
   const nowhere = new THREE.Matrix4().makeScale(0, 0, 0);
   function draw() {
     for (const group of groups) {
@@ -521,6 +542,7 @@
     placesAt: (time) => show.blocks.map((block) => stateAt(block, time).place),
     turnsAt: (time) => show.blocks.map((block) => turnAt(block, stateAt(block, time)).toArray()),
     drawn: () => groups.flatMap((group) => group.blocks.map((block, k) => { group.bodies.getMatrixAt(k, matrix); return [...matrix.elements]; })),
+    camera: () => camera.position.toArray(),
     screen: (place) => { camera.updateMatrixWorld(); return screen(place); },
     segments: () => groups.map((group) => [group.grown.instanceCount, group.ends.length]),
   };

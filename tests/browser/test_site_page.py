@@ -16,12 +16,14 @@ import rockfall
 from rockfall.core.camera.model import rotation_from_vector
 from rockfall.core.outreach.page import make_page
 from rockfall.core.outreach.show import Show, ShowRequest, open_show
+from rockfall.core.terrain.raycast import heights_above
 
 pytest.importorskip("selenium", reason="selenium is not installed: pip install 'rockfall[dev]'")
 
 from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
@@ -187,6 +189,20 @@ def test_a_click_on_a_block_tells_about_it(browser, page: str, show: Show) -> No
     ).click().perform()
     time.sleep(0.3)
     assert said(browser, "card-name") == show.falls[chosen].name.partition(",")[0]
+
+
+def test_zooming_does_not_pass_through_the_ground(browser, page: str, show: Show) -> None:
+    """However far one scrolls in, the camera stays above the terrain."""
+    opened(browser, page + "#t=3")
+    canvas = browser.find_element(By.ID, "canvas")
+    x, y = browser.execute_script("return rockfall.screen(arguments[0])", show.falls[1].position[-1].tolist())
+    origin = ScrollOrigin.from_element(canvas, int(x - canvas.size["width"] / 2), int(y - canvas.size["height"] / 2))
+    for _ in range(25):
+        ActionChains(browser).scroll_from_origin(origin, 0, -400).perform()
+    time.sleep(1.0)
+    place = np.array(browser.execute_script("return rockfall.camera()"))
+    assert np.linalg.norm(place - show.falls[1].position[-1]) < 30  # it came near
+    assert heights_above(show.surface, place[None])[0] > 0
 
 
 def test_it_speaks_three_languages(browser, page: str) -> None:

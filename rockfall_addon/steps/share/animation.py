@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An animation that the core has computed, as a scene that Blender's exporters write."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from errno import ENOSPC
 from os import strerror
 from pathlib import Path
@@ -28,6 +28,7 @@ def write(source: Path, files: list[Path], progress: Progress) -> None:
     RockfallError : one cannot be written.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
+    check_formats(file.suffix.removeprefix(".") for file in files)
     animation = load_animation(source)
     progress("Building the scene", 0, len(files))
     _build(animation)
@@ -35,6 +36,24 @@ def write(source: Path, files: list[Path], progress: Progress) -> None:
         progress(f"Writing {file.name}", i, len(files))
         _export(file, animation)
     progress(f"Writing {files[-1].name}", len(files), len(files))
+
+
+def check_formats(endings: Iterable[str]) -> None:
+    """Refuse formats that this Blender is built without.
+
+    Raises
+    ------
+    RockfallError : there is one.
+    """
+    built = bpy.app.build_options
+    for ending in endings:
+        name, there = {"usdc": ("USD", built.usd), "usda": ("USD", built.usd), "abc": ("Alembic", built.alembic)}.get(
+            ending, ("", True)
+        )
+        if not there:
+            raise RockfallError(
+                f"This Blender is built without {name}. Leave that format out, or use the Blender of blender.org."
+            )
 
 
 def _build(animation: Animation) -> None:

@@ -17,6 +17,7 @@ from ...view import job
 from ...view.from_file import last_folder
 from ...view.job import InBackground, Work
 from ...view.reporting import possible
+from .animation import check_formats
 from .beside import animator_command
 
 LANGUAGES = [(name, said["language"], "") for name, said in page_texts().items()]
@@ -133,6 +134,7 @@ class ROCKFALL_OT_export_animation(_Shown, bpy.types.Operator):
         path, asked, rate, block = self.file(), self.asked(context), self.rate, self.block
         stem = path.with_suffix("") if path.suffix.lower().removeprefix(".") in FORMATS else path
         formats = [name for name in FORMATS if name in self.formats] or [KINDS[0][0]]
+        check_formats(formats)
         files, command = [stem.with_name(f"{stem.name}.{name}") for name in formats], animator_command()
 
         def compute(progress: Progress) -> object:

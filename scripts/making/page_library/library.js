@@ -3,7 +3,7 @@
 export {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, ColorManagement, DirectionalLight, DoubleSide, FrontSide, Group,
   HemisphereLight, InstancedMesh, LinearSRGBColorSpace, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
-  PerspectiveCamera, Points, PointsMaterial, Quaternion, Scene, Sprite, SpriteMaterial, Vector2, Vector3, WebGLRenderer,
+  PerspectiveCamera, Points, PointsMaterial, Quaternion, Raycaster, Scene, Sprite, SpriteMaterial, Vector2, Vector3, WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 export { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";

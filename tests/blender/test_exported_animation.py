@@ -6,6 +6,7 @@ import re
 import struct
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -227,9 +228,8 @@ def test_nothing_is_exported_without_trajectories(rockfall) -> None:
 
 def test_a_format_that_blender_is_built_without_is_named(rockfall, part, monkeypatch: pytest.MonkeyPatch) -> None:
     module = part("rockfall_addon.steps.share.animation")
-    without = type(
-        "Bpy", (), {"app": type("App", (), {"build_options": type("O", (), {"usd": False, "alembic": True})})}
-    )
+    options = SimpleNamespace(usd=False, alembic=True)
+    without = SimpleNamespace(app=SimpleNamespace(build_options=options))
     monkeypatch.setattr(module, "bpy", without)
     module.check_formats(["glb", "abc"])
     with pytest.raises(part("core.errors").RockfallError, match="built without USD"):

@@ -38,9 +38,7 @@ def case_export_page_and_animation(window):
         content = json.loads(re.search(r'id="show">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL)[1])
         assert len(content["blocks"]) == 15
         with window.override():
-            bpy.ops.rockfall.export_animation(
-                filepath=str(animation), formats={"glb", "abc"} if bpy.app.build_options.alembic else {"glb"}
-            )
+            bpy.ops.rockfall.export_animation(filepath=str(animation), formats={"glb"})
         yield from window.wait_for(lambda: not job.is_running(), 150, "animation")
         yield 0.5
         window.screenshot("5-animation")

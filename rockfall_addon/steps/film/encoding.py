@@ -93,6 +93,6 @@ def _read_again(job: FilmJob, frames: int) -> None:
 def _lacking(codec: str, reason: str = "") -> str:
     said = f" ({reason.removeprefix('Error: ').strip().rstrip('.')})" if reason else ""
     return (
-        f"This Blender cannot write {CODECS[codec]} here{said}. Choose another codec with --codec: h264 is written by all, "
-        "--images keeps the frames as pictures."
+        f"This Blender cannot write {CODECS[codec]} here{said}. Choose another codec with --codec: h264 is written by "
+        "all, --images keeps the frames as pictures."
     )

@@ -5,7 +5,7 @@ import argparse
 from pathlib import Path
 
 from ..errors import InputError
-from ..film.engines import ENGINES
+from ..film.engines import ENGINES, MEASURED
 from ..film.job import AS_SET_UP, BLEND, GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
@@ -127,7 +127,9 @@ def run(arguments: argparse.Namespace) -> int:
         done = maker.film(job, progress)
     for remark in done.remarks:
         print(remark)
-    print(f"{preset.width}×{preset.height}, rendered with {done.engine.capitalize()}")
+    engine = "cycles" if done.engine == MEASURED and kind != "film" else done.engine
+    said = "" if engine == MEASURED else f", rendered with {engine.capitalize()}"
+    print(f"{preset.width}×{preset.height}{said}")
     print(f"Written: {Path(arguments.out) / name}")
     return 0
 

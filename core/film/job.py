@@ -28,7 +28,8 @@ class FilmJob:
         "frames" the folder.
     out : the file to write.
     preset : name of the render preset.
-    engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen; `AS_SET_UP` of a .blend.
+    engine : "cycles", "workbench" or "eevee"; "auto" until one is chosen; `MEASURED` lets frames tell
+        (for a picture it is Cycles); `AS_SET_UP` of a .blend.
     frames : first and last frame, both included; None for all, or for a still the last.
     up, unit_m : how to read a terrain file.
     models : impact models whose blocks are shown beside the real ones, from each impact to the next.

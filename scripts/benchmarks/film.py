@@ -22,16 +22,22 @@ WHOLE = 452
 def measure(engine: str, count: int, preset: str) -> None:
     """Print the time to load and dress the scene, and the time of a frame."""
     maker = film_maker()
-    times: list[float] = []
+    at: dict[int, float] = {}
     with tempfile.TemporaryDirectory() as folder:
         frames = (MIDDLE, MIDDLE + count - 1)
         job = FilmJob("film", PROJECT, Path(folder) / "film.mp4", engine, preset, frames)
         start = time.perf_counter()
-        maker.make(job, lambda *_: times.append(time.perf_counter() - start))
-    each = (times[-1] - times[0]) / (len(times) - 1)
+
+        def told(_text: str, done: int = 0, total: int = 0) -> None:
+            if total and done:  # said again and again while a frame takes long
+                at.setdefault(done, time.perf_counter() - start)
+
+        maker.make(job, told)
+    first, last = min(at), max(at)
+    each = (at[last] - at[first]) / (last - first)
     print(
-        f"{engine:<10} {preset}: first frame after {times[0]:5.1f} s, then {each:.3f} s a frame: "
-        f"{times[0] + each * (WHOLE - 1):.0f} s for the film of {WHOLE} frames"
+        f"{engine:<10} {preset}: first frame after {at[first]:5.1f} s, then {each:.3f} s a frame: "
+        f"{at[first] + each * (WHOLE - 1):.0f} s for the film of {WHOLE} frames"
     )
 
 

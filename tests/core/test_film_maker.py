@@ -8,7 +8,7 @@ import pytest
 from rockfall.core import cli
 from rockfall.core.errors import DependencyError, RockfallError
 from rockfall.core.film import maker as maker_module
-from rockfall.core.film.engines import PASSED, choose_engine, probe, probe_script
+from rockfall.core.film.engines import MEASURED, PASSED, choose_engine, probe, probe_script
 from rockfall.core.film.job import AS_SET_UP, FilmJob
 from rockfall.core.film.maker import FilmMaker, film_maker, inside_blender, run_job
 from rockfall.core.progress import CancelledError
@@ -28,7 +28,8 @@ def test_probe_script_is_python_for_each_engine() -> None:
 
 def test_auto_takes_workbench_on_a_graphics_card_only() -> None:
     assert choose_engine("auto", says("NVIDIA")) == "workbench"
-    assert choose_engine("auto", says("SOFTWARE")) == "cycles"
+    assert choose_engine("auto", says("SOFTWARE")) == MEASURED
+    assert choose_engine(MEASURED, KILL_YOURSELF) == MEASURED
 
 
 def test_a_probe_that_crashes_or_hangs_means_cycles() -> None:

@@ -8,6 +8,7 @@ import bpy
 from ....core.errors import InputError, RockfallError
 from ....core.exchange.project import Project, RenderPreset, read_project
 from ....core.film.check import check_film, check_picture
+from ....core.film.engines import MEASURED
 from ....core.film.falls import fall_beside
 from ....core.film.job import BLEND, FilmJob
 from ....core.film.presets import HD, FilmTiming, find_preset
@@ -19,6 +20,7 @@ from ...scene import models, simulation
 from ...scene.project import load_project
 from . import dressing, encoding, saved
 from .engine import engine_of, use_engine
+from .quicker import use_quicker
 
 
 def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
@@ -29,6 +31,7 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     RockfallError : the project is bad, has nothing to show, or the file cannot be written.
     """
     scene, remarks = bpy.context.scene, ()
+    measured, job = job.engine == MEASURED, job.with_engine("cycles") if job.engine == MEASURED else job
     if job.kind == "frames":
         encoding.encode(job, progress)
         return remarks
@@ -48,6 +51,11 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
             dressing.set_up_picture(scene, preset, job.engine)
         else:
             dressing.set_up_film(scene, preset, job.engine, job.graphs)
+    if job.kind == "film" and measured:
+        progress("Measuring which engine is quicker", 0, 0)
+        first, last = job.frames or (scene.frame_start, scene.frame_end)
+        said = use_quicker(scene, first, min(last, scene.frame_end))
+        remarks = (*remarks, *([said] if said else []))
     if job.kind == "film":
         render_film(scene, job.out, job.frames, progress)
     else:

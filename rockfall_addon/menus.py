@@ -67,7 +67,8 @@ STEPS = (
         "rockfall.open_motion_graphs", "rockfall.open_keys", "rockfall.show_relief",
     )),
     ("film", "9  Film", (
-        "rockfall.set_up_film", "rockfall.preview_film", "rockfall.render_film", "rockfall.remove_film",
+        "rockfall.set_up_film", "rockfall.preview_film", "rockfall.render_film", "rockfall.remove_film", None,
+        "rockfall.make_film",
     )),
     ("share", "10  Share", (
         "rockfall.export_tables", "rockfall.export_graphs", "rockfall.export_simulation",

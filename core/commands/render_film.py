@@ -100,12 +100,12 @@ def run(arguments: argparse.Namespace) -> int:
 def _request(arguments: argparse.Namespace) -> "FilmRequest":
     from ..exchange.parameters import checked_parameters
     from ..exchange.project import read_project
-    from ..film.composed.catalogue import find_film
+    from ..film.composed.kinds import find_kind
     from ..film.composed.request import SUN_DEG, FilmRequest
     from ..film.presets import find_preset
     from ..film.simulated import NUMBER
 
-    find_film(arguments.film)
+    find_kind(arguments.film)
     project = read_project(arguments.project)
     preset = find_preset(project, arguments.preset or DEFAULT_PRESET)
     models = models_as_asked(arguments.model)

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from ..impact_models.machinery.parameters import Value
 from .simulated import NUMBER
 
-Kind = Literal["film", "still", "slope", "terrain", "frames"]
+Kind = Literal["film", "still", "slope", "terrain", "frames", "composed"]
 GraphKind = Literal["impacts", "motion"]
 AS_SET_UP, BLEND = "", ".blend"
 GRAPH_KINDS: tuple[GraphKind, ...] = get_args(GraphKind)
@@ -23,7 +23,8 @@ class FilmJob:
     Attributes
     ----------
     kind : "film" (MP4); "still" (one frame of the film, PNG); "slope" (the whole slope with all trajectories, PNG);
-        "terrain" (a terrain file without trajectories, PNG); "frames" (numbered pictures of a folder, MP4).
+        "terrain" (a terrain file without trajectories, PNG); "frames" (numbered pictures of a folder, MP4);
+        "composed" (what `request` says).
     source : the project; a .blend, whose film or still is as its settings say; for "terrain" the terrain file, for
         "frames" the folder.
     out : the file to write.
@@ -38,6 +39,7 @@ class FilmJob:
     parameters : model → parameter → value, where it is not the default.
     graphs : which stand in a film or still and follow its time; None for none.
     title : written into the picture of a terrain; empty for the name of its file.
+    request : of "composed", as JSON.
     fps, codec, size : of "frames": frames per second, "h264", "h265" or "av1", width and height [px].
     scene : of a .blend; empty for the one that was open when it was saved.
     """
@@ -55,6 +57,7 @@ class FilmJob:
     graphs: GraphKind | None = None
     fps: float = 25.0
     codec: str = "h264"
+    request: str = ""
     size: tuple[int, int] = (0, 0)
     models: tuple[str, ...] = ()
     simulate: tuple[str, ...] = ()

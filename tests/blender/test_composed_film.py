@@ -66,3 +66,37 @@ def test_the_scene_is_as_it_was(frames: Path, part) -> None:
     before = sorted(scene.name for scene in bpy.data.scenes)
     make(job.FilmJob("frames", frames, frames / "f.mp4", frames=(7, 8), size=SIZE), lambda *_: None)
     assert sorted(scene.name for scene in bpy.data.scenes) == before
+
+
+def test_the_list_of_films_and_what_each_needs(scan, part) -> None:
+    import bpy
+
+    composed, kinds = part("rockfall_addon.steps.film.composed"), part("core.film.composed.kinds")
+    settings = scan.rockfall_composed_film
+    assert [item[0] for item in composed._kinds(settings, bpy.context)] == list(kinds.NAMES)
+    assert all((composed.PICTURES / f"{name}.jpg").is_file() for name in kinds.NAMES)
+    assert "no trajectories" in composed.lacking(scan)
+    assert not bpy.ops.rockfall.make_film.poll()
+    settings.kind, settings.language = "turntable", "fr"
+    request = composed.request_of(scan)
+    assert (request.film, request.language, request.rate) == ("turntable", "fr", None)
+    assert part("core.film.composed.request").FilmRequest.from_json(request.to_json()) == request
+
+
+def test_a_picture_is_made_of_the_open_scene(rockfall, part, tmp_path: Path) -> None:
+    """The demo's footage with its camera, from the scene to a picture that is checked."""
+    import bpy
+
+    assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+    scene, composed = bpy.context.scene, part("rockfall_addon.steps.film.composed")
+    assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
+    scene.rockfall_composed_film.kind = "story"
+    assert composed.lacking(scene) == ""
+    scene.rockfall_film.file = str(tmp_path / "site.mp4")
+    scene.rockfall_film.size = "preview"
+    scene.rockfall_composed_film.kind = "contact_sheet"
+    assert bpy.ops.rockfall.make_film() == {"FINISHED"}
+    picture = cv2.imread(str(tmp_path / "site_contact_sheet.png"))
+    assert picture.shape == (360, 640, 3)
+    assert picture.std() > 20
+    assert [file.name for file in tmp_path.iterdir()] == ["site_contact_sheet.png"]

@@ -11,11 +11,12 @@ from rockfall.core.camera.model import Camera, look_at
 from rockfall.core.errors import InputError
 from rockfall.core.film.composed.blocks import Pose, draw_block, draw_shadow, sun_direction
 from rockfall.core.film.composed.canvas import Canvas, text_width
-from rockfall.core.film.composed.catalogue import FILMS, compose, find_film
+from rockfall.core.film.composed.catalogue import FILMS, PICTURES, compose
 from rockfall.core.film.composed.envelope import envelope
 from rockfall.core.film.composed.falls import Fall
 from rockfall.core.film.composed.frame_store import frame_store
 from rockfall.core.film.composed.ground import Photograph, ground_picture, lit_ground
+from rockfall.core.film.composed.kinds import KINDS, NAMES, find_kind
 from rockfall.core.film.composed.look import MEASURED
 from rockfall.core.film.composed.material import open_material
 from rockfall.core.film.composed.request import FilmRequest
@@ -329,9 +330,10 @@ def test_a_full_disk_is_said_and_finished_frames_stay(tmp_path: Path, monkeypatc
 
 
 def test_films_are_found_by_name_and_the_nearest_is_named() -> None:
-    assert [kind.name for kind in FILMS if kind.is_picture] == ["contact_sheet", "stroboscopic"]
+    assert [kind.name for kind in KINDS if kind.is_picture] == list(PICTURES)
+    assert {*FILMS, *PICTURES} == set(NAMES)
     with pytest.raises(InputError, match="Did you mean side_by_side"):
-        find_film("side-by-side2")
+        find_kind("side-by-side2")
 
 
 def test_the_overlay_is_registered_on_the_demos_footage() -> None:
@@ -361,7 +363,7 @@ def test_texts_stand_inside_the_picture(film: str, size: tuple[int, int], langua
     request = FilmRequest(
         film, DEMO / "project.toml", *size, language=language, number=2, graphs="motion" if film == "story" else ""
     )
-    made = compose(find_film(film), open_material(request))
+    made = compose(find_kind(film), open_material(request))
     for k in range(0, made.frames, max(made.frames // 24, 1)):
         canvas = made.canvas(k)
         assert canvas.picture.shape == (made.height, made.width, 3)

@@ -75,3 +75,40 @@ def case_preview_and_render_a_film(window):
     assert sorted(obj.name for obj in bpy.context.scene.objects) == before
     assert bpy.context.scene.rockfall_film.size == "preview"
     shutil.rmtree(folder)
+
+
+def case_films_of_the_footage(window):
+    """The list with its pictures, a picture made in the background, and what another one lacks."""
+    job = window.part("rockfall_addon.view.job")
+    folder = Path(tempfile.mkdtemp())
+    with window.override():
+        assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+        assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
+    scene = bpy.context.scene
+    scene.rockfall_film.file, scene.rockfall_film.size = str(folder / "site.mp4"), "preview"
+    scene.rockfall_composed_film.kind = "contact_sheet"
+    with window.override():
+        bpy.ops.ed.undo_push(message="settings")
+    yield from window.show_sidebar()
+    yield from window.open_panel("ROCKFALL_PT_film")
+    window.screenshot("1-panel")
+    yield 0.5
+    with window.override():
+        bpy.ops.rockfall.make_film("INVOKE_DEFAULT")
+    yield 0.5
+    window.screenshot("2-drawing")
+    yield from window.wait_for(lambda: not job.is_running(), 120, "drawn")
+    yield 0.5
+    window.screenshot("3-drawn")
+    window.part("core.film.check").check_picture(folder / "site_contact_sheet.png", (640, 360))
+    scene.rockfall_composed_film.kind = "story"
+    with window.override():
+        bpy.ops.rockfall.make_film("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: (folder / "site_story.frames" / "000020.png").exists(), 120, "frames")
+    yield from window.press("ESC", *window.centre())
+    assert not job.is_running()
+    yield 0.5
+    window.screenshot("4-stopped")
+    assert not (folder / "site_story.mp4").exists()
+    assert len(list((folder / "site_story.frames").glob("*.png"))) > 20, "finished frames are kept"
+    shutil.rmtree(folder)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a request to a file: frames drawn, kept, and encoded by Blender."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ...errors import InputError
@@ -14,13 +13,12 @@ from ...versions import versions
 from ..check import check_film, check_index, check_picture
 from ..job import FilmJob
 from ..maker import film_maker
-from .catalogue import compose, find_film
+from .catalogue import compose
 from .frame_store import frame_store
+from .kinds import CODECS, find_kind
 from .material import open_material
 from .request import FilmRequest
 from .shots import ComposedFilm
-
-CODECS: Mapping[str, str] = {"h264": "H.264", "h265": "H.265", "av1": "AV1"}
 
 
 @dataclass(frozen=True)
@@ -51,6 +49,7 @@ def make_film(
     still: bool = False,
     images: bool = False,
     codec: str = "h264",
+    name: str = "",
     progress: Progress = silent,
 ) -> Made:
     """Draw a film, or a picture, into a folder: NAME.mp4, NAME.png, or with `images` a folder NAME of pictures.
@@ -60,6 +59,7 @@ def make_film(
     frames : first and last, both included; None for all.
     still : one picture only, of the first of `frames` or of the middle of the film.
     codec : one of `CODECS`.
+    name : of the file, without its ending; empty for that of the kind of film.
 
     Notes
     -----
@@ -69,7 +69,7 @@ def make_film(
     ------
     RockfallError : the request or the project is bad, there is no Blender to encode with, the disk is full.
     """
-    kind = find_film(request.film)
+    kind = find_kind(request.film)
     if codec not in CODECS:
         raise InputError(f"There is no codec {codec!r}", advice=f"Codecs: {', '.join(CODECS)}")
     maker = None if kind.is_picture or still or images else film_maker()
@@ -80,19 +80,20 @@ def make_film(
     if kind.is_picture or still:
         frame = 0 if kind.is_picture else first if frames else film.frames // 2
         progress("Drawing", 0, 0)
-        file = out / f"{kind.name}.png"
+        file = out / f"{name or kind.name}.png"
         out.mkdir(parents=True, exist_ok=True)
         write_bytes(file, opencv().imencode(".png", film.canvas(frame).picture)[1].tobytes())
         check_picture(file, size)
         return Made(file, 1, 0, size, tuple(material.remarks))
     wanted = range(first, last + 1)
-    folder = out / (kind.name if images else f"{kind.name}.frames")
+    name = name or kind.name
+    folder = out / (name if images else f"{name}.frames")
     with frame_store(folder, _states(request)) as store:
         kept = store.fill(wanted, lambda frame: film.canvas(frame).picture, progress)
         if images:
             return Made(folder, len(wanted), kept, size, tuple(material.remarks))
         assert maker is not None
-        file = out / f"{kind.name}.mp4"
+        file = out / f"{name}.mp4"
         with output_file(file) as draft:
             job = FilmJob("frames", store.folder, draft, fps=film.fps, codec=codec, frames=(first, last), size=size)
             maker.make(job, progress)
@@ -114,6 +115,7 @@ def _span(film: ComposedFilm, frames: tuple[int, int] | None) -> tuple[int, int]
 def _states(request: FilmRequest) -> dict[str, object]:
     """All that decides the frames."""
     hashes = input_hashes(input_files(request.project, [request.solid]))
+    request = replace(request, project=Path(request.project.name))  # a copy of the project elsewhere is the same
     return {
         "request": request.to_json(),
         "inputs": hashes,

@@ -57,6 +57,15 @@ class FilmRequest:
     sun_deg: tuple[float, float] = SUN_DEG
     dust: bool = False
 
+    @classmethod
+    def from_json(cls, text: str) -> "FilmRequest":
+        """The inverse of `to_json`."""
+        values = json.loads(text)
+        for name in ("trajectories", "models", "sun_deg"):
+            values[name] = tuple(values[name])
+        values["slow_at"] = None if values["slow_at"] is None else tuple(values["slow_at"])
+        return cls(**{**values, "project": Path(values["project"])})
+
     def to_json(self) -> str:
         """As text, the same for the same request."""
         return json.dumps({**asdict(self), "project": str(self.project)}, sort_keys=True)

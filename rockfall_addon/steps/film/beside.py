@@ -7,6 +7,7 @@ The other one gets a copy of the .blend. What it makes is checked, and then repl
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -14,10 +15,14 @@ import bpy
 
 from .... import __package__ as PACKAGE  # noqa: N812
 from ....core.errors import RockfallError
+from ....core.film.composed.request import FilmRequest
 from ....core.film.job import AS_SET_UP, FilmJob
 from ....core.film.maker import run_job
 from ....core.output import output_file
 from ....core.progress import Progress
+from ...scene.project import save_project
+
+type Remarks = tuple[str, ...]
 
 written: dict[int, Path] = {}
 """session_uid of a scene → the film that was made of it."""
@@ -53,6 +58,36 @@ def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
             shutil.rmtree(folder, ignore_errors=True)
 
     return render
+
+
+def composed_of(scene: bpy.types.Scene, request: FilmRequest, path: Path, codec: str) -> Callable[[Progress], Remarks]:
+    """What composes a film, or a picture, of a scene as it is now: from a copy of its project, in another Blender.
+
+    Parameters
+    ----------
+    request : its project is set here.
+
+    Raises
+    ------
+    RockfallError : the project cannot be written. What is returned raises it when the film cannot be made: the old one
+        is as it was, and finished frames are kept beside it.
+    """
+    folder = Path(mkdtemp(dir=bpy.app.tempdir))
+    try:
+        file, _ = save_project(scene, folder / "project")
+    except RockfallError:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    asked, command = replace(request, project=file), _command()
+
+    def make(progress: Progress) -> Remarks:
+        try:
+            job = FilmJob("composed", file, path, request=asked.to_json(), codec=codec)
+            return run_job([*command, job.to_json()], path.name, progress)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    return make
 
 
 def _command() -> list[str]:

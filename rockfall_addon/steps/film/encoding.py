@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import RockfallError
-from ....core.film.composed.making import CODECS
+from ....core.film.composed.kinds import CODECS
 from ....core.film.job import FilmJob
 from ....core.film.presets import blender_rate
 from ....core.progress import Progress
@@ -93,6 +93,6 @@ def _read_again(job: FilmJob, frames: int) -> None:
 def _lacking(codec: str, reason: str = "") -> str:
     said = f" ({reason.removeprefix('Error: ').strip().rstrip('.')})" if reason else ""
     return (
-        f"This Blender cannot write {CODECS[codec]} here{said}. Choose another codec with --codec: h264 is written by "
-        "all, --images keeps the frames as pictures."
+        f"This Blender cannot write {CODECS[codec]} here{said}. Choose another codec with --codec: "
+        "h264 is written by all, --images keeps the frames as pictures."
     )

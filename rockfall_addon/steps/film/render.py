@@ -11,6 +11,7 @@ from ....core.film.check import check_film, check_picture
 from ....core.film.engines import MEASURED
 from ....core.film.falls import fall_beside
 from ....core.film.job import BLEND, FilmJob
+from ....core.film.maker import FilmMaker, inside_blender
 from ....core.film.presets import HD, FilmTiming, find_preset
 from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
@@ -35,6 +36,8 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     if job.kind == "frames":
         encoding.encode(job, progress)
         return remarks
+    if job.kind == "composed":
+        return _compose(job, progress)
     if job.source.suffix.lower() == BLEND:
         scene = saved.open_film(job)
     elif job.kind == "terrain":
@@ -65,6 +68,20 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
         render_picture(scene, job.out)
         progress("Rendering", 1, 1)
     return remarks
+
+
+def _compose(job: FilmJob, progress: Progress) -> tuple[str, ...]:
+    """Draw a film of a project, which this Blender encodes."""
+    from ....core.film.composed.making import make_film
+    from ....core.film.composed.request import FilmRequest
+
+    token = inside_blender.set(FilmMaker(make, ()))
+    try:
+        return make_film(
+            FilmRequest.from_json(job.request), job.out.parent, name=job.out.stem, codec=job.codec, progress=progress
+        ).remarks
+    finally:
+        inside_blender.reset(token)
 
 
 def render_film(scene: bpy.types.Scene, path: Path, frames: tuple[int, int] | None, progress: Progress) -> None:

@@ -19,8 +19,9 @@ from ...view import job
 from ...view.job import InBackground, Work
 from ...view.panel import RockfallPanel, fields, paragraph
 from ...view.reporting import possible
-from . import beside, stopwatch
+from . import beside, remembered, stopwatch
 from .properties import file_of, graphs_of
+from .written import draw_written
 
 PICTURES = Path(__file__).resolve().parents[3] / "assets" / "film" / "previews"
 LANGUAGES = (("en", "English", ""), ("fr", "Français", ""), ("de", "Deutsch", ""))
@@ -32,7 +33,7 @@ SOLIDS = (
     ("eota_111", "Norm Block 1:1:1", "EAD 340059-00-0106"),
     ("eota_221", "Norm Block 2:2:1", "EAD 340059-00-0106"),
 )
-PICTURE_SCALE, LIST_SCALE = 7.0, 6.0
+PICTURE_SCALE, LIST_SCALE = 6.0, 6.0
 
 _previews: dict[str, Any] = {}
 _items: list[tuple[str, str, str, int, int]] = []
@@ -156,6 +157,9 @@ class ROCKFALL_PT_composed_film(RockfallPanel, bpy.types.Panel):
         row.scale_y = 1.4
         text = "Make Picture" if kind.is_picture else "Make Film"
         row.operator("rockfall.make_film", text=text, icon="RENDER_STILL" if kind.is_picture else "RENDER_ANIMATION")
+        if not remembered.is_set_up(scene):  # else the panel above shows both
+            job.draw(context, layout, "film")
+            draw_written(layout, scene)
 
 
 CLASSES = (ComposedFilmSettings, ROCKFALL_OT_make_film, ROCKFALL_PT_composed_film)

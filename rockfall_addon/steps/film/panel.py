@@ -6,7 +6,8 @@ import bpy
 from ...scene import store
 from ...view import job
 from ...view.panel import RockfallPanel, State, fields, paragraph
-from . import beside, remembered, stopwatch, up_to_date
+from . import remembered, stopwatch, up_to_date
+from .written import draw_written
 
 
 class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
@@ -45,9 +46,7 @@ class ROCKFALL_PT_film(RockfallPanel, bpy.types.Panel):
         row.scale_y = 1.4
         row.operator("rockfall.render_film", icon="RENDER_ANIMATION")
         job.draw(context, layout, "film")
-        path = beside.written.get(scene.session_uid)
-        if path is not None:
-            layout.operator("wm.path_open", text=f"Open {path.name}", icon="PLAY").filepath = str(path)
+        draw_written(layout, scene)
         layout.operator("rockfall.remove_film", icon="X")
 
 

@@ -32,6 +32,9 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="blocks start when they did, one after the other (default: all at the same moment)",
     )
+    parser.add_argument(
+        "--plain", action="store_true", help="the terrain in light and shade only, without the colours of the videos"
+    )
 
 
 def show_as_asked(arguments: argparse.Namespace) -> "ShowRequest":
@@ -54,4 +57,12 @@ def show_as_asked(arguments: argparse.Namespace) -> "ShowRequest":
     project = read_project(arguments.project)
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
     parameters = model_parameters(arguments, simulate, known)
-    return ShowRequest(arguments.project, simulate, number, arguments.seed or 0, parameters, not arguments.as_observed)
+    return ShowRequest(
+        arguments.project,
+        simulate,
+        number,
+        arguments.seed or 0,
+        parameters,
+        not arguments.as_observed,
+        not arguments.plain,
+    )

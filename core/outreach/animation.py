@@ -128,7 +128,7 @@ def animate(show: Show, rate: float = RATE, block: str = "rock", progress: Progr
         progress("Placing the blocks", i, len(show.falls))
         place[i] = places_at(fall, moments)
         turn[i] = _continuous(quaternion_from_rotation(np.stack([fall.turn(float(moment)) for moment in moments])))
-    ground, colours = _ground(show.surface)
+    ground, colours = _ground(show)
     extra = show.site.extra
     about = {
         "title": show.site.name,
@@ -244,9 +244,10 @@ def _path(fall: Fall) -> Array:
     return place[kept | repeated | ~np.isfinite(place[:, 0])]
 
 
-def _ground(surface: Surface | None) -> tuple[Surface | None, Array]:
+def _ground(show: Show) -> tuple[Surface | None, Array]:
+    surface = show.surface
     if surface is None or not len(surface.faces):
         return None, np.zeros((0, 3))
     coarse = decimate(surface.vertices, surface.faces, MOST_FACES)
     ground = Surface(coarse.vertices, coarse.faces, surface.shift, surface.name)
-    return ground, lit_ground(ground, sun_direction(*SUN_DEG)).colours
+    return ground, lit_ground(ground, sun_direction(*SUN_DEG), show.photographs).colours

@@ -119,7 +119,7 @@ def _page(show: Show, language: str, most_faces: int) -> Page:
     sun = _sun(view)
     groups = list(dict.fromkeys(fall.group for fall in show.falls))
     falls = [thinned(fall, SIMULATED_STEP_S if fall.group else MEASURED_STEP_S) for fall in show.falls]
-    terrain = _terrain(show.surface, most_faces, sun, packing)
+    terrain = _terrain(show, most_faces, sun, packing)
     blocks = _blocks(falls, groups, show, packing)
     body = solid("rock", np.ones(3))
     packing.add("solid", body.vertices[body.faces].reshape(-1, 3), "float32")
@@ -230,13 +230,14 @@ def _group(name: str, falls: list[Fall]) -> dict[str, Any]:
     }
 
 
-def _terrain(surface: Surface | None, most_faces: int, sun: Array, packing: Packing) -> dict[str, Any] | None:
+def _terrain(show: Show, most_faces: int, sun: Array, packing: Packing) -> dict[str, Any] | None:
+    surface = show.surface
     if surface is None or not len(surface.faces):
         return None
     coarse = decimate(surface.vertices, surface.faces, most_faces)
     used, faces = np.unique(coarse.faces, return_inverse=True)
     mesh = Surface(coarse.vertices[used], faces.reshape(-1, 3).astype(np.int32), surface.shift, surface.name)
-    colours = lit_ground(mesh, sun).colours
+    colours = lit_ground(mesh, sun, show.photographs).colours
     places = quantise(mesh.vertices)
     packing.add("vertices", places.number, "uint16", differences=True)
     packing.add("colours", np.round(255 * np.clip(colours, 0, 1)), "uint8", differences=True)

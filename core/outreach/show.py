@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..exchange.opening import open_project
 from ..exchange.project import Project, Site, read_project
 from ..film.composed.falls import Fall, Hits, measured_falls, simulated_falls
+from ..film.composed.ground import Photograph
 from ..film.falls import fall_beside
 from ..film.job import FilmJob
 from ..film.simulated import NUMBER, group_name
@@ -24,6 +25,7 @@ from ..simulation.measured_releases import start_times
 from ..terrain.surface import Surface
 from ..vectors import Array
 from ..workflow.simulation import remarks_of
+from .photographs import photographs_of
 
 CREDITS, DOI = "credits", "doi"
 """Keys of a project's [site] beside its name and description."""
@@ -45,6 +47,7 @@ class ShowRequest:
     simulate : impact models whose blocks fall beside the measured ones, from the same starts.
     number, seed : of simulated blocks for each measured one and model, and of their random numbers.
     parameters : model → parameter → value, where it is not the default.
+    photographs : whether the terrain has the colours of the project's aligned videos.
     together : whether all blocks start at 0 s, not one after the other as they were observed.
     """
 
@@ -54,6 +57,7 @@ class ShowRequest:
     seed: int = 0
     parameters: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     together: bool = True
+    photographs: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +73,7 @@ class Show:
     rests : names of those that are at rest in the end; the others are lost from sight, or leave the terrain.
     together : whether all start at 0 s.
     remarks : what a user should know.
+    photographs : of the slope, whose colours its terrain has where they show it.
     """
 
     site: Site
@@ -78,6 +83,7 @@ class Show:
     rests: frozenset[str]
     together: bool = True
     remarks: tuple[str, ...] = ()
+    photographs: tuple[Photograph, ...] = ()
 
     @property
     def duration_s(self) -> float:
@@ -106,7 +112,12 @@ def open_show(request: ShowRequest, progress: Progress = silent) -> Show:
         simulations = _simulated(request, project, result, progress)
     remarks = [str(remark) for remark in (*result.remarks, *(remarks_of(simulations) if simulations else ()))]
     site = project.site if project.site.name else replace(project.site, name=request.project.absolute().parent.name)
-    return show_of(site, surface, result, simulations, together=request.together, remarks=remarks)
+    show = show_of(site, surface, result, simulations, together=request.together, remarks=remarks)
+    if not request.photographs or surface is None:
+        return show
+    centre = show.origin.vector - surface.shift.vector
+    photographs, said = photographs_of(project, surface, centre, progress)
+    return replace(show, photographs=photographs, remarks=(*show.remarks, *said))
 
 
 def show_of(

@@ -97,6 +97,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         georeference.write_shift(scene, shift)
     reconstruction.keep_settings(scene, project)
     scene[store.SITE_DESCRIPTION] = project.site.description
+    scene[store.SITE_MORE] = json.dumps({k: text for k, text in project.site.extra.items() if isinstance(text, str)})
     scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in film_preset.take(scene, project.render)])
     fit.forget(scene)
     for which, values in parameters.items():
@@ -120,6 +121,12 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
         if said:
             simulation_setup.keep(scene, {}, (Remark(said, "warning", "project"),))
     return result
+
+
+def site_of(scene: bpy.types.Scene) -> Site:
+    """The site's name and description, and what else the project says of it: credits, DOI of the data."""
+    more = store.read_json(scene, store.SITE_MORE, {})
+    return Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, "")), more)
 
 
 def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Remark, ...]]:
@@ -166,7 +173,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
         )
         parameters = {"A": models.parameters_of(scene), "B": fit.second_set(scene)}
         project = Project(
-            site=Site(str(scene.get(store.SITE, "")), str(scene.get(store.SITE_DESCRIPTION, ""))),
+            site=site_of(scene),
             terrain=None if surface is None else source,
             picks=None if table is None else place / "picks.csv",
             block=settings.block,

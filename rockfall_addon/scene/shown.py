@@ -2,7 +2,7 @@
 """What of the scene is shown to others, on a page or as an animation: the measured blocks, and the simulated ones."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
@@ -14,7 +14,8 @@ from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ground_of, run_models
-from . import picks, reconstruction, simulation, simulation_setup, store, terrain
+from . import picks, reconstruction, simulation, simulation_setup, terrain
+from .project import site_of
 from .simulation_setup import Plan
 
 STALE = "Settings have changed since the simulation: simulate again first, or export without simulated blocks."
@@ -64,7 +65,8 @@ def ask(scene: bpy.types.Scene, *, simulated: bool, together: bool) -> Asked:
             f"{sum(counts.values())} simulated blocks are too many to be shown to others: {MOST_BLOCKS} at most. "
             "Simulate fewer, or export without them."
         )
-    site = Site(str(scene.get(store.SITE, "")) or "Rockfall", str(scene.get(store.SITE_DESCRIPTION, "")))
+    site = site_of(scene)
+    site = site if site.name else replace(site, name="Rockfall")
     surface = terrain.surface_of_scene(scene)
     plan = simulation_setup.plan(scene) if with_them else None
     return Asked(site, surface, measured, plan, counts, together, left_out)

@@ -36,7 +36,7 @@ COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
 # of the scene: the project
 SCHEMA = "rockfall_schema"
 SHIFT, CRS = "rockfall_shift_m", "rockfall_crs"
-SITE, SITE_DESCRIPTION = "rockfall_site", "rockfall_site_description"
+SITE, SITE_DESCRIPTION, SITE_MORE = "rockfall_site", "rockfall_site_description", "rockfall_site_more"
 PICKS_SOURCE = "rockfall_picks_source"
 RENDER_PRESETS = "rockfall_render_presets"
 BEFORE_FILM = "rockfall_film_before"

@@ -271,6 +271,7 @@ OF_THE_SCENE: dict[str, tuple[Check, str]] = {
     store.SIMULATION: (json_of(dict, _results_at_screens), "simulate again to know what is shown"),
     store.KNOWN_VIDEOS: (json_of(dict, _texts_by_name), "videos that were deleted before are not missed"),
     store.PROPOSAL: (json_of(dict, _having("ids", "names", "prints")), "nothing is proposed: refine again"),
+    store.SITE_MORE: (json_of(dict, _texts_by_name), "credits and DOI are not known: open the project again"),
     store.RENDER_PRESETS: (json_of(list, _presets), "the project has no films of its own"),
 }  # fmt: skip
 """Key → how it is checked, and what holds as long as it cannot be used."""

@@ -221,6 +221,26 @@ def test_the_scene_writes_a_page_of_what_it_shows(slope: bpy.types.Scene, part, 
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".html"] == ["plane.html"]
 
 
+def test_credits_of_a_project_stay_with_the_file(rockfall, part, tmp_path: Path) -> None:
+    demo = Path(part("core").__file__).parents[1] / "assets" / "demo"
+    text = (
+        (demo / "project.toml")
+        .read_text(encoding="utf-8")
+        .replace("[site]\n", '[site]\ncredits = "Noël"\ndoi = "10.1/x"\n')
+    )
+    for name in ("terrain.ply", "picks.csv"):
+        text = text.replace(f'"{name}"', f'"{(demo / name).as_posix()}"')
+    (tmp_path / "project.toml").write_text(text, encoding="utf-8")
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "project.toml")) == {"FINISHED"}
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "again")) == {"FINISHED"}
+    again = part("core.exchange.project").read_project(tmp_path / "again" / "project.toml")
+    assert again.site.extra == {"credits": "Noël", "doi": "10.1/x"}
+    assert bpy.ops.rockfall.export_web_page(filepath=str(tmp_path / "a.html")) == {"FINISHED"}
+    text = (tmp_path / "a.html").read_text(encoding="utf-8")
+    content = json.loads(re.search(r'id="show">(.*?)</script>', text, re.DOTALL)[1])
+    assert (content["credits"], content["doi"]) == ("Noël", "10.1/x")
+
+
 def test_nothing_is_exported_without_trajectories(rockfall) -> None:
     assert not bpy.ops.rockfall.export_web_page.poll()
     assert not bpy.ops.rockfall.export_animation.poll()

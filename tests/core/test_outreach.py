@@ -184,6 +184,54 @@ def test_an_animation_is_handed_over_whole(show: Show, tmp_path: Path) -> None:
     assert [len(path) for path in found.paths] == [len(path) for path in animation.paths]
 
 
+def with_footage(folder: Path, video: Path) -> Path:
+    """The demo's project, with the footage of one of its blocks."""
+    demo = DEMO.parent
+    text = DEMO.read_text(encoding="utf-8")
+    for name in ("terrain.ply", "picks.csv"):
+        text = text.replace(f'file = "{name}"', f'file = "{(demo / name).as_posix()}"')
+    camera = (demo / "footage" / "camera.toml").as_posix()
+    text += f'\n[[videos]]\nname = "film"\nfile = "{video.as_posix()}"\ncamera = "{camera}"\noffset_s = 465.499\n'
+    (folder / "project.toml").write_text(text, encoding="utf-8")
+    return folder / "project.toml"
+
+
+def test_the_terrain_has_the_colours_of_the_footage(tmp_path: Path) -> None:
+    """Truth: OpenCV's own projection of the terrain into a frame of the video."""
+    import cv2
+
+    footage = DEMO.parent / "footage"
+    show = open_show(ShowRequest(with_footage(tmp_path, footage / "footage.mp4")))
+    content, tables = unpacked(make_page(show).text)
+    _, plain = unpacked(make_page(replace(show, photographs=())).text)
+    np.testing.assert_array_equal(tables["vertices"], plain["vertices"])
+    changed = np.abs(tables["colours"].astype(int) - plain["colours"]).max(axis=1) > 8
+    assert 0.05 < changed.mean() < 0.9
+    said = tomllib.loads((footage / "camera.toml").read_text(encoding="utf-8"))
+    vertices = np.array(content["terrain"]["low"]) + np.array(content["terrain"]["step"]) * tables["vertices"]
+    survey = vertices[changed] + [content["origin"][axis] for axis in "xyz"] - np.array(said["position"])
+    matrix = np.array([[said["fx"], 0, said["cx"]], [0, said["fy"], said["cy"]], [0, 0, 1]])
+    lens = np.array([said.get(name, 0.0) for name in ("k1", "k2", "p1", "p2", "k3")])
+    turn, _ = cv2.Rodrigues(np.array(said["rotation"]))
+    pixels = cv2.projectPoints(survey, turn, np.zeros(3), matrix, lens)[0][:, 0]
+    video = cv2.VideoCapture(str(footage / "footage.mp4"))
+    frame = cv2.GaussianBlur(video.read()[1], (0, 0), 1.5)
+    video.release()
+    inside = ((pixels > 20) & (pixels < [said["width"] - 20, said["height"] - 20])).all(axis=1)
+    assert inside.sum() > 3000  # the others are in other frames: the camera turns
+    at = pixels[inside].astype(int)
+    seen = frame[at[:, 1], at[:, 0], ::-1].astype(float)
+    shown = tables["colours"][changed][inside].astype(float)
+    assert np.median(np.abs(seen - shown)) < 12
+    assert np.corrcoef(seen.mean(axis=1), shown.mean(axis=1))[0, 1] > 0.7
+
+
+def test_a_video_that_is_not_there_is_told_and_the_page_is_made(tmp_path: Path) -> None:
+    show = open_show(ShowRequest(with_footage(tmp_path, tmp_path / "gone.mp4")))
+    assert show.photographs == ()
+    assert any("without the colours of the video film" in remark for remark in show.remarks)
+
+
 def test_simulated_blocks_begin_where_the_measured_do() -> None:
     show = open_show(ShowRequest(DEMO, simulate=("noel_2017",), number=2))
     simulated = [fall for fall in show.falls if not fall.is_measured]

@@ -69,13 +69,15 @@ def run(arguments: argparse.Namespace) -> int:
         _write(folder / "accuracy.csv", ("quantity", *columns[1:]), rows)
         _say("How good that is", truth_sentences(deviations))
         if maker is not None:
-            _say("Picture and film", ["Rendered by Blender; the film takes two to three minutes on two cores."])
+            _say("Picture and film", ["Rendered by Blender; the film takes one to three minutes on two cores."])
             common = {"source": SITE / "project.toml", "engine": arguments.engine}
             done = maker.film(
                 FilmJob(kind="slope", out=folder.absolute() / "slope.png", preset="hd", **common), progress
             )
             film = FilmJob(kind="film", out=folder.absolute() / "rockfall.mp4", preset="preview", **common)
-            maker.film(film.with_engine(done.engine), progress)
+            remarks = maker.film(film.with_engine(done.engine), progress).remarks
+            if remarks:
+                _say("How the film was made", remarks)
         written = [name for name in FILES if (folder / name).exists()]
     print(f"Written to {arguments.out}:")
     for name in written:

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..progress import Progress, silent
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask, norm
 from .model import Camera, project, rays, undistort
 from .path import CameraPath, bent_through
 from .turning import LEAST_FEATURES, Turns, solve_turns
 from .walking import LEAST_POINTS, solve_poses
+
+SOLVING = "Solving the camera of each frame"
 
 type PointsOf = Callable[[Array, Array], Array]
 """Origins and directions of rays, (n, 3) each, to the points where they meet the terrain, (n, 3), NaN where nowhere."""
@@ -65,6 +68,7 @@ def solve_motion(
     points_of: PointsOf | None = None,
     key_frames: Mapping[int, Camera] | None = None,
     sigma_px: float = 0.5,
+    progress: Progress = silent,
 ) -> SolvedMotion:
     """A pose for each frame, from one solved frame and features of the background.
 
@@ -98,9 +102,12 @@ def solve_motion(
     length = np.sqrt(1 + (plane[rows] ** 2).sum(axis=1))
     bearing = np.append(plane[rows], np.ones((len(length), 1)), axis=1) / length[:, None]
     sigma = sigma_px / (np.sqrt(camera.fx * camera.fy) * length**1.5)
+    progress(SOLVING, 0, times.size)
     turns = solve_turns(bearing, tracks.frame, tracks.feature, sigma, times.size, reference_frame, camera.rotation)
     if mode == "full" and points_of is not None:
-        position, rotation, covariance, points = _walk(camera, tracks, turns, reference_frame, points_of, sigma_px)
+        position, rotation, covariance, points = _walk(
+            camera, tracks, turns, reference_frame, points_of, sigma_px, progress
+        )
     else:
         position = np.repeat(camera.position[None], times.size, axis=0)
         rotation, points = turns.rotation, camera.position + 100 * turns.direction
@@ -156,7 +163,13 @@ def _checked(
 
 
 def _walk(
-    camera: Camera, tracks: FeatureTracks, turns: Turns, reference: int, points_of: PointsOf, sigma_px: float
+    camera: Camera,
+    tracks: FeatureTracks,
+    turns: Turns,
+    reference: int,
+    points_of: PointsOf,
+    sigma_px: float,
+    progress: Progress,
 ) -> tuple[Array, Array, Array, Array]:
     """Positions, rotations and covariances of the frames, and points of the features, in waves from the reference."""
     frame, feature, pixel = tracks.frame, tracks.feature, tracks.pixel
@@ -170,6 +183,7 @@ def _walk(
     tried = np.zeros(features, dtype=bool)
     total = np.bincount(frame, minlength=frames)
     while True:
+        progress(SOLVING, int(solved.sum()), frames)
         new = np.flatnonzero(solved[frame] & ~tried[feature])
         # Each feature from the solved frame nearest to the reference.
         new = new[np.argsort(np.abs(frame[new] - reference), kind="stable")]

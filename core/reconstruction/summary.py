@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..vectors import Array, norm
+from ..vectors import Array, Names, norm
 from .impact import FLAGS, Impacts
 from .trajectory import Reconstruction
 
@@ -18,6 +18,7 @@ MEANINGS = {
 }
 """What the flags say about impacts, for people."""
 MOST_NOTES = 12
+FEWEST_TRAJECTORIES = 8
 
 
 def summarise(reconstruction: Reconstruction) -> tuple[str, ...]:
@@ -62,12 +63,61 @@ def _typical(impacts: Impacts) -> list[str]:
         ("deviation", np.degrees(impacts.theta_dev), "°", 1),
         ("bounce height", impacts.bounce_height_m, " m", 2),
     )
-    parts = [
-        f"{name} {np.nanmedian(column):.{digits}f}{unit}"
-        for name, column, unit, digits in values
-        if np.isfinite(column).any()
-    ]
-    return [f"Medians: {', '.join(parts)}."] if parts else []
+    parts, is_wide = [], False
+    for name, column, unit, digits in values:
+        if not np.isfinite(column).any():
+            continue
+        ends = median_interval(column, impacts.trajectory)
+        is_wide |= ends is not None
+        between = "" if ends is None else f" ({ends[0]:.{digits}f}–{ends[1]:.{digits}f})"
+        parts.append(f"{name} {np.nanmedian(column):.{digits}f}{between}{unit}")
+    if not parts:
+        return []
+    said = " (and 95 % intervals, over trajectories)" if is_wide else ""
+    return [f"Medians{said}: {', '.join(parts)}."]
+
+
+def median_interval(values: Array, trajectory: Names) -> tuple[float, float] | None:
+    """95 % interval of a median, which takes into account that the impacts of a trajectory are not independent.
+
+    Parameters
+    ----------
+    values, trajectory : (n,) NaN is left out.
+
+    Returns
+    -------
+    Its two ends; None of fewer than `FEWEST_TRAJECTORIES`, of which it would be too narrow.
+
+    Notes
+    -----
+    The values that a sign test does not refuse: with s the number of a trajectory's impacts above a value, less that
+    below it, Σs/√Σs² follows Student's t of one less than the number of trajectories.
+    """
+    from scipy.special import stdtrit
+
+    known = np.isfinite(values)
+    _, group = np.unique(trajectory[known], return_inverse=True)
+    groups = int(group.max(initial=-1)) + 1
+    if groups < FEWEST_TRAJECTORIES:
+        return None
+    found, limit = values[known], float(stdtrit(groups - 1, 0.975))
+    ascending = np.sort(found)
+
+    def refused(place: int) -> bool:
+        signs = np.bincount(group, np.sign(found - ascending[place]), minlength=groups)
+        return bool(abs(signs.sum()) > limit * np.sqrt(max(float(signs @ signs), 1e-300)))
+
+    middle = found.size // 2
+    ends = []
+    for outer in (0, found.size - 1):
+        inside, outside = middle, outer
+        if not refused(outer):
+            inside = outside
+        while abs(inside - outside) > 1:
+            between = (inside + outside) // 2
+            inside, outside = (inside, between) if refused(between) else (between, outside)
+        ends.append(float(ascending[inside]))
+    return ends[0], ends[1]
 
 
 def _where(impacts: Impacts, flag: str) -> list[str]:

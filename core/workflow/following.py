@@ -89,7 +89,6 @@ def follow_background(
     motion, seen = background
     if motion.still and not solved.keys:
         return FollowedCamera(fixed(solved.camera), True, 0.0, np.nan, ())
-    progress("Solving the camera of each frame", 0, 0)
     made = solve_motion(
         solved.camera,
         FeatureTracks(seen.frame - first, seen.feature, seen.pixel),
@@ -98,6 +97,7 @@ def follow_background(
         mode=mode,
         points_of=None if surface is None else _points_on(surface),
         key_frames={frame - first: camera for frame, camera in solved.keys.items()},
+        progress=progress,
     )
     return FollowedCamera(
         made.path, False, float(np.median(made.features)), float(np.nanmedian(made.residual_px)), made.remarks

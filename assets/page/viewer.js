@@ -519,7 +519,7 @@
   const at = Number.parseFloat(asked.get("t"));
   if (Number.isFinite(at)) setTime(at);
   setPlaying(!Number.isFinite(at) && !matchMedia("(prefers-reduced-motion: reduce)").matches);
-  setTimeout(hintGone, 9000);
+  setTimeout(hintGone, 6000);
   let before = null;
   function frame(now) {
     const passed = before === null ? 0 : Math.min((now - before) / 1000, 0.25);

@@ -8,6 +8,7 @@ import json
 import shutil
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -219,6 +220,44 @@ def test_it_speaks_three_languages(browser, page: str) -> None:
     browser.find_element(By.ID, "close").click()
 
 
+def touch(chrome: webdriver.Chrome, kind: str, *points: tuple[float, float]) -> None:
+    fingers = [{"x": x, "y": y, "id": i} for i, (x, y) in enumerate(points)]
+    chrome.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
+    time.sleep(0.03)
+
+
+def test_fingers_turn_pinch_and_tap(page: str, show: Show, tmp_path: Path) -> None:
+    chrome = driver(tmp_path / "profile", "phone")
+    try:
+        opened(chrome, page + "#t=3")
+        x, y = chrome.execute_script("return rockfall.screen(arguments[0])", show.falls[0].state(3.0)[0].tolist())
+        touch(chrome, "touchStart", (x, y))
+        touch(chrome, "touchEnd")
+        WebDriverWait(chrome, PATIENCE_S, 0.1).until(lambda b: b.find_element(By.ID, "card").is_displayed())
+        assert said(chrome, "card-kind")
+
+        def camera() -> np.ndarray:
+            time.sleep(1.0)  # the motion ends softly
+            return np.array(chrome.execute_script("return rockfall.camera()"))
+
+        before = camera()
+        touch(chrome, "touchStart", (180, 480))
+        for i in range(1, 9):
+            touch(chrome, "touchMove", (180 + 10 * i, 480))
+        touch(chrome, "touchEnd")
+        turned = camera()
+        assert np.linalg.norm(turned - before) > 5
+        assert abs(turned[2] - before[2]) < 5  # it went round, not up
+        touch(chrome, "touchStart", (190, 470), (210, 490))
+        for i in range(1, 9):
+            touch(chrome, "touchMove", (190 - 9 * i, 470 - 9 * i), (210 + 9 * i, 490 + 9 * i))
+        touch(chrome, "touchEnd")
+        middle = show.falls[0].position.mean(axis=0)
+        assert np.linalg.norm(camera() - middle) < 0.6 * np.linalg.norm(turned - middle)
+    finally:
+        chrome.quit()
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_all_is_inside_the_picture_at_any_size(size: str, page: str, show: Show, tmp_path: Path) -> None:
     chrome = driver(tmp_path / "profile", size)
@@ -251,6 +290,16 @@ def test_all_is_inside_the_picture_at_any_size(size: str, page: str, show: Show,
             chrome.save_screenshot(str(SHOTS / f"site_page_{size}_{language}.png"))
     finally:
         chrome.quit()
+
+
+def test_without_a_terrain_there_are_the_paths_alone(browser, show: Show, tmp_path: Path) -> None:
+    file = tmp_path / "bare.html"
+    file.write_text(make_page(replace(show, surface=None)).text, encoding="utf-8")
+    opened(browser, file.as_uri() + "#t=3")
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+    assert not browser.find_element(By.ID, "person").is_displayed()
+    assert colours(browser) > 20
+    ActionChains(browser).move_to_element(browser.find_element(By.ID, "canvas")).click().perform()
 
 
 def test_a_browser_that_cannot_draw_says_so(page: str, tmp_path: Path) -> None:

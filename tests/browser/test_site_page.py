@@ -84,6 +84,11 @@ def opened(browser: webdriver.Chrome, url: str) -> None:
     WebDriverWait(browser, PATIENCE_S, 0.1).until(lambda b: b.execute_script("return window.rockfall?.ready === true"))
 
 
+def until(browser: webdriver.Chrome, condition) -> None:
+    """What is done shows with the next picture."""
+    WebDriverWait(browser, PATIENCE_S, 0.05).until(lambda _browser: condition())
+
+
 def said(browser: webdriver.Chrome, name: str) -> str:
     return browser.find_element(By.ID, name).text
 
@@ -154,7 +159,7 @@ def test_it_plays_at_the_rate_that_is_chosen_and_pauses(browser, page: str) -> N
     buttons = browser.find_elements(By.CSS_SELECTOR, "#rates button")
     assert [button.text for button in buttons] == ["¼×", "½×", "1×"]
     buttons[0].click()
-    assert "slow motion" in said(browser, "clock")
+    until(browser, lambda: "slow motion" in said(browser, "clock"))
     browser.find_element(By.ID, "play").click()
     WebDriverWait(browser, PATIENCE_S, 0.05).until(lambda b: b.execute_script("return rockfall.time()") > 0.1)
     browser.find_element(By.ID, "play").click()
@@ -188,8 +193,7 @@ def test_a_click_on_a_block_tells_about_it(browser, page: str, show: Show) -> No
     ActionChains(browser).move_to_element_with_offset(
         canvas, x - box["width"] / 2, y - box["height"] / 2
     ).click().perform()
-    time.sleep(0.3)
-    assert said(browser, "card-name") == show.falls[chosen].name.partition(",")[0]
+    until(browser, lambda: said(browser, "card-name") == show.falls[chosen].name.partition(",")[0])
 
 
 def test_zooming_does_not_pass_through_the_ground(browser, page: str, show: Show) -> None:
@@ -209,10 +213,10 @@ def test_zooming_does_not_pass_through_the_ground(browser, page: str, show: Show
 def test_it_speaks_three_languages(browser, page: str) -> None:
     opened(browser, page + "#t=1&lang=de")
     assert "Gemessen" in said(browser, "legend")
-    assert "Echtzeit" in said(browser, "clock")
+    until(browser, lambda: "Echtzeit" in said(browser, "clock"))
     Select(browser.find_element(By.ID, "language")).select_by_value("fr")
     assert "Mesuré" in said(browser, "legend")
-    assert "temps réel" in said(browser, "clock")
+    until(browser, lambda: "temps réel" in said(browser, "clock"))
     browser.find_element(By.ID, "info").click()
     about = said(browser, "about")
     assert "Synthetic gully" in about

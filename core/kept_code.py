@@ -20,6 +20,9 @@ import numpy as np
 from .errors import InputError
 from .output import write_bytes
 
+TREE = Path(__file__).parents[1]
+CHECKOUT = TREE / "build" / "kernels"
+"""Where the set-up of a checkout leaves what it compiles of ours."""
 PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic, np.dtype)
 
 
@@ -28,10 +31,10 @@ class KeptCode:
 
     Notes
     -----
-    The directories are numba's: NUMBA_CACHE_DIR, else beside the source, else the user's; with none to write to, code
-    is compiled anew in each process. One file for each signature and kind of processor begins with a check sum over the
-    digest and the code, and replaces an outdated one in one step: several processes may read and write at once, nothing
-    half-written or outdated is used, and nothing piles up.
+    The directories are numba's: NUMBA_CACHE_DIR, else `CHECKOUT` if it is there, else beside the source, else the
+    user's; with none to write to, code is compiled anew in each process. One file for each signature and kind of
+    processor begins with a check sum over the digest and the code, and replaces an outdated one in one step: several
+    processes may read and write at once, nothing half-written or outdated is used, and nothing piles up.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -45,13 +48,19 @@ class KeptCode:
 
     @cached_property
     def _numba(self) -> Any:
-        from numba.core import caching
+        from numba.core import caching, config
 
         make: Any = caching.CompileResultCacheImpl
+        settings: Any = config
+        asked = settings.CACHE_DIR
+        if not asked and CHECKOUT.is_dir() and Path(self._function.__code__.co_filename).is_relative_to(TREE):
+            settings.CACHE_DIR = str(CHECKOUT)
         try:
             return make(self._function)
         except RuntimeError:  # no directory can be written to
             return None
+        finally:
+            settings.CACHE_DIR = asked
 
     @cached_property
     def _digest(self) -> bytes:

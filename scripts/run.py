@@ -129,7 +129,7 @@ def set_up() -> None:
         say("pip failed; trying once more, in case the network was at fault")
     STAMP.write_text(wanted, encoding="utf-8")
     say("compiling what would be compiled when first needed")
-    start(SCRIPTS / "rockfall", "prepare")  # without it only the first commands take longer
+    start(PYTHON, "-m", "rockfall.core.cli", "prepare")  # without it only the first commands take longer
     say(f"set up in {time.monotonic() - started:.0f} s")
 
 

@@ -138,3 +138,22 @@ def test_a_digest_looks_at_how_a_function_that_is_called_is_compiled():
 
     assert made() == made()
     assert len({made(), made(forceinline=True), made(error_model="numpy")}) == 3
+
+
+def test_what_the_set_up_of_a_checkout_has_compiled_is_used(tmp_path: Path) -> None:
+    """Ours is kept where the set-up leaves it, code of others beside its source."""
+    package(tmp_path)
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    code = (
+        "import rockfall.core.kept_code as k, pathlib, sys\n"
+        f"k.CHECKOUT = pathlib.Path({str(kernels)!r})\n"
+        "import numpy as np\n"
+        "from rockfall.core.exchange.shortest_kernels import _upper\n"
+        "from bench.outer import shifted\n"
+        "print([f._cache.cache_path for f in (_upper, shifted)])\n"
+        "from numba import config; print(config.CACHE_DIR)"
+    )
+    ours, others = eval(run(tmp_path, None, code).splitlines()[0])
+    assert Path(ours).is_relative_to(kernels)
+    assert not Path(others).is_relative_to(kernels)

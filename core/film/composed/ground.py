@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The terrain in a composed film: every pixel is a ray, so that a lens bends it as it bends the footage."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ...camera.model import Camera, project, rays
+from ...compiled import in_chunks
 from ...opencv import opencv
 from ...terrain.raycast import any_hit, cast_rays
 from ...terrain.surface import Surface
@@ -20,7 +21,7 @@ AMBIENT = 0.46
 LIFT_M = 0.05
 """Above the ground, where it is asked whether the sun is seen: scans have noise."""
 EDGE = 0.01
-"""A pixel whose neighbours are further away by more than this part is at an edge, and gets more rays."""
+"""A pixel at which 1/distance bends by more than this part is at an edge, and gets more rays."""
 EDGE_RAYS = 3
 NEAREST_M = 1.0
 FLATTEST = 0.12
@@ -165,23 +166,19 @@ def ground_picture(ground: Ground, camera: Camera) -> tuple[Picture, Array]:
 
 def _cast(ground: Ground, camera: Camera, at: Array) -> tuple[np.ndarray, Array]:
     """(n, 3) float32 colours and (n,) distances through pixels (n, 2)."""
+    from .ground_kernels import mix_corners
+
     surface = ground.surface
     origins, directions = rays(camera, at)
     hits = cast_rays(surface, origins, directions)
-    met = np.flatnonzero(hits.face >= 0)
-    colour = _sky(directions)
-    faces = surface.faces[hits.face[met]]
-    a, b, c = (surface.vertices[faces[:, i]] for i in range(3))
-    first, second, within = b - a, c - a, hits.point[met] - a
-    d11, d12, d22 = dot(first, first), dot(first, second), dot(second, second)
-    d1, d2 = dot(within, first), dot(within, second)
-    area = np.maximum(d11 * d22 - d12 * d12, 1e-300)
-    u, v = (d22 * d1 - d12 * d2) / area, (d11 * d2 - d12 * d1) / area
-    shares = np.clip(np.column_stack([1 - u - v, u, v]), 0, 1).astype(np.float32)
-    colour[met] = np.einsum("ij,ijk->ik", shares, ground.bgr[faces])
-    distance = np.full(len(at), np.inf)
-    distance[met] = hits.distance[met]
-    return colour, distance
+    missed = hits.face < 0
+    colour = np.empty((len(at), 3), np.float32)
+    colour[missed] = _sky(directions[missed])
+    in_chunks(
+        lambda i, j: mix_corners(hits.point, hits.face, surface.vertices, surface.faces, ground.bgr, colour, i, j),
+        len(at),
+    )
+    return colour, np.where(missed, np.inf, hits.distance)
 
 
 def _sky(directions: Array) -> np.ndarray:
@@ -190,25 +187,14 @@ def _sky(directions: Array) -> np.ndarray:
 
 
 def _edges(distance: Array) -> Mask:
-    """(h, w) whether the next pixel across or down is much further away, or nearer."""
+    """(h, w) whether the ground is bent or torn there: on a plane, 1/distance changes evenly from pixel to pixel."""
+    near = np.where(np.isfinite(distance), 1 / np.maximum(distance, NEAREST_M), 0.0)
     edge = np.zeros(distance.shape, dtype=bool)
-    with np.errstate(invalid="ignore"):
-        for axis in (0, 1):
-            a = distance[:-1] if axis == 0 else distance[:, :-1]
-            b = distance[1:] if axis == 0 else distance[:, 1:]
-            step = (np.abs(a - b) > EDGE * np.minimum(a, b)) & (np.isfinite(a) | np.isfinite(b))
-            if axis == 0:
-                edge[:-1] |= step
-                edge[1:] |= step
-            else:
-                edge[:, :-1] |= step
-                edge[:, 1:] |= step
+    for axis in (0, 1):
+        before, here, after = (
+            near[i : near.shape[0] - 2 + i] if axis == 0 else near[:, i : near.shape[1] - 2 + i] for i in range(3)
+        )
+        torn = np.abs(before - 2 * here + after) > EDGE * np.maximum(np.maximum(before, here), after)
+        inner = (slice(1, -1), slice(None)) if axis == 0 else (slice(None), slice(1, -1))
+        edge[inner] |= torn
     return edge
-
-
-def sharper(camera: Camera, times: int) -> Camera:
-    """The same view with so many times the pixels across and down."""
-    return replace(
-        camera, width=times * camera.width, height=times * camera.height, fx=times * camera.fx, fy=times * camera.fy,
-        cx=times * camera.cx, cy=times * camera.cy,
-    )  # fmt: skip

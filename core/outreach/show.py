@@ -20,7 +20,7 @@ from ..impact_models.machinery.parameters import Value
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..reconstruction.trajectory import Reconstruction
-from ..simulation.engine import ENDS, IMPACT, STOPPED, Simulation
+from ..simulation.engine import ENDS, STOPPED, Simulation
 from ..simulation.measured_releases import start_times
 from ..terrain.surface import Surface
 from ..vectors import Array
@@ -31,7 +31,6 @@ CREDITS, DOI = "credits", "doi"
 """Keys of a project's [site] beside its name and description."""
 AROUND = 0.6
 """So much of the terrain is shown around the paths, in parts of their greatest extent …"""
-NEARLY_S, NEARLY_M = 1e-7, 1e-6
 """A row of a path is that of an impact."""
 LEAST_AROUND_M = 25.0
 """… and at least so much [m]."""
@@ -150,7 +149,7 @@ def show_of(
     for simulation in simulations:
         model = find_model(simulation.settings.model)
         group = group_name(model)
-        own = [_with_incident(fall, simulation) for fall in simulated_falls(simulation, starts, group, model.colour)]
+        own = simulated_falls(simulation, starts, group, model.colour)
         end = simulation.end[np.searchsorted(simulation.number, [int(fall.name.rpartition(" ")[2]) for fall in own])]
         named = [replace(fall, name=f"{fall.name}, {model.name}") for fall in own]
         still = (end == ENDS.index(STOPPED)) | (end >= len(ENDS))  # on the ground, or held by a structure
@@ -182,27 +181,6 @@ def _simulated(
         parameters=request.parameters,
     )
     return fall_beside(job, project, len(start_times(result)), progress)
-
-
-def _with_incident(fall: Fall, simulation: Simulation) -> Fall:
-    """A simulated fall with the velocity before each impact, too, without which its last part would be bent."""
-    records = simulation.records
-    run = int(np.searchsorted(simulation.number, int(fall.name.rpartition(" ")[2])))
-    first, end = np.searchsorted(records.run, [run, run + 1])
-    rows = first + np.flatnonzero(records.what[first:end] == IMPACT)
-    since = fall.time_s - fall.time_s[0] + records.time_s[first]
-    at = np.searchsorted(since, records.time_s[rows] - NEARLY_S)
-    place = fall.position[np.minimum(at, since.size - 1)]
-    known = (at > 0) & (at < since.size) & (np.abs(place - records.position[rows]).max(axis=1, initial=0.0) < NEARLY_M)
-    at, v1 = at[known], records.v1[rows[known]]
-    return replace(
-        fall,
-        time_s=np.insert(fall.time_s, at, fall.time_s[at]),
-        position=np.insert(fall.position, at, fall.position[at], axis=0),
-        velocity=np.insert(fall.velocity, at, v1, axis=0),
-        chain=np.insert(fall.chain, at, fall.chain[at]),
-        spin=None if fall.spin is None else np.insert(fall.spin, at, fall.spin[at], axis=0),
-    )
 
 
 def _near(fall: Fall, centre: Array) -> Hits | None:

@@ -372,3 +372,34 @@ def test_texts_stand_inside_the_picture(film: str, size: tuple[int, int], langua
             assert one.box.top >= 0, (k, one)
             assert one.box.right <= made.width, (k, one)
             assert one.box.bottom <= made.height, (k, one)
+
+
+def test_simulated_blocks_keep_to_their_parabolas_up_to_the_impact() -> None:
+    """Between two records of a run, as the engine wrote them, a block is where gravity alone brings it."""
+    from rockfall.core.film.composed.falls import simulated_falls
+    from rockfall.core.simulation.engine import FLIES_OFF, IMPACT, RELEASED, Settings, simulate
+    from rockfall.core.simulation.ground import make_ground
+    from rockfall.core.simulation.release import make_releases
+
+    slope = plane(half=200.0)
+    turn = np.radians(35.0)
+    tilted = np.column_stack([slope.vertices[:, 0], slope.vertices[:, 1], -np.tan(turn) * slope.vertices[:, 0]])
+    surface = Surface(tilted, slope.faces, GlobalShift(), "slope")
+    assert surface.face_normals[0, 2] > 0
+    ground = make_ground(surface)
+    releases = make_releases(np.array([[-150.0, 0.0, 150.0 * np.tan(turn) + 6.0]]))
+    simulation = simulate(ground, releases, Settings("noel_2017"), record="all")
+    fall = simulated_falls(simulation, {}, "M", (1.0, 0.0, 0.0))[0]
+    records, checked = simulation.records, 0
+    for k in range(len(records) - 1):
+        if records.what[k] not in (RELEASED, IMPACT, FLIES_OFF) or records.what[k + 1] != IMPACT:
+            continue
+        length = records.time_s[k + 1] - records.time_s[k]
+        for share in (0.3, 0.9, 0.999):
+            t = share * length
+            state = fall.state(float(records.time_s[k] + t))
+            true = records.position[k] + t * records.v2[k] - 0.5 * 9.81 * t * t * np.array([0, 0, 1])
+            assert state is not None
+            assert np.abs(state[0] - true).max() < 1e-6
+            checked += 1
+    assert checked > 20

@@ -12,7 +12,7 @@ from ...camera.model import rotation_from_vector
 from ...reconstruction.block import Block
 from ...reconstruction.sampling import TrajectorySamples, sample_trajectories
 from ...reconstruction.trajectory import Reconstruction
-from ...simulation.engine import Simulation
+from ...simulation.engine import IMPACT, Simulation
 from ...simulation.results import sample_runs
 from ...vectors import Array, Indices, norm
 from .look import MEASURED, Colour
@@ -20,6 +20,7 @@ from .look import MEASURED, Colour
 STEP_S = 1 / 120
 SIMULATED_STEP_S = 1 / 30
 STILL_S = 1e-3
+NEARLY_S, NEARLY_M = 1e-7, 1e-6
 """Between the points of a path: half a pixel where a block of 20 m/s crosses 50 px a metre as straight pieces."""
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -186,15 +187,34 @@ def simulated_falls(
         # A row's spin is that of the last record up to it; of two at one time, the later.
         at = own[np.clip(np.searchsorted(records.time_s[own], time, side="right") - 1, 0, own.size - 1)]
         name = str(samples.trajectory[begin])
-        falls.append(
-            Fall(
-                f"{name} {samples.run[begin]}", group, colour, time + starts_s.get(name, 0.0),
-                samples.position[begin:end],
-                samples.velocity[begin:end], np.zeros(end - begin, np.intp), releases.axes_m[i],
-                float(releases.mass_kg[i]), None, records.omega2[at],
-            )
+        fall = Fall(
+            f"{name} {samples.run[begin]}", group, colour, time + starts_s.get(name, 0.0),
+            samples.position[begin:end], samples.velocity[begin:end], np.zeros(end - begin, np.intp),
+            releases.axes_m[i], float(releases.mass_kg[i]), None, records.omega2[at],
         )  # fmt: skip
+        falls.append(_with_incident(fall, simulation))
     return tuple(falls)
+
+
+def _with_incident(fall: Fall, simulation: Simulation) -> Fall:
+    """A simulated fall with the velocity before each impact, too, without which its last part would be bent."""
+    records = simulation.records
+    run = int(np.searchsorted(simulation.number, int(fall.name.rpartition(" ")[2])))
+    first, end = np.searchsorted(records.run, [run, run + 1])
+    rows = first + np.flatnonzero(records.what[first:end] == IMPACT)
+    since = fall.time_s - fall.time_s[0] + records.time_s[first]
+    at = np.searchsorted(since, records.time_s[rows] - NEARLY_S)
+    place = fall.position[np.minimum(at, since.size - 1)]
+    known = (at > 0) & (at < since.size) & (np.abs(place - records.position[rows]).max(axis=1, initial=0.0) < NEARLY_M)
+    at, v1 = at[known], records.v1[rows[known]]
+    return replace(
+        fall,
+        time_s=np.insert(fall.time_s, at, fall.time_s[at]),
+        position=np.insert(fall.position, at, fall.position[at], axis=0),
+        velocity=np.insert(fall.velocity, at, v1, axis=0),
+        chain=np.insert(fall.chain, at, fall.chain[at]),
+        spin=None if fall.spin is None else np.insert(fall.spin, at, fall.spin[at], axis=0),
+    )
 
 
 def predicted_falls(

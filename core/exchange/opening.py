@@ -15,7 +15,6 @@ from ..reconstruction.drag import Drag
 from ..reconstruction.picks import Picks
 from ..reconstruction.trajectory import Reconstruction, reconstruct
 from ..remarks import Remark
-from ..terrain.opening import HowToRead
 from ..terrain.readers import read_tiles
 from ..terrain.surface import Surface
 from ..workflow.uprightness import turned_path, turned_picks
@@ -107,7 +106,7 @@ def open_terrain(project: Project) -> Surface | None:
     source = project.terrain
     if source is None:
         return None
-    return read_tiles(source.files, HowToRead(source.up, source.unit_m), shift=source.global_shift)
+    return read_tiles(source.files, source.how, shift=source.global_shift)
 
 
 def block_of(project: Project, trajectory: str) -> Block:

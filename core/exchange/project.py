@@ -17,6 +17,7 @@ from ..output import final_path, write_text
 from ..reading import reader
 from ..reconstruction.block import SHAPES
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
+from ..terrain.opening import HowToRead
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
 from .toml_text import TomlTable, Vector3, read_toml
 
@@ -50,6 +51,7 @@ class TerrainSource:
     files : meshes, grids or point clouds, one or more that join; `[terrain] file` is a name or a list of names.
     shift : the survey coordinates of the local origin; None lets the reader propose it.
     crs : coordinate reference system as the survey states it ("EPSG:2154"), empty when unknown.
+    vertical_datum : the system of the heights, likewise ("EPSG:5720").
     up : the axis that points up in the files, one of `UP_AXES`.
     unit_m : length of the files' unit [m].
     sigma_m : accuracy of the terrain, as a standard deviation of its height [m]; None: by its point spacing.
@@ -58,6 +60,7 @@ class TerrainSource:
     files: tuple[Path, ...]
     shift: Vector3 | None = None
     crs: str = ""
+    vertical_datum: str = ""
     up: str = "auto"
     unit_m: float = 1.0
     sigma_m: float | None = None
@@ -69,9 +72,14 @@ class TerrainSource:
         return terrain_inputs(self.files)
 
     @property
+    def how(self) -> HowToRead:
+        """How to read the files."""
+        return HowToRead(self.up, self.unit_m, crs=self.crs, vertical=self.vertical_datum)
+
+    @property
     def global_shift(self) -> GlobalShift | None:
         """The shift as the terrain and table readers take it; None when the project leaves it to the reader."""
-        return None if self.shift is None else GlobalShift(*self.shift, crs=self.crs)
+        return None if self.shift is None else GlobalShift(*self.shift, self.crs, self.vertical_datum)
 
 
 @dataclass(frozen=True)
@@ -349,6 +357,7 @@ def _terrain(table: TomlTable) -> TerrainSource:
         files=table.paths("file"),
         shift=table.optional_vector("shift"),
         crs=table.text("crs", ""),
+        vertical_datum=table.text("vertical_datum", ""),
         up=table.choice("up", UP_AXES, "auto"),
         unit_m=table.number("unit_m", 1.0),
         sigma_m=table.optional_number("sigma_m"),

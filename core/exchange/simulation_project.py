@@ -22,7 +22,6 @@ from ..simulation.polygons import Polygon
 from ..simulation.release import Releases
 from ..simulation.release_sources import in_polygon, on_line, on_points, steeper_than
 from ..terrain.cloud import Cloud
-from ..terrain.opening import HowToRead
 from ..terrain.readers import read_structure, read_tile_points
 from ..terrain.surface import Surface
 from ..workflow.simulation import ReleaseSource, Scenario
@@ -90,7 +89,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
     how = project.reconstruction
     met: Surface | Cloud = terrain
     if entry.contact == "points":
-        met = read_tile_points(source.files, HowToRead(source.up, source.unit_m), shift=terrain.shift)
+        met = read_tile_points(source.files, source.how, shift=terrain.shift)
     zones = None
     if entry.zones is not None:
         progress(f"Reading {entry.zones.file.name}", 0, 0)

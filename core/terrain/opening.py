@@ -49,12 +49,15 @@ class HowToRead:
     ground_only : use the ground class of LAS and LAZ: None if there is one, True always, False never.
     ground_filter_m : cell of a filter that takes vegetation out of a cloud, whatever its classes say [m]; none when
         None. See `filter_ground`.
+    crs, vertical : coordinate system, and that of the heights, where the file does not state them.
     """
 
     up: str = "auto"
     unit_m: float = 1.0
     ground_only: bool | None = None
     ground_filter_m: float | None = None
+    crs: str = ""
+    vertical: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +130,13 @@ def _one_cloud(paths: Sequence[Path], sources: Sequence[Source]) -> tuple[Path, 
     notes = [f"{path.name}: {note}" for path, source in zip(paths, sources, strict=True) for note in source.notes]
     notes.append(f"The {len(paths)} clouds are read as one.")
     points = np.concatenate([source.points for source in sources])
+    vertical = next((source.vertical for source in sources if source.vertical), "")
     geographic, turned = (any(getattr(source, what) for source in sources) for what in ("geographic", "turned"))
     name = ", ".join(path.name for path in paths)
     return (
         paths[0],
         name,
-        Source(points, crs=crs, geographic=geographic, turned=turned, notes=tuple(notes)),
+        Source(points, crs=crs, vertical=vertical, geographic=geographic, turned=turned, notes=tuple(notes)),
     )
 
 
@@ -148,9 +152,13 @@ def _localised(
     heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
     low, high = box_of(points[heights], path)
     advice.refuse_degrees(source, low, high, how.unit_m, path)
-    shift = _shift(shift, low, high, source.crs, path)
-    if source.vertical and not shift.vertical:
-        shift = replace(shift, vertical=source.vertical)
+    for theirs, stated in ((source.crs, how.crs), (source.vertical, how.vertical)):
+        if surely_different(theirs, stated):
+            raise _two_systems(theirs, f"and {stated} is stated", path)
+    shift = _shift(shift, low, high, how.crs or source.crs, path)
+    vertical = how.vertical or source.vertical
+    if vertical and not shift.vertical:
+        shift = replace(shift, vertical=vertical)
     said = [*advice.sentences(low, high, shift)]
     if source.kind == "cloud" and advice.faces_along_y(points):
         said.append(advice.Y_UP)
@@ -271,7 +279,7 @@ def _shift(given: GlobalShift | None, low: Array, high: Array, crs: str, path: P
         return GlobalShift.proposed(low, high, crs)
     if surely_different(crs, given.crs):
         raise _two_systems(crs, f"the project in {given.crs}", path)
-    return given if given.crs or not crs else GlobalShift(given.x, given.y, given.z, crs)
+    return given if given.crs or not crs else replace(given, crs=crs)
 
 
 def _two_systems(crs: str, other: str, path: Path) -> InputError:

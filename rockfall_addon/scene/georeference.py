@@ -16,7 +16,7 @@ def read_shift(scene: bpy.types.Scene) -> GlobalShift:
     """The project's global shift; one left by BlenderGIS is honoured, none means no shift."""
     if store.SHIFT in scene:
         x, y, z = (float(value) for value in scene[store.SHIFT])
-        return GlobalShift(x, y, z, str(scene.get(store.CRS, "")))
+        return GlobalShift(x, y, z, str(scene.get(store.CRS, "")), str(scene.get(store.VERTICAL, "")))
     if "crs x" in scene and "crs y" in scene:
         return GlobalShift(float(scene["crs x"]), float(scene["crs y"]), 0.0, str(scene.get("SRID", "")))
     return GlobalShift()
@@ -25,7 +25,7 @@ def read_shift(scene: bpy.types.Scene) -> GlobalShift:
 def write_shift(scene: bpy.types.Scene, shift: GlobalShift) -> None:
     """Store the global shift, also where BlenderGIS looks for it."""
     scene[store.SHIFT] = [shift.x, shift.y, shift.z]
-    scene[store.CRS] = shift.crs
+    scene[store.CRS], scene[store.VERTICAL] = shift.crs, shift.vertical
     scene["crs x"], scene["crs y"] = shift.x, shift.y
     if shift.crs:
         scene["SRID"] = shift.crs

@@ -169,7 +169,12 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             stated = replace(stated, trees=simulated_trees.copied(stated.trees, place))
             stated = replace(stated, structures=_write_structures(met, place), screens=tuple(drawn))
         source = TerrainSource(
-            (place / "terrain.ply",), (shift.x, shift.y, shift.z), shift.crs, up="z", sigma_m=terrain.accuracy_m(scene)
+            (place / "terrain.ply",),
+            (shift.x, shift.y, shift.z),
+            shift.crs,
+            shift.vertical,
+            up="z",
+            sigma_m=terrain.accuracy_m(scene),
         )
         parameters = {"A": models.parameters_of(scene), "B": fit.second_set(scene)}
         project = Project(

@@ -35,7 +35,7 @@ COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
 
 # of the scene: the project
 SCHEMA = "rockfall_schema"
-SHIFT, CRS = "rockfall_shift_m", "rockfall_crs"
+SHIFT, CRS, VERTICAL = "rockfall_shift_m", "rockfall_crs", "rockfall_vertical_datum"
 SITE, SITE_DESCRIPTION, SITE_MORE = "rockfall_site", "rockfall_site_description", "rockfall_site_more"
 PICKS_SOURCE = "rockfall_picks_source"
 RENDER_PRESETS = "rockfall_render_presets"

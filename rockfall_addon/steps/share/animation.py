@@ -27,7 +27,8 @@ def write(source: Path, files: list[Path], progress: Progress) -> None:
     ------
     RockfallError : one cannot be written.
     """
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    # Unlike factory settings, this leaves the enabled extensions alone.
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     check_formats(file.suffix.removeprefix(".") for file in files)
     animation = load_animation(source)
     progress("Building the scene", 0, len(files))

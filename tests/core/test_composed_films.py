@@ -255,13 +255,34 @@ def test_texts_say_the_same_in_every_language() -> None:
 
 
 def test_type_is_as_wide_as_is_said() -> None:
-    for text in ("Measured", "R_N 0.51", "écart 12 m"):
+    for text in ("Measured", "R_N 0.51", "vɴ₁ [m/s]", "my_video_2.mp4", "écart 12 m"):
         canvas = Canvas(np.zeros((200, 900, 3), np.uint8))
         box = canvas.text(text, 100, 120, 40, (1.0, 1.0, 1.0))
         columns = np.flatnonzero(canvas.picture.any(axis=(0, 2)))
         assert columns[0] >= 98
         assert columns[-1] + 1 == pytest.approx(100 + text_width(text, 40), abs=4)
         assert box.right == 100 + text_width(text, 40)
+
+
+def test_graphs_speak_the_language_of_the_film_and_every_letter_is_there() -> None:
+    from rockfall.core.analysis.graphs import PAPER_GRAPHS
+    from rockfall.core.analysis.variables import find_variable
+    from rockfall.core.film.composed.canvas import _pieces_of
+
+    def drawn(text: str) -> bytes:
+        canvas = Canvas(np.zeros((80, 80, 3), np.uint8))
+        canvas.text(text, 20, 60, 40)
+        return canvas.picture.tobytes()
+
+    labels = {find_variable(name).label.partition(" [")[0] for spec in PAPER_GRAPHS for name in (spec.x, spec.y)}
+    labels |= {"Speed", "Height above ground", "Kinetic energy", "Time"}
+    unknown = drawn("?")
+    for language in languages():
+        words = texts(language).words
+        assert {f"axis {label}" for label in labels} <= set(words)
+        letters = {letter for text in words.values() for piece, _, _ in _pieces_of(text, 40) for letter in piece}
+        for letter in letters - {"?", " "}:
+            assert drawn(letter) != unknown, letter
 
 
 def test_shots_fade_through_black_and_every_frame_can_be_asked_for() -> None:

@@ -4,6 +4,7 @@
 Pixels are counted from the corner of the picture, as the camera does.
 """
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -22,6 +23,11 @@ FAR = 30_000
 """Places further away than this overflow OpenCV's numbers."""
 CENTRE = 0.5
 SUBSCRIPT, LOWER = 0.68, 0.2
+DIGITS = str.maketrans("₁₂", "12")
+SUBSCRIPTED = re.compile(r"\b([RvE])_([NT][12₁₂]?|[12])(?!\w)")
+"""Only symbols: names of files have low lines, too."""
+LACKING = str.maketrans({"ɴ": "_N", "ᴛ": "_T"})
+"""Letters that the typeface has not."""
 ROUND = 0.35
 """Radius of a panel's corners, in heights of its type."""
 
@@ -241,13 +247,15 @@ def text_width(text: str, size: int, weight: int = REGULAR) -> int:
 
 def _pieces_of(text: str, size: int) -> list[tuple[str, int, float]]:
     """A line in pieces, each with its size and how much lower it stands: R_N has its N lower and smaller."""
-    first, *later = text.split("_")
-    pieces = [(first, size, 0.0)] if first else []
-    for part in later:
-        pieces.append((part[:1], round(SUBSCRIPT * size), LOWER * size))
-        if part[1:]:
-            pieces.append((part[1:], size, 0.0))
-    return pieces
+    text = text.translate(LACKING)
+    pieces, at = [], 0
+    for found in SUBSCRIPTED.finditer(text):
+        pieces += [
+            (text[at : found.end(1)], size, 0.0),
+            (found[2].translate(DIGITS), round(SUBSCRIPT * size), LOWER * size),
+        ]
+        at = found.end()
+    return [*pieces, (text[at:], size, 0.0)] if text[at:] else pieces
 
 
 @cache

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...analysis.axes import Axis
 from ...vectors import Array
 from ..graphs import FilmGraph, FilmGraphs
 from .canvas import Box, Canvas, text_width
@@ -71,11 +72,15 @@ class Inset:
             canvas.lines([np.array([[left, y], [right, y]])], GRID, 1, GRID_OPACITY)
             canvas.text(words, left - 0.4 * size, y + 0.35 * size, size, QUIET, anchor="right")
         canvas.lines([np.array([[left, top], [left, bottom], [right, bottom]])], QUIET, 1, 0.8)
-        label = self._said(axes.y.label)
-        label = label if text_width(label, size) < right - left else axes.y.symbol
-        canvas.text(label, left, top - 0.45 * size, size, PAPER)
+        canvas.text(self._fitting(axes.y, right - left, size), left, top - 0.45 * size, size, PAPER)
         if graph.shows_x:
-            canvas.text(self._said(axes.x.label), right, bottom + 2.4 * size, size, PAPER, anchor="right")
+            label = self._fitting(axes.x, right - left, size)
+            canvas.text(label, right, bottom + 2.4 * size, size, PAPER, anchor="right")
+
+    def _fitting(self, axis: Axis, width: float, size: int) -> str:
+        """What an axis is of: its name, or its symbol where there is no room for that."""
+        label = self._said(axis.label)
+        return label if text_width(label, size) <= width or not axis.symbol else axis.symbol
 
     def _content(self, canvas: Canvas, graph: FilmGraph, moment_s: float) -> None:
         for strokes in graph.strokes:

@@ -221,7 +221,8 @@ def draw_person(canvas: Canvas, camera: Camera, foot: Array, words: Texts) -> Bo
             canvas.area([body], colour)
             canvas.disc(head, HEAD_RADIUS * height, colour)
     look = canvas.look
-    return canvas.text(words.say("person"), float(ends[0][0]) + 0.3 * height, float(ends[0][1]), look.small, PAPER)
+    _haloed(canvas, words.say("person"), float(ends[0][0]) + 0.3 * height, float(ends[0][1]), look.small, "left")
+    return canvas.written[-1].box
 
 
 def north_on_picture(camera: Camera, place: Array, length_m: float = 1.0) -> Array | None:

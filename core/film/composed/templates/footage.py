@@ -4,7 +4,7 @@
 import numpy as np
 
 from ....camera.model import Camera
-from ..canvas import Canvas, Picture
+from ..canvas import Canvas
 from ..falls import Fall
 from ..film_clock import FilmClock
 from ..material import Material
@@ -137,10 +137,3 @@ def asked_models(material: Material) -> tuple[Fall, ...]:
 
 def _film(material: Material, shots: list[Shot]) -> ComposedFilm:
     return ComposedFilm(*material.size, material.request.fps, shots)
-
-
-def first_picture(material: Material) -> Picture:
-    """What stands behind a title: the first frame of the footage, or the site."""
-    if material.footage is not None:
-        return whole_footage(material).at(material.span_s[0])[0].picture
-    return Plate(material.ground, slope_camera(material, material.falls, material.size)).picture

@@ -3,7 +3,7 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -284,7 +284,7 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
         source,
         {name: parameters.get(name, {}) for name in models},
         measured,
-        structures={name: read_structure(file, progress=progress, **asdict(reading)) for name, file in files.items()},
+        structures={name: read_structure(file, reading, progress=progress) for name, file in files.items()},
         zones=zones,
         drag=Drag() if arguments.drag else None,
         draws=draws,

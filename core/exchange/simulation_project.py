@@ -81,7 +81,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
     structures: dict[str, Surface | Cloud] = {}
     for structure in entry.structures:
         progress(f"Reading {structure.file.name}", 0, 0)
-        structures[structure.name] = read_structure(structure.file, up=source.up, unit_m=source.unit_m)
+        structures[structure.name] = read_structure(structure.file, source.how)
         inputs[structure.name] = structure.file
     for screens in entry.screens:
         if screens.file is not None:

@@ -160,22 +160,15 @@ def read_points(
 
 @reader("terrain")
 def read_structure(
-    path: str | Path,
-    *,
-    shift: GlobalShift | None = None,
-    up: str = "auto",
-    unit_m: float = 1.0,
-    ground_only: bool | None = None,
-    ground_filter_m: float | None = None,
-    progress: Progress = silent,
+    path: str | Path, how: HowToRead | None = None, *, shift: GlobalShift | None = None, progress: Progress = silent
 ) -> Surface | Cloud:
     """Read a mesh or a grid as a surface, a cloud as its points: a wall has no surface in plan.
 
-    Parameters and errors are those of `read_terrain`.
+    Errors are those of `read_terrain`.
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
-    opened = open_terrain_file(path, HowToRead(up, unit_m, ground_only, ground_filter_m), shift, progress)
+    opened = open_terrain_file(path, how or HowToRead(), shift, progress)
     return _cloud(opened) if opened.source.kind == "cloud" else _surface(opened, None, progress)
 
 

@@ -198,7 +198,7 @@ def _structures(project: Project, surface: Surface | None) -> tuple[dict[str, Su
     entry, source = project.simulation, project.terrain
     if entry is None or surface is None or source is None:
         return {}, [] if entry is None else [f"the structure {each.name}" for each in entry.structures]
-    return {each.name: read_structure(each.file, up=source.up, unit_m=source.unit_m) for each in entry.structures}, []
+    return {each.name: read_structure(each.file, source.how) for each in entry.structures}, []
 
 
 def _write_structures(met: Mapping[str, Surface | Cloud], place: Path) -> tuple[StructureEntry, ...]:

@@ -123,7 +123,7 @@ def test_a_project_takes_structures_along(
     assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
     project = tmp_path / "out" / "project.toml"
     (entry,) = part("core.exchange.project").read_project(project).simulation.structures
-    read = part("core.terrain.readers").read_structure(entry.file, up="z")
+    read = part("core.terrain.readers").read_structure(entry.file, part("core.terrain.opening").HowToRead(up="z"))
     survey = read.shift.to_survey(read.vertices)
     np.testing.assert_allclose(survey.min(axis=0), [2_600_000.0 + WALL_X, 1_200_000.0 - 6.0, -20.0], atol=1e-9)
     np.testing.assert_allclose(survey.max(axis=0), [2_600_000.0 + WALL_X, 1_200_000.0 + 124.0, 80.0], atol=1e-9)

@@ -6,16 +6,19 @@ is even. Sets of them are simulated in rounds: the first from the prior, each la
 weights 1/q make up for how they were proposed. The statistics, which may be many, are projected to one for each
 parameter, its estimate by a regression (Fearnhead & Prangle 2012); the sets whose projections are nearest to the
 observed ones are taken, and what is left of the difference is taken out by a local linear regression of the normal
-quantile of the place, so that no draw leaves the range.
+quantile of the place, so that no draw leaves the range. Both regressions say of each set what they would without it:
+else the intervals are too narrow.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ..errors import InputError
 from ..vectors import Array, Indices
+from .projection import LEAST_LEFT, Projection, project
 
 DEFENSIVE = 0.2
 """This part of later rounds is from the prior, so that no weight is larger than its inverse."""
@@ -27,10 +30,6 @@ least. Where the posterior is narrow, the first reaches sets far away whose weig
 FEWEST_ACCEPTED = 150
 NEARER = 0.35
 """Of the sets, those among which the nearest are looked for once more."""
-RIDGES = (1e-4, 1e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0, 3.0, 10.0)
-"""That are tried, beside the variance 1 of each statistic."""
-IDLE = 1e-9
-"""A statistic that spreads less, beside its size, is always the same."""
 INSIDE = 1e-6
 """Places keep so far from the ends of the range, whose normal quantile is infinite."""
 CONFIDENCE = 0.95
@@ -54,30 +53,12 @@ class SimulatedSets:
     def __len__(self) -> int:
         return self.weight.size
 
+    @cached_property
+    def wanted(self) -> Array:
+        """(N, k) normal quantiles of the places."""
+        from scipy.special import ndtri
 
-@dataclass(frozen=True, eq=False)
-class Projection:
-    """D statistics → k estimates of the normal quantiles of places, scaled to an even spread.
-
-    Attributes
-    ----------
-    centre, spread : (D,) of the statistics; infinite for one that is always the same.
-    low, high : (D,) beyond which they say no more.
-    squares : whether those of the statistics count too.
-    coefficients : of the statistics, of their squares, and a constant, for each of the k.
-    """
-
-    centre: Array
-    spread: Array
-    low: Array
-    high: Array
-    squares: bool
-    coefficients: Array
-
-    def __call__(self, statistics: Array) -> Array:
-        """(..., D) → (..., k)."""
-        scaled = (np.clip(statistics, self.low, self.high) - self.centre) / self.spread
-        return np.asarray(_features(scaled, self.squares) @ self.coefficients[:-1] + self.coefficients[-1])
+        return np.asarray(ndtri(self.place))
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,62 +231,16 @@ def find_posterior(table: SimulatedSets, observed: Array) -> Posterior:
     ----------
     observed : (D,) statistics, all finite.
     """
-    rough = project(table, table.weight, squares=True)
-    near = _nearest(rough(table.statistics), table.weight, rough(observed), NEARER)[0]
+    rough = project(table.statistics, table.wanted, table.weight, squares=True)
+    near = _region(table, rough, observed)
     weight = np.zeros(len(table))
     weight[near] = table.weight[near]
-    return draw_with(table, rough, project(table, weight, squares=False), observed)
+    return draw_with(table, rough, project(table.statistics, table.wanted, weight, squares=False), observed)
 
 
-def project(table: SimulatedSets, weight: Array, *, squares: bool) -> Projection:
-    """The ridge regression of the normal quantiles of the places on the statistics.
-
-    Parameters
-    ----------
-    weight : (N,) of the sets.
-    squares : whether on their squares too, which bends; beyond the sets that count it is wrong soon.
-
-    Notes
-    -----
-    The ridge of each parameter is that with the least error by generalised cross-validation (Golub et al. 1979): with
-    few sets and many statistics the sets would else look nearer to the truth than new data can be.
-    """
-    from scipy.special import ndtri
-
-    some = weight > 0
-    statistics, w = table.statistics[some], weight[some] / weight[some].sum()
-    low, high = np.quantile(statistics, [0.001, 0.999], axis=0)
-    clipped = np.clip(statistics, low, high)
-    centre = w @ clipped
-    spread = np.sqrt(w @ (clipped - centre) ** 2)
-    spread = np.where(spread > IDLE * np.maximum(np.abs(centre), 1.0), spread, np.inf)
-    features = _features((clipped - centre) / spread, squares)
-    mean = w @ features
-    wanted = ndtri(table.place[some])
-    middle = w @ wanted
-    apart = wanted - middle
-    features = features - mean
-    weighted = w[:, None] * features
-    square, axes = np.linalg.eigh(features.T @ weighted)
-    square = np.maximum(square, 0.0)
-    aim = axes.T @ (weighted.T @ apart)
-    total = w @ apart**2
-    number = 1.0 / float(w @ w)
-    slopes = []
-    for j in range(wanted.shape[1]):
-        errors = []
-        for ridge in RIDGES:
-            rest = float(total[j] - ((square + 2 * ridge) / (square + ridge) ** 2) @ aim[:, j] ** 2)
-            free = float((square / (square + ridge)).sum())
-            errors.append(rest / max(1.0 - free / number, 1e-6) ** 2)
-        ridge = RIDGES[int(np.argmin(errors))]
-        slopes.append(axes @ (aim[:, j] / (square + ridge)))
-    slope = np.stack(slopes, axis=1)
-    return Projection(centre, spread, low, high, squares, np.vstack([slope, middle - mean @ slope]))
-
-
-def _features(scaled: Array, squares: bool) -> Array:
-    return np.concatenate([scaled, scaled**2], axis=-1) if squares else scaled
+def _region(table: SimulatedSets, rough: Projection, observed: Array, without: int = -1) -> Indices:
+    every = np.arange(len(table))
+    return _nearest(rough.differences(table.statistics, every, observed, without), table.weight, NEARER)[0]
 
 
 def draw_with(
@@ -317,35 +252,36 @@ def draw_with(
     ----------
     without : a set that is left out, −1 for none.
     """
-    from scipy.special import ndtr, ndtri
+    from scipy.special import ndtr
 
-    region, _ = _nearest(rough(table.statistics), table.weight, rough(observed), NEARER)
+    region = _region(table, rough, observed, without)
     region = region[region != without]
-    projected, aim = fine(table.statistics[region]), fine(observed)
+    apart = fine.differences(table.statistics, region, observed, without)
     taken = [
         (near, weight / weight.sum())
         for part in ACCEPTED
-        for near, kernel in [_nearest(projected, table.weight[region], aim, part * len(table) / region.size)]
+        for near, kernel in [_nearest(apart, table.weight[region], part * len(table) / region.size)]
         for weight in [table.weight[region[near]] * kernel]
     ]
     near, weight = min(taken, key=lambda one: float((one[1] ** 2).sum()))
     source = region[near]
-    design = np.column_stack([np.ones(near.size), projected[near] - aim])
-    wanted = ndtri(table.place[source])
+    design = np.column_stack([np.ones(near.size), apart[near]])
+    wanted = table.wanted[source]
     weighted = design * weight[:, None]
     square = weighted.T @ design
-    slope = np.linalg.solve(square + 1e-9 * np.trace(square) * np.eye(len(square)), weighted.T @ wanted)
-    moved = wanted - design[:, 1:] @ slope[1:]
-    return Posterior(np.clip(ndtr(moved), INSIDE, 1.0 - INSIDE), weight, source, rough, fine)
+    inverse = np.linalg.inv(square + 1e-9 * np.trace(square) * np.eye(len(square)))
+    slope = inverse @ (weighted.T @ wanted)
+    own = np.einsum("ni,ij,nj->n", design, inverse, weighted)
+    left = (wanted - design @ slope) / np.maximum(1.0 - own, LEAST_LEFT)[:, None]
+    return Posterior(np.clip(ndtr(slope[0] + left), INSIDE, 1.0 - INSIDE), weight, source, rough, fine)
 
 
-def _nearest(projected: Array, weight: Array, aim: Array, part: float) -> tuple[Indices, Array]:
-    """The nearest part of (N, k) projections, and Epanechnikov's weight of each."""
-    spread = np.atleast_2d(np.cov(projected, rowvar=False, aweights=weight))
+def _nearest(apart: Array, weight: Array, part: float) -> tuple[Indices, Array]:
+    """The part of (N, k) differences that is nearest to none, and Epanechnikov's weight of each."""
+    spread = np.atleast_2d(np.cov(apart, rowvar=False, aweights=weight))
     inverse = np.linalg.inv(spread + (1e-9 * np.trace(spread) + 1e-300) * np.eye(len(spread)))
-    apart = projected - aim
     square = np.einsum("ni,ij,nj->n", apart, inverse, apart)
-    number = min(max(FEWEST_ACCEPTED, round(part * len(projected))), len(projected) - 1)
+    number = min(max(FEWEST_ACCEPTED, round(part * len(apart))), len(apart) - 1)
     near = np.argsort(square, kind="stable")[: number + 1]
     limit = square[near[-1]]
     return near[:-1], np.asarray(1.0 - square[near[:-1]] / limit if limit > 0 else np.ones(number))

@@ -33,8 +33,7 @@ class Projection:
     axes : (F, F) principal ones of the features. shrunk : (k, F) inverse of their squares and the ridge.
     row : (N,) of each set in the arrays that follow, −1 for one that the regression has nothing from.
     along : (m, F) features along the axes. weight : (m,) their sum is 1.
-    own : (m, k) how far an estimate follows the set's own wanted value. apart : (m, k) wanted, less its estimate by
-        the regression without the set.
+    own : (m, k) how far an estimate follows the set's own wanted value. left : (m, k) wanted less its estimate.
     """
 
     centre: Array
@@ -50,7 +49,7 @@ class Projection:
     along: Array
     weight: Array
     own: Array
-    apart: Array
+    left: Array
 
     def features(self, statistics: Array) -> Array:
         """(..., D) → (..., F), their mean over the sets 0."""
@@ -73,13 +72,23 @@ class Projection:
         features, aim = self.features(statistics[sets]), self.features(observed)
         result = (features - aim) @ self.slope
         row = self.row[sets]
-        inside = row >= 0
+        inside = np.flatnonzero(row >= 0)
         row = row[inside]
+        one = int(self.row[without]) if without >= 0 else -1
+        own, left = self.own[row], self.left[row]
         on_aim = self.weight[row, None] * (1.0 + (self.along[row] * (aim @ self.axes)) @ self.shrunk.T)
-        result[inside] -= (self.own[row] - on_aim) * self.apart[row]
-        if without >= 0 and (one := int(self.row[without])) >= 0:
-            on_sets = self.weight[one] * (1.0 + ((features @ self.axes) * self.along[one]) @ self.shrunk.T)
-            result += (self.own[one] - on_sets) * self.apart[one]
+        if one < 0:
+            result[inside] -= (own - on_aim) * left / np.maximum(1.0 - own, LEAST_LEFT)
+            return np.asarray(result)
+        # both are left out at once: their residuals solve a system of two
+        on_sets = self.weight[one] * (1.0 + ((features @ self.axes) * self.along[one]) @ self.shrunk.T)
+        its, its_left, crossed = self.own[one], self.left[one], on_sets[inside]
+        scale = np.maximum((1.0 - own) * (1.0 - its) - crossed * on_aim, LEAST_LEFT**2)
+        of_set = ((1.0 - its) * left + crossed * its_left) / scale
+        of_one = np.broadcast_to(its_left / np.maximum(1.0 - its, LEAST_LEFT), result.shape).copy()
+        of_one[inside] = ((1.0 - own) * its_left + on_aim * left) / scale
+        result += (its - on_sets) * of_one
+        result[inside] -= (own - on_aim) * of_set
         return np.asarray(result)
 
 
@@ -117,10 +126,8 @@ def project(statistics: Array, wanted: Array, weight: Array, *, squares: bool) -
     slope = axes @ (aim * shrunk.T)
     row = np.full(weight.size, -1)
     row[some] = np.arange(some.size)
-    apart = (centred - features @ slope) / np.maximum(1.0 - own, LEAST_LEFT)
-    return Projection(
-        centre, spread, low, high, squares, mean, slope, axes, shrunk, row, along, w, own, apart
-    )  # fmt: skip
+    left = centred - features @ slope
+    return Projection(centre, spread, low, high, squares, mean, slope, axes, shrunk, row, along, w, own, left)
 
 
 def _ridge(square: Array, aim: Array, total: float, number: float) -> float:

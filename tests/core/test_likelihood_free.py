@@ -133,7 +133,7 @@ def test_estimates_are_those_of_the_regression_without_the_set(monkeypatch: pyte
     assert np.abs(np.array(alone) - plain).max() > 0.1
     both = [estimate([i, 40], statistics[i]) - estimate([i, 40], statistics[40]) for i in sets]
     found = fitted.differences(statistics, sets, statistics[40], without=40)[:, 0]
-    np.testing.assert_allclose(found, both, atol=0.06)
+    np.testing.assert_allclose(found, both, atol=0.03)
 
 
 def test_intervals_hold_the_truth_when_sets_are_few_and_statistics_many() -> None:

@@ -58,15 +58,15 @@ def releases(ground: Ground) -> Releases:
     return make_releases(place, name=names, velocity=np.tile([3.0, 0.0, 0.0], (BLOCKS, 1)))
 
 
-def observed_with(ground: Ground, releases: Releases, parameters: dict[str, object], seed: int = 5) -> Observed:
-    paths = simulated_paths(simulate(ground, releases, Settings(MODEL, parameters, seed=seed)))
+def observed_with(ground: Ground, releases: Releases, settings: Settings) -> Observed:
+    paths = simulated_paths(simulate(ground, releases, settings))
     return Observed(paths, np.zeros(len(paths), dtype=np.bool_))
 
 
 @pytest.fixture(scope="module")
 def analysis(ground: Ground, releases: Releases) -> BackAnalysis:
     priors = make_priors(find_model(MODEL), ["rn", "rt"], {})
-    observed = observed_with(ground, releases, TRUTH)
+    observed = observed_with(ground, releases, Settings(MODEL, TRUTH, seed=5))
     return back_analyse(ground, observed, releases, Settings(MODEL), priors, sets=400, rounds=2)
 
 
@@ -96,8 +96,9 @@ def test_fitted_parameters_predict_runs_that_were_held_out(analysis: BackAnalysi
 def test_what_has_no_effect_is_not_told(ground: Ground, releases: Releases) -> None:
     """Where a block stops at its first contact with the ground, friction is not felt."""
     priors = make_priors(find_model(MODEL), ["rn", "friction"], {"friction": "0.2..0.8"})
-    observed = observed_with(ground, releases, TRUTH)
-    found = back_analyse(ground, observed, releases, Settings(MODEL, {"rt": 0.78}, rolling="none"), priors, sets=800)
+    settings = Settings(MODEL, {"rt": TRUTH["rt"]}, rolling="none")
+    observed = observed_with(ground, releases, replace(settings, parameters=TRUTH, seed=5))
+    found = back_analyse(ground, observed, releases, settings, priors, sets=800)
     rn, friction = found.estimates
     assert not friction.is_determined
     assert "cannot tell" in friction.verdict
@@ -137,12 +138,18 @@ def test_cancelling_ends_it(ground: Ground, releases: Releases) -> None:
     priors = make_priors(find_model(MODEL), ["rn"], {})
     with pytest.raises(CancelledError):
         back_analyse(
-            ground, observed_with(ground, releases, TRUTH), releases, Settings(MODEL), priors, sets=300, progress=stop
+            ground,
+            observed_with(ground, releases, Settings(MODEL, TRUTH, seed=5)),
+            releases,
+            Settings(MODEL),
+            priors,
+            sets=300,
+            progress=stop,
         )
 
 
 def test_runs_that_say_nothing_are_refused(ground: Ground, releases: Releases) -> None:
-    observed = observed_with(ground, releases, TRUTH)
+    observed = observed_with(ground, releases, Settings(MODEL, TRUTH, seed=5))
     paths = observed.paths
     unseen = replace(
         paths, impact_piece=np.zeros(0, dtype=np.intp), stop=np.full((len(paths), 3), np.nan),

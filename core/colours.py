@@ -32,6 +32,12 @@ def srgb_to_linear(colours: Array) -> Array:
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
+def linear_to_srgb(values: Array) -> Array:
+    """The inverse of `srgb_to_linear`."""
+    v = np.asarray(values, dtype=np.float64)
+    return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
 def scale_colours(values: Array, low: float, high: float, scale: Array = SPEED_SCALE) -> Array:
     """Colours of values on a scale, clipped at its ends.
 

@@ -24,6 +24,16 @@ FIGURE_FORMATS = ("png", "svg", "pdf")
 UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
 
+def add_terrain_colours(parser: "argparse.ArgumentParser | argparse._ArgumentGroup") -> None:
+    """Where a terrain that is shown has its colours from."""
+    parser.add_argument(
+        "--terrain-colours",
+        metavar="auto|footage|scan|none",
+        help="where the terrain has its colours from: the footage where that shows it, else the scan if it has colours "
+        "(auto, the default); one of them; or light and shade only (none)",
+    )
+
+
 def positive(text: str) -> float:
     """A number above zero."""
     value = float(text)

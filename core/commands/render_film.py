@@ -6,13 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import model_parameters, models_as_asked, not_negative, positive, whole
+from .options import add_terrain_colours, model_parameters, models_as_asked, not_negative, positive, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..film.composed.request import FilmRequest
 
-OWN = ("language", "rate", "slow_at", "freeze", "video", "trajectory", "block", "sun", "dust", "codec", "images")
+OWN = (
+    "language", "rate", "slow_at", "freeze", "video", "trajectory", "block", "sun", "terrain_colours", "dust", "codec",
+    "images",
+)  # fmt: skip
 DEFAULT_PRESET = "720p"
 
 
@@ -49,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--sun", type=_sun, metavar="AZ,EL", help="azimuth from north and elevation of the sun [°] (default 315,50)"
     )
+    add_terrain_colours(group)
     group.add_argument("--dust", action="store_true", help="impacts raise dust: drawn, not measured")
     group.add_argument("--codec", metavar="CODEC", help="h264 (the default), h265 or av1, where this Blender writes it")
     group.add_argument(
@@ -100,6 +104,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _request(arguments: argparse.Namespace) -> "FilmRequest":
     from ..exchange.parameters import checked_parameters
     from ..exchange.project import read_project
+    from ..film.composed.ground import check_terrain_colours
     from ..film.composed.kinds import find_kind
     from ..film.composed.request import SUN_DEG, FilmRequest
     from ..film.presets import find_preset
@@ -132,6 +137,7 @@ def _request(arguments: argparse.Namespace) -> "FilmRequest":
         arguments.block or "rock",
         arguments.sun or SUN_DEG,
         arguments.dust,
+        check_terrain_colours(arguments.terrain_colours or "auto"),
     )
 
 

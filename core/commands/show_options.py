@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, whole
+from .options import (
+    add_model_option,
+    add_parameter_options,
+    add_terrain_colours,
+    model_parameters,
+    models_as_asked,
+    whole,
+)
 
 if TYPE_CHECKING:
     from ..outreach.show import ShowRequest
@@ -32,9 +39,7 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="blocks start when they did, one after the other (default: all at the same moment)",
     )
-    parser.add_argument(
-        "--plain", action="store_true", help="the terrain in light and shade only, without the colours of the videos"
-    )
+    add_terrain_colours(parser)
 
 
 def show_as_asked(arguments: argparse.Namespace) -> "ShowRequest":
@@ -46,6 +51,7 @@ def show_as_asked(arguments: argparse.Namespace) -> "ShowRequest":
     """
     from ..exchange.parameters import checked_parameters
     from ..exchange.project import read_project
+    from ..film.composed.ground import check_terrain_colours
     from ..film.simulated import NUMBER, check_number
     from ..outreach.show import ShowRequest
 
@@ -64,5 +70,5 @@ def show_as_asked(arguments: argparse.Namespace) -> "ShowRequest":
         arguments.seed or 0,
         parameters,
         not arguments.as_observed,
-        not arguments.plain,
+        check_terrain_colours(arguments.terrain_colours or "auto"),
     )

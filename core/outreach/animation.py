@@ -20,6 +20,7 @@ from ..film.composed.solids import SOLIDS, solid
 from ..georeference import GlobalShift
 from ..progress import Progress, silent
 from ..terrain.decimation import decimate
+from ..terrain.scan_colours import colours_at
 from ..terrain.surface import Surface
 from ..vectors import Array
 from .show import CREDITS, DOI, Show
@@ -249,5 +250,6 @@ def _ground(show: Show) -> tuple[Surface | None, Array]:
     if surface is None or not len(surface.faces):
         return None, np.zeros((0, 3))
     coarse = decimate(surface.vertices, surface.faces, MOST_FACES)
-    ground = Surface(coarse.vertices, coarse.faces, surface.shift, surface.name)
+    scanned = None if surface.colours is None else colours_at(coarse.vertices, surface.vertices, surface.colours)
+    ground = Surface(coarse.vertices, coarse.faces, surface.shift, surface.name, colours=scanned)
     return ground, lit_ground(ground, sun_direction(*SUN_DEG), show.photographs).colours

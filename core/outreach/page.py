@@ -24,6 +24,7 @@ from ..film.simulated import path_opacity
 from ..progress import Progress, silent
 from ..terrain.decimation import decimate
 from ..terrain.raycast import any_hit, cast_rays
+from ..terrain.scan_colours import colours_at
 from ..terrain.surface import Surface
 from ..vectors import Array, Mask, norm, unit
 from ..versions import versions
@@ -236,7 +237,9 @@ def _terrain(show: Show, most_faces: int, sun: Array, packing: Packing) -> dict[
         return None
     coarse = decimate(surface.vertices, surface.faces, most_faces)
     used, faces = np.unique(coarse.faces, return_inverse=True)
-    mesh = Surface(coarse.vertices[used], faces.reshape(-1, 3).astype(np.int32), surface.shift, surface.name)
+    vertices = coarse.vertices[used]
+    scanned = None if surface.colours is None else colours_at(vertices, surface.vertices, surface.colours)
+    mesh = Surface(vertices, faces.reshape(-1, 3).astype(np.int32), surface.shift, surface.name, colours=scanned)
     colours = lit_ground(mesh, sun, show.photographs).colours
     places = quantise(mesh.vertices)
     packing.add("vertices", places.number, "uint16", differences=True)

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..exchange.opening import open_project
 from ..exchange.project import Project, Site, read_project
 from ..film.composed.falls import Fall, Hits, measured_falls, simulated_falls
-from ..film.composed.ground import Photograph
+from ..film.composed.ground import FROM_FOOTAGE, Photograph, TerrainColours, coloured
 from ..film.falls import fall_beside
 from ..film.job import FilmJob
 from ..film.simulated import NUMBER, group_name
@@ -46,7 +46,7 @@ class ShowRequest:
     simulate : impact models whose blocks fall beside the measured ones, from the same starts.
     number, seed : of simulated blocks for each measured one and model, and of their random numbers.
     parameters : model → parameter → value, where it is not the default.
-    photographs : whether the terrain has the colours of the project's aligned videos.
+    terrain_colours : where the terrain has its colours from.
     together : whether all blocks start at 0 s, not one after the other as they were observed.
     """
 
@@ -56,7 +56,7 @@ class ShowRequest:
     seed: int = 0
     parameters: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     together: bool = True
-    photographs: bool = True
+    terrain_colours: TerrainColours = "auto"
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +100,7 @@ def open_show(request: ShowRequest, progress: Progress = silent) -> Show:
     progress("Reading the project", 0, 0)
     project = read_project(request.project)
     surface, result = open_project(project)
+    surface = None if surface is None else coloured(surface, request.terrain_colours)
     simulations: tuple[Simulation, ...] = ()
     if request.simulate:
         if surface is None:
@@ -112,7 +113,7 @@ def open_show(request: ShowRequest, progress: Progress = silent) -> Show:
     remarks = [str(remark) for remark in (*result.remarks, *(remarks_of(simulations) if simulations else ()))]
     site = project.site if project.site.name else replace(project.site, name=request.project.absolute().parent.name)
     show = show_of(site, surface, result, simulations, together=request.together, remarks=remarks)
-    if not request.photographs or surface is None:
+    if request.terrain_colours not in FROM_FOOTAGE or surface is None:
         return show
     centre = show.origin.vector - surface.shift.vector
     photographs, said = photographs_of(project, surface, centre, progress)
@@ -196,4 +197,5 @@ def _around(surface: Surface, place: Array, centre: Array, origin: GlobalShift) 
     faces = surface.faces[near.all(axis=1)]
     used, numbered = np.unique(faces, return_inverse=True)
     vertices = np.ascontiguousarray(surface.vertices[used] - centre)
-    return Surface(vertices, numbered.reshape(-1, 3).astype(np.int32), origin, surface.name)
+    colours = None if surface.colours is None else surface.colours[used]
+    return Surface(vertices, numbered.reshape(-1, 3).astype(np.int32), origin, surface.name, colours=colours)

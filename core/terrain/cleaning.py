@@ -17,9 +17,7 @@ def merge_duplicates(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, 
     The order of the remaining vertices is kept.
     """
     # Sorting one hash per vertex is many times faster than sorting rows; equal hashes are checked below.
-    hashed = np.empty(len(vertices), np.uint64)
-    for start in range(0, len(vertices), CHUNK):
-        hashed[start : start + CHUNK] = _hashes(vertices[start : start + CHUNK])
+    hashed = point_hashes(vertices)
     ordered = np.sort(hashed)
     if not (ordered[1:] == ordered[:-1]).any():
         return vertices, faces, 0
@@ -35,6 +33,14 @@ def merge_duplicates(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, 
     kept = original == np.arange(len(vertices), dtype=np.int32)
     number = (np.cumsum(kept, dtype=np.int32) - 1)[original]
     return vertices[kept], number[faces], int((~kept).sum())
+
+
+def point_hashes(vertices: Array) -> NDArray[np.uint64]:
+    """(n,) the same for the same coordinates (n, 3)."""
+    hashed = np.empty(len(vertices), np.uint64)
+    for start in range(0, len(vertices), CHUNK):
+        hashed[start : start + CHUNK] = _hashes(vertices[start : start + CHUNK])
+    return hashed
 
 
 def _hashes(vertices: Array) -> NDArray[np.uint64]:

@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..reading import check_promise, reading
 from ..vectors import Array
 from .crs import crs_beside, crs_from_geokeys, crs_from_wkt
+from .scan_colours import Colours, colour_columns, colours_of
 from .source import Source
 from .text import number_table, read_text
 
@@ -40,11 +41,12 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
     InputError : not a LAS file, truncated, fewer points than its header promises; no ground class when it is asked for.
     """
     header, crs, geographic = _las_header(path)
-    points, classes = _las_points(path, header)
+    points, classes, colours = _las_points(path, header)
     if len(points) != header.point_count:
         raise _truncated(path, header.point_count, len(points))
     ground = classes == GROUND_CLASS
     notes = [f"Cloud of {len(points):,} points."]
+    kept = slice(None)
     if ground_only and not ground.any():
         raise InputError(
             f"None of the {len(points)} points is classified as ground (class {GROUND_CLASS})",
@@ -52,12 +54,12 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
             advice="Use all points, or classify the cloud first",
         )
     if ground.any() and ground_only is not False:
-        points = points[ground]
-        notes.append(f"Used the {len(points):,} points of the ground class ({GROUND_CLASS}).")
+        kept = ground
+        notes.append(f"Used the {int(ground.sum()):,} points of the ground class ({GROUND_CLASS}).")
     else:
         noise = (classes == 7) | (classes == 18)
         if noise.any():
-            points = points[~noise]
+            kept = ~noise
             notes.append(f"Left out {int(noise.sum()):,} points classified as noise (7, 18).")
         notes.append(
             "Used all classes, as asked."
@@ -65,7 +67,10 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
             else "The cloud has no ground class: vegetation and buildings, if any, are part of the surface. "
             "The ground filter leaves them out (--ground-filter; in Blender “Points” in the import dialog)."
         )
-    return Source(points, crs=crs, geographic=geographic, notes=tuple(notes))
+    return Source(
+        points[kept], crs=crs, geographic=geographic, notes=tuple(notes),
+        colours=None if colours is None else colours[kept],
+    )  # fmt: skip
 
 
 def inspect_las(path: Path) -> tuple[Array, int, str, bool, tuple[str, ...]]:
@@ -156,11 +161,13 @@ def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
     return crs_beside(path)
 
 
-def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray]:
+def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray, Colours | None]:
     import laspy
 
     points = np.empty((header.point_count, 3))
     classes = np.empty(header.point_count, np.uint8)
+    coloured = {"red", "green", "blue"} <= set(header.point_format.dimension_names)
+    colours = np.empty((header.point_count if coloured else 0, 3), np.uint16)
     at = 0
     with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
         for chunk in opened.chunk_iterator(2_000_000):
@@ -168,8 +175,11 @@ def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray]:
             for axis, name in enumerate("XYZ"):
                 points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
             classes[part] = np.asarray(chunk.classification)
+            if coloured:
+                for channel, name in enumerate(("red", "green", "blue")):
+                    colours[part, channel] = np.asarray(chunk[name])
             at += len(chunk)
-    return points[:at], classes[:at]
+    return points[:at], classes[:at], colours_of(colours[:at])[0]
 
 
 def _truncated(path: Path, promised: int, held: int | None) -> InputError:
@@ -184,7 +194,8 @@ def _truncated(path: Path, promised: int, held: int | None) -> InputError:
 def read_xyz(path: Path) -> Source:
     """Read a table of coordinates: blanks, commas, semicolons or tabs between columns, a header row or none.
 
-    With a header the columns x, y, z (or easting, northing, elevation) are used, else the first three.
+    With a header the columns x, y, z (or easting, northing, elevation) are used, and red, green, blue (or r, g, b)
+    where there are such; else the first three, and the last three of six or more if they are whole and 255 at most.
 
     Raises
     ------
@@ -196,9 +207,10 @@ def read_xyz(path: Path) -> Source:
     lines = re.sub(rb"[,;\t]", b" ", text).split(b"\n")
     original = text.split(b"\n")
     rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith((b"#", b"//"))]
-    columns = [0, 1, 2]
+    columns, three = [0, 1, 2], [-3, -2, -1]
     if rows and re.match(rb'[\s"]*[A-Za-z_]', lines[rows[0]]) and not re.match(rb"\s*(nan|inf)", lines[rows[0]], re.I):
-        columns = _named_columns(original[rows[0]], path, rows[0] + 1)
+        names = _column_names(original[rows[0]])
+        columns, three = _named_columns(names, path, rows[0] + 1), colour_columns(names)
         rows = rows[1:]
     elif rows and len(lines[rows[0]].split()) == 1 and len(rows) > 1 and len(lines[rows[1]].split()) >= 3:
         rows = rows[1:]  # some programs begin with the number of points
@@ -213,8 +225,20 @@ def read_xyz(path: Path) -> Source:
             advice="Export x, y and z",
         )
     crs, geographic = crs_beside(path)
-    note = f"Cloud of {len(table):,} points."
-    return Source(np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=(note,))
+    notes = [f"Cloud of {len(table):,} points."]
+    found = table[:, three] if three and table.shape[1] > max(three) else table[:, :0]
+    if three and three[0] < 0:  # without a header they have to look like colours
+        found = found if table.shape[1] >= 6 and _look_like_colours(found) else table[:, :0]
+    colours, said = colours_of(found)
+    notes += [said] if said else []
+    return Source(
+        np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=tuple(notes), colours=colours
+    )
+
+
+def _look_like_colours(found: Array) -> bool:
+    """Whole numbers from 0 to 255, not a normal or a class."""
+    return bool(((found >= 0) & (found <= 255) & (found % 1 == 0)).all()) and float(found.max()) > 1
 
 
 def _has_decimal_commas(text: bytes) -> bool:
@@ -226,13 +250,16 @@ def _has_decimal_commas(text: bytes) -> bool:
     return b"." not in b"".join(rows) and any(b"," in found for found in rows)
 
 
-def _named_columns(line: bytes, path: Path, row: int) -> list[int]:
+def _column_names(line: bytes) -> list[str]:
     text = line.decode("utf-8", "replace").lower()
-    names = [name.strip(' "') for name in (re.split(r"[,;\t]", text) if re.search(r"[,;\t]", text) else text.split())]
+    return [name.strip(' "') for name in (re.split(r"[,;\t]", text) if re.search(r"[,;\t]", text) else text.split())]
+
+
+def _named_columns(names: list[str], path: Path, row: int) -> list[int]:
     found = [next((names.index(n) for n in accepted if n in names), -1) for accepted in AXIS_NAMES]
     if min(found) < 0:
         raise InputError(
-            f'The header "{text[:80].strip()}" names no x, y and z',
+            f'The header "{" ".join(names)[:80].strip()}" names no x, y and z',
             file=path,
             row=row,
             advice="Name the columns x, y, z",

@@ -11,9 +11,11 @@ from ..extras import E57, install_command, is_there
 from ..reading import check_promise
 from ..vectors import Array
 from .crs import crs_beside, crs_from_wkt
+from .scan_colours import Colours, colours_of, joined_colours
 from .source import Source
 
 SIGNATURE = b"ASTM-E57"
+COLOURS = ("Red", "Green", "Blue")
 
 
 def read_e57(path: Path) -> Source:
@@ -42,24 +44,30 @@ def read_e57(path: Path) -> Source:
     try:
         counts = [opened.get_header(i).point_count for i in range(opened.scan_count)]
         check_promise(f"{sum(counts):,} points", sum(counts), size, path)
-        parts = [_scan(opened, i) for i in range(len(counts)) if counts[i]]
+        scans_of = [_scan(opened, i) for i in range(len(counts)) if counts[i]]
         system = _system(opened)
     finally:
         opened.close()
-    points = np.concatenate(parts) if parts else np.empty((0, 3))
+    points = np.concatenate([points for points, _ in scans_of]) if scans_of else np.empty((0, 3))
     if not len(points):
         raise InputError("The file has no points", file=path, advice="Export its scans with their points")
     scans = "a scan" if len(counts) == 1 else f"{len(counts)} scans"
     note = f"Cloud of {len(points):,} points in {scans}."
     if invalid := sum(counts) - len(points):
         note += f" Left out {invalid:,} that the scanner marked as invalid."
+    colours, said = joined_colours([(found, f"scan {i}") for i, (_, found) in enumerate(scans_of, start=1)])
     crs, geographic = crs_from_wkt(system) if system else crs_beside(path)
-    return Source(points, crs=crs, geographic=geographic, notes=(note,))
+    notes = (note, said) if said else (note,)
+    return Source(points, crs=crs, geographic=geographic, notes=notes, colours=colours)
 
 
-def _scan(opened: Any, number: int) -> Array:
-    found = opened.read_scan(number, ignore_missing_fields=True)
-    return np.stack([np.asarray(found[f"cartesian{axis}"], dtype=np.float64) for axis in "XYZ"], axis=1)
+def _scan(opened: Any, number: int) -> tuple[Array, Colours | None]:
+    """Points of a scan, and their colours."""
+    coloured = {f"color{name}" for name in COLOURS} <= set(opened.get_header(number).point_fields)
+    found = opened.read_scan(number, ignore_missing_fields=True, colors=coloured)
+    points = np.stack([np.asarray(found[f"cartesian{axis}"], dtype=np.float64) for axis in "XYZ"], axis=1)
+    numbers = [np.asarray(found[f"color{name}"]) for name in COLOURS] if coloured else []
+    return points, colours_of(np.stack(numbers, axis=1))[0] if coloured else None
 
 
 def _system(opened: Any) -> str:

@@ -8,8 +8,10 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ..colours import linear_to_srgb
 from ..errors import InputError
 from ..reading import check_promise, reading
+from .scan_colours import Colours, colours_of, joined_colours
 from .source import Source, check_face_indices
 
 DAMAGED = "Export it again, as GLB or with its .bin beside it"
@@ -32,7 +34,7 @@ def read_gltf(path: Path) -> Source:
     with reading(path, "glTF file", DAMAGED):
         _check_accessors(_document(path, size), size, path)
         scene = trimesh.load_scene(path, process=False)
-        points, faces, offset = [], [], 0
+        points, faces, colours, offset = [], [], [], 0
         for node in sorted(scene.graph.nodes_geometry):
             transform, name = scene.graph[node]
             geometry = scene.geometry[name]
@@ -42,11 +44,28 @@ def read_gltf(path: Path) -> Source:
             points.append(vertices @ transform[:3, :3].T + transform[:3, 3])
             triangles = np.asarray(geometry.faces, np.int64)
             faces.append(check_face_indices(triangles, len(vertices), path).astype(np.int64) + offset)
+            colours.append((_colours(geometry), str(name)))
             offset += len(vertices)
     if not faces:
         raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
-    notes = (f"{len(faces)} meshes of the scene were joined.",) if len(faces) > 1 else ()
-    return Source(np.concatenate(points), check_face_indices(np.concatenate(faces), offset, path), up="y", notes=notes)
+    found, said = joined_colours(colours)
+    joined = f"{len(faces)} meshes of the scene were joined." if len(faces) > 1 else ""
+    return Source(
+        np.concatenate(points), check_face_indices(np.concatenate(faces), offset, path), up="y",
+        notes=tuple(note for note in (joined, said) if note), colours=found,
+    )  # fmt: skip
+
+
+def _colours(mesh: Any) -> Colours | None:
+    """Of the vertices, or of the texture at them."""
+    visual = mesh.visual
+    if visual.kind == "texture":
+        if getattr(visual.material, "baseColorTexture", None) is None or visual.uv is None:
+            return None
+        return np.asarray(visual.to_color().vertex_colors[:, :3], dtype=np.uint8)
+    if visual.kind != "vertex":
+        return None
+    return colours_of(linear_to_srgb(np.asarray(visual.vertex_colors[:, :3], dtype=np.float64) / 255))[0]
 
 
 def _document(path: Path, size: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..georeference import GlobalShift
 from ..vectors import Array, Mask
 from .cloud import Cloud
+from .scan_colours import joined_colours
 from .surface import Surface
 
 SAME_M = 1e-3
@@ -49,11 +50,16 @@ def join(surfaces: Sequence[Surface]) -> Surface:
     vertices = np.concatenate([tile.vertices for tile in tiles])
     faces = np.concatenate([tile.faces + np.int32(start) for tile, start in zip(tiles, starts[:-1], strict=True)])
     same = _same_points(tiles, starts)
-    vertices, faces = _merged(vertices, faces, same)
+    colours, lost = joined_colours([(tile.colours, tile.name) for tile in tiles])
+    vertices, faces, kept = _merged(vertices, faces, same)
     said = [f"{tile.name}: {sentence}" for tile in tiles for sentence in tile.summary]
     said.append(f"{len(tiles)} tiles are one surface of {len(faces):,} faces.")
+    said += [lost] if lost else []
     name, left_out = ", ".join(tile.name for tile in tiles), np.concatenate([tile.left_out for tile in tiles])
-    return Surface(vertices, faces, tiles[0].shift, name, tuple(said), left_out, any(tile.turned for tile in tiles))
+    return Surface(
+        vertices, faces, tiles[0].shift, name, tuple(said), left_out, any(tile.turned for tile in tiles),
+        None if colours is None else colours[kept],
+    )  # fmt: skip
 
 
 def _same_points(tiles: Sequence[Surface], starts: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -88,10 +94,13 @@ def _on_border(surface: Surface) -> Mask:
     return border
 
 
-def _merged(vertices: Array, faces: NDArray[np.int32], same: NDArray[np.int64]) -> tuple[Array, NDArray[np.int32]]:
-    """Without the second of each pair of points."""
+def _merged(
+    vertices: Array, faces: NDArray[np.int32], same: NDArray[np.int64]
+) -> tuple[Array, NDArray[np.int32], Mask]:
+    """Without the second of each pair of points; and which are kept."""
+    kept = np.ones(len(vertices), np.bool_)
     if not len(same):
-        return vertices, faces
+        return vertices, faces, kept
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -99,9 +108,9 @@ def _merged(vertices: Array, faces: NDArray[np.int32], same: NDArray[np.int64]) 
     graph = coo_array((np.ones(len(same), np.bool_), (same[:, 0], same[:, 1])), shape=(n, n))
     _, group = connected_components(graph, directed=False)
     _, first = np.unique(group, return_index=True)
-    kept = np.zeros(n, np.bool_)
+    kept[:] = False
     kept[first] = True
     number = (np.cumsum(kept) - 1).astype(np.int32)
     faces = number[first[group]][faces]
     real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return vertices[kept], faces[real]
+    return vertices[kept], faces[real], kept

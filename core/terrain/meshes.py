@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
 from .cleaning import merge_duplicates
+from .scan_colours import colours_of
 from .source import Source, check_face_indices, check_finite
 from .text import NumberRows, all_numbers, line_at, line_blocks, shown
 
@@ -22,7 +23,9 @@ STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("att
 
 
 def read_obj(path: Path) -> Source:
-    """Read the vertices and faces of a Wavefront OBJ; materials, normals and texture coordinates are not needed.
+    """Read the vertices and faces of a Wavefront OBJ, and colours that follow the coordinates of its vertices.
+
+    Normals are not needed.
 
     Raises
     ------
@@ -49,7 +52,10 @@ def read_obj(path: Path) -> Source:
     points = vertices.table()
     if points.shape[1] < 3:
         raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_row)
-    return Source(np.ascontiguousarray(points[:, :3]), corners.triangles())
+    colours, said = colours_of(points[:, -3:]) if points.shape[1] in (6, 7) else (None, "")
+    return Source(
+        np.ascontiguousarray(points[:, :3]), corners.triangles(), notes=(said,) if said else (), colours=colours
+    )
 
 
 class _Corners:

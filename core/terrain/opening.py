@@ -12,10 +12,11 @@ from ..georeference import GlobalShift, z_up
 from ..plausibility import GREATEST_M
 from ..progress import Progress, silent
 from ..reading import reader
-from ..vectors import Array
+from ..vectors import Array, Mask
 from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, ptx
 from .crs import surely_different
 from .ground_filter import filter_ground
+from .scan_colours import joined_colours
 from .source import Source, check_finite
 
 READERS: dict[str, Callable[[Path], Source]] = {
@@ -130,13 +131,23 @@ def _one_cloud(paths: Sequence[Path], sources: Sequence[Source]) -> tuple[Path, 
     notes = [f"{path.name}: {note}" for path, source in zip(paths, sources, strict=True) for note in source.notes]
     notes.append(f"The {len(paths)} clouds are read as one.")
     points = np.concatenate([source.points for source in sources])
+    colours, said = joined_colours([(source.colours, path.name) for path, source in zip(paths, sources, strict=True)])
+    notes += [said] if said else []
     vertical = next((source.vertical for source in sources if source.vertical), "")
     geographic, turned = (any(getattr(source, what) for source in sources) for what in ("geographic", "turned"))
     name = ", ".join(path.name for path in paths)
     return (
         paths[0],
         name,
-        Source(points, crs=crs, vertical=vertical, geographic=geographic, turned=turned, notes=tuple(notes)),
+        Source(
+            points,
+            crs=crs,
+            vertical=vertical,
+            geographic=geographic,
+            turned=turned,
+            notes=tuple(notes),
+            colours=colours,
+        ),
     )
 
 
@@ -144,10 +155,12 @@ def _localised(
     source: Source, path: Path, name: str, how: HowToRead, shift: GlobalShift | None, progress: Progress
 ) -> Opened:
     """A placed source in local coordinates; errors name the path."""
-    points, notes = source.points, list(source.notes)
+    points, notes, colours = source.points, list(source.notes), source.colours
     left_out = points[:0]
     if how.ground_filter_m is not None:
-        points, left_out, filtered = _ground(source, points, how.ground_filter_m, path, progress)
+        ground, filtered = _ground(source, points, how.ground_filter_m, path, progress)
+        points, left_out = points[ground], points[~ground]
+        colours = None if colours is None else colours[ground]
         notes += filtered
     heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
     low, high = box_of(points[heights], path)
@@ -170,13 +183,14 @@ def _localised(
         f"Coordinate reference system {shift.crs}." if shift.crs else "The coordinate reference system is unknown."
     )
     left_out = left_out - shift.vector
-    return Opened(name, replace(source, points=points - shift.vector), shift, tuple(notes), tuple(said), left_out)
+    source = replace(source, points=points - shift.vector, colours=colours)
+    return Opened(name, source, shift, tuple(notes), tuple(said), left_out)
 
 
 def _ground(
     source: Source, points: Array, cell_m: float, path: Path, progress: Progress
-) -> tuple[Array, Array, tuple[str, ...]]:
-    """The points on the ground, those left out, and what to say of it."""
+) -> tuple[Mask, tuple[str, ...]]:
+    """Which points are on the ground, and what to say of it."""
     if source.kind != "cloud":
         raise InputError(
             f"This is a {source.kind}, and the ground filter works on clouds", file=path, advice="Read it without"
@@ -185,7 +199,7 @@ def _ground(
         found = filter_ground(points, cell_m, progress=progress)
     except InputError as error:
         raise InputError(error.problem, file=path, advice=error.advice) from error
-    return points[found.ground], points[~found.ground], found.notes
+    return found.ground, found.notes
 
 
 def check_path(path: Path) -> None:

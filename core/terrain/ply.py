@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reading import AGAIN
+from .scan_colours import colour_columns, colours_of
 from .source import Source, check_face_indices, triangulated
 from .text import even_table, number_table, shown
 
@@ -19,6 +20,7 @@ TYPES = {
     "float": "f4", "double": "f8", "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8",
 }  # fmt: skip
 PLAIN = "Export the mesh without colours, textures and attributes"
+NO_COLOURS: NDArray[Any] = np.empty((0, 3))
 FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
@@ -53,10 +55,12 @@ def read_ply(path: Path) -> Source:
         contents = _read_binary(data, start, elements, order, path)
     else:
         contents = _read_ascii(data[start:].tobytes(), header_rows, elements, path)
-    points, faces = contents
-    if faces is None:
-        return Source(points, crs=crs)
-    return Source(points, check_face_indices(faces, len(points), path), crs=crs)
+    points, faces, found = contents
+    colours, said = colours_of(found)
+    notes = (said,) if said else ()
+    if faces is not None:
+        faces = check_face_indices(faces, len(points), path)
+    return Source(points, faces, crs=crs, notes=notes, colours=colours)
 
 
 def read_header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], int, int, str]:
@@ -124,8 +128,9 @@ def _check_element(element: Element, path: Path) -> None:
 
 def _read_binary(
     data: NDArray[np.uint8], offset: int, elements: list[Element], order: str, path: Path
-) -> tuple[NDArray[np.float64], NDArray[Any] | None]:
-    points, faces = np.empty((0, 3)), None
+) -> tuple[NDArray[np.float64], NDArray[Any] | None, NDArray[Any]]:
+    """Points, faces, and the numbers of the points' colours (n, 3), without rows where there are none."""
+    points, faces, colours = np.empty((0, 3)), None, NO_COLOURS
     for element in elements:
         dtype = row_type(data, offset, element, order)
         end = offset + element.rows * dtype.itemsize
@@ -139,6 +144,9 @@ def _read_binary(
             lists, end = _walk(data, offset, element, order, path)
         if element.name == "vertex":
             points = np.stack([rows[axis].astype(np.float64) for axis in "xyz"], axis=1)
+            names = [p.name for p in element.properties if not p.count_type]
+            if len(rows) and (three := colour_columns(names)):
+                colours = np.stack([rows[names[i]] for i in three], axis=1)
         elif element.name == "face" and element.rows:
             name = next((p.name for p in element.properties if p.name in FACE_LISTS and p.count_type), "")
             if not name:
@@ -147,7 +155,7 @@ def _read_binary(
         offset = end
         if offset >= data.size and faces is not None:
             break
-    return points, faces
+    return points, faces, colours
 
 
 def row_type(data: NDArray[np.uint8], offset: int, element: Element, order: str) -> np.dtype:
@@ -205,9 +213,9 @@ def _walk(
 
 def _read_ascii(
     text: bytes, header_rows: int, elements: list[Element], path: Path
-) -> tuple[NDArray[np.float64], NDArray[Any] | None]:
+) -> tuple[NDArray[np.float64], NDArray[Any] | None, NDArray[Any]]:
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), start=header_rows + 1) if line.strip()]
-    points, faces = np.empty((0, 3)), None
+    points, faces, colours = np.empty((0, 3)), None, NO_COLOURS
     at = 0
     for element in elements:
         block = numbered[at : at + element.rows]
@@ -227,10 +235,22 @@ def _read_ascii(
                     row=rows[0],
                     advice=AGAIN,
                 )
-            points = table[:, [names.index(axis) for axis in "xyz"]] if len(lines) else points
+            if len(lines):
+                points = table[:, [names.index(axis) for axis in "xyz"]]
+                colours = _written_colours(element, table)
         elif element.name == "face" and element.rows:
             faces = _ascii_faces(element, lines, rows, path)
-    return points, faces
+    return points, faces, colours
+
+
+def _written_colours(element: Element, table: NDArray[np.float64]) -> NDArray[Any]:
+    """Of an ascii file, whose numbers have the type that its header gives them."""
+    three = colour_columns([p.name for p in element.properties])
+    if not three:
+        return NO_COLOURS
+    found = table[:, three]
+    whole = all(element.properties[i].type[0] in "iu" for i in three) and (found % 1 == 0).all()
+    return found.astype(np.int64) if whole else found
 
 
 def _ascii_faces(element: Element, lines: list[bytes], rows: list[int], path: Path) -> NDArray[np.int64]:

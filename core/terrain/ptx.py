@@ -10,11 +10,15 @@ from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
 from .crs import crs_beside
+from .scan_colours import colours_of
 from .source import Source
 from .text import number_table, read_text, shown
 
 HEADER_ROWS = 10
 """Columns and rows of the grid; place and axes of the scanner, 4 rows; transformation, 4 rows."""
+COLOURED = 7
+"""Columns of a scan with colours: x, y, z, intensity, red, green, blue."""
+SOME = "The colours are left out: some scans have none."
 TOLERANCE = 1e-3
 """Files round their rotations to some digits."""
 
@@ -31,7 +35,7 @@ def read_ptx(path: Path) -> Source:
     lines = read_text(path).split(b"\n")
     while lines and not lines[-1].strip():
         lines.pop()
-    parts, at, empty = [], 0, 0
+    parts, colours, at, empty = [], [], 0, 0
     while at < len(lines):
         count, transformation = _header(lines, at, path)
         at += HEADER_ROWS
@@ -50,14 +54,18 @@ def read_ptx(path: Path) -> Source:
         measured = (points != 0).any(axis=1)
         empty += count - int(measured.sum())
         parts.append(points[measured] @ transformation[:3, :3] + transformation[3, :3])
+        colours.append(table[measured, 4:7] if table.shape[1] == COLOURED else table[:0, :3])
         at += count
     points = np.concatenate(parts)
     if not len(points):
         raise InputError("Nothing was measured in any direction", file=path, advice="Export the scans again")
     scans = "a scan" if len(parts) == 1 else f"{len(parts)} scans"
     note = f"Cloud of {len(points):,} points in {scans}; {empty:,} directions without a point."
+    numbers = np.concatenate(colours)
+    found, said = colours_of(numbers) if len(numbers) == len(points) else (None, SOME if len(numbers) else "")
     crs, geographic = crs_beside(path)
-    return Source(points, crs=crs, geographic=geographic, notes=(note,))
+    notes = (note, said) if said else (note,)
+    return Source(points, crs=crs, geographic=geographic, notes=notes, colours=found)
 
 
 def _header(lines: Sequence[bytes], at: int, path: Path) -> tuple[int, Array]:

@@ -29,6 +29,7 @@ from .opening import (
     read_placed,
 )
 from .overhangs import find_overhangs
+from .scan_colours import colours_at
 from .source import Source
 from .surface import Surface
 
@@ -195,9 +196,13 @@ def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Su
     else:
         meshed = triangulation.Meshed(source.points, source.faces, ())
     kind, turned, merged = source.kind, source.turned, source.merged
+    points, colours = (source.points, source.colours) if source.colours is not None else (meshed.points, None)
     del source, opened  # their points are as large as what follows
     vertices, faces, done = _cleaned(meshed, kind, merged)
-    return Surface(vertices, faces, shift, name, (*before, *meshed.notes, *done, *after), left_out, turned)
+    if colours is not None:
+        colours = colours_at(vertices, points, colours)
+        done.append("The points have colours.")
+    return Surface(vertices, faces, shift, name, (*before, *meshed.notes, *done, *after), left_out, turned, colours)
 
 
 @reader("terrain")

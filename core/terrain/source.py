@@ -27,6 +27,7 @@ class Source:
     turned : y was up, and the points were turned.
     notes : sentences for the summary.
     merged : so many vertices more are in the file, at the places of others.
+    colours : (n, 3) sRGB of the points; None when they have none.
     """
 
     points: Array
@@ -39,6 +40,7 @@ class Source:
     notes: tuple[str, ...] = ()
     vertical: str = ""
     merged: int = 0
+    colours: NDArray[np.uint8] | None = None
 
     @property
     def kind(self) -> str:

@@ -28,6 +28,7 @@ class Surface:
     summary : what the reader did, in sentences.
     left_out : (k, 3) points of the cloud that the ground filter took for vegetation [m].
     turned : the file has y up; what came with it may have so too.
+    colours : (n, 3) sRGB of the vertices, as scanned; None when there are none.
     """
 
     vertices: Array
@@ -37,6 +38,7 @@ class Surface:
     summary: tuple[str, ...] = ()
     left_out: Array = field(default_factory=lambda: np.empty((0, 3)))
     turned: bool = False
+    colours: NDArray[np.uint8] | None = None
 
     @cached_property
     def _cross(self) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output import output_stream
+from ..vectors import Array
 from .cloud import Cloud
 from .surface import Surface
 
@@ -15,7 +16,9 @@ from .surface import Surface
 def write_ply(
     terrain: Surface | Cloud, path: str | Path, face_values: Mapping[str, NDArray[np.integer]] | None = None
 ) -> None:
-    """Write a binary PLY in survey coordinates, double precision: nothing is lost. A cloud has no faces there.
+    """Write a binary PLY in survey coordinates, double precision and colours if there are any: nothing is lost.
+
+    A cloud has no faces there.
 
     Parameters
     ----------
@@ -23,6 +26,7 @@ def write_ply(
     """
     attributes = face_values or {}
     is_cloud = isinstance(terrain, Cloud)
+    colours = None if isinstance(terrain, Cloud) else terrain.colours
     points = terrain.points if isinstance(terrain, Cloud) else terrain.vertices
     corners = np.empty((0, 3), np.int32) if isinstance(terrain, Cloud) else terrain.faces
     of_faces = [
@@ -37,6 +41,7 @@ def write_ply(
             *([f"comment crs {terrain.shift.crs}"] if terrain.shift.crs else []),
             f"element vertex {len(points)}",
             *(f"property double {axis}" for axis in "xyz"),
+            *(f"property uchar {name}" for name in (() if colours is None else ("red", "green", "blue"))),
             *([] if is_cloud else of_faces),
             "end_header\n",
         ]
@@ -48,5 +53,13 @@ def write_ply(
         faces[name] = values
     with output_stream(path, binary=True) as file:
         file.write(header.encode("ascii", "replace"))
-        file.write(terrain.shift.to_survey(points).astype("<f8").tobytes())
+        file.write(_vertex_rows(terrain.shift.to_survey(points), colours))
         file.write(faces.tobytes())
+
+
+def _vertex_rows(points: Array, colours: NDArray[np.uint8] | None) -> bytes:
+    if colours is None:
+        return points.astype("<f8").tobytes()
+    rows = np.empty(len(points), np.dtype([("place", "<f8", 3), ("colour", "u1", 3)]))
+    rows["place"], rows["colour"] = points, colours
+    return rows.tobytes()

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The terrain in a composed film: every pixel is a ray, so that a lens bends it as it bends the footage."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 
 from ...camera.model import Camera, project, rays
 from ...compiled import in_chunks
+from ...errors import InputError
 from ...opencv import opencv
 from ...terrain.raycast import any_hit, cast_rays
 from ...terrain.surface import Surface
@@ -15,7 +17,12 @@ from ...vectors import Array, Mask, dot, norm
 from .canvas import Picture
 
 ROCK = np.array([0.70, 0.67, 0.62])
-"""sRGB of the ground that no photograph shows."""
+"""sRGB of the ground whose colour nothing tells."""
+TerrainColours = Literal["auto", "footage", "scan", "none"]
+"""Where a terrain has its colours from: the footage, where that shows it, else the scan; one of them; none."""
+FROM_FOOTAGE, FROM_SCAN = ("auto", "footage"), ("auto", "scan")
+SCAN_SHADE, SCAN_LIGHT = 0.55, 0.6
+"""Colours of a scan have a light of their own; so much of them is left in the shade, and so much more in the sun."""
 SKY_TOP, SKY_LOW = np.array([0.52, 0.63, 0.74]), np.array([0.86, 0.89, 0.91])
 AMBIENT = 0.46
 LIFT_M = 0.05
@@ -67,8 +74,40 @@ class Photograph:
     camera: Camera
 
 
+def check_terrain_colours(name: str) -> TerrainColours:
+    """A name as a choice.
+
+    Raises
+    ------
+    InputError : there is no such choice.
+    """
+    for known in get_args(TerrainColours):
+        if name == known:
+            return known
+    raise InputError(
+        f"Terrain colours cannot be from {name!r}", advice=f"Choose one of {', '.join(get_args(TerrainColours))}"
+    )
+
+
+def coloured(surface: Surface, wanted: TerrainColours) -> Surface:
+    """A terrain without its own colours, if they are not wanted.
+
+    Raises
+    ------
+    InputError : they alone are, and it has none.
+    """
+    if wanted == "scan" and surface.colours is None:
+        raise InputError(
+            f"The terrain {surface.name} has no colours",
+            advice="Export the scan with the colours of its points, or take those of the footage",
+        )
+    return surface if wanted in FROM_SCAN or surface.colours is None else replace(surface, colours=None)
+
+
 def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...] = ()) -> Ground:
-    """A terrain in the light of the sun; where a photograph shows it, in its colours, which have their own light.
+    """A terrain in the light of the sun, in its own colours if it has any.
+
+    Where a photograph shows it, it is in the photograph's, which have their own light.
 
     Parameters
     ----------
@@ -85,7 +124,10 @@ def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...]
     light = AMBIENT + (1 - AMBIENT) * np.clip(faces_sun, 0, 1) * lit
     # Curved ground from above is lighter than hollows: a little sky light, which shows relief in the shade.
     light *= 0.82 + 0.18 * np.clip(normals[:, 2], 0, 1)
-    colours = np.clip(ROCK * (1.12 * light)[:, None], 0, 1)
+    if surface.colours is None:
+        colours = np.clip(ROCK * (1.12 * light)[:, None], 0, 1)
+    else:
+        colours = np.clip(surface.colours / 255 * (SCAN_SHADE + SCAN_LIGHT * light)[:, None], 0, 1)
     if photographs:
         shown = [_photographed(surface, normals, photograph) for photograph in photographs]
         weights = np.array([weight for _, weight in shown])

@@ -28,7 +28,7 @@ from ..job import FilmJob
 from .blocks import sun_direction
 from .falls import Fall, measured_falls, predicted_falls, simulated_falls
 from .filmed import Footage
-from .ground import Ground, Photograph, lit_ground
+from .ground import FROM_FOOTAGE, Ground, Photograph, coloured, lit_ground
 from .request import FilmRequest
 from .scenery import Scene
 from .solids import SOLIDS
@@ -126,14 +126,14 @@ class Material:
         """The terrain, lit, with the colours of the footage where it shows it."""
         self.progress("Lighting the terrain", 0, 0)
         photographs: tuple[Photograph, ...] = ()
-        if self.footage is not None:
+        if self.footage is not None and self.request.terrain_colours in FROM_FOOTAGE:
             first, last = (self.footage.frame(moment) for moment in self.span_s)
             frames = np.unique(np.linspace(first, last, PHOTOGRAPHS).astype(np.intp)).tolist()
             photographs = tuple(
                 Photograph(self.footage.picture(frame), self.footage.camera(self.footage.moment(frame)))
                 for frame in frames
             )
-        return lit_ground(self.terrain, self.sun, photographs)
+        return lit_ground(coloured(self.terrain, self.request.terrain_colours), self.sun, photographs)
 
     @cached_property
     def body(self) -> Surface | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ...impact_models.machinery.parameters import Value
 from ..simulated import NUMBER
+from .ground import TerrainColours
 
 SUN_DEG = (315.0, 50.0)
 
@@ -35,6 +36,7 @@ class FilmRequest:
     solid : what stands for the block, see `solids`; or the file of a scanned one.
     sun_deg : azimuth from north and elevation.
     dust : whether impacts raise some; it is drawn, not measured.
+    terrain_colours : where the terrain has its colours from.
     """
 
     film: str
@@ -56,6 +58,7 @@ class FilmRequest:
     solid: str = "rock"
     sun_deg: tuple[float, float] = SUN_DEG
     dust: bool = False
+    terrain_colours: TerrainColours = "auto"
 
     @classmethod
     def from_json(cls, text: str) -> "FilmRequest":

@@ -9,6 +9,7 @@ DEMOS = ("rockfall.load_demo", "rockfall.load_footage_demo", "rockfall.open_proj
 STEPS = (
     ("terrain", "1  Terrain", (
         "rockfall.import_terrain", "rockfall.show_relief", "rockfall.reset_relief", "rockfall.toggle_full_terrain",
+        "rockfall.colour_from_footage", "rockfall.remove_footage_colours",
         "rockfall.lock_terrain", "rockfall.put_terrain_back", "rockfall.toggle_left_out",
         "rockfall.remove_terrain",
     )),

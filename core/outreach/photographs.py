@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of the slope from a project's aligned videos, in whose colours its terrain is shown."""
+"""Pictures of the slope from aligned videos, in whose colours its terrain is shown."""
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from ..camera.path import camera_at
+from ..camera.path import CameraPath, camera_at
 from ..errors import RockfallError
 from ..exchange.opening import read_project_camera
-from ..exchange.project import Project, VideoEntry
-from ..film.composed.ground import Photograph
+from ..exchange.project import Project
+from ..film.composed.photographs import Photograph
 from ..footage.video import open_video, read_frame
 from ..progress import Progress, silent
 from ..terrain.surface import Surface
@@ -20,10 +22,32 @@ FRAMES = 5
 MOST_VIDEOS = 4
 
 
+@dataclass(frozen=True, eq=False)
+class Filmed:
+    """A video of the slope, and its camera, in the terrain's local coordinates."""
+
+    name: str
+    file: Path
+    path: CameraPath
+
+
+def project_videos(project: Project, surface: Surface | None) -> tuple[tuple[Filmed, ...], tuple[str, ...]]:
+    """The videos of a project that have a file and a camera, and sentences on those that cannot be used."""
+    found, said = [], []
+    for entry in project.videos:
+        if entry.file is None or entry.camera is None:
+            continue
+        try:
+            found.append(Filmed(entry.name, entry.file, read_project_camera(entry.camera, surface)[0].path))
+        except RockfallError as error:
+            said.append(_without(entry.name, error))
+    return tuple(found), tuple(said)
+
+
 def photographs_of(
-    project: Project, surface: Surface | None, centre: Array, progress: Progress = silent
+    videos: Iterable[Filmed], centre: Array | None = None, progress: Progress = silent
 ) -> tuple[tuple[Photograph, ...], tuple[str, ...]]:
-    """Frames of the videos that have a file and a camera, and sentences on those that cannot be used.
+    """Frames of videos, of the first ones if there are many, and sentences on those that cannot be used.
 
     Parameters
     ----------
@@ -31,20 +55,21 @@ def photographs_of(
     """
     found: list[Photograph] = []
     said = []
-    entries = [video for video in project.videos if video.file is not None and video.camera is not None]
-    for entry in entries[:MOST_VIDEOS]:
+    for filmed in tuple(videos)[:MOST_VIDEOS]:
         try:
-            found += _frames(entry, surface, centre, progress)
+            found += _frames(filmed, np.zeros(3) if centre is None else centre, progress)
         except RockfallError as error:
-            said.append(f"The terrain is shown without the colours of the video {entry.name}: {error}")
+            said.append(_without(filmed.name, error))
     return tuple(found), tuple(said)
 
 
-def _frames(entry: VideoEntry, surface: Surface | None, centre: Array, progress: Progress) -> list[Photograph]:
-    assert entry.file is not None
-    assert entry.camera is not None
-    path = read_project_camera(entry.camera, surface)[0].path
-    video = open_video(entry.file, progress)
+def _without(name: str, error: RockfallError) -> str:
+    return f"The terrain is shown without the colours of the video {name}: {error}"
+
+
+def _frames(filmed: Filmed, centre: Array, progress: Progress) -> list[Photograph]:
+    path = filmed.path
+    video = open_video(filmed.file, progress)
     size = path.reference.width, path.reference.height
     if size != (video.width, video.height):
         raise RockfallError(
@@ -52,7 +77,7 @@ def _frames(entry: VideoEntry, surface: Surface | None, centre: Array, progress:
         )
     photographs: list[Photograph] = []
     for frame in np.unique(np.linspace(0, video.frames - 1, FRAMES).astype(np.intp)).tolist():
-        progress(f"Reading {entry.name}", len(photographs), FRAMES)
+        progress(f"Reading {filmed.name}", len(photographs), FRAMES)
         camera = camera_at(path, float(video.time_s[frame]))
         near = replace(camera, position=camera.position - centre)
         photographs.append(Photograph(read_frame(video, frame), near))

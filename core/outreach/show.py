@@ -11,7 +11,8 @@ from ..errors import InputError
 from ..exchange.opening import open_project
 from ..exchange.project import Project, Site, read_project
 from ..film.composed.falls import Fall, Hits, measured_falls, simulated_falls
-from ..film.composed.ground import FROM_FOOTAGE, Photograph, TerrainColours, coloured
+from ..film.composed.ground import FROM_FOOTAGE, TerrainColours, coloured
+from ..film.composed.photographs import Photograph
 from ..film.falls import fall_beside
 from ..film.job import FilmJob
 from ..film.simulated import NUMBER, group_name
@@ -25,7 +26,7 @@ from ..simulation.measured_releases import start_times
 from ..terrain.surface import Surface
 from ..vectors import Array
 from ..workflow.simulation import remarks_of
-from .photographs import photographs_of
+from .photographs import Filmed, photographs_of, project_videos
 
 CREDITS, DOI = "credits", "doi"
 """Keys of a project's [site] beside its name and description."""
@@ -115,9 +116,22 @@ def open_show(request: ShowRequest, progress: Progress = silent) -> Show:
     show = show_of(site, surface, result, simulations, together=request.together, remarks=remarks)
     if request.terrain_colours not in FROM_FOOTAGE or surface is None:
         return show
-    centre = show.origin.vector - surface.shift.vector
-    photographs, said = photographs_of(project, surface, centre, progress)
-    return replace(show, photographs=photographs, remarks=(*show.remarks, *said))
+    videos, unusable = project_videos(project, surface)
+    return with_photographs(show, surface, videos, unusable, progress)
+
+
+def with_photographs(
+    show: Show, surface: Surface, videos: Iterable[Filmed], unusable: Iterable[str] = (), progress: Progress = silent
+) -> Show:
+    """The same with the colours of videos on its terrain.
+
+    Parameters
+    ----------
+    surface : the whole terrain, in whose local coordinates the cameras stand.
+    unusable : sentences on videos that are left out.
+    """
+    photographs, said = photographs_of(videos, show.origin.vector - surface.shift.vector, progress)
+    return replace(show, photographs=photographs, remarks=(*show.remarks, *unusable, *said))
 
 
 def show_of(

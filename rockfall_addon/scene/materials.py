@@ -12,6 +12,8 @@ ROCK_COLOUR = (0.47, 0.43, 0.38)
 THIN_COLOUR = (0.30, 0.42, 0.60)
 RELIEF_BRIGHTNESS = 1.2
 RELIEF_MIDDLE = 0.55  # the light that contrast leaves as it is
+OWN_LIGHT = 0.6
+"""Scans and pictures bring light with their colours: this part of it is left to them."""
 SUN_DIRECTION = (-0.5, -0.5, 0.7071)  # from the north-west as on maps would be behind a camera that looks up the slope
 TRAIL_GROUP = "Rockfall trail"
 TIME_ATTRIBUTE = "display_time_s"
@@ -20,14 +22,20 @@ SPEED_COLOUR = "speed_colour"
 TICK_ATTRIBUTE = "tick"
 TICK_RADII = 1.5
 RELIEF_COLOUR = "relief"
+SCAN_COLOURS, FOOTAGE_COLOURS = OWN_COLOURS = ("scan_colours", "footage_colours")
 PATH_MATERIAL = "Rockfall simulated film path"
 TERRAIN_MATERIAL = "Rockfall terrain"
-TERRAIN_VALUES = {"hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "brightness": 1.0, "contrast": 1.0}
+TERRAIN_VALUES = {
+    "hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "brightness": 1.0, "contrast": 1.0,
+    SCAN_COLOURS: 1.0, FOOTAGE_COLOURS: 1.0,
+}  # fmt: skip
 """Nodes of the terrain's material whose values the sliders set."""
 
 
 def terrain_material() -> bpy.types.Material:
     """Relief as in Noël et al. 2018, figure 3: hillshade × eye-dome from the vertex attributes, thin data hatched.
+
+    Rock, or the colours of the scan and of the footage where there are any.
 
     It emits its colour: no lamp, no shadow rays, no noise, the same picture from every engine. One from a file of an
     earlier version, without nodes for the sliders, is built anew.
@@ -276,15 +284,41 @@ def _build_terrain(tree: bpy.types.ShaderNodeTree, output: bpy.types.Node) -> No
     stripe = math_node(tree, "GREATER_THAN", math_node(tree, "FRACT", diagonal, 0.0), 0.5)
     hatch = math_node(tree, "MULTIPLY", stripe, math_node(tree, "MULTIPLY", attribute("thin"), slider("thin")))
 
-    rock = new("ShaderNodeMix")
-    rock.data_type = "RGBA"
-    rock.inputs["A"].default_value = (*ROCK_COLOUR, 1.0)
-    rock.inputs["B"].default_value = (*THIN_COLOUR, 1.0)
-    link(hatch, rock.inputs["Factor"])
+    def mixed(kind: str, part: bpy.types.NodeSocket) -> tuple[bpy.types.NodeSocket, ...]:
+        """The inputs A and B of a new node that mixes them, and its output."""
+        node = new("ShaderNodeMix")
+        node.data_type = kind
+        link(part, next(s for s in node.inputs if s.enabled and s.name == "Factor"))
+        ends = [next(s for s in node.inputs if s.enabled and s.name == name) for name in "AB"]
+        return *ends, next(s for s in node.outputs if s.enabled)
+
     light = math_node(tree, "MULTIPLY", lit("hillshade"), lit("eye_dome"))
     even = math_node(tree, "POWER", math_node(tree, "DIVIDE", light, RELIEF_MIDDLE), slider("contrast"))
     bright = math_node(tree, "MULTIPLY", even, RELIEF_MIDDLE * RELIEF_BRIGHTNESS)
-    _emit(tree, output, rock.outputs["Result"], math_node(tree, "MULTIPLY", bright, slider("brightness")))
+    own = math_node(tree, "MULTIPLY_ADD", even, 1.0 - OWN_LIGHT)
+    own.node.inputs[2].default_value = OWN_LIGHT
+    colour: bpy.types.NodeSocket | None = None
+    for name in OWN_COLOURS:
+        found = new("ShaderNodeAttribute")
+        found.attribute_name = name
+        # a mesh without the attribute gives black, with alpha 1; black of a scan is a colour that it does not know
+        known = math_node(tree, "GREATER_THAN", found.outputs["Fac"], 0.0)
+        part = math_node(tree, "MULTIPLY", math_node(tree, "MULTIPLY", known, found.outputs["Alpha"]), slider(name))
+        before, after, result = mixed("RGBA", part)
+        if colour is None:
+            before.default_value = (*ROCK_COLOUR, 1.0)
+        else:
+            link(colour, before)
+        link(found.outputs["Color"], after)
+        colour = result
+        before, after, lighter = mixed("FLOAT", part)
+        link(bright, before)
+        link(own, after)
+        bright = lighter
+    before, after, result = mixed("RGBA", hatch)
+    link(colour, before)
+    after.default_value = (*THIN_COLOUR, 1.0)
+    _emit(tree, output, result, math_node(tree, "MULTIPLY", bright, slider("brightness")))
 
 
 def math_node(

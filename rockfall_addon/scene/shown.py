@@ -8,13 +8,16 @@ import bpy
 
 from ...core.errors import RockfallError
 from ...core.exchange.project import Site
-from ...core.outreach.show import Show, show_of
+from ...core.film.composed.ground import FROM_FOOTAGE, TerrainColours, coloured
+from ...core.outreach.photographs import Filmed
+from ...core.outreach.show import Show, show_of, with_photographs
 from ...core.progress import Progress
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ground_of, run_models
 from . import picks, reconstruction, simulation, simulation_setup, terrain
+from . import terrain_colours as colours_of_scene
 from .project import site_of
 from .simulation_setup import Plan
 
@@ -32,6 +35,7 @@ class Asked:
     plan : of the simulated blocks; None without any.
     counts : model → how many of its runs are shown.
     left_out : what of the measured trajectories is missing.
+    filmed : videos whose colours the terrain has.
     """
 
     site: Site
@@ -41,6 +45,7 @@ class Asked:
     counts: Mapping[str, int]
     together: bool
     left_out: tuple[Remark, ...]
+    filmed: tuple[Filmed, ...] = ()
 
 
 def missing(scene: bpy.types.Scene) -> str:
@@ -48,7 +53,7 @@ def missing(scene: bpy.types.Scene) -> str:
     return "" if picks.objects_of(scene) else "There are no trajectories to show: import picks first, or load the demo"
 
 
-def ask(scene: bpy.types.Scene, *, simulated: bool, together: bool) -> Asked:
+def ask(scene: bpy.types.Scene, *, simulated: bool, together: bool, terrain_colours: TerrainColours = "auto") -> Asked:
     """What the scene says.
 
     Raises
@@ -68,8 +73,10 @@ def ask(scene: bpy.types.Scene, *, simulated: bool, together: bool) -> Asked:
     site = site_of(scene)
     site = site if site.name else replace(site, name="Rockfall")
     surface = terrain.surface_of_scene(scene)
+    surface = None if surface is None else coloured(surface, terrain_colours)
+    filmed = colours_of_scene.filmed(scene) if terrain_colours in FROM_FOOTAGE and surface is not None else ()
     plan = simulation_setup.plan(scene) if with_them else None
-    return Asked(site, surface, measured, plan, counts, together, left_out)
+    return Asked(site, surface, measured, plan, counts, together, left_out, filmed)
 
 
 def show(asked: Asked, progress: Progress) -> Show:
@@ -84,7 +91,10 @@ def show(asked: Asked, progress: Progress) -> Show:
                 found += run_models(ground, releases.take(slice(0, asked.counts[one.model])), [one], progress=progress)
         starts = {name: origin.time_s for name, origin in asked.plan.origins.items()}
     progress("Placing the blocks", 0, 0)
-    return show_of(
+    made = show_of(
         asked.site, asked.surface, asked.measured, found, starts_s=starts, together=asked.together,
         remarks=map(str, asked.left_out),
     )  # fmt: skip
+    if asked.surface is None or not asked.filmed:
+        return made
+    return with_photographs(made, asked.surface, asked.filmed, progress=progress)

@@ -79,6 +79,10 @@ def _texts(found: list) -> None:
         raise TypeError
 
 
+def _digests(found: dict) -> None:
+    _texts(list(found.values()))
+
+
 def _releases(found: list) -> None:
     if not found:
         raise ValueError
@@ -159,7 +163,9 @@ BY_ROLE: dict[str, Kept] = {
         },
         do="Compute the maps again",
     ),
-    store.TERRAIN_ROLE: Kept(beside={store.REACH: _amount, store.THIN_SHARE: number(0.0, 1.0)}),
+    store.TERRAIN_ROLE: Kept(
+        beside={store.REACH: _amount, store.THIN_SHARE: number(0.0, 1.0), store.FOOTAGE_OF: json_of(dict, _digests)}
+    ),
 }
 
 

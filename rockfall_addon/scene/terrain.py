@@ -13,7 +13,7 @@ from ...core.georeference import LARGE_COORDINATE_M
 from ...core.terrain.joining import join, moved
 from ...core.terrain.shading import Shading, thin_share
 from ...core.terrain.surface import Surface
-from . import georeference, store, terrain_look, terrain_mesh, terrain_view
+from . import georeference, materials, store, terrain_colours, terrain_look, terrain_mesh, terrain_view
 
 LEAST_THIN = 0.005
 
@@ -35,6 +35,8 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
         georeference.write_shift(scene, surface.shift)
     values = dict(zip(terrain_mesh.SHADING, (shading.hillshade, shading.eye_dome, shading.thin), strict=True))
     mesh = terrain_mesh.new_mesh(surface.name, surface.vertices, surface.faces, values)
+    if surface.colours is not None:
+        terrain_colours.write(mesh, materials.SCAN_COLOURS, surface.colours)
     obj = bpy.data.objects.new(surface.name, mesh)
     obj[store.ROLE], obj[store.ID] = store.TERRAIN_ROLE, uuid.uuid4().hex
     obj[store.TERRAIN_SUMMARY], obj[store.TERRAIN_FILE] = list(surface.summary), surface.name
@@ -247,7 +249,8 @@ def _read(obj: bpy.types.Object) -> Surface:
     local = terrain_mesh.placed_vertices(obj)
     if np.linalg.det(np.array(obj.matrix_world)[:3, :3]) < 0:  # mirrored: the faces would look into the ground
         faces = np.ascontiguousarray(faces[:, ::-1])
-    return Surface(local, faces, georeference.read_shift(_scene_of(obj)), obj.name, turned=bool(obj.get(store.TURNED)))
+    shift, turned = georeference.read_shift(_scene_of(obj)), bool(obj.get(store.TURNED))
+    return Surface(local, faces, shift, obj.name, turned=turned, colours=terrain_colours.scanned(obj.data))
 
 
 def _way_m(tile: bpy.types.Object) -> float:

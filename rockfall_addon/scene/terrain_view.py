@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.terrain.decimation import decimate
-from . import materials, store, terrain_look, terrain_mesh
+from . import materials, store, terrain_colours, terrain_look, terrain_mesh
 
 GROUP = "Rockfall coarse view"
 SHARE = 3
@@ -83,10 +83,15 @@ def _make(tile: bpy.types.Object, wanted: int) -> None:
     values = np.empty((len(names), len(vertices)), dtype=np.float32)
     for row, name in zip(values, names, strict=True):
         full.attributes[name].data.foreach_get("value", row)
+    own = {name: found for name in materials.OWN_COLOURS if (found := terrain_colours.read(full, name)) is not None}
+    values = np.concatenate([values, *(found.T.astype(np.float32) for found in own.values())])
     coarse = decimate(vertices.astype(np.float64), faces, wanted, values.T)
     mesh = terrain_mesh.new_mesh(
-        f"{full.name} coarse", coarse.vertices, coarse.faces, dict(zip(names, coarse.values.T, strict=True))
+        f"{full.name} coarse", coarse.vertices, coarse.faces, dict(zip(names, coarse.values.T, strict=False))
     )
+    for i, name in enumerate(own):
+        found = coarse.values[:, len(names) + 4 * i : len(names) + 4 * i + 4]
+        terrain_colours.write(mesh, name, np.rint(np.clip(found, 0, 255)).astype(np.uint8))
     _remove(tile)
     other = bpy.data.objects.new(mesh.name, mesh)
     other[store.ROLE] = store.COARSE_VIEW_ROLE

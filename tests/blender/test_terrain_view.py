@@ -7,6 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
+RELIEF = ("hillshade", "eye_dome", "thin", "brightness", "contrast")
+
 
 @pytest.fixture
 def slope(part):
@@ -37,7 +39,7 @@ def drawn(obj) -> int:
 
 def values() -> dict[str, float]:
     nodes = bpy.data.materials["Rockfall terrain"].node_tree.nodes
-    return {n: nodes[n].outputs[0].default_value for n in ("hillshade", "eye_dome", "thin", "brightness", "contrast")}
+    return {n: nodes[n].outputs[0].default_value for n in (*RELIEF, "scan_colours", "footage_colours")}
 
 
 def test_usual_look_is_that_of_the_paper(part, slope) -> None:
@@ -69,10 +71,14 @@ def test_each_slider_does_its_own(part, slope) -> None:
     np.testing.assert_allclose(colours(ground.data)[:, :3], 0.5 * flat[:, :3], rtol=1e-5)
     settings.contrast, settings.brightness = 2.0, 1.0
     np.testing.assert_allclose(colours(ground.data)[:, 0], np.minimum(flat[:, 0] / 0.55, 1.0), rtol=1e-5)
-    np.testing.assert_allclose(list(values().values()), [0.0, 0.0, 0.0, 1.0, 2.0])
+    np.testing.assert_allclose(list(values().values()), [0.0, 0.0, 0.0, 1.0, 2.0, 1.0, 1.0])
     assert bpy.ops.rockfall.reset_relief() == {"FINISHED"}
     look = asdict(part("rockfall_addon.scene.terrain_look").look_of(bpy.context.scene))
-    assert look == {"hillshade": 0.75, "eye_dome": 0.75, "thin": 0.7, "brightness": 1.0, "contrast": 1.0}
+    assert look == {
+        **dict(zip(RELIEF, (0.75, 0.75, 0.7, 1.0, 1.0), strict=True)),
+        "scan_colours": 1.0,
+        "footage_colours": 1.0,
+    }
     np.testing.assert_allclose(list(values().values()), list(look.values()), rtol=1e-6)
 
 

@@ -15,10 +15,11 @@ from rockfall.core.film.composed.catalogue import FILMS, PICTURES, compose
 from rockfall.core.film.composed.envelope import envelope
 from rockfall.core.film.composed.falls import Fall
 from rockfall.core.film.composed.frame_store import frame_store
-from rockfall.core.film.composed.ground import Photograph, ground_picture, lit_ground
+from rockfall.core.film.composed.ground import ground_picture, lit_ground
 from rockfall.core.film.composed.kinds import KINDS, NAMES, find_kind
 from rockfall.core.film.composed.look import MEASURED
 from rockfall.core.film.composed.material import open_material
+from rockfall.core.film.composed.photographs import Photograph
 from rockfall.core.film.composed.request import FilmRequest
 from rockfall.core.film.composed.scenery import Scene, draw_paths, keys_of
 from rockfall.core.film.composed.shots import ComposedFilm, Shot

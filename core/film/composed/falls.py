@@ -253,6 +253,8 @@ def predicted_falls(
 
 def falls_of(samples: TrajectorySamples, blocks: dict[str, Block], group: str, colour: Colour) -> tuple[Fall, ...]:
     """The blocks of a table of motion: a run is a stretch without gaps of a measured one, or a simulated one."""
+    if not samples.time_s.size:
+        return ()
     keys = (
         samples.trajectory
         if not group

@@ -7,14 +7,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...camera.model import Camera, project, rays
+from ...camera.model import Camera, rays
 from ...compiled import in_chunks
 from ...errors import InputError
-from ...opencv import opencv
 from ...terrain.raycast import any_hit, cast_rays
 from ...terrain.surface import Surface
-from ...vectors import Array, Mask, dot, norm
+from ...vectors import Array, Mask, norm
 from .canvas import Picture
+from .photographs import LIFT_M, Photograph, photographed, smoothed
 
 ROCK = np.array([0.70, 0.67, 0.62])
 """sRGB of the ground whose colour nothing tells."""
@@ -25,18 +25,10 @@ SCAN_SHADE, SCAN_LIGHT = 0.55, 0.6
 """Colours of a scan have a light of their own; so much of them is left in the shade, and so much more in the sun."""
 SKY_TOP, SKY_LOW = np.array([0.52, 0.63, 0.74]), np.array([0.86, 0.89, 0.91])
 AMBIENT = 0.46
-LIFT_M = 0.05
-"""Above the ground, where it is asked whether the sun is seen: scans have noise."""
 EDGE = 0.01
 """A pixel at which 1/distance bends by more than this part is at an edge, and gets more rays."""
 EDGE_RAYS = 3
 NEAREST_M = 1.0
-FLATTEST = 0.12
-"""Sine of the angle at which a photograph meets the ground: below it, it is smeared."""
-LEAST_WEIGHT = 0.02
-BORDER = 0.03
-"""Part of a photograph at its border over which it fades out."""
-ROW = 4096
 ROWS = 64
 """Of a picture that are cast at once: memory stays small."""
 
@@ -58,20 +50,6 @@ class Ground:
     def bgr(self) -> np.ndarray:
         """(n, 3) float32, 0…255, blue first."""
         return np.ascontiguousarray((255 * self.colours[:, ::-1]).astype(np.float32))
-
-
-@dataclass(frozen=True, eq=False)
-class Photograph:
-    """A picture of the slope and the camera that took it.
-
-    Attributes
-    ----------
-    picture : (h, w, 3) BGR uint8, without moving things.
-    camera : of that picture.
-    """
-
-    picture: Picture
-    camera: Camera
 
 
 def check_terrain_colours(name: str) -> TerrainColours:
@@ -120,7 +98,7 @@ def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...]
     lit = np.zeros(len(places))
     towards = faces_sun > 0
     lit[towards] = ~any_hit(surface, places[towards], np.broadcast_to(sun, (int(towards.sum()), 3)))
-    lit = _smoothed(surface, lit)
+    lit = smoothed(surface, lit)
     light = AMBIENT + (1 - AMBIENT) * np.clip(faces_sun, 0, 1) * lit
     # Curved ground from above is lighter than hollows: a little sky light, which shows relief in the shade.
     light *= 0.82 + 0.18 * np.clip(normals[:, 2], 0, 1)
@@ -129,55 +107,9 @@ def lit_ground(surface: Surface, sun: Array, photographs: tuple[Photograph, ...]
     else:
         colours = np.clip(surface.colours / 255 * (SCAN_SHADE + SCAN_LIGHT * light)[:, None], 0, 1)
     if photographs:
-        shown = [_photographed(surface, normals, photograph) for photograph in photographs]
-        weights = np.array([weight for _, weight in shown])
-        known = weights > LEAST_WEIGHT
-        each = np.where(known[:, :, None], np.array([colour for colour, _ in shown]), np.nan)
-        seen = known.any(axis=0)
-        colours[seen] += weights.max(axis=0)[seen, None] * (np.nanmedian(each[:, seen], axis=0) - colours[seen])
+        shown, weight = photographed(surface, photographs)
+        colours += weight[:, None] * (shown - colours)
     return Ground(surface, colours)
-
-
-def _photographed(surface: Surface, normals: Array, photograph: Photograph) -> tuple[np.ndarray, Array]:
-    """For each vertex: the photograph's colour (n, 3), and how much it counts (n,)."""
-    camera, (height, width) = photograph.camera, photograph.picture.shape[:2]
-    where = project(camera, surface.vertices)
-    inside = np.isfinite(where).all(axis=1) & (where > 0).all(axis=1) & (where < [width, height]).all(axis=1)
-    away = surface.vertices - camera.position
-    distance = norm(away)
-    square = np.where(inside, -dot(normals, away) / np.maximum(distance, 1e-9), 0.0)
-    asked = np.flatnonzero(inside & (square > 0))
-    hidden = any_hit(surface, camera.position, away[asked], np.maximum(distance[asked] - 4 * LIFT_M, 0.0))
-    seen = np.zeros(len(where), dtype=bool)
-    seen[asked[~hidden]] = True
-    colour = _sampled(photograph.picture, np.nan_to_num(where, nan=-1.0))
-    border = np.minimum(where, [width, height] - where).min(axis=1) / (BORDER * min(width, height))
-    weight = np.where(seen, np.clip(border, 0, 1) * np.clip(square / (2 * FLATTEST), 0, 1), 0.0)
-    return colour[:, ::-1].astype(np.float32) / 255, _smoothed(surface, np.nan_to_num(weight))
-
-
-def _sampled(picture: Picture, where: Array) -> Picture:
-    """(n, 3) of a picture at pixels (n, 2), in rows that are not too long for OpenCV."""
-    cv2, n = opencv(), len(where)
-    grid = np.resize(where - 0.5, (-(-n // ROW), ROW, 2)).astype(np.float32)
-    found: Picture = cv2.remap(
-        picture,
-        np.ascontiguousarray(grid[..., 0]),
-        np.ascontiguousarray(grid[..., 1]),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    return found.reshape(-1, 3)[:n]
-
-
-def _smoothed(surface: Surface, values: Array) -> Array:
-    """Values of vertices, mixed with those around them: the borders of shadows are soft."""
-    corners = surface.faces.ravel()
-    number = np.maximum(np.bincount(corners, minlength=len(values)), 1)
-    for _ in range(2):
-        of_faces = np.repeat(values[surface.faces].mean(axis=1), 3)
-        values = np.where(number > 0, np.bincount(corners, of_faces, len(values)) / number, values)
-    return values
 
 
 def ground_picture(ground: Ground, camera: Camera) -> tuple[Picture, Array]:

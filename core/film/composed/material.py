@@ -28,7 +28,8 @@ from ..job import FilmJob
 from .blocks import sun_direction
 from .falls import Fall, measured_falls, predicted_falls, simulated_falls
 from .filmed import Footage
-from .ground import FROM_FOOTAGE, Ground, Photograph, coloured, lit_ground
+from .ground import FROM_FOOTAGE, Ground, coloured, lit_ground
+from .photographs import Photograph
 from .request import FilmRequest
 from .scenery import Scene
 from .solids import SOLIDS

@@ -19,6 +19,7 @@ from ...view import job
 from ...view.job import InBackground, Work
 from ...view.panel import RockfallPanel, fields, paragraph
 from ...view.reporting import possible
+from ...view.terrain_colours import terrain_colours
 from . import beside, remembered, stopwatch
 from .properties import file_of, graphs_of
 from .written import draw_written
@@ -59,6 +60,7 @@ class ComposedFilmSettings(bpy.types.PropertyGroup):
         name="Codec", description="How the film is compressed; H.264 plays everywhere",
         items=[(name, title, "") for name, title in CODECS.items()],
     )  # fmt: skip
+    terrain_colours: terrain_colours()
     dust: BoolProperty(name="Dust", description="Impacts raise dust: drawn, not measured, as the last card says")
 
 
@@ -132,6 +134,7 @@ def request_of(scene: bpy.types.Scene) -> FilmRequest:
         rate=None if abs(preset.time_scale - 1.0) < 1e-6 else preset.time_scale, models=chosen,
         parameters={name: values for name, values in models.parameters_of(scene).items() if name in chosen},
         graphs=graphs_of(scene) or "", solid=asked.solid, dust=asked.dust,
+        terrain_colours=asked.terrain_colours,
     )  # fmt: skip
 
 
@@ -147,7 +150,9 @@ class ROCKFALL_PT_composed_film(RockfallPanel, bpy.types.Panel):
         kind = find_kind(settings.kind)
         layout.label(text=kind.title)
         paragraph(context, layout, f"{kind.description}.")
-        fields(layout, settings, ("language", "solid", *(() if kind.is_picture else ("codec", "dust"))))
+        fields(
+            layout, settings, ("language", "solid", "terrain_colours", *(() if kind.is_picture else ("codec", "dust")))
+        )
         missing = lacking(scene)
         if missing:
             paragraph(context, layout, f"{missing}.", "INFO")

@@ -17,6 +17,7 @@ from ...view import job
 from ...view.from_file import last_folder
 from ...view.job import InBackground, Work
 from ...view.reporting import possible
+from ...view.terrain_colours import terrain_colours
 from .animation import check_formats
 from .beside import animator_command
 
@@ -45,6 +46,7 @@ class _Shown(InBackground):
         default=True,
     )
     start: EnumProperty(name="Blocks Start", items=TIMES)
+    terrain_colours: terrain_colours()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -67,7 +69,12 @@ class _Shown(InBackground):
         return path / f"{self.stem}{self.ending}" if path.is_dir() or not path.name else path
 
     def asked(self, context: bpy.types.Context) -> shown.Asked:
-        return shown.ask(context.scene, simulated=self.simulated, together=self.start == "TOGETHER")
+        return shown.ask(
+            context.scene,
+            simulated=self.simulated,
+            together=self.start == "TOGETHER",
+            terrain_colours=self.terrain_colours,
+        )
 
 
 class ROCKFALL_OT_export_web_page(_Shown, bpy.types.Operator):
@@ -88,6 +95,7 @@ class ROCKFALL_OT_export_web_page(_Shown, bpy.types.Operator):
         layout.prop(self, "language")
         layout.prop(self, "simulated")
         layout.prop(self, "start")
+        layout.prop(self, "terrain_colours")
 
     def prepare(self, context: bpy.types.Context) -> Work:
         path, asked, language = self.file(), self.asked(context), self.language
@@ -129,6 +137,7 @@ class ROCKFALL_OT_export_animation(_Shown, bpy.types.Operator):
         layout.prop(self, "block")
         layout.prop(self, "simulated")
         layout.prop(self, "start")
+        layout.prop(self, "terrain_colours")
 
     def prepare(self, context: bpy.types.Context) -> Work:
         path, asked, rate, block = self.file(), self.asked(context), self.rate, self.block

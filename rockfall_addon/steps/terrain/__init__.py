@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 1: the terrain."""
 
-from . import operators, panel, properties, removing
+from . import colouring, operators, panel, properties, removing
 
-PARTS = (properties, operators, removing, panel)
+PARTS = (properties, operators, colouring, removing, panel)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import georeference, store, terrain, terrain_view
+from ...scene import georeference, materials, store, terrain, terrain_colours, terrain_view
 from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 
@@ -94,7 +94,7 @@ class ROCKFALL_PT_terrain_reading(RockfallPanel, bpy.types.Panel):
 
 
 class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
-    bl_label = "Relief"
+    bl_label = "Relief and Colours"
     bl_idname = "ROCKFALL_PT_relief"
     bl_parent_id = "ROCKFALL_PT_terrain"
     bl_options = {"DEFAULT_CLOSED"}
@@ -111,12 +111,28 @@ class ROCKFALL_PT_relief(RockfallPanel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("brightness", "contrast"):
             column.prop(settings, name)
+        self._draw_colours(context, layout)
         layout.operator("rockfall.reset_relief", icon="LOOP_BACK")
         if terrain_view.is_coarse(context.scene):
             self.layout.prop(settings, "full_resolution", toggle=True, icon="MESH_GRID")
             column = self.layout.column()
             column.use_property_split, column.use_property_decorate = True, False
             column.prop(settings, "view_limit")
+
+    def _draw_colours(self, context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+        scene = context.scene
+        known = [name for name in materials.OWN_COLOURS if terrain_colours.have(scene, name)]
+        column = layout.column(align=True)
+        for name in known:
+            column.prop(scene.rockfall_terrain, name, slider=True)
+        from_footage = materials.FOOTAGE_COLOURS in known
+        if from_footage and terrain_colours.is_stale(scene):
+            paragraph(context, layout, "A camera has moved since it coloured the terrain: colour it again.", "ERROR")
+        row = layout.row(align=True)
+        text = "Colour Again" if from_footage else "Colour from Footage"
+        row.operator("rockfall.colour_from_footage", text=text, icon="BRUSH_DATA")
+        if from_footage:
+            row.operator("rockfall.remove_footage_colours", text="", icon="X")
 
 
 CLASSES = (ROCKFALL_PT_terrain, ROCKFALL_PT_terrain_reading, ROCKFALL_PT_relief)

@@ -48,6 +48,15 @@ class TerrainSettings(bpy.types.PropertyGroup):
         name="Contrast", description="Between light and shade",
         default=TERRAIN_VALUES["contrast"], min=0.0, max=3.0, update=_look_changed,
     )  # fmt: skip
+    scan_colours: FloatProperty(
+        name="Scan colours", description="How much the terrain has the colours that its file brought",
+        default=TERRAIN_VALUES["scan_colours"], min=0.0, max=1.0, subtype="FACTOR", update=_look_changed,
+    )  # fmt: skip
+    footage_colours: FloatProperty(
+        name="Footage colours", description="How much the terrain has the colours of the aligned videos, where these "
+        "show it",
+        default=TERRAIN_VALUES["footage_colours"], min=0.0, max=1.0, subtype="FACTOR", update=_look_changed,
+    )  # fmt: skip
     full_resolution: BoolProperty(
         name="Show full resolution", description="Draw every triangle in the 3-D view, even where that is slow. "
         "Rays, normals and renders use every triangle in either case",

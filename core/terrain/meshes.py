@@ -15,6 +15,7 @@ from .cleaning import merge_duplicates
 from .scan_colours import colours_of
 from .source import Source, check_face_indices, check_finite
 from .text import NumberRows, all_numbers, line_at, line_blocks, shown
+from .textures import texture_colours
 
 BLANK, NEWLINE = 32, 10
 NO_VERTEX = np.iinfo(np.int32).max
@@ -23,17 +24,17 @@ STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("att
 
 
 def read_obj(path: Path) -> Source:
-    """Read the vertices and faces of a Wavefront OBJ, and colours that follow the coordinates of its vertices.
-
-    Normals are not needed.
+    """Read the vertices and faces of a Wavefront OBJ, and its colours: those that follow the coordinates of the
+    vertices, or those of its texture.
 
     Raises
     ------
     InputError : no vertices or faces, something that is not a number, a vertex that does not exist; with its row.
     """
     vertices, corners = NumberRows(path, "Coordinates"), _Corners(path)
-    before, vertex_row = 0, 0
+    before, vertex_row, library = 0, 0, b""
     for lines in line_blocks(path):
+        library = library or next((line[7:].strip() for line in lines if line.startswith(b"mtllib ")), b"")
         vertex_rows = [i for i, line in enumerate(lines) if line.startswith((b"v ", b"v\t"))]
         face_rows = [i for i, line in enumerate(lines) if line.startswith((b"f ", b"f\t"))]
         vertices.add([lines[i][2:] for i in vertex_rows], [before + i + 1 for i in vertex_rows])
@@ -53,9 +54,10 @@ def read_obj(path: Path) -> Source:
     if points.shape[1] < 3:
         raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_row)
     colours, said = colours_of(points[:, -3:]) if points.shape[1] in (6, 7) else (None, "")
-    return Source(
-        np.ascontiguousarray(points[:, :3]), corners.triangles(), notes=(said,) if said else (), colours=colours
-    )
+    points, faces = np.ascontiguousarray(points[:, :3]), corners.triangles()
+    if colours is None and not said and library:
+        colours, said = texture_colours(path, library.decode("utf-8", "replace"), points)
+    return Source(points, faces, notes=(said,) if said else (), colours=colours)
 
 
 class _Corners:

@@ -184,7 +184,7 @@ def test_without_an_aligned_video_there_is_nothing_to_colour_from(part, scan) ->
 def test_a_page_of_the_scene_has_the_colours_of_the_footage(part, demo) -> None:
     shown, ground = part("rockfall_addon.scene.shown"), part("core.film.composed.ground")
     scene = bpy.context.scene
-    assert bpy.ops.rockfall.import_picks(filepath=str(FOOTAGE / "picks.csv")) == {"FINISHED"}
+    assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
     with_them = shown.show(shown.ask(scene, simulated=False, together=True), lambda *_: None)
     without = shown.show(shown.ask(scene, simulated=False, together=True, terrain_colours="none"), lambda *_: None)
     assert with_them.photographs

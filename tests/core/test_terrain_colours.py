@@ -6,6 +6,7 @@ import struct
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import laspy
 import numpy as np
 import pytest
@@ -98,6 +99,48 @@ def test_obj(tmp_path: Path) -> None:
                  zip(points.tolist(), painted(points), strict=True)]  # fmt: skip
         (tmp_path / name).write_text("\n".join([*lines, *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in corners)]))
         check(read_terrain(tmp_path / name))
+
+
+def textured(folder: Path) -> Path:
+    """An OBJ with a texture whose pixel at the place of each vertex has the vertex's colour."""
+    points, corners = slope()
+    at = np.round(points[:, :2] * 2).astype(int)
+    picture = np.zeros((SIDE, SIDE, 3), np.uint8)
+    picture[SIDE - 1 - at[:, 1], at[:, 0]] = painted(points)  # v is up, rows are down
+    assert cv2.imwrite(str(folder / "rock.png"), picture[:, :, ::-1])
+    (folder / "slope.mtl").write_text("newmtl rock\nmap_Kd rock.png\n")
+    lines = ["mtllib slope.mtl", *(f"v {' '.join(map(str, p))}" for p in points.tolist())]
+    lines += [f"vt {(i + 0.5) / SIDE} {(j + 0.5) / SIDE}" for i, j in at]
+    lines += ["usemtl rock", *(f"f {a + 1}/{a + 1} {b + 1}/{b + 1} {c + 1}/{c + 1}" for a, b, c in corners)]
+    (folder / "slope.obj").write_text("\n".join(lines))
+    return folder / "slope.obj"
+
+
+def test_the_texture_of_an_obj_and_one_that_is_missing(tmp_path: Path) -> None:
+    path = textured(tmp_path)
+    check(read_terrain(path))
+    for lost in ("rock.png", "slope.mtl"):
+        (tmp_path / lost).unlink()
+        surface = read_terrain(path)
+        assert surface.colours is None
+        assert any(f"{lost} is not beside it" in sentence for sentence in surface.summary)
+    textured(tmp_path)
+    (tmp_path / "rock.png").write_bytes(b"no picture")
+    surface = read_terrain(path)
+    assert surface.colours is None
+    assert any("left out" in sentence for sentence in surface.summary)
+
+
+def test_e57(tmp_path: Path) -> None:
+    pye57 = pytest.importorskip("pye57")
+    points, _ = slope()
+    file = pye57.E57(str(tmp_path / "scan.e57"), mode="w")
+    raw = {f"cartesian{axis}": np.ascontiguousarray(column) for axis, column in zip("XYZ", points.T, strict=True)}
+    names = ("Red", "Green", "Blue")
+    raw |= {f"color{name}": np.ascontiguousarray(c) for name, c in zip(names, painted(points).T, strict=True)}
+    file.write_scan_raw(raw, rotation=np.array([1.0, 0, 0, 0]), translation=np.zeros(3))
+    file.close()
+    check(read_terrain(tmp_path / "scan.e57"))
 
 
 @pytest.mark.parametrize("scale", [1, 257])

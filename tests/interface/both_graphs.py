@@ -13,7 +13,6 @@ sys.path.append(str(Path(__file__).parent))  # cases share their helpers
 
 from graphs import lonely
 from graphs import open_graphs as open_impact_graphs
-from motion_graphs import theme
 
 IMPACTS, MOTION = "RockfallImpactGraphs", "RockfallMotionGraphs"
 
@@ -263,7 +262,7 @@ def case_motion_graphs_small_and_large(window):
     select_only([next(o for o in scene.objects if o.get("rockfall_role") == "block")])
     yield 1.0
     for name in ("Dark", "Light"):
-        theme(name)
+        window.theme(name)
         yield 1.0
         window.screenshot(f"{name}_small")
         preferences.view.ui_scale = 2.5

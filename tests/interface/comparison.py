@@ -31,13 +31,6 @@ def wide(window):
     yield 1.0
 
 
-def theme(name):
-    bpy.ops.script.execute_preset(
-        filepath=f"{bpy.utils.system_resource('SCRIPTS')}/presets/interface_theme/Blender_{name}.xml",
-        menu_idname="USERPREF_MT_interface_theme_presets",
-    )
-
-
 def case_sidebar_of_the_graphs(window):
     """What is in the sidebar, with two sets of parameters and with what a calibration proposes, in both themes."""
     yield from wide(window)
@@ -50,10 +43,10 @@ def case_sidebar_of_the_graphs(window):
     scene.rockfall_other_parameters.noel_2017.rt = 0.4
     yield 1.5
     window.screenshot("both")
-    theme("Light")
+    window.theme("Light")
     yield 1.5
     window.screenshot("light")
-    theme("Dark")
+    window.theme("Dark")
     scene.rockfall_comparison.models = {MODEL}
     scene.rockfall_comparison.sets = "A"
     scene.rockfall_comparison.fitted = MODEL

@@ -30,13 +30,6 @@ def spot(window, x, y):
     return region.x + x, region.y + y
 
 
-def theme(name):
-    bpy.ops.script.execute_preset(
-        filepath=f"{bpy.utils.system_resource('SCRIPTS')}/presets/interface_theme/Blender_{name}.xml",
-        menu_idname="USERPREF_MT_interface_theme_presets",
-    )
-
-
 def case_graphs_first_look(window):
     yield from open_graphs(window)
     window.screenshot("dark")
@@ -64,7 +57,7 @@ def case_statistics_beside_the_graphs(window):
     yield from window.wait_for(lambda: next(iter(kept.values()))[1].tests is not None, 30.0, "the groups are tested")
     yield 1.0
     window.screenshot("tested")
-    theme("Light")
+    window.theme("Light")
     yield 1.0
     window.screenshot("light")
     # Blender 5.2.2 crashes, also without extensions and in its Shader Editor, when a new file comes with the mouse on a
@@ -79,7 +72,7 @@ def case_graphs_in_both_themes(window):
     scene, preferences = bpy.context.scene, bpy.context.preferences
     area = window.area("NODE_EDITOR")
     for name in ("Dark", "Light"):
-        theme(name)
+        window.theme(name)
         for scale in (1.0, 2.0):
             preferences.view.ui_scale = scale
             for models in ({"noel_2017"}, {"noel_2017", "dorren_2015", "pfeiffer_bowen_1989", "wyllie_2014"}):
@@ -93,7 +86,7 @@ def case_graphs_in_both_themes(window):
     small = min((one for one in window.window.screen.areas if one.type == "NODE_EDITOR"), key=lambda one: one.height)
     print("small", small.width, small.height)
     for name in ("Light", "Dark"):
-        theme(name)
+        window.theme(name)
         yield 1.5
         window.screenshot(f"{name}-small")
 

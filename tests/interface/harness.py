@@ -114,6 +114,13 @@ class Window:
         assert drawn, f"{name} is not open"
         return x, top - HEADER_PX * names.index(name)
 
+    def unfold(self, name: str) -> None:
+        """Let a panel, also one within another, be open when it is drawn for the first time."""
+        panel = next(one for one in self.part("rockfall_addon.steps").classes() if one.__name__ == name)
+        bpy.utils.unregister_class(panel)
+        panel.bl_options = panel.bl_options - {"DEFAULT_CLOSED"}
+        bpy.utils.register_class(panel)
+
     def move(self, x: float, y: float) -> Steps:
         """Move the mouse to a pixel of the window, counted from the bottom left."""
         self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=round(x), y=round(y))
@@ -146,6 +153,14 @@ class Window:
     def redraw(self) -> None:
         for area in self.window.screen.areas:
             area.tag_redraw()
+
+    def theme(self, name: str) -> None:
+        """Blender's own theme of a name: "Dark" or "Light"."""
+        presets = f"{bpy.utils.system_resource('SCRIPTS')}/presets/interface_theme"
+        with self.override():
+            bpy.ops.script.execute_preset(
+                filepath=f"{presets}/Blender_{name}.xml", menu_idname="USERPREF_MT_interface_theme_presets"
+            )
 
     def screenshot(self, name: str) -> Path:
         """A picture of the whole screen, as a person sees it."""

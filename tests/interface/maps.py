@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person computes maps of the demo, looks at them and reads the numbers of a cell under the mouse."""
 
-from pathlib import Path
-
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -48,8 +46,7 @@ def case_maps_of_the_demo(window):
     yield 1.0
     assert window.screenshot("2-energy").read_bytes() != reach.read_bytes(), "another map is painted at once"
     settings().seed = 5
-    light = Path(bpy.utils.system_resource("SCRIPTS")) / "presets" / "interface_theme" / "Blender_Light.xml"
-    bpy.ops.script.execute_preset(filepath=str(light), menu_idname="USERPREF_MT_interface_theme_presets")
+    window.theme("Light")
     yield 1.0
     window.screenshot("3-light-and-old")
     assert maps.is_stale(scene)

@@ -29,18 +29,11 @@ def place(window, number, time_s, value):
     return region(window).x + x, region(window).y + y
 
 
-def theme(name):
-    bpy.ops.script.execute_preset(
-        filepath=f"{bpy.utils.system_resource('SCRIPTS')}/presets/interface_theme/Blender_{name}.xml",
-        menu_idname="USERPREF_MT_interface_theme_presets",
-    )
-
-
 def case_motion_graphs_first_look(window):
     yield from open_graphs(window)
     window.screenshot("dark")
     assert len(canvas(window).frames) == 3
-    theme("Light")
+    window.theme("Light")
     yield 1.0
     window.screenshot("light")
 

@@ -11,7 +11,6 @@ from mathutils import Vector
 
 sys.path.append(str(Path(__file__).parent))  # cases share their helpers
 
-from motion_graphs import theme
 
 FOOT_X = 66.0
 
@@ -74,12 +73,12 @@ def case_screen_across_the_slope(window):
     yield from window.wait_for(lambda: not job.is_running() and not setup.is_stale(scene), 240, "simulated again")
     (found,) = setup.screen_results(scene)
     assert found["held"] + found["over"] + found["through"] == found["hits"]
-    theme("Light")
+    window.theme("Light")
     try:
         yield 1.0
         window.screenshot("3-held")
     finally:
-        theme("Dark")
+        window.theme("Dark")
 
 
 def look_below(window):

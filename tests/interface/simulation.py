@@ -120,9 +120,7 @@ def case_simulate_beside_the_real_blocks(window):
     bpy.context.scene.frame_set(130)
     yield 2.0
     window.screenshot("1-demo")
-    light = Path(bpy.utils.system_resource("SCRIPTS")) / "presets" / "interface_theme" / "Blender_Light.xml"
-    with window.override():
-        bpy.ops.script.execute_preset(filepath=str(light), menu_idname="USERPREF_MT_interface_theme_presets")
+    window.theme("Light")
     yield 1.0
     window.screenshot("1-light")
     with window.override():

@@ -74,6 +74,42 @@ def case_a_slope_that_stands_upright_asks_whether_y_points_up(window):
     yield from window.wait_for(lambda: any("rockfall_role" in o for o in bpy.context.scene.objects), what="imported")
 
 
+def case_the_terrain_takes_the_colours_of_the_footage(window):
+    """By its button, in the background; the camera's view then lies on the terrain, also from another place."""
+    job = window.part("rockfall_addon.view.job")
+    colours = window.part("rockfall_addon.scene.terrain_colours")
+    with window.override():
+        assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+        bpy.ops.rockfall.show_relief()
+    window.unfold("ROCKFALL_PT_relief")
+    yield from window.show_sidebar()
+    yield from window.open_panel("ROCKFALL_PT_terrain")
+    yield 1.0
+    window.screenshot("1-rock")
+    with window.override():
+        bpy.ops.rockfall.colour_from_footage("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: not job.is_running(), 60, "coloured")
+    yield 1.0
+    scene = bpy.context.scene
+    assert colours.have(scene, "footage_colours")
+    window.screenshot("2-footage")
+    window.theme("Light")
+    yield 1.0
+    window.screenshot("3-light-theme")
+    window.theme("Dark")
+    camera = next(obj for obj in scene.objects if "rockfall_poses" in obj)
+    poses = list(camera["rockfall_poses"])
+    camera["rockfall_poses"] = [poses[0] + 1.0, *poses[1:]]
+    yield 0.5
+    window.area().tag_redraw()
+    yield 0.5
+    window.screenshot("4-a-camera-has-moved")
+    camera["rockfall_poses"] = poses
+    with window.override():
+        bpy.ops.ed.undo()
+    assert not colours.have(bpy.context.scene, "footage_colours"), "one step of undo"
+
+
 def case_relief_sliders_at_their_ends(window):
     yield from window.show_sidebar()
     scene = bpy.context.scene

@@ -61,7 +61,8 @@ STEPS = (
         ("rockfall.draw_release", "Draw Release Points", {"kind": "points"}),
         "rockfall.use_as_structure", "rockfall.draw_screen", None,
         "rockfall.simulate", "rockfall.select_run", "rockfall.remove_simulation", None,
-        "rockfall.compute_maps", "rockfall.export_maps", "rockfall.remove_maps",
+        "rockfall.compute_maps", "rockfall.export_maps", "rockfall.remove_maps", None,
+        "rockfall.back_analyse", "rockfall.use_medians", "rockfall.remove_back_analysis",
     )),
     ("playback", "8  Playback", (
         ("screen.animation_play", "Play or Pause", {}), "rockfall.frame_trajectory",

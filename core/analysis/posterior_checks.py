@@ -314,7 +314,7 @@ def posterior_remarks(
         )
         yield Remark(text, "warning", "runs")
     if effective < 100:
-        text = f"The posterior rests on {effective:.0f} sets of parameters: simulate more (--sets, --rounds)."
+        text = f"The posterior rests on {effective:.0f} sets of parameters: take more sets, or more rounds."
         yield Remark(text, "warning", "sets")
     if not wrong and checks:
         yield Remark(f"{model} can give what was observed in all {len(checks)} quantities.", "note", "fit")

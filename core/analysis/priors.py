@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is known of a parameter before any run is looked at: a law over a range, and places 0…1 where it is even."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
@@ -60,6 +61,24 @@ class Prior:
             bend = self.axis.bend
             return np.minimum(high, low + bend * np.sinh(place * np.arcsinh((high - low) / bend)))
         return np.asarray(low + place * (high - low))
+
+
+def laws_in(text: str) -> dict[str, str]:
+    """Parameter → law, of a text with several, between commas or semicolons: rn = 0.2..0.6, friction = normal:0.5,0.1.
+
+    Raises
+    ------
+    InputError : a part without a name or a law, a name twice.
+    """
+    found: dict[str, str] = {}
+    for part in re.split(r"[;,]\s*(?=[\w.]+\s*=)", text.strip().strip(";,")) if text.strip() else []:
+        name, equals, law = (each.strip() for each in part.partition("="))
+        if not (equals and name and law):
+            raise InputError(f'"{part.strip()}" gives no law', advice=f"Write {FORMS}, as in rn = 0.2..0.6")
+        if name in found:
+            raise InputError(f"{name} has two laws", advice="Leave one of them out")
+        found[name] = law
+    return found
 
 
 def make_priors(model: ImpactModel, names: list[str], asked: Mapping[str, str]) -> tuple[Prior, ...]:

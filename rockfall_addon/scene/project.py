@@ -40,6 +40,7 @@ from . import (
     georeference,
     models,
     picks,
+    posterior,
     project_videos,
     reconstruction,
     screens,
@@ -100,6 +101,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     scene[store.SITE_MORE] = json.dumps({k: text for k, text in project.site.extra.items() if isinstance(text, str)})
     scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in film_preset.take(scene, project.render)])
     fit.forget(scene)
+    posterior.forget(scene)
     for which, values in parameters.items():
         models.keep_parameters(scene, values, which)
     if surface is not None and shading is not None:
@@ -165,6 +167,10 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
         if zones is not None and stated is not None:
             write_attribute_zones(zones, place / "zones.csv")
             stated = replace(stated, zones=ZonesEntry(place / "zones.csv", ZONE))
+        fits = None if stated is None else posterior.in_use(scene, stated.models)
+        if stated is not None and fits is not None:
+            posterior.write(fits, place / "posterior.csv")
+            stated = replace(stated, posterior=place / "posterior.csv")
         if stated is not None:
             stated = replace(stated, trees=simulated_trees.copied(stated.trees, place))
             stated = replace(stated, structures=_write_structures(met, place), screens=tuple(drawn))

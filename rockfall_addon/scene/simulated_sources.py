@@ -21,7 +21,7 @@ from ...core.simulation.ground import Contact
 from ...core.simulation.measured_releases import start_times
 from ...core.terrain.surface import Surface
 from ...core.workflow.simulation import ReleaseSource
-from . import drawn_releases, fingerprints, georeference, models, reconstruction, simulated_trees, store
+from . import drawn_releases, fingerprints, georeference, models, posterior, reconstruction, simulated_trees, store
 from .simulation import Origin
 
 FILMED = ("MEASURED", "PICK")
@@ -48,10 +48,14 @@ def entry_of(scene: bpy.types.Scene) -> SimulationEntry:
     ------
     RockfallError : a drawing that is none, numbers that no block has.
     """
+    return replace(motion_entry(scene), releases=_release_entry(scene))
+
+
+def motion_entry(scene: bpy.types.Scene) -> SimulationEntry:
+    """The same without what says where blocks start."""
     settings = scene.rockfall_simulation
     return SimulationEntry(
         models=tuple(name for name in models.ORDER if name in settings.models),
-        releases=_release_entry(scene),
         contact=cast(Contact, settings.contact),
         rolling=cast(Rolling, settings.rolling),
         friction=store.double(settings.friction),
@@ -104,7 +108,11 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
         settings.drawn = _drawing(scene, releases)
     absent = [f"its releases from {Path(releases.file).name}"] if releases.file is not None else []
     absent += [f"{entry.observed.name} for the model observed"] if entry.observed is not None else []
-    absent += [f"the posterior {entry.posterior.name}"] if entry.posterior is not None else []
+    if entry.posterior is not None:
+        try:
+            posterior.read(scene, entry.posterior)
+        except RockfallError as error:
+            absent.append(f"the posterior {entry.posterior.name} ({error})")
     absent += left_out
     return f"Of the project's simulation Blender leaves out {', '.join(absent)}." if absent else ""
 

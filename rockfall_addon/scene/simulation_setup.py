@@ -30,6 +30,7 @@ from ...core.workflow.simulation import Scenario, ground_of, remarks_of, run_mod
 from . import (
     fingerprints,
     models,
+    posterior,
     reconstruction,
     screens,
     simulated_sources,
@@ -80,7 +81,17 @@ def plan(scene: bpy.types.Scene, entry: SimulationEntry | None = None) -> Plan:
     lacking = missing(scene, None if entry is None else entry.models)
     if lacking:
         raise RockfallError(lacking)
-    surface, entry = ground(scene), entry or simulated_sources.entry_of(scene)
+    return planned(scene, entry or simulated_sources.entry_of(scene))
+
+
+def planned(scene: bpy.types.Scene, entry: SimulationEntry) -> Plan:
+    """The same of what an entry says, whatever the panels lack.
+
+    Raises
+    ------
+    RockfallError : something cannot be.
+    """
+    surface = ground(scene)
     met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
     source, origins, left_out = simulated_sources.source_of(scene, entry, surface)
     how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
@@ -89,11 +100,13 @@ def plan(scene: bpy.types.Scene, entry: SimulationEntry | None = None) -> Plan:
         good, left_out = reconstruction.reconstruct_good(scene)
         measured = measured_rebounds(good.impacts)
     trees = None if entry.trees is None else open_trees(entry.trees, surface, entry.seed)[0]
+    drawn = posterior.in_use(scene, entry.models)
     scenario = Scenario(
         met,
         source,
         {name: parameters.get(name, {}) for name in entry.models},
         measured,
+        draws={} if drawn is None else {drawn.model: drawn.draws},
         structures=structures.met_of(scene),
         rolling=entry.rolling,
         friction=entry.friction,
@@ -245,7 +258,12 @@ def fingerprint(scene: bpy.types.Scene, chosen: Collection[str] | None = None, n
         fingerprints.ground(scene), fingerprints.ground_contents(scene), sources,
         json.dumps(used, sort_keys=True), how,
     ]  # fmt: skip
-    parts += [*simulated_zones.fingerprint(scene), *structures.fingerprint(scene), *screens.fingerprint(scene)]
+    parts += [
+        posterior.fingerprint(scene, chosen),
+        *simulated_zones.fingerprint(scene),
+        *structures.fingerprint(scene),
+        *screens.fingerprint(scene),
+    ]
     return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()
 
 

@@ -63,6 +63,7 @@ GRAPH_CHOSEN = "rockfall_graph_chosen"  # impacts of other sites that are select
 FIT = "rockfall_fit"  # what a calibration has found and proposes, as text
 MOTION_LIMITS = "rockfall_motion_limits"  # of the axes of motion graphs, as text
 SIMULATION = "rockfall_simulation_shown"  # what was simulated, as text
+BACK_ANALYSIS = "rockfall_back_analysis"  # the posterior of a back-analysis, as text
 AT_SCREENS = "screens"  # in it: what was found at each screen
 BACKGROUND = "rockfall_background"  # of a camera: what was noticed of its video's background, as text
 MASS, TOP_SPEED, STALE = "rockfall_mass_kg", "rockfall_top_speed_mps", "rockfall_stale"  # of blocks and flights

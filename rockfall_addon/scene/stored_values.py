@@ -10,14 +10,17 @@ from collections.abc import Callable, Collection
 from difflib import get_close_matches
 from functools import lru_cache
 
+import numpy as np
+
 from ...core.errors import RockfallError
 from ...core.exchange.parameters import checked_parameters
 from ...core.exchange.project import RenderPreset
-from ...core.impact_models.registry import MODELS
+from ...core.impact_models.registry import MODELS, find_model
 from ...core.plausibility import GREATEST_M, OF_UNIT, limits
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.picks import KINDS, STATUSES
 from ...core.remarks import from_plain, from_text
+from ...core.simulation.parameter_draws import ParameterDraws, check_draws
 from . import store
 
 type Check = Callable[[object], str]
@@ -245,6 +248,18 @@ def _results_at_screens(value: object) -> None:
             raise ValueError(result)
 
 
+def _posterior(value: dict) -> None:
+    """Draws that the model can have, and a row for each parameter."""
+    draws = ParameterDraws(tuple(value["names"]), np.array(value["values"], float), np.array(value["weight"], float))
+    check_draws(draws, find_model(value["model"]))
+    if not all(isinstance(value[key], str) for key in ("said", "print")):
+        raise TypeError
+    for row in value["rows"]:
+        _name, _unit, *numbers_of, _prior, remarks = row
+        if number()(numbers_of[0]) or len(numbers_of) != 3 or not isinstance(remarks, list):
+            raise ValueError(row)
+
+
 AGAIN = "it was computed again"
 OF_A_FIT = ("model", "imitated", "names", "print", "rows", "set_b", "sets", "models")
 OF_THE_SCENE: dict[str, tuple[Check, str]] = {
@@ -269,6 +284,7 @@ OF_THE_SCENE: dict[str, tuple[Check, str]] = {
     store.FIT: (json_of(dict, _having(*OF_A_FIT)), "nothing is proposed: fit again"),
     store.MOTION_LIMITS: (json_of(dict, _pairs_by_name), "the axes of the motion graphs have no limits of their own"),
     store.SIMULATION: (json_of(dict, _results_at_screens), "simulate again to know what is shown"),
+    store.BACK_ANALYSIS: (json_of(dict, _posterior), "blocks have the parameters of the panels: analyse again"),
     store.KNOWN_VIDEOS: (json_of(dict, _texts_by_name), "videos that were deleted before are not missed"),
     store.PROPOSAL: (json_of(dict, _having("ids", "names", "prints")), "nothing is proposed: refine again"),
     store.SITE_MORE: (json_of(dict, _texts_by_name), "credits and DOI are not known: open the project again"),

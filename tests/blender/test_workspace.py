@@ -11,7 +11,7 @@ POINTED = {"rockfall.mark_pair", "rockfall.drag_pick", "rockfall.mark_spin"}
 """What only the tools call: they need a mouse on the terrain or the footage."""
 WITH_PANEL = {
     "rockfall.compare_model",
-    "rockfall.choose_fitted",
+    "rockfall.choose_fitted", "rockfall.choose_back_analysed",
     "rockfall.use_ground",
     "rockfall.sort_impacts", "rockfall.remove_video", "rockfall.choose_simulated_model", "rockfall.next_run",
     "rockfall.add_zone", "rockfall.remove_zone", "rockfall.remove_structure", "rockfall.remove_screen",

@@ -114,12 +114,22 @@ class Window:
         assert drawn, f"{name} is not open"
         return x, top - HEADER_PX * names.index(name)
 
-    def unfold(self, name: str) -> None:
-        """Let a panel, also one within another, be open when it is drawn for the first time."""
+    def unfold(self, name: str, is_open: bool = True) -> None:
+        """Let a panel, also one within another, be open when it is drawn for the first time, or closed."""
         panel = next(one for one in self.part("rockfall_addon.steps").classes() if one.__name__ == name)
         bpy.utils.unregister_class(panel)
-        panel.bl_options = panel.bl_options - {"DEFAULT_CLOSED"}
+        panel.bl_options = panel.bl_options - {"DEFAULT_CLOSED"} | (set() if is_open else {"DEFAULT_CLOSED"})
         bpy.utils.register_class(panel)
+
+    def scroll(self, steps: int, area: str = "VIEW_3D") -> Steps:
+        """Turn the wheel over the sidebar: down, or up where it is below zero."""
+        sidebar = self.region("UI", area)
+        x, y = sidebar.x + sidebar.width // 2, sidebar.y + sidebar.height // 2
+        yield from self.move(x, y)
+        for _ in range(abs(steps)):
+            kind = "WHEELDOWNMOUSE" if steps > 0 else "WHEELUPMOUSE"
+            self.window.event_simulate(type=kind, value="PRESS", x=round(x), y=round(y))
+            yield BETWEEN_EVENTS_S
 
     def move(self, x: float, y: float) -> Steps:
         """Move the mouse to a pixel of the window, counted from the bottom left."""

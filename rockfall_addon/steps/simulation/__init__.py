@@ -2,6 +2,7 @@
 """Step 7: whole rockfalls, simulated on the terrain."""
 
 from . import (
+    back_analysis,
     drawing,
     fences,
     map_overlay,
@@ -28,6 +29,7 @@ PARTS = (
     screens,
     maps,
     panel,
+    back_analysis,
     map_panel,
     overlay,
     fences,

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Back-analysis in the scene: what is asked, without Blender, and what is kept of the answer."""
+
+import hashlib
+from dataclasses import dataclass, replace
+from functools import partial
+
+import bpy
+
+from ...core.analysis.calibration import usual_names
+from ...core.analysis.observed_runs import observe_runs
+from ...core.analysis.priors import Prior, laws_in, make_priors
+from ...core.errors import RockfallError
+from ...core.exchange.simulation_entry import ReleaseEntry
+from ...core.impact_models.registry import MODELS, find_model
+from ...core.progress import Progress
+from ...core.reconstruction.picks import Picks
+from ...core.reconstruction.trajectory import Reconstruction
+from ...core.remarks import Remark, to_plain
+from ...core.simulation.parameter_draws import FRICTION_NAME
+from ...core.workflow.back_analysis import BackAnalysis, back_analyse
+from ...core.workflow.simulation import Scenario, ground_of
+from ...core.workflow.whole_runs import released_as_observed
+from . import (
+    fingerprints,
+    model_parameters,
+    models,
+    posterior,
+    reconstruction,
+    simulated_sources,
+    simulated_trees,
+    simulated_zones,
+    simulation_setup,
+    store,
+    structures,
+    terrain,
+)
+
+CHOICES = [choice for choice in models.CHOICES if not MODELS[choice[0]].draws_from_impacts]
+"""Models with coefficients."""
+VARIANTS = 64
+"""Starts of each observed run, moved by the errors of its picks where these are known."""
+STALE = "Picks, terrain or other settings were changed since: these are parameters of what was before. Analyse again."
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is asked, without Blender.
+
+    Attributes
+    ----------
+    scenario : of the model alone, with what is not fitted.
+    reconstruct : gives the observed runs.
+    priors : of the parameters that are fitted.
+    sets, rounds : of parameters.
+    print : of all that.
+    remarks : what of the measured trajectories is missing.
+    """
+
+    scenario: Scenario
+    reconstruct: "partial[Reconstruction]"
+    priors: tuple[Prior, ...]
+    sets: int
+    rounds: int
+    print: str
+    remarks: tuple[Remark, ...]
+
+
+def missing(scene: bpy.types.Scene) -> str:
+    """What is still needed, in a sentence; empty when all is there."""
+    if not terrain.tiles(scene):
+        return "Blocks fall on the terrain: import it first, in step 1."
+    if not store.has_role(scene, store.PICK_ROLE):
+        return "Pick impacts first: observed runs say which parameters fit."
+    if scene.rockfall_simulation.contact != "mesh":
+        return "Observed runs are on the surface: choose Blocks meet: Surface, under Motion."
+    return simulated_trees.missing(scene) or structures.problem(scene)
+
+
+def fitted_names(scene: bpy.types.Scene, model: str) -> tuple[str, ...]:
+    """The parameters of a model that are fitted, and friction, in the order of its table."""
+    words = scene.rockfall_back_analysis.names.split()
+    chosen = [word.partition(".")[2] for word in words if word.partition(".")[0] == model]
+    known = [spec.name for spec in find_model(model).parameters if not spec.choices]
+    return tuple(name for name in (*known, FRICTION_NAME) if name in chosen) or (
+        *(name for name in usual_names(find_model(model)) if name in known),
+        FRICTION_NAME,
+    )
+
+
+def toggle(scene: bpy.types.Scene, model: str, name: str) -> None:
+    """Fit a parameter, or leave it; the last one stays."""
+    settings = scene.rockfall_back_analysis
+    names = set(fitted_names(scene, model)) ^ {name}
+    others = [word for word in settings.names.split() if word.partition(".")[0] != model]
+    if names:
+        settings.names = " ".join([*others, *(f"{model}.{each}" for each in sorted(names))])
+
+
+def ask(scene: bpy.types.Scene) -> Question:
+    """What is asked, as the scene has it now.
+
+    Raises
+    ------
+    RockfallError : something is missing, or cannot be; a law that is none.
+    """
+    lacking = missing(scene)
+    if lacking:
+        raise RockfallError(lacking)
+    settings = scene.rockfall_back_analysis
+    model = find_model(settings.model)
+    priors = make_priors(model, list(fitted_names(scene, model.name)), laws_in(settings.priors))
+    entry = replace(simulated_sources.motion_entry(scene), models=(model.name,), releases=ReleaseEntry())
+    planned = simulation_setup.planned(scene, entry)
+    picks, left_out = reconstruction.good_picks(scene)
+    return Question(
+        replace(planned.scenario, draws={}),
+        _reconstruction(scene, picks),
+        priors,
+        settings.sets,
+        settings.rounds,
+        _print(scene),
+        left_out,
+    )
+
+
+def run(question: Question, progress: Progress) -> BackAnalysis:
+    """Find the posterior, without Blender.
+
+    Raises
+    ------
+    RockfallError : whatever the core refuses.
+    CancelledError : the work was ended.
+    """
+    progress("Preparing the ground", 0, 0)
+    ground = ground_of(question.scenario)
+    made = question.reconstruct()
+    observed = observe_runs(made, ground)
+    releases = released_as_observed(ground, observed, made, VARIANTS)
+    return back_analyse(
+        ground, observed, releases, question.scenario.settings[0], question.priors,
+        sets=question.sets, rounds=question.rounds, progress=progress,
+    )  # fmt: skip
+
+
+def keep(scene: bpy.types.Scene, question: Question, found: BackAnalysis) -> None:
+    """Keep the answer with the scene."""
+    rows = [
+        [one.name, one.unit, one.median, one.low, one.high, one.prior, to_plain(one.remarks)] for one in found.estimates
+    ]
+    n = len(found.observed)
+    said = f"{n} observed run{'s' * (n != 1)}, {found.runs:,} simulated in {found.seconds:.0f} s."
+    remarks = (*question.remarks, *found.remarks)
+    posterior.keep(
+        scene, found.model, found.draws, rows=rows, said=said, remarks=to_plain(remarks), print=question.print
+    )
+
+
+def use_medians(scene: bpy.types.Scene) -> None:
+    """Give the model, and the motion on the ground, the medians; blocks draw no more.
+
+    Raises
+    ------
+    RockfallError : nothing is kept.
+    """
+    kept = posterior.kept_of(scene)
+    if kept is None:
+        raise RockfallError("There is no back-analysis: run one first.")
+    medians = {row.name: float(f"{row.median:.4g}") for row in kept.rows}
+    friction = medians.pop(FRICTION_NAME, None)
+    if friction is not None:
+        scene.rockfall_simulation.friction = friction
+    if medians:
+        model_parameters.keep(scene, kept.model, medians)
+    scene.rockfall_back_analysis.draw = False
+
+
+def is_stale(scene: bpy.types.Scene, kept: posterior.Kept) -> bool:
+    """Whether it was computed from something else than the scene now says."""
+    return bool(kept.print) and kept.print != _print(scene, kept.model, tuple(row.name for row in kept.rows))
+
+
+def _reconstruction(scene: bpy.types.Scene, picks: Picks) -> "partial[Reconstruction]":
+    """Flights are between centres of blocks, as those of simulated ones."""
+    return partial(reconstruction.reconstruction_of(scene, picks, simulation_setup.ground(scene)), flights="centres")
+
+
+def _print(scene: bpy.types.Scene, model: str = "", names: tuple[str, ...] = ()) -> str:
+    settings = scene.rockfall_simulation
+    model = model or scene.rockfall_back_analysis.model
+    names = names or fitted_names(scene, model)
+    own = models.parameters_of(scene).get(model, {})
+    parts = [
+        fingerprints.ground(scene),
+        fingerprints.ground_contents(scene),
+        sorted(fingerprints.remembered(scene).items()),
+        scene.get(store.BLOCKS, ""),
+        sorted((name, value) for name, value in own.items() if name not in names),
+        reconstruction.project_settings(scene, []).reconstruction,
+        settings.rolling,
+        settings.use_drag,
+        None if FRICTION_NAME in names else store.double(settings.friction),
+        *simulated_zones.fingerprint(scene),
+        *structures.fingerprint(scene),
+        *simulated_trees.fingerprint(scene),
+    ]
+    return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()

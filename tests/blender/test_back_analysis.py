@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Back-analysis in the scene: what is found is kept, drawn from, exported, and known to be old when it is."""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+MODEL = "pfeiffer_bowen_1989"
+KEY = "rockfall_back_analysis"
+
+
+@pytest.fixture
+def scene(part, monkeypatch):
+    assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
+    monkeypatch.setattr(part("core.workflow.back_analysis"), "CHECKED", 30)
+    monkeypatch.setattr(part("core.workflow.back_analysis"), "TRUTHS", 20)
+    settings = bpy.context.scene.rockfall_back_analysis
+    settings.model, settings.sets, settings.rounds = MODEL, 150, 1
+    settings.priors = "rn = 0.2..0.6; friction = normal:0.5,0.1"
+    bpy.context.scene.rockfall_simulation.models = {MODEL, "noel_2017"}
+    bpy.context.scene.rockfall_simulation.number = 2
+    return bpy.context.scene
+
+
+def analysed(scene) -> dict:
+    assert bpy.ops.rockfall.back_analyse() == {"FINISHED"}
+    return json.loads(scene[KEY])
+
+
+def draw_panel(part) -> list[str]:
+    """Texts of the panel's result, as a stand-in for a layout is told."""
+    kept = part("rockfall_addon.scene.posterior").kept_of(bpy.context.scene)
+    return [] if kept is None else [row.name for row in kept.rows]
+
+
+def test_what_fits_is_kept_with_its_intervals_and_how_good_it_is(part, scene) -> None:
+    kept = analysed(scene)
+    assert kept["model"] == MODEL
+    assert kept["names"] == ["rn", "rt", "friction"]
+    values, weight = np.array(kept["values"]), np.array(kept["weight"])
+    assert weight.sum() == pytest.approx(1.0)
+    assert ((values[:, 0] >= 0.2) & (values[:, 0] <= 0.6)).all(), "within what was thought possible"
+    for column, (name, _, median, low, high, prior, _) in enumerate(kept["rows"]):
+        assert low < median < high, name
+        order = np.argsort(values[:, column])
+        below = weight[order][values[order, column] < low].sum()
+        assert below == pytest.approx(0.025, abs=0.02), name
+        assert prior
+    assert "normal, 0.5 ± 0.1" in kept["rows"][2][5]
+    assert "15 observed runs" in kept["said"]
+    assert "held out" in json.dumps(kept["remarks"])
+    assert draw_panel(part) == kept["names"]
+    again = analysed(scene)
+    assert again["values"] == kept["values"], "the same seed"
+
+
+def test_blocks_draw_from_it_when_they_are_told_to(part, scene) -> None:
+    setup, posterior = part("rockfall_addon.scene.simulation_setup"), part("rockfall_addon.scene.posterior")
+    kept = analysed(scene)
+    assert setup.plan(scene).scenario.draws == {}
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert not setup.is_stale(scene)
+    before = setup.plan(scene).scenario
+    scene.rockfall_back_analysis.draw = True
+    assert setup.is_stale(scene), "other blocks would fall now"
+    drawn = setup.plan(scene).scenario.draws
+    assert list(drawn) == [MODEL]
+    np.testing.assert_array_equal(drawn[MODEL].values, kept["values"])
+    assert {one.model: one.draws is not None for one in setup.plan(scene).scenario.settings} == {
+        MODEL: True,
+        "noel_2017": False,
+    }
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    assert any("Each block drew its" in str(remark) for remark in setup.remarks(scene))
+    assert not setup.is_stale(scene)
+    scene.rockfall_simulation.models = {"noel_2017"}
+    assert posterior.in_use(scene, {"noel_2017"}) is None
+    assert before.draws == {}
+
+
+def test_it_goes_with_the_project_and_comes_back(part, scene, tmp_path: Path) -> None:
+    kept = analysed(scene)
+    scene.rockfall_back_analysis.draw = True
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path)) == {"FINISHED"}
+    text = (tmp_path / "posterior.csv").read_text()
+    assert text.splitlines()[0].split(",")[:2] == ["model", "weight"]
+    rows = np.array([line.split(",")[1:] for line in text.splitlines()[1:]], dtype=float)
+    np.testing.assert_array_equal(rows[:, 1:], kept["values"])
+    project = part("core.exchange.project").read_project(tmp_path / "project.toml")
+    scenario, inputs = part("core.exchange.simulation_project").open_simulation(project, tmp_path / "project.toml")
+    np.testing.assert_array_equal(scenario.draws[MODEL].values, kept["values"])
+    assert inputs["posterior"] == tmp_path / "posterior.csv"
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "project.toml")) == {"FINISHED"}
+    scene = bpy.context.scene
+    found = part("rockfall_addon.scene.posterior").kept_of(scene)
+    np.testing.assert_array_equal(found.draws.values, kept["values"])
+    assert scene.rockfall_back_analysis.draw
+    assert [row.median for row in found.rows] == pytest.approx([row[2] for row in kept["rows"]], rel=0.02)
+    assert not part("rockfall_addon.scene.back_analysis").is_stale(scene, found), "nobody knows what it was of"
+
+
+def test_it_is_old_when_the_picks_have_changed(part, scene) -> None:
+    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    analysed(scene)
+    assert not analysis.is_stale(scene, posterior.kept_of(scene))
+    scene.rockfall_back_analysis.names = f"{MODEL}.rn"
+    scene.rockfall_back_analysis.model = "stevens_1998"
+    assert not analysis.is_stale(scene, posterior.kept_of(scene)), "another question changes no answer"
+    scene.rockfall_simulation.rolling = "coulomb"
+    assert analysis.is_stale(scene, posterior.kept_of(scene))
+    scene.rockfall_simulation.rolling = "azzoni_1995"
+    pick = next(obj for obj in scene.objects if obj.get("rockfall_role") == "pick")
+    pick.location.x += 0.3
+    part("rockfall_addon.scene.sync").recompute(scene)
+    assert analysis.is_stale(scene, posterior.kept_of(scene))
+
+
+def test_medians_become_the_values(part, scene) -> None:
+    kept = analysed(scene)
+    scene.rockfall_back_analysis.draw = True
+    assert bpy.ops.rockfall.use_medians() == {"FINISHED"}
+    own = part("rockfall_addon.scene.models").parameters_of(scene)[MODEL]
+    assert own["rn"] == pytest.approx(kept["rows"][0][2], rel=1e-3)
+    assert scene.rockfall_simulation.friction == pytest.approx(kept["rows"][2][2], rel=1e-3)
+    assert not scene.rockfall_back_analysis.draw
+    assert bpy.ops.rockfall.remove_back_analysis() == {"FINISHED"}
+    assert KEY not in scene
+    assert not bpy.ops.rockfall.use_medians.poll()
+
+
+def test_parameters_are_chosen_and_bad_laws_refused(part, scene) -> None:
+    analysis = part("rockfall_addon.scene.back_analysis")
+    assert analysis.fitted_names(scene, MODEL) == ("rn", "rt", "friction")
+    assert bpy.ops.rockfall.choose_back_analysed(model=MODEL, parameter="rt") == {"FINISHED"}
+    assert analysis.fitted_names(scene, MODEL) == ("rn", "friction")
+    for law, told in (("rn", "no law"), ("rt = 0.2..0.6", "not fitted"), ("rn = 3..9", "no part of its range")):
+        scene.rockfall_back_analysis.priors = law
+        with pytest.raises(RuntimeError, match=told):
+            bpy.ops.rockfall.back_analyse()
+    assert KEY not in scene
+
+
+@pytest.mark.parametrize(
+    "change", [{"model": "newton"}, {"values": [[0.1]]}, {"weight": [-1.0]}, {"rows": [["rn"]]}, {"names": ["mass"]}]
+)
+def test_a_damaged_one_is_set_aside_and_named(part, scene, tmp_path: Path, change: dict) -> None:
+    kept = {"model": MODEL, "names": ["rn"], "values": [[0.3], [0.4]], "weight": [0.5, 0.5], "rows": [], "said": "",
+            "remarks": [], "print": ""}  # fmt: skip
+    scene[KEY] = json.dumps(kept | change)
+    scene.rockfall_back_analysis.draw = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
+    scene = bpy.context.scene
+    assert KEY not in scene
+    said = [str(one) for one in part("rockfall_addon.scene.set_aside_words").grave(scene)]
+    said += [str(one) for one in part("rockfall_addon.scene.problems").remarks(scene)] if not said else []
+    assert any("analyse again" in sentence for sentence in said), said
+    assert part("rockfall_addon.scene.simulation_setup").plan(scene).scenario.draws == {}

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A person asks which parameters make whole falls come out as the observed ones, and lets blocks draw from them."""
+
+import json
+
+import bpy
+
+KEY = "rockfall_back_analysis"
+
+
+def case_back_analysis_of_the_demo(window):
+    """By its button: progress, Esc, the answer in both themes, the blocks that draw from it, undo."""
+    job = window.part("rockfall_addon.view.job")
+    with window.override():
+        assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
+    scene = bpy.context.scene
+    settings = scene.rockfall_back_analysis
+    settings.model, settings.sets, settings.rounds = "stevens_1998", 300, 2
+    settings.priors = "rn = 0.1..0.7; friction = 0.2..0.9"
+    scene.rockfall_simulation.models = {"stevens_1998"}
+    with window.override():
+        bpy.ops.ed.undo_push(message="settings")
+    window.unfold("ROCKFALL_PT_back_analysis")
+    for name in ("simulated_run", "simulation_screens"):
+        window.unfold(f"ROCKFALL_PT_{name}", is_open=False)
+    yield from window.show_sidebar()
+    yield from window.open_panel("ROCKFALL_PT_simulation")
+    yield from window.scroll(60)
+    yield 1.0
+    window.screenshot("1-question")
+    with window.override():
+        bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: job.is_running() and job._running[0].share > 0.1, 60, "sets are simulated")
+    window.screenshot("2-at-work")
+    yield from window.press("ESC", *window.centre())
+    assert not job.is_running()
+    assert KEY not in bpy.context.scene
+    with window.override():
+        bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: not job.is_running(), 120, "analysed")
+    yield 1.0
+    yield from window.scroll(60)
+    scene = bpy.context.scene
+    assert len(json.loads(scene[KEY])["rows"]) == 3
+    window.screenshot("3-answer")
+    window.theme("Light")
+    yield 1.0
+    window.screenshot("4-light-theme")
+    window.theme("Dark")
+    scene.rockfall_back_analysis.draw = True
+    with window.override():
+        bpy.ops.rockfall.simulate("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: not job.is_running(), 60, "simulated")
+    yield 1.0
+    window.screenshot("5-blocks-draw-from-it")
+    with window.override():
+        bpy.ops.ed.undo()
+        bpy.ops.ed.undo()
+    assert KEY not in bpy.context.scene, "a step of undo each"

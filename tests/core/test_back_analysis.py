@@ -9,7 +9,7 @@ from rockfall.core.analysis.fitting import Axis
 from rockfall.core.analysis.observed_runs import Observed, observe_stops
 from rockfall.core.analysis.paths import Paths, simulated_paths
 from rockfall.core.analysis.posterior_checks import FLAT
-from rockfall.core.analysis.priors import Prior, make_priors
+from rockfall.core.analysis.priors import Prior, laws_in, make_priors
 from rockfall.core.analysis.run_measures import Limits, measure_rebounds
 from rockfall.core.analysis.run_statistics import (
     LEAST_ERROR,
@@ -298,3 +298,15 @@ def test_impacts_that_are_not_told_apart_are_one() -> None:
     way = paths.end[2] - paths.end[0]
     after = way / 1.0 + [0.0, 0.0, 9.81 / 2]
     assert found["", "rebound_r"] == pytest.approx([np.linalg.norm(after) / np.hypot(4.0, 9.81)])
+
+
+def test_laws_in_a_text() -> None:
+    assert laws_in("") == {}
+    assert laws_in("rn = 0.2..0.6, friction = normal:0.5,0.1; rt=0.5..0.9,") == {
+        "rn": "0.2..0.6",
+        "friction": "normal:0.5,0.1",
+        "rt": "0.5..0.9",
+    }
+    for text, told in (("rn", "gives no law"), ("rn = 1..2, rn = 2..3", "two laws"), ("= 3..4", "gives no law")):
+        with pytest.raises(InputError, match=told):
+            laws_in(text)

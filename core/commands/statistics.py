@@ -13,6 +13,7 @@ from .options import (
     add_site_option,
     add_where_option,
     figure_formats,
+    impacts_as_asked,
     naming,
     tables_as_asked,
     whole,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 EPILOG = """examples:
   rockfall statistics impacts.csv --out statistics
+  rockfall statistics project.toml --out statistics
   rockfall statistics impacts.csv --group material --graph normal_spread_deg rn --out statistics
   rockfall statistics gully.csv quarry.csv --group site --where 'flags!=doubtful' --out statistics
 
@@ -40,7 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = EPILOG
     parser.add_argument(
-        "impacts", nargs="+", metavar="IMPACTS", help="impacts.csv, of one site or several, or a merged package"
+        "impacts",
+        nargs="+",
+        metavar="IMPACTS",
+        help="impacts.csv, of one site or several; a merged package; or a project.toml with picks",
     )
     add_out(parser)
     parser.add_argument(
@@ -138,12 +143,11 @@ def _read(arguments: argparse.Namespace, progress: "Progress") -> "tuple[Impacts
     from ..exchange.database import digest, merge
     from ..exchange.selection import matching, rows_of
     from ..exchange.statistics_tables import described
-    from ..exchange.tables import read_impacts
 
     files, notes = arguments.impacts, []
     if len(files) == 1 and Path(files[0]).is_file() and Path(files[0]).suffix != ".json" and not arguments.site:
         progress(f"Reading {files[0]}", 0, 0)
-        impacts = read_impacts(files[0])
+        impacts = impacts_as_asked(files[0])
         inputs = [{"file": Path(files[0]).name, "sha256": digest(files[0]), "impacts": len(impacts)}]
     else:
         merged = merge(tables_as_asked(arguments, files, progress))

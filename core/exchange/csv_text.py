@@ -148,6 +148,12 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     DependencyError : a Parquet file, and pyarrow is not installed.
     """
     path = Path(path)
+    if path.suffix.lower() == ".toml" and path.is_file():
+        raise InputError(
+            "This is a TOML file, and a table is needed",
+            file=path,
+            advice="Give the table itself; `rockfall reconstruct` makes impacts.csv and trajectories.csv of a project",
+        )
     if path.suffix.lower() == SUFFIX:
         return _parquet_table(path, required, known)
     data = _checked(path, path.read_bytes())

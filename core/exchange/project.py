@@ -246,6 +246,10 @@ class Project:
         return found
 
 
+NO_PROJECT = (".csv", ".tsv", ".txt", ".parquet", ".ply", ".obj", ".las", ".laz", ".mp4", ".mov", ".blend", ".json")
+"""Endings of files that people give in the place of a project."""
+
+
 @reader("project")
 def read_project(path: str | Path) -> Project:
     """Read ``project.toml``.
@@ -256,6 +260,12 @@ def read_project(path: str | Path) -> Project:
         terrain or table that is not there. The message names the file, the key and what to do.
     """
     path = Path(path)
+    if path.suffix.lower() in NO_PROJECT and path.is_file():
+        raise InputError(
+            f"This is a {path.suffix} file, and a project is needed: a TOML file that names terrain, picks and videos",
+            file=path,
+            advice="Give project.toml; Blender writes one (Share > Export Project), and `rockfall demo` an example",
+        )
     top = TomlTable(read_toml(path, "project"), "", path)
     _check_schema(top)
     site, terrain, picks = top.table("site"), top.table("terrain"), top.table("picks")

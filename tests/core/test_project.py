@@ -407,3 +407,9 @@ def test_a_list_of_files_that_is_none_is_refused(tmp_path: Path, files: str, pro
     (tmp_path / "west.obj").touch()
     with pytest.raises(InputError, match=problem):
         read(tmp_path, f"schema = 1\n[terrain]\nfile = {files}\n")
+
+
+def test_a_table_in_the_place_of_a_project_is_named(tmp_path):
+    (tmp_path / "picks.csv").write_text("trajectory,time_s\n")
+    with pytest.raises(InputError, match=r"This is a \.csv file, and a project is needed"):
+        read_project(tmp_path / "picks.csv")

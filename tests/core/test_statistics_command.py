@@ -224,3 +224,17 @@ def test_the_figures_of_groups(demo, tmp_path) -> None:
         assert f"{name}({int((demo.complete & (ground == name)).sum())})" in text
     assert "others" in text  # impacts without a ground
     assert "Roughnessoftheground" in words(tmp_path / "roughness.svg")
+
+
+def test_a_project_gives_the_numbers_of_its_table(table, tmp_path, capsys) -> None:
+    assert main(["statistics", str(table), "--out", str(tmp_path / "table"), "--tables-only"]) == 0
+    project = str(SITE / "project.toml")
+    assert main(["statistics", project, "--out", str(tmp_path / "project"), "--tables-only"]) == 0
+    for name in ("statistics.csv", "angle_classes.csv"):
+        assert (tmp_path / "project" / name).read_bytes() == (tmp_path / "table" / name).read_bytes()
+
+
+def test_a_project_among_tables_is_named(table, tmp_path, capsys) -> None:
+    arguments = [str(table), str(SITE / "project.toml"), "--out", str(tmp_path / "out")]
+    assert main(["statistics", *arguments]) == 1
+    assert "project.toml: This is a TOML file, and a table is needed" in capsys.readouterr().err

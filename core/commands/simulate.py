@@ -42,8 +42,6 @@ from .worker_options import add_worker_options, forget_chunks, several_workers, 
 
 if TYPE_CHECKING:
     from ..exchange.chunk_store import ChunkStore
-    from ..hazard.cell_tally import CellTally
-    from ..hazard.screen_tally import ScreenTally
     from ..hazard.screens import Screen
     from ..reconstruction.trajectory import Reconstruction
     from ..simulation.ground import Ground
@@ -117,6 +115,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "maps/NAME.tif (default: no maps)",
     )
     parser.add_argument(
+        "--faces",
+        action="store_true",
+        help="maps of the faces of the mesh as well, for cliffs and overhangs: contacts, speed, energy → "
+        "maps/faces.gpkg, maps/faces.csv",
+    )
+    parser.add_argument(
         "--geopackage",
         action="store_true",
         help="also simulation.gpkg for a GIS: releases, stops, screens, what --record names as impacts and paths in "
@@ -148,7 +152,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..output import output_folder
     from ..remarks import gravest_first
     from ..workflow.enough import enough_remarks, in_chance_order
-    from ..workflow.maps import map_models, map_remarks
+    from ..workflow.maps import Mapped, map_models, map_remarks
     from ..workflow.screens import screen_remarks
     from ..workflow.simulation import ground_of, remarks_of, run_models
 
@@ -178,12 +182,10 @@ def run(arguments: argparse.Namespace) -> int:
                 )
             written, remarks, kept = simulate_on_workers(
                 arguments, scenario, ground, releases,
-                record=record, cell_m=asked.cell_m, screens=screens, first_run=first_run, measured=asked.measured,
-                folder=folder, inputs=asked.inputs | screen_files, progress=progress,
+                record=record, cell_m=asked.cell_m, faces=asked.faces, screens=screens, first_run=first_run,
+                measured=asked.measured, folder=folder, inputs=asked.inputs | screen_files, progress=progress,
             )  # fmt: skip
         else:
-            maps: dict[str, CellTally] = {}
-            tallies: dict[str, ScreenTally] = {}
             with stopped_by_interrupt(progress) as counted:
                 how = {
                     "record": recorded_for(record, bool(scenario.structures)),
@@ -191,21 +193,27 @@ def run(arguments: argparse.Namespace) -> int:
                     "threads": arguments.threads,
                     "progress": counted,
                 }
-                if asked.cell_m is None and not screens:
-                    simulations = run_models(ground, releases, scenario.settings, **how)
+                if asked.cell_m is None and not asked.faces and not screens:
+                    mapped = Mapped(run_models(ground, releases, scenario.settings, **how), {}, {}, {})
                 else:
                     until = arguments.until_known
-                    simulations, maps, tallies = map_models(
-                        ground, releases, scenario.settings, asked.cell_m, screens, until_known=until, **how
-                    )
-            said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(tallies))
+                    mapped = map_models(
+                        ground, releases, scenario.settings, asked.cell_m, screens,
+                        faces=asked.faces, until_known=until, **how,
+                    )  # fmt: skip
+            simulations = mapped.simulations
+            said = (
+                *remarks_of(simulations, list(scenario.models)),
+                *map_remarks(mapped.cells),
+                *screen_remarks(mapped.screens),
+            )
             if arguments.until_known is not None:
-                for model, tally in tallies.items():
+                for model, tally in mapped.screens.items():
                     said += tuple(enough_remarks(model, tally, arguments.until_known))
             remarks = gravest_first([*said])
             written = write_simulations(
-                simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=maps, screens=tallies,
-                remarks=remarks, progress=progress,
+                simulations, folder, record=record, inputs=asked.inputs | screen_files, maps=mapped.cells,
+                faces=mapped.faces, screens=mapped.screens, remarks=remarks, progress=progress,
             )  # fmt: skip
             if arguments.geopackage:
                 write_simulation_geopackage(
@@ -236,12 +244,13 @@ def _screens(
 
 class _Asked(NamedTuple):
     """What is simulated, the tables beside runs.csv that a project names, the files that decide it, the cells of the
-    maps, and what the project has measured, where that is to be written beside it."""
+    maps, whether faces have maps, and what the project has measured, where that is to be written beside it."""
 
     scenario: "Scenario"
     record: tuple[str, ...] | None
     inputs: dict[str, Path]
     cell_m: float | None
+    faces: bool
     measured: "Reconstruction | None" = None
 
 
@@ -300,7 +309,8 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> _Aske
     }
     if measured is not None:
         inputs["observed"] = Path(arguments.observed)
-    return _Asked(scenario, None, inputs | {name: Path(file) for name, file in files.items()}, arguments.cell)
+    inputs |= {name: Path(file) for name, file in files.items()}
+    return _Asked(scenario, None, inputs, arguments.cell, arguments.faces)
 
 
 def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked:
@@ -354,7 +364,8 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Asked
     measured = None
     if arguments.geopackage and project.picks is not None:
         measured = reconstruct_project(project, scenario.terrain if isinstance(scenario.terrain, Surface) else None)
-    return _Asked(scenario, entry.record, inputs, arguments.cell or entry.cell_m, measured)
+    faces = arguments.faces or entry.faces
+    return _Asked(scenario, entry.record, inputs, arguments.cell or entry.cell_m, faces, measured)
 
 
 def _posteriors(arguments: argparse.Namespace, models: Sequence[str]) -> "dict[str, ParameterDraws]":

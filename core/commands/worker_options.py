@@ -59,6 +59,7 @@ def simulate_on_workers(
     *,
     record: Collection[str],
     cell_m: float | None,
+    faces: bool,
     screens: "Sequence[Screen]",
     first_run: int,
     measured: "Reconstruction | None",
@@ -102,16 +103,21 @@ def simulate_on_workers(
     try:
         with stopped_by_interrupt(progress) as counted, DaskPool(arguments.scheduler, arguments.workers or 1) as pool:
             try:
-                simulations, maps, passed, stores = simulate_in_chunks(
+                mapped, stores = simulate_in_chunks(
                     ground, releases, scenario.settings, pool, kept,
-                    record=record, cell_m=cell_m, screens=screens, first_run=first_run, progress=counted,
+                    record=record, cell_m=cell_m, faces=faces, screens=screens, first_run=first_run, progress=counted,
                 )  # fmt: skip
             except CancelledError as error:
                 raise Interrupt(said=goes_on) from error
-        said = (*remarks_of(simulations, list(scenario.models)), *map_remarks(maps), *screen_remarks(passed))
+        simulations = mapped.simulations
+        said = (
+            *remarks_of(simulations, list(scenario.models)),
+            *map_remarks(mapped.cells),
+            *screen_remarks(mapped.screens),
+        )
         remarks = gravest_first([*said])
-        written = write_chunk_tables(stores, folder, simulations, passed, progress=progress)
-        written += write_all_maps(simulations, maps, folder, progress)
+        written = write_chunk_tables(stores, folder, simulations, mapped.screens, progress=progress)
+        written += write_all_maps(simulations, mapped.cells, mapped.faces, folder, progress)
         written += write_met_trees(simulations, folder)
         if arguments.geopackage:
             write_simulation_geopackage(

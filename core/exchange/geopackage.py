@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GeoPackage (OGC 12-128r19, version 1.4) by SQLite alone: layers of points and lines in space, and their styles."""
+"""GeoPackage (OGC 12-128r19, version 1.4) by SQLite alone: points, lines and polygons in space, and their styles."""
 
 import sqlite3
 import struct
@@ -26,7 +26,7 @@ APPLICATION_ID, USER_VERSION = 0x47504B47, 10400
 UNDEFINED_CARTESIAN = -1
 """The standard's own system for coordinates in metres of which no more is known."""
 LITTLE_ENDIAN_XYZ, LITTLE_ENDIAN_NO_ENVELOPE = 0b0000_0101, 0b0000_0001
-POINT_Z, LINE_STRING_Z = 1001, 1002
+POINT_Z, LINE_STRING_Z, POLYGON_Z = 1001, 1002, 1003
 AT_ONCE = 20_000
 """Rows that are written together."""
 TYPES: Mapping[str, str] = {"f": "REAL", "i": "INTEGER", "u": "INTEGER", "b": "BOOLEAN", "U": "TEXT"}
@@ -35,7 +35,7 @@ DISK = {sqlite3.SQLITE_FULL: ENOSPC, sqlite3.SQLITE_IOERR: EIO}
 
 @dataclass(frozen=True, eq=False)
 class FeatureLayer:
-    """A layer of points, or of lines.
+    """A layer of points, of lines, or of polygons.
 
     Attributes
     ----------
@@ -45,6 +45,7 @@ class FeatureLayer:
     first : (n + 1,) the first point of each line, and k; None for points.
     columns : name → (n,) numbers or words; NaN is empty.
     style : of QGIS; empty for none.
+    closed : the lines are the outlines of polygons, each of which ends in its first point.
     """
 
     name: str
@@ -53,6 +54,7 @@ class FeatureLayer:
     first: Indices | None = None
     columns: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     style: str = ""
+    closed: bool = False
 
     def __len__(self) -> int:
         return len(self.points) if self.first is None else self.first.size - 1
@@ -132,6 +134,10 @@ def _check(layer: FeatureLayer, path: Path) -> None:
         raise InputError(f"The layer {layer.name} has a coordinate that is not finite", file=path)
     if layer.first is not None and (np.diff(layer.first) < 2).any():
         raise InputError(f"The layer {layer.name} has a line of less than two points", file=path)
+    if layer.closed and layer.first is not None:
+        ends = layer.points[layer.first[:-1]] == layer.points[layer.first[1:] - 1]
+        if not (ends.all() and (np.diff(layer.first) >= 4).all()):
+            raise InputError(f"The layer {layer.name} has an outline that is not closed", file=path)
 
 
 def _write_layer(
@@ -141,7 +147,7 @@ def _write_layer(
     places = np.ascontiguousarray(shift.to_survey(layer.points), dtype="<f8")
     low, high = _boxes(places, layer.first)
     columns = ", ".join(f'"{name}" {TYPES[values.dtype.kind]}' for name, values in layer.columns.items())
-    kind = "LINESTRING" if line else "POINT"
+    kind = "POLYGON" if layer.closed else "LINESTRING" if line else "POINT"
     database.execute(
         f'CREATE TABLE "{layer.name}" (fid INTEGER PRIMARY KEY AUTOINCREMENT NOT NULL, '
         f"geom {kind}{', ' + columns if columns else ''})"
@@ -157,7 +163,7 @@ def _write_layer(
     insert = f'INSERT INTO "{layer.name}" VALUES ({marks})'
     for start in range(0, len(layer), AT_ONCE):
         stop = min(start + AT_ONCE, len(layer))
-        shapes = _geometries(places, layer.first, low, high, system, start, stop)
+        shapes = _geometries(places, layer, low, high, system, start, stop)
         database.executemany(
             insert, zip(range(start + 1, stop + 1), shapes, *(one[start:stop] for one in values), strict=True)
         )
@@ -175,9 +181,10 @@ def _boxes(places: Array, first: Indices | None) -> tuple[Array, Array]:
 
 
 def _geometries(
-    places: Array, first: Indices | None, low: Array, high: Array, system: int, start: int, stop: int
+    places: Array, layer: FeatureLayer, low: Array, high: Array, system: int, start: int, stop: int
 ) -> Iterator[bytes]:
-    """GeoPackageBinary of some features: a header, of lines with their box, then well-known binary."""
+    """GeoPackageBinary of some features: a header, of lines and polygons with their box, then well-known binary."""
+    first = layer.first
     if first is None:
         head = b"GP" + struct.pack("<BBiBI", 0, LITTLE_ENDIAN_NO_ENVELOPE, system, 1, POINT_Z)
         data = places[start:stop].tobytes()
@@ -189,7 +196,11 @@ def _geometries(
     data = places[begin : int(first[stop])].tobytes()
     ends = (first[start : stop + 1] - begin).tolist()
     for place, (at, end) in enumerate(pairwise(ends)):
-        form = struct.pack("<BII", 1, LINE_STRING_Z, end - at)
+        form = (
+            struct.pack("<BIII", 1, POLYGON_Z, 1, end - at)
+            if layer.closed
+            else struct.pack("<BII", 1, LINE_STRING_Z, end - at)
+        )
         yield head + boxes[48 * place : 48 * place + 48] + form + data[24 * at : 24 * end]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..hazard.cell_tally import CellTally
 from ..hazard.cells import cells_over
+from ..hazard.face_tally import FaceTally
 from ..hazard.run_tally import COLUMNS, RunTally
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import Screen, check_screens
@@ -23,13 +24,14 @@ from ..simulation.release import Releases
 from ..vectors import Array
 from ..versions import versions
 from ..workflow.ensembles import CHUNK, Pool, Tables, Work, run_ensemble
+from ..workflow.maps import Mapped, check_faces
 from .chunk_store import ChunkStore
 from .content_digest import content_digest
 from .screens import write_screens
 from .simulation_output import MAPS, recorded_for, write_tables
 from .simulation_tables import append_screen_hits, drawn_names
 
-RUNS, SCREENS = "runs", "screens"
+RUNS, SCREENS, FACES = "runs", "screens", "faces"
 HITS = "hits.csv"
 KEY_LETTERS = 16
 
@@ -61,24 +63,25 @@ def simulate_in_chunks(
     *,
     record: Collection[str],
     cell_m: float | None = None,
+    faces: bool = False,
     screens: Sequence[Screen] = (),
     first_run: int = 0,
     size: int = CHUNK,
     progress: Progress = silent,
-) -> tuple[tuple[Simulation, ...], dict[str, CellTally], dict[str, ScreenTally], tuple[ChunkStore, ...]]:
+) -> tuple[Mapped, tuple[ChunkStore, ...]]:
     """Let the same blocks fall once for each of the settings, chunk by chunk.
 
     Parameters
     ----------
     kept : folder for what is finished; from there the same simulation goes on after it was ended.
     record : tables beside runs.csv, see `write_simulations`.
-    cell_m : side of the cells of maps; None for no maps.
+    cell_m, faces : see `map_models`.
     first_run, progress : see `run_models`.
 
     Returns
     -------
-    The simulations, without the moments of their motion; of each model what its maps are made of, and what passes its
-    screens; and what has the tables, for `write_chunk_tables`.
+    The simulations, without the moments of their motion, with what was counted; and what has the tables, for
+    `write_chunk_tables`.
 
     Raises
     ------
@@ -89,21 +92,26 @@ def simulate_in_chunks(
     tallies: dict[str, Tally] = {RUNS: RunTally()}
     if cell_m is not None:
         tallies[MAPS] = CellTally(cells_over(ground.surface, cell_m))
+    if faces:
+        check_faces(ground)
+        tallies[FACES] = FaceTally(len(ground.owner))
     if screens:
         check_screens(screens, ground)
         tallies[SCREENS] = ScreenTally(screens)
     if len(tallies) > 1:
         recorded = "all"
     simulations, stores = [], []
-    maps, passed = dict[str, CellTally](), dict[str, ScreenTally]()
+    maps, touched, passed = dict[str, CellTally](), dict[str, FaceTally](), dict[str, ScreenTally]()
     for one in settings:
         began = time.perf_counter()
-        decides = (ground, releases, one, first_run, size, tables, cell_m, tuple(screens), versions())
+        decides = (ground, releases, one, first_run, size, tables, cell_m, faces, tuple(screens), versions())
         store = ChunkStore(kept / content_digest(*decides)[:KEY_LETTERS])
         work = Work(ground, one, tallies, recorded, tables)
         found = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)
         if cell_m is not None:
             maps[one.model] = cast(CellTally, found[MAPS])
+        if faces:
+            touched[one.model] = cast(FaceTally, found[FACES])
         if screens:
             passed[one.model] = cast(ScreenTally, found[SCREENS])
         ends = found[RUNS].arrays()
@@ -115,7 +123,7 @@ def simulate_in_chunks(
             )
         )  # fmt: skip
         stores.append(store)
-    return tuple(simulations), maps, passed, tuple(stores)
+    return Mapped(tuple(simulations), maps, touched, passed), tuple(stores)
 
 
 def write_chunk_tables(

@@ -11,6 +11,7 @@
     posterior = "posterior.csv"      # of a back-analysis: each block draws its parameters
     record = ["impacts"]             # trajectories; without it the number of blocks decides
     cell_m = 1.0                     # side of the cells of maps; without it there are none
+    faces = true                     # maps of the faces of the mesh, for cliffs
 
     [simulation.releases]
     from = "polygon"                 # measured, table, points, line, polygon, steep
@@ -186,6 +187,7 @@ class SimulationEntry:
     drag : of the air, with the coefficient and density of the project's reconstruction.
     record : of `RECORDS`, the tables beside runs.csv; None lets the number of blocks decide.
     cell_m : side of the cells of maps; None makes no maps.
+    faces : whether there are maps of the faces of the mesh.
     """
 
     models: tuple[str, ...] = ()
@@ -203,6 +205,7 @@ class SimulationEntry:
     seed: int = 0
     record: tuple[str, ...] | None = None
     cell_m: float | None = None
+    faces: bool = False
     extra: Extra = field(default_factory=dict)
 
 
@@ -235,6 +238,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         seed=table.whole("seed", 0, zero_allowed=True),
         record=table.choices("record", RECORDS) if table.has("record") else None,
         cell_m=table.number("cell_m", 1.0) if table.has("cell_m") else None,
+        faces=table.flag("faces", False),
         extra=table.rest(),
     )
 
@@ -257,6 +261,8 @@ def simulation_content(entry: SimulationEntry, relative: Callable[[Path], str]) 
         content["record"] = list(entry.record)
     if entry.cell_m is not None:
         content["cell_m"] = entry.cell_m
+    if entry.faces:
+        content["faces"] = True
     content["releases"] = _release_content(entry.releases, relative)
     if entry.zones is not None:
         own = {"attribute": entry.zones.attribute} if entry.zones.attribute else {}

@@ -6,10 +6,12 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..hazard.cell_tally import CellTally
+from ..hazard.face_tally import FaceTally
 from ..hazard.screen_tally import ScreenTally
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Simulation
+from .face_maps import write_face_maps
 from .map_output import draw_maps, write_maps
 from .screens import write_screens
 from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
@@ -19,6 +21,7 @@ from .trees import write_trees
 
 MAPS = "maps"
 NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
+NO_FACES: Mapping[str, FaceTally] = MappingProxyType({})
 LARGE = 20_000
 """From so many blocks on, motion in time is written only when it is asked for."""
 HUGE = 1_000_000
@@ -44,6 +47,7 @@ def write_simulations(
     record: Collection[str],
     inputs: Mapping[str, Path],
     maps: Mapping[str, CellTally] = NO_MAPS,
+    faces: Mapping[str, FaceTally] = NO_FACES,
     screens: Mapping[str, ScreenTally] = NO_SCREENS,
     remarks: Sequence[Remark] = (),
     progress: Progress = silent,
@@ -57,7 +61,7 @@ def write_simulations(
     simulations : of one ground and the same releases, one for each model.
     record : of `RECORDS`; the simulations must have been recorded for them.
     inputs : what it is → file, for the hashes in summary.json.
-    maps : model → what its maps are made of. They go to maps/, those of several models to maps/MODEL/.
+    maps, faces : model → what its maps are made of. They go to maps/, those of several models to maps/MODEL/.
     screens : model → what passes screens, where there are any.
 
     Returns
@@ -69,7 +73,7 @@ def write_simulations(
     OSError : the folder cannot be written.
     """
     written = write_tables(simulations, folder, record=record, screens=screens, progress=progress)
-    written += write_all_maps(simulations, maps, folder, progress)
+    written += write_all_maps(simulations, maps, faces, folder, progress)
     if screens:
         write_screens(screens, folder / "screens.csv")
         written.append("screens.csv")
@@ -88,20 +92,29 @@ def write_met_trees(simulations: Sequence[Simulation], folder: Path) -> list[str
 
 
 def write_all_maps(
-    simulations: Sequence[Simulation], maps: Mapping[str, CellTally], folder: Path, progress: Progress = silent
+    simulations: Sequence[Simulation],
+    maps: Mapping[str, CellTally],
+    faces: Mapping[str, FaceTally],
+    folder: Path,
+    progress: Progress = silent,
 ) -> list[str]:
     """Write the maps of `write_simulations`; returns the names of their folders."""
-    written = []
-    for model, tally in maps.items():
-        place = folder / MAPS if len(maps) == 1 else folder / MAPS / model
-        drawn, shift = tally.maps(), simulations[0].ground.shift
+    written, models = [], list(dict.fromkeys([*maps, *faces]))
+    for model in models:
+        place = folder / MAPS if len(models) == 1 else folder / MAPS / model
         about, said = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}, model
         if (trees := simulations[0].settings.trees) is not None:
             about["TREES"], said = str(len(trees)), f"{model} among {len(trees)} trees"
+        written.append(f"{place.relative_to(folder).as_posix()}/")
+        if model in faces:
+            progress("Writing the maps of faces", 0, 0)
+            write_face_maps(faces[model], simulations[0].ground, place, about)
+        if model not in maps:
+            continue
+        drawn, shift = maps[model].maps(), simulations[0].ground.shift
         write_maps(drawn, place, shift, about, progress)
         releases = simulations[0].releases.position
         draw_maps(drawn, simulations[0].ground.terrain, place, said=said, releases=releases, progress=progress)
-        written.append(f"{place.relative_to(folder).as_posix()}/")
     return written
 
 

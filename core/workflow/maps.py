@@ -2,11 +2,12 @@
 """Runs and their maps: every block is followed through the cells, whatever is recorded of it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ..errors import InputError
 from ..hazard.cell_tally import CellTally
 from ..hazard.cells import cells_over
+from ..hazard.face_tally import FaceTally
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import Screen, check_screens
 from ..hazard.tally import Tally
@@ -15,11 +16,29 @@ from ..remarks import Remark
 from ..simulation.engine import Recorded, Settings, Simulation, check_settings, joined
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
+from ..terrain.cloud import Cloud
 from .enough import is_known
 from .hazard import run_chunks
 
 FEW = 20
 """Fewer blocks in a cell have no standard error of their 95 % values."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mapped:
+    """Simulations, and what was counted of them.
+
+    Attributes
+    ----------
+    simulations : as those of `run_models`.
+    cells : model → what its maps are made of. faces : model → contacts with each face.
+    screens : model → what passes the screens.
+    """
+
+    simulations: tuple[Simulation, ...]
+    cells: Mapping[str, CellTally]
+    faces: Mapping[str, FaceTally]
+    screens: Mapping[str, ScreenTally]
 
 
 def map_models(
@@ -29,26 +48,22 @@ def map_models(
     cell_m: float | None,
     screens: Sequence[Screen] = (),
     *,
+    faces: bool = False,
     until_known: float | None = None,
     record: Recorded = "ends",
     first_run: int = 0,
     threads: int | None = None,
     progress: Progress = silent,
-) -> tuple[tuple[Simulation, ...], dict[str, CellTally], dict[str, ScreenTally]]:
+) -> Mapped:
     """Let the same blocks fall once for each of the settings, map them, and look at what passes screens.
 
     Parameters
     ----------
     cell_m : side of the cells, which cover the terrain; None for no maps.
+    faces : whether contacts with each face of the mesh are counted.
     until_known : end when the values that this share of the hits does not exceed are known at the screens; the
         simulations then have the blocks that were enough.
     record, first_run, threads, progress : see `run_models`. The maps do not depend on what is recorded.
-
-    Returns
-    -------
-    simulations : as those of `run_models`.
-    maps : model → what its maps are made of.
-    screens : model → what passes the screens.
 
     Raises
     ------
@@ -62,12 +77,15 @@ def map_models(
     for one in settings:
         check_settings(ground, one)
     n, simulations = len(releases), list[Simulation]()
-    maps, passed = dict[str, CellTally](), dict[str, ScreenTally]()
+    if faces:
+        check_faces(ground)
+    maps, touched, passed = dict[str, CellTally](), dict[str, FaceTally](), dict[str, ScreenTally]()
     for place, one in enumerate(settings):
         parts, hits = list[Simulation](), ScreenTally(screens)
-        tallies: list[Tally] = [] if cells is None else [CellTally(cells)]
-        if screens:
-            tallies.append(hits)
+        of_cells, of_faces = None if cells is None else CellTally(cells), FaceTally(len(ground.owner))
+        tallies: list[Tally] = [] if of_cells is None else [of_cells]
+        tallies += [of_faces] if faces else []
+        tallies += [hits] if screens else []
 
         def told(text: str, done: int = 0, _: int = 0, place: int = place, model: str = one.model) -> None:
             progress(f"{text} {model}", place * n + done, len(settings) * n)
@@ -88,13 +106,30 @@ def map_models(
         ended = until_known is not None and is_known(hits, until_known)
         wanted = counted.blocks if ended else n
         simulations.append(replace(whole, wanted=wanted, seconds=counted.seconds))
-        if isinstance(tallies[0], CellTally):
-            maps[one.model] = tallies[0]
+        if of_cells is not None:
+            maps[one.model] = of_cells
+        if faces:
+            touched[one.model] = of_faces
         if screens:
             passed[one.model] = hits
         if counted.blocks < wanted:
             break
-    return tuple(simulations), maps, passed
+    return Mapped(tuple(simulations), maps, touched, passed)
+
+
+def check_faces(ground: Ground) -> None:
+    """Whether there are faces to be counted.
+
+    Raises
+    ------
+    InputError : the blocks meet points.
+    """
+    if isinstance(ground.terrain, Cloud):
+        raise InputError(
+            "Blocks meet points, which have no faces to be mapped",
+            file=ground.terrain.name,
+            advice="Leave out --faces, or let blocks meet the surface (contact: mesh)",
+        )
 
 
 def map_remarks(tallies: Mapping[str, CellTally]) -> tuple[Remark, ...]:

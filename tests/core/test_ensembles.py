@@ -134,11 +134,16 @@ def test_screens_on_workers_are_those_of_one_process(ground, tmp_path):
     settings = [SETTINGS, replace(SETTINGS, model="pfeiffer_bowen_1989")]
     one, many = tmp_path / "one", tmp_path / "many"
     one.mkdir(), many.mkdir()
-    simulations, _, passed = map_models(ground, releases, settings, None, screens)
+    mapped = map_models(ground, releases, settings, None, screens, faces=True)
+    simulations, passed = mapped.simulations, mapped.screens
     written = write_simulations(simulations, one, record=[], inputs={}, screens=passed)
-    ended, _, same_passed, stores = simulate_in_chunks(
-        ground, releases, settings, Backwards(), tmp_path / "kept", record=[], screens=screens, size=SIZE
+    again, stores = simulate_in_chunks(
+        ground, releases, settings, Backwards(), tmp_path / "kept", record=[], screens=screens, faces=True, size=SIZE
     )
+    ended, same_passed = again.simulations, again.screens
+    for model, tally in mapped.faces.items():
+        for name, values in tally.layers().items():
+            np.testing.assert_array_equal(again.faces[model].layers()[name], values, err_msg=name)
     assert passed[SETTINGS.model].figures()[0].hits > 10
     assert [*write_chunk_tables(stores, many, ended, same_passed, size=SIZE), "summary.json"] == written
     for name in ("runs.csv", "hits.csv", "screens.csv"):
@@ -169,9 +174,8 @@ def test_work_that_is_killed_goes_on_and_gives_the_same_tables(ground, tmp_path)
     process.send_signal(signal.SIGKILL)
     process.wait()
     pool = Counting()
-    simulations, _, _, stores = simulate_in_chunks(
-        ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE
-    )
+    mapped, stores = simulate_in_chunks(ground, releases, [SETTINGS], pool, kept, record=["impacts"], size=SIZE)
+    simulations = mapped.simulations
     assert pool.computed == [3, 4, 5, 6]
     out, whole = tmp_path / "out", tmp_path / "whole"
     out.mkdir()

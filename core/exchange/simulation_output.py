@@ -108,7 +108,8 @@ def write_all_maps(
         written.append(f"{place.relative_to(folder).as_posix()}/")
         if model in faces:
             progress("Writing the maps of faces", 0, 0)
-            write_face_maps(faces[model], simulations[0].ground, place, about)
+            ground = simulations[0].ground
+            write_face_maps(faces[model].maps(ground), place, ground.shift, about)
         if model not in maps:
             continue
         drawn, shift = maps[model].maps(), simulations[0].ground.shift

@@ -73,13 +73,18 @@ def classes_of(name: str, values: Array) -> Classes:
     ------
     KeyError : there is no such map.
     """
+    return classes_in(LAYERS[name].unit, values)
+
+
+def classes_in(unit: str, values: Array) -> Classes:
+    """The same of values in a unit, which is one of `SERIES`."""
     shown = values[np.isfinite(values) & (values > 0)]
     least, greatest = np.quantile(shown, [LOW, 1.0]).tolist() if shown.size else (0.0, 0.0)
-    series = [one[bisect_left(one, least) : bisect_right(one, greatest)] for one in SERIES[LAYERS[name].unit]]
+    series = [one[bisect_left(one, least) : bisect_right(one, greatest)] for one in SERIES[unit]]
     fine, coarse = series
     limits = (fine if len(fine) <= MOST_LIMITS else coarse)[-MOST_LIMITS:]
     if not limits:
-        limits = SERIES[LAYERS[name].unit][0][:1]
+        limits = SERIES[unit][0][:1]
     colours = scale_colours(np.linspace(0.0, 1.0, len(limits) + 1), 0.0, 1.0)
     words = [f"{limit:,.10g}" for limit in limits]
     between = [f"{low} – {high}" for low, high in pairwise(words)]

@@ -2,6 +2,7 @@
 """What happens at each face of the mesh: cliffs and overhangs have no cell of their own in plan."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..simulation.engine import Simulation
-from ..vectors import Array
+from ..simulation.ground import TERRAIN, Ground
+from ..vectors import Array, Indices, Names
 from .cell_tally import JOULES, UNITS
 from .maps import CLASSES_KJ, QUANTITIES, SHARES, Layer
 from .quantiles import Sketches
@@ -41,6 +43,25 @@ def _layers() -> dict[str, Layer]:
 
 
 FACE_LAYERS: Mapping[str, Layer] = MappingProxyType(_layers())
+
+
+@dataclass(frozen=True, eq=False)
+class FaceMaps:
+    """The maps of n blocks on the triangles that some of them touch.
+
+    Attributes
+    ----------
+    faces : (t,) their numbers in the ground. corners : (t, 3, 3) local [m].
+    of : (t,) "terrain", or the name of a structure.
+    blocks : n.
+    layers : name, see `FACE_LAYERS` → (t,).
+    """
+
+    faces: Indices
+    corners: Array
+    of: Names
+    blocks: int
+    layers: Mapping[str, Array]
 
 
 class FaceTally:
@@ -105,6 +126,24 @@ class FaceTally:
         own = {name[9:]: values for name, values in arrays.items() if name.startswith("contacts_")}
         made.contacts = Sketches.from_arrays(own)
         return made
+
+    def maps(self, ground: Ground) -> FaceMaps:
+        """The maps of the triangles that blocks touch.
+
+        Parameters
+        ----------
+        ground : that of the simulations.
+        """
+        layers, triangles = self.layers(), len(ground.faces)
+        faces = np.flatnonzero(layers["Nr_contacts"][:triangles] > 0)
+        owner, names = ground.owner[faces], np.array(["terrain", *ground.structures])
+        return FaceMaps(
+            faces,
+            ground.vertices[ground.faces[faces]],
+            names[np.where(owner == TERRAIN, 0, owner)],
+            self.blocks,
+            {name: values[:triangles][faces] for name, values in layers.items()},
+        )
 
     def layers(self) -> dict[str, Array]:
         """All `FACE_LAYERS`: name → (faces,), NaN where no block touches."""

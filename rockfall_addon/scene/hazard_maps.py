@@ -12,7 +12,9 @@ import numpy as np
 
 from ...core.hazard.cell_tally import CellTally
 from ...core.hazard.cells import Cells, cells_over
+from ...core.hazard.face_tally import FACE_LAYERS, FaceMaps, FaceTally
 from ...core.hazard.maps import LAYERS, Maps
+from ...core.hazard.tally import Tally
 from ...core.progress import Progress
 from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.vectors import Array
@@ -25,6 +27,8 @@ from .simulation_setup import Plan
 COLLECTION = "Maps"
 CELL = "cell"
 """Attribute: number of the cell, row by row from the south-west."""
+FACE, OF = "face", "face_of"
+"""Attributes: number of the face in the ground, and of what it is among the names that the object has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +67,16 @@ def fingerprint(scene: bpy.types.Scene) -> str:
     return f"{runs} {store.double(settings.map_cell_m):g}"
 
 
-def run(asked: MapPlan, progress: Progress) -> tuple[Maps, tuple[Remark, ...]]:
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Maps of the cells and of the faces; of faces none where blocks meet points."""
+
+    cells: Maps
+    faces: FaceMaps | None
+    remarks: tuple[Remark, ...]
+
+
+def run(asked: MapPlan, progress: Progress) -> Found:
     """Simulate and count, without Blender; what is finished at a cancel is kept.
 
     Raises
@@ -74,14 +87,16 @@ def run(asked: MapPlan, progress: Progress) -> tuple[Maps, tuple[Remark, ...]]:
     progress("Preparing the ground", 0, 0)
     ground = ground_of(asked.plan.scenario)
     tally = CellTally(cells_over(asked.plan.scenario.terrain, asked.cell_m))
+    of_faces = FaceTally(len(ground.owner)) if len(ground.faces) else None
+    tallies: list[Tally] = [tally] if of_faces is None else [tally, of_faces]
     progress("Releasing the blocks", 0, 0)
     releases = asked.plan.scenario.releases(ground)
     barriers = [screen for screen in asked.plan.screens if screen.holds]
     settings = asked.plan.scenario.settings[0]
     if barriers:  # what is mapped is what is shown: blocks end where a barrier holds them
-        counted = run_chunks(ground, releases, settings, [], behind=[tally], barriers=barriers, progress=progress)
+        counted = run_chunks(ground, releases, settings, [], behind=tallies, barriers=barriers, progress=progress)
     else:
-        counted = run_chunks(ground, releases, settings, [tally], progress=progress)
+        counted = run_chunks(ground, releases, settings, tallies, progress=progress)
     remarks = list(map_remarks({asked.model: tally}))
     if counted.blocks < counted.wanted:
         text = f"Stopped by you: the maps are of {counted.blocks} of {counted.wanted} blocks."
@@ -91,12 +106,16 @@ def run(asked: MapPlan, progress: Progress) -> tuple[Maps, tuple[Remark, ...]]:
         remarks.append(Remark(f"Blocks end where a barrier holds them: {names}.", "note", "barriers"))
     text = "All numbers are conditional on the release: how often blocks are released is not in them."
     remarks.append(Remark(text, "note", "maps"))
-    return tally.maps(), tuple(gravest_first([*asked.plan.remarks, *remarks]))
+    faces = None if of_faces is None else of_faces.maps(ground)
+    return Found(tally.maps(), faces, tuple(gravest_first([*asked.plan.remarks, *remarks])))
 
 
-def show(scene: bpy.types.Scene, maps: Maps, model: str, said: str, remarks: tuple[Remark, ...]) -> bpy.types.Object:
+def show(scene: bpy.types.Scene, found: Found, model: str, said: str) -> bpy.types.Object:
     """Keep these maps in the scene, and no others."""
     remove(scene)
+    maps, remarks = found.cells, found.remarks
+    if found.faces is not None:
+        _show_faces(scene, found.faces)
     cells = maps.cells
     filled = np.zeros(cells.shape, np.bool_)
     for values in maps.layers.values():
@@ -122,9 +141,30 @@ def show(scene: bpy.types.Scene, maps: Maps, model: str, said: str, remarks: tup
     return obj
 
 
+def _show_faces(scene: bpy.types.Scene, maps: FaceMaps) -> None:
+    """The triangles as a mesh that is never seen, their numbers as attributes."""
+    mesh, count = bpy.data.meshes.new("Face maps"), len(maps.faces)
+    mesh.vertices.add(3 * count)
+    mesh.attributes["position"].data.foreach_set("vector", maps.corners.astype(np.float32).ravel())
+    mesh.loops.add(3 * count)
+    mesh.attributes[".corner_vert"].data.foreach_set("value", np.arange(3 * count, dtype=np.int32))
+    mesh.polygons.add(count)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    mesh.attributes.new(FACE, "INT", "FACE").data.foreach_set("value", maps.faces.astype(np.int32))
+    names = list(dict.fromkeys(maps.of.tolist()))
+    of = np.array([names.index(name) for name in maps.of.tolist()], dtype=np.int32)
+    mesh.attributes.new(OF, "INT", "FACE").data.foreach_set("value", of)
+    for name, values in maps.layers.items():
+        mesh.attributes.new(name, "FLOAT", "FACE").data.foreach_set("value", values.astype(np.float32))
+    obj = bpy.data.objects.new("Face maps", mesh)
+    obj[store.ROLE], obj[store.MAP_BLOCKS], obj[OF] = store.FACE_MAPS_ROLE, maps.blocks, names
+    obj.hide_viewport = obj.hide_render = obj.hide_select = True
+    store.link(store.collection(scene, COLLECTION), obj)
+
+
 def remove(scene: bpy.types.Scene) -> None:
     """Keep no maps."""
-    store.remove_objects(store.with_role(scene, store.MAPS_ROLE))
+    store.remove_objects([*store.with_role(scene, store.MAPS_ROLE), *store.with_role(scene, store.FACE_MAPS_ROLE)])
     store.remove_collection(scene, COLLECTION)
 
 
@@ -132,6 +172,40 @@ def maps_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """The object of the scene's maps."""
     found = next(iter(store.with_role(scene, store.MAPS_ROLE)), None)
     return found if found is not None and found.type == "MESH" and CELL in found.data.attributes else None
+
+
+def faces_of(scene: bpy.types.Scene) -> FaceMaps | None:
+    """The maps of the faces, kept until they are others; layers that are not there any more are left out."""
+    obj = next(iter(store.with_role(scene, store.FACE_MAPS_ROLE)), None)
+    if obj is None or obj.type != "MESH" or any(name not in obj.data.attributes for name in (FACE, OF)):
+        return None
+    mesh = obj.data
+    count = len(mesh.polygons)
+    key = mesh.session_uid, count
+    if len(mesh.vertices) != 3 * count or not count:
+        return None
+    if not _faces or _faces[0][0] != key:
+        corners = np.empty(9 * count, np.float32)
+        mesh.attributes["position"].data.foreach_get("vector", corners)
+        numbers = {}
+        for name in (FACE, OF):
+            numbers[name] = np.empty(count, np.int32)
+            mesh.attributes[name].data.foreach_get("value", numbers[name])
+        layers = {}
+        for name in FACE_LAYERS:
+            attribute = mesh.attributes.get(name)
+            if attribute is not None and attribute.data_type == "FLOAT" and attribute.domain == "FACE":
+                values = np.empty(count, np.float32)
+                attribute.data.foreach_get("value", values)
+                layers[name] = values.astype(np.float64)
+        names = np.array([str(name) for name in obj.get(OF, ["terrain"])])
+        of = names[np.clip(numbers[OF], 0, len(names) - 1)]
+        corners = corners.astype(np.float64).reshape(count, 3, 3)
+        _faces[:] = [(key, FaceMaps(numbers[FACE], corners, of, int(obj[store.MAP_BLOCKS]), layers))]
+    return _faces[0][1]
+
+
+_faces: list[tuple[tuple, FaceMaps]] = []
 
 
 def read(obj: bpy.types.Object) -> Maps:

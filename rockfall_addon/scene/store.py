@@ -25,6 +25,7 @@ SIMULATED_BLOCKS_ROLE, SIMULATED_PATHS_ROLE = "simulated_blocks", "simulated_pat
 SIMULATED_TREES_ROLE = "simulated_trees"  # the stems that the shown blocks met
 SIMULATED_PATTERN_ROLE = "simulated_pattern"  # the block whose mesh the simulated ones show
 MAPS_ROLE = "maps"  # of what passes through the cells of the terrain, of many runs
+FACE_MAPS_ROLE = "face_maps"  # of the faces of the terrain and its structures, beside the others
 RELEASE_ROLE = "release"  # a drawn line, area or points
 STRUCTURE_ROLE = "structure"  # a mesh that blocks meet beside the terrain
 SCREEN_ROLE = "screen"  # a line at which passing blocks are measured or held

@@ -124,3 +124,51 @@ def test_maps_are_exported(mapped: bpy.types.Scene, tmp_path: Path, part) -> Non
     source = part("core.terrain.geotiff").read_geotiff(tmp_path / "maps" / "E_max.tif")
     np.testing.assert_allclose(np.nanmax(source.points[:, 2]), np.nanmax(kept(part, mapped).layers["E_max"]))
     assert json.loads(mapped.objects["Maps"]["rockfall_map_of"])["remarks"]
+
+
+def test_faces_are_mapped_beside_the_cells(mapped: bpy.types.Scene, part, tmp_path: Path) -> None:
+    """Against the same runs, counted by the core; after saving, too."""
+    module = part("rockfall_addon.scene.hazard_maps")
+    found = module.faces_of(mapped)
+    asked = module.plan(mapped)
+    ground = part("core.workflow.simulation").ground_of(asked.plan.scenario)
+    simulate = part("core.simulation.engine").simulate
+    runs = simulate(ground, asked.plan.scenario.releases(ground), asked.plan.scenario.settings[0], record="all")
+    tally = part("core.hazard.face_tally").FaceTally(len(ground.owner))
+    tally.add(runs)
+    layers = tally.layers()
+    touched = np.flatnonzero(layers["Nr_contacts"] > 0)
+    np.testing.assert_array_equal(found.faces, touched)
+    assert touched.size > 50
+    for name, values in layers.items():
+        np.testing.assert_array_equal(found.layers[name], values[touched].astype(np.float32), err_msg=name)
+    np.testing.assert_allclose(found.corners, ground.vertices[ground.faces[touched]], atol=1e-4)
+    assert set(found.of.tolist()) == {"terrain"}
+    path = str(tmp_path / "faces.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    again = module.faces_of(bpy.context.scene)
+    np.testing.assert_array_equal(again.layers["E_max"], found.layers["E_max"])
+    assert again.blocks == found.blocks == 150
+    assert bpy.ops.rockfall.export_maps(directory=str(tmp_path / "maps")) == {"FINISHED"}
+    rows = (tmp_path / "maps" / "faces.csv").read_text().splitlines()
+    assert len(rows) == len(found.faces) + 1
+    assert (tmp_path / "maps" / "faces.gpkg").is_file()
+    assert bpy.ops.rockfall.remove_maps() == {"FINISHED"}
+    assert module.faces_of(bpy.context.scene) is None
+
+
+def test_the_probe_tells_the_numbers_of_the_face(mapped: bpy.types.Scene, part) -> None:
+    probe = part("rockfall_addon.steps.simulation.face_overlay")
+    faces = part("rockfall_addon.scene.hazard_maps").faces_of(mapped)
+    row = int(np.nanargmax(faces.layers["Nr_contacts"]))
+    middle = faces.corners[row].mean(axis=0)
+    above = middle + np.array([0.0, 0.0, 30.0])
+    down = np.array([0.0, 0.0, -1.0])
+    assert probe.face_under(faces, above, down, 30.0) == row
+    assert probe.face_under(faces, above, down, 10.0) == -1, "the terrain is before it"
+    sentences, table = probe.card_of(faces, row)
+    assert sentences[0].startswith(f"{faces.layers['Nr_blocks'][row]:.0f} of 150 blocks touch this face of the terrain")
+    energy = next(cells for cells in table if cells[0] == "kinetic energy [kJ]")
+    assert energy[table[0].index("max")] == f"{faces.layers['E_max'][row]:.3g}"
+    assert probe.card_of(faces, -1) == (["No block touches this face."], [])

@@ -45,10 +45,15 @@ def case_maps_of_the_demo(window):
     yield from window.move(region.x + spot.x - 2, region.y + spot.y)
     yield 1.0
     assert window.screenshot("2-energy").read_bytes() != reach.read_bytes(), "another map is painted at once"
+    settings().map_on, settings().face_layer = "FACES", "V_max"
+    yield 0.5
+    yield from window.move(region.x + spot.x + 1, region.y + spot.y)
+    yield 1.0
+    window.screenshot("3-faces")
     settings().seed = 5
     window.theme("Light")
     yield 1.0
-    window.screenshot("3-light-and-old")
+    window.screenshot("4-light-and-old")
     assert maps.is_stale(scene)
     with window.override():
         bpy.ops.ed.undo()
@@ -58,4 +63,4 @@ def case_maps_of_the_demo(window):
         bpy.ops.ed.redo()
     yield 0.5
     assert maps.maps_of(bpy.context.scene) is not None, "redone"
-    window.screenshot("4-redone")
+    window.screenshot("5-redone")

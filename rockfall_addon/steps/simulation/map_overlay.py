@@ -10,10 +10,12 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ....core.hazard.classes import Classes, classes_of
+from ....core.hazard.face_tally import FACE_LAYERS
 from ....core.hazard.maps import LAYERS, Maps
 from ....core.impact_models.registry import MODELS
 from ...scene import hazard_maps, problems, simulation, store, terrain, terrain_mesh
 from ...view import legend
+from . import face_overlay
 
 NEARER = 2e-5
 """The map is drawn so much nearer, in depth, that the terrain that it lies on does not speckle it."""
@@ -68,6 +70,7 @@ def register() -> None:
 def unregister() -> None:
     _batches.clear()
     _texture.clear()
+    face_overlay.unregister()
     _shader.cache_clear()
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
@@ -105,31 +108,39 @@ def _draw_map() -> None:
     if not is_drawn(context):
         return
     scene = context.scene
+    faces = face_overlay.shown_faces(scene)
     found = hazard_maps.maps_of(scene)
-    painted = None if found is None else _painted(scene, found)
-    if painted is None:
+    painted = None if found is None or faces is not None else _painted(scene, found)
+    if painted is None and faces is None:
         return
-    shader = _shader()
     gpu.state.blend_set("ALPHA")
     gpu.state.depth_test_set("LESS_EQUAL")
     gpu.state.depth_mask_set(False)
-    tiles = [tile for tile in terrain.tiles(scene) if tile.visible_get()]
-    meshes = {_drawn_mesh(tile).session_uid for tile in tiles}
-    for gone in _batches.keys() - meshes:
-        del _batches[gone]
     with gpu.matrix.push_pop_projection():
         matrix = gpu.matrix.get_projection_matrix()
         matrix[2] -= NEARER * matrix[3]
         gpu.matrix.load_projection_matrix(matrix)
-        for tile in tiles:
-            batch = _batch_of(tile)
-            shader.bind()
-            shader.uniform_float("grid", painted.grid)
-            shader.uniform_float("opacity", OPACITY)
-            shader.uniform_sampler("map", painted.texture)
-            batch.draw(shader)
+        if faces is not None:
+            face_overlay.draw(scene, faces)
+        elif painted is not None:
+            _draw_cells(scene, painted)
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")
+
+
+def _draw_cells(scene: bpy.types.Scene, painted: _Painted) -> None:
+    shader = _shader()
+    tiles = [tile for tile in terrain.tiles(scene) if tile.visible_get()]
+    meshes = {_drawn_mesh(tile).session_uid for tile in tiles}
+    for gone in _batches.keys() - meshes:
+        del _batches[gone]
+    for tile in tiles:
+        batch = _batch_of(tile)
+        shader.bind()
+        shader.uniform_float("grid", painted.grid)
+        shader.uniform_float("opacity", OPACITY)
+        shader.uniform_sampler("map", painted.texture)
+        batch.draw(shader)
 
 
 def _painted(scene: bpy.types.Scene, obj: bpy.types.Object) -> _Painted | None:
@@ -195,10 +206,16 @@ def _draw_legend() -> None:
     if not scene.rockfall.show_legend or not is_drawn(context):
         return
     obj = hazard_maps.maps_of(scene)
-    painted = None if obj is None else _painted(scene, obj)
-    if painted is None:
+    faces, settings = face_overlay.shown_faces(scene), scene.rockfall_simulation
+    if obj is None:
         return
-    layer, classes = LAYERS[scene.rockfall_simulation.map_layer], painted.classes
+    if faces is not None:
+        layer, classes = FACE_LAYERS[settings.face_layer], face_overlay.classes(scene, faces)
+    else:
+        painted = _painted(scene, obj)
+        layer, classes = LAYERS[settings.map_layer], None if painted is None else painted.classes
+    if classes is None:
+        return
     scale = context.preferences.system.ui_scale
     left = context.region.width - legend.covered_right(context.area) - (LEGEND_WIDTH + legend.MARGIN) * scale
     rows = [(label, tuple(colour)) for label, colour in zip(classes.labels, classes.colours.tolist(), strict=True)]

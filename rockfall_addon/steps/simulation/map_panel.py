@@ -36,7 +36,10 @@ class ROCKFALL_PT_simulation_maps(RockfallPanel, bpy.types.Panel):
             return
         box = layout.box()
         show_remarks(context, box, hazard_maps.remarks(scene))
-        box.prop(settings, "map_layer", text="")
+        of_faces = hazard_maps.faces_of(scene) is not None
+        if of_faces:
+            box.row().prop(settings, "map_on", expand=True)
+        box.prop(settings, "face_layer" if of_faces and settings.map_on == "FACES" else "map_layer", text="")
         column = box.column(align=True)
         column.prop(settings, "show_map")
         row = column.row()

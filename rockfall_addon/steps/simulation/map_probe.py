@@ -14,7 +14,7 @@ from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES, Maps
 from ....core.terrain.raycast import cast_ray
 from ...scene import hazard_maps, problems, simulation_setup
 from ...view import legend
-from . import map_overlay
+from . import face_overlay, map_overlay
 
 AWAY = 22
 """Between the mouse and the card [px at interface scale 1]."""
@@ -64,10 +64,15 @@ def place_under(context: bpy.types.Context, spot: np.ndarray) -> np.ndarray | No
         surface = simulation_setup.ground(context.scene)
     except RockfallError:
         return None
-    origin = np.array(region_2d_to_origin_3d(context.region, context.region_data, Vector(spot)))
-    direction = np.array(region_2d_to_vector_3d(context.region, context.region_data, Vector(spot)))
-    hit = cast_ray(surface, origin, direction)
+    hit = cast_ray(surface, *_ray(context, spot))
     return hit.point if hit is not None else None
+
+
+def _ray(context: bpy.types.Context, spot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Origin and direction (3,) of the ray through a place of the region, local."""
+    region, view = context.region, context.region_data
+    origin = np.array(region_2d_to_origin_3d(region, view, Vector(spot)))
+    return origin, np.array(region_2d_to_vector_3d(region, view, Vector(spot)))
 
 
 @problems.guarded
@@ -83,6 +88,14 @@ def _draw(mouse: tuple[int, int]) -> None:
     if obj is None or not ((spot >= 0) & (spot <= (region.width, region.height))).all():
         return
     place = place_under(context, spot)
+    faces = face_overlay.shown_faces(scene)
+    if faces is not None:
+        origin, direction = _ray(context, spot)
+        far = np.inf if place is None else float(np.linalg.norm(place - origin))
+        row = face_overlay.face_under(faces, origin, direction, far)
+        if row >= 0 or place is not None:
+            _draw_card(context, mouse, *face_overlay.card_of(faces, row))
+        return
     maps = hazard_maps.read(obj)
     cell = None if place is None else hazard_maps.cell_at(maps.cells, place)
     if cell is not None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
+from ....core.exchange.face_maps import write_face_maps
 from ....core.exchange.map_output import draw_maps, write_maps
 from ....core.impact_models.registry import find_model
 from ....core.output import output_folder
@@ -34,9 +35,8 @@ class ROCKFALL_OT_compute_maps(InBackground, bpy.types.Operator):
             return hazard_maps.run(planned, progress)
 
         def keep(scene: bpy.types.Scene, found: object) -> str:
-            maps, remarks = found
-            hazard_maps.show(scene, maps, planned.model, said, remarks)
-            return remarks[0].text
+            hazard_maps.show(scene, found, planned.model, said)
+            return found.remarks[0].text
 
         return Work("maps", compute, keep, keeps_part=True)
 
@@ -58,7 +58,8 @@ class ROCKFALL_OT_remove_maps(bpy.types.Operator):
 
 
 class ROCKFALL_OT_export_maps(InBackground, bpy.types.Operator):
-    """Write all maps as GeoTIFF with styles for QGIS, and figures of the most important ones"""
+    """Write all maps as GeoTIFF with styles for QGIS, those of the faces as GeoPackage and table, and figures of the
+    most important ones"""
 
     bl_idname = "rockfall.export_maps"
     bl_label = "Export Maps"
@@ -81,6 +82,7 @@ class ROCKFALL_OT_export_maps(InBackground, bpy.types.Operator):
         scene, folder = context.scene, Path(bpy.path.abspath(self.directory))
         obj = hazard_maps.maps_of(scene)
         maps, model = hazard_maps.read(obj), str(obj[store.MODEL])
+        faces = hazard_maps.faces_of(scene)
         surface, shift = simulation_setup.ground(scene), georeference.read_shift(scene)
         seed = str(scene.rockfall_simulation.seed)
 
@@ -88,6 +90,7 @@ class ROCKFALL_OT_export_maps(InBackground, bpy.types.Operator):
             with output_folder(folder) as place:
                 about = {"MODEL": model, "SEED": seed}
                 written = write_maps(maps, place, shift, about, progress)
+                written += [] if faces is None else write_face_maps(faces, place, shift, about)
                 said = find_model(model).title
                 return written + draw_maps(maps, surface, place, said=said, progress=progress)
 

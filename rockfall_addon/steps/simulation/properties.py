@@ -15,6 +15,7 @@ from bpy.props import (
 
 from ....core.constants import ROCK_DENSITY_KGPM3
 from ....core.hazard.cells import LEAST_M
+from ....core.hazard.face_tally import FACE_LAYERS
 from ....core.hazard.maps import LAYERS
 from ....core.simulation.block_shapes import SHAPES
 from ....core.simulation.engine import FRICTION
@@ -234,6 +235,20 @@ class SimulationSettings(bpy.types.PropertyGroup):
     map_layer: EnumProperty(
         name="Map", description="What is painted on the terrain",
         items=[(name, layer.title, f"{layer.meaning} ({name})") for name, layer in LAYERS.items()],
+        default="Reach_probability", update=_map_changed,
+    )  # fmt: skip
+    map_on: EnumProperty(
+        name="Of", description="What the painted map is of",
+        items=[
+            ("CELLS", "Cells", "Cells in plan: what passes through them"),
+            ("FACES", "Faces", "Faces of the mesh: what happens at contacts with them, also on cliffs, which have no "
+             "cell of their own"),
+        ],
+        default="CELLS", update=_map_changed,
+    )  # fmt: skip
+    face_layer: EnumProperty(
+        name="Map", description="What is painted on the faces",
+        items=[(name, layer.title, f"{layer.meaning} ({name})") for name, layer in FACE_LAYERS.items()],
         default="Reach_probability", update=_map_changed,
     )  # fmt: skip
     show_map: BoolProperty(

@@ -13,7 +13,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError as FutureCancelledError
 from contextlib import ExitStack, suppress
 from importlib import import_module
+from pathlib import Path
 from queue import Empty, Queue
+from tempfile import TemporaryDirectory
 from threading import Thread
 from types import TracebackType
 from typing import Any
@@ -24,6 +26,7 @@ from ..extras import CLUSTER, demand
 from ..simulation.release import Releases
 from ..versions import versions
 from .ensembles import Chunk, Work
+from .shared_work import read_shared, write_shared
 
 ANSWER_S = 15.0
 """A scheduler that takes longer does not answer; so long is waited for its first worker, too."""
@@ -35,6 +38,16 @@ BEAT_S, LOOK_S = 0.2, 2.0
 """Between two beats of the progress, and two looks at the workers."""
 ANYWHERE = "127.0.0.1:0"
 """A port that is free, which only this machine reaches."""
+OF_WORKERS = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.tick.limit": "1m",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.worker.memory.monitor-interval": "2s",
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": 1 << 30,
+}
+"""Dask looks at itself and its workers up to a hundred times a second, for people who watch it, and lets them give back
+memory that the next chunk takes again. A chunk takes a second."""
 TRIES = 3
 """A chunk whose computation fails is computed so often again."""
 
@@ -59,6 +72,7 @@ class DaskPool:
         self._client: Any = None
 
     def __enter__(self) -> "DaskPool":
+        from dask import config
         from distributed import Client, LocalCluster
 
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said by us
@@ -67,6 +81,7 @@ class DaskPool:
             warnings.simplefilter("ignore")
             address: Any = self._address
             if address is None:
+                self._open.enter_context(config.set(OF_WORKERS))
                 address = self._open.enter_context(
                     LocalCluster(
                         n_workers=self._workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50
@@ -96,12 +111,13 @@ class DaskPool:
     ) -> Iterator[tuple[int, Chunk]]:
         """See `ensembles.Pool`."""
         key = f"rockfall-{uuid4().hex}"
-        self._client.register_plugin(_plugin(work), name=key)
         finished: Queue[Any] = Queue()
         sent: dict[Any, int] = {}
         watch = _Watch(self._client)
         more = True
-        try:
+        with ExitStack() as meanwhile:
+            self._client.register_plugin(self._plugin(work, meanwhile), name=key)
+            meanwhile.callback(self._forget, key, sent)
             while True:
                 while more and len(sent) < AHEAD * watch.threads:
                     following = next(chunks, None)
@@ -125,10 +141,23 @@ class DaskPool:
                 number = sent.pop(future)
                 yield number, _result(future)
                 del future
-        finally:
-            with suppress(Exception):
-                self._client.cancel(list(sent), force=True)
-                self._client.unregister_worker_plugin(key)
+
+    def _plugin(self, work: Work, meanwhile: ExitStack) -> Any:
+        """What brings the work to each worker, once; to those on this machine in a file that they share."""
+        if self._address is None:
+            folder = meanwhile.enter_context(TemporaryDirectory(prefix="rockfall-", ignore_cleanup_errors=True))
+            file = Path(folder) / "work"
+            try:
+                write_shared(work, file)
+            except OSError:  # no room there: it is sent
+                return _plugin(work)
+            return _plugin(file)
+        return _plugin(work)
+
+    def _forget(self, key: str, sent: dict[Any, int]) -> None:
+        with suppress(Exception):
+            self._client.cancel(list(sent), force=True)
+            self._client.unregister_worker_plugin(key)
 
     def _compare_versions(self) -> None:
         """Refuse workers that would compute other bits."""
@@ -246,12 +275,15 @@ def _compute(key: str, releases: Releases, first_run: int) -> Chunk:
     """On a worker."""
     from distributed import get_worker
 
-    work: Work = get_worker().plugins[key].work
+    plugin = get_worker().plugins[key]
+    if isinstance(plugin.work, Path):
+        plugin.work = read_shared(plugin.work)
+    work: Work = plugin.work
     return work.chunk(releases, first_run)
 
 
-def _plugin(work: Work) -> Any:
-    """What brings the work to each worker, once."""
+def _plugin(work: Work | Path) -> Any:
+    """What brings the work to each worker, or says in which file it is."""
     from distributed import WorkerPlugin
 
     plugin = WorkerPlugin()

@@ -34,6 +34,11 @@ FEWEST_SHARE = 0.25
 RENEW_SHARE = 0.6
 type Steps = tuple[int, float]
 
+GLANCES, GLANCED_AT = 4, 250_000
+"""Pictures of a first look, and the pixels that they are reduced to."""
+LEAST_GLANCED = 120
+ALIKE = 0.08
+"""Of the peak of a phase correlation: below it two pictures show different things."""
 STILL_PX = 0.15
 """A tripod: the typical corner never moves further than this."""
 
@@ -93,6 +98,35 @@ def stabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
 def destabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
     """(n, 2) pixels of the reference frame as they lie in frames (n,); undoes `stabilise`."""
     return _through(np.linalg.inv(_of(motion, frame)).astype(np.float64), pixels)
+
+
+def glance(source: Source) -> float:
+    """How far the middle of a few pictures lies from that of the first one, the furthest [px]; NaN if that is not seen.
+
+    A look at the whole picture (phase correlation), not at its corners: for a first word on whether a camera is on a
+    tripod, within half a second. A motion that comes back between these pictures is not seen, nor one in tiny pictures.
+
+    Raises
+    ------
+    InputError : a picture cannot be read.
+    """
+    cv2 = opencv()
+    chosen = np.unique(np.linspace(0, source.time_s.size - 1, GLANCES).astype(np.intp)).tolist()
+    first, window, furthest = None, None, np.nan
+    for _, picture in frames(source, chosen):
+        if min(picture.shape[:2]) < LEAST_GLANCED:
+            break
+        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        while grey.size > GLANCED_AT:
+            grey = cv2.pyrDown(grey)
+        small = grey.astype(np.float32)
+        if first is None or window is None:
+            first, window = small, cv2.createHanningWindow(small.shape[::-1], cv2.CV_32F)
+            continue
+        (x, y), response = cv2.phaseCorrelate(first, small, window)
+        if response >= ALIKE:
+            furthest = np.nanmax([furthest, np.hypot(x, y) * picture.shape[1] / small.shape[1]])
+    return float(furthest)
 
 
 def background_motion(

@@ -23,6 +23,8 @@ LARGEST_GAIN = 3.0
 FASTEST_MPS = 150.0
 """No rockfall is this fast: that of a fall of 1 100 m in a vacuum."""
 FEWEST_FLIGHTS = 3
+GLANCE_PX = 6.0
+"""A first look at reduced pictures is not much more exact than this."""
 TREMBLE_PX = 2.0
 """A background that moves further than this is not that of a tripod in the wind."""
 
@@ -47,6 +49,17 @@ def no_tripod(motion: BackgroundMotion, camera: Camera, video: str) -> tuple[Rem
     text = (
         f"The background of {video} moves by {turn_deg(motion, camera):.1f}°, but its camera counts as a tripod: "
         "choose Hand-held in step 3 and follow the background."
+    )
+    return (Remark(text, "warning", "background"),)
+
+
+def moves_at_a_glance(moved_px: float, video: str) -> tuple[Remark, ...]:
+    """A warning on a camera whose pictures lie apart, as `glance` says; nothing where it does not know."""
+    if not moved_px > GLANCE_PX:
+        return ()
+    text = (
+        f"The background of {video} moves by {moved_px:.0f} px in the course of the video: if it was held by hand, "
+        "choose Hand-held in step 3 before you mark pairs."
     )
     return (Remark(text, "warning", "background"),)
 

@@ -14,7 +14,7 @@ from ...core.footage.background import BackgroundMotion
 from ...core.remarks import Remark, from_plain, from_text, to_plain, to_text
 from ...core.vectors import Array
 from ...core.workflow.alignment import counting_pairs, reference_frame
-from ...core.workflow.noticed import no_tripod
+from ...core.workflow.noticed import moves_at_a_glance, no_tripod
 from . import camera_paths, georeference, store, terrain, videos
 from .pairs import POINT, complete_of, open_pair, pairs_of, table
 
@@ -81,6 +81,13 @@ def moves(camera: bpy.types.Object) -> bool:
 def keep_background(camera: bpy.types.Object, motion: BackgroundMotion) -> None:
     """Remember whether the background of a video says that its camera is no tripod."""
     camera[store.BACKGROUND] = to_text(no_tripod(motion, camera_paths.camera_path(camera).reference, camera.name))
+
+
+def look_at_background(camera: bpy.types.Object, moved_px: float) -> None:
+    """Remember that the pictures of a video lie apart; what was found by following its background is not touched."""
+    said = moves_at_a_glance(moved_px, camera.name)
+    if said and store.BACKGROUND not in camera:
+        camera[store.BACKGROUND] = to_text(said)
 
 
 def background_remarks(camera: bpy.types.Object) -> tuple[Remark, ...]:

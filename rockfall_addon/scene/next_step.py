@@ -66,6 +66,8 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         sentence = "Add the videos of the fall, or import a table of timed picks. Without either, simulate in step 7."
         return NextStep(sentence, ("rockfall.add_video", "rockfall.import_picks", "rockfall.draw_release"))
     if camera is not None and not camera_paths.is_solved(camera):
+        for remark in alignment.background_remarks(camera):
+            return NextStep(remark.text, ("rockfall.align_views",))
         hint = alignment.hint(scene, camera) or alignment.solution_of(camera).problem
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
         return NextStep(sentence, ("rockfall.align_views",))

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import bpy
+import cv2
 import numpy as np
 import pytest
 from video_scene import DATA, Part, add, number_in, scene
@@ -194,3 +195,28 @@ def test_disabled_and_enabled(part: Part, installation: object) -> None:
     (camera,) = videos.cameras(scene())
     scene().frame_set(20)
     assert clocks.true_frame(scene(), camera) == 20
+
+
+def test_a_video_that_was_held_by_hand_is_asked_about_before_anything_is_marked(scan, part: Part) -> None:
+    """The demo's footage pans; it is asked until the camera is said to be hand-held."""
+    footage = Path(__file__).resolve().parents[2] / "assets" / "demo" / "footage" / "footage.mp4"
+    assert bpy.ops.rockfall.add_video(filepath=str(footage)) == {"FINISHED"}
+    following, videos = part("rockfall_addon.scene.next_step"), part("rockfall_addon.scene.videos")
+    camera = videos.active_camera(scene())
+    step = following.next_step(scene())
+    assert "if it was held by hand, choose Hand-held in step 3" in step.sentence
+    assert step.actions == ("rockfall.align_views",)
+    camera.rockfall_alignment.motion = "ROTATION"
+    assert "held by hand" not in following.next_step(scene()).sentence
+
+
+def test_a_tripod_is_not_asked_about(scan, part: Part, tmp_path: Path) -> None:
+    """A film of one noisy picture."""
+    rng = np.random.default_rng(1)
+    ground = cv2.GaussianBlur(rng.normal(120, 90, (240, 320, 3)), (0, 0), 2)
+    writer = cv2.VideoWriter(str(tmp_path / "still.mp4"), cv2.VideoWriter_fourcc(*"mp4v"), 25, (320, 240))
+    for _ in range(40):
+        writer.write(np.clip(ground + rng.normal(0, 4, ground.shape), 0, 255).astype(np.uint8))
+    writer.release()
+    assert bpy.ops.rockfall.add_video(filepath=str(tmp_path / "still.mp4")) == {"FINISHED"}
+    assert "held by hand" not in part("rockfall_addon.scene.next_step").next_step(scene()).sentence

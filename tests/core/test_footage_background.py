@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.footage.background import _fit, background_motion, destabilise, no_motion, stabilise
+from rockfall.core.footage.background import _fit, background_motion, destabilise, glance, no_motion, stabilise
 from rockfall.core.footage.sources import Pictures
 from scipy.optimize import least_squares
 
@@ -133,3 +133,18 @@ def test_what_cannot_be_followed_is_told_with_its_frame(what: str) -> None:
 def test_frames_beyond_what_is_known() -> None:
     with pytest.raises(InputError, match="frame 12"):
         stabilise(no_motion(3, 9), np.array([12]), np.zeros((1, 2)))
+
+
+def test_a_first_look_tells_a_hand_from_a_tripod() -> None:
+    """Four pictures: those of the pan lie apart by what it was made with; a block alone moves nothing."""
+    count = 31
+    moved = glance(clip(film(count)))
+    middle = np.array([[200.0, 150.0]])
+    true = max(np.hypot(*(true_places(frame, middle) - middle).T)[0] for frame in (10, 20, 30))
+    assert moved == pytest.approx(true, rel=0.25)
+    assert glance(clip(film(count, still=True))) < 0.5
+
+
+def test_a_first_look_at_different_scenes_says_nothing() -> None:
+    other = [np.clip(ground(seed)[:300, :400], 0, 255).astype(np.uint8) for seed in (3, 4, 5, 6)]
+    assert np.isnan(glance(clip(other)))

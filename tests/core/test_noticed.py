@@ -9,7 +9,13 @@ from rockfall.core.footage.background import BackgroundMotion, no_motion
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
-from rockfall.core.workflow.noticed import impossible_sizes, no_tripod, tracks_off_the_motion, turn_deg
+from rockfall.core.workflow.noticed import (
+    impossible_sizes,
+    moves_at_a_glance,
+    no_tripod,
+    tracks_off_the_motion,
+    turn_deg,
+)
 
 
 def course(offset_px):
@@ -78,3 +84,10 @@ def test_a_background_that_turns_is_no_tripod(turn, told):
     assert len(said) == told
     assert all("moves by 13.6°" in remark.text for remark in said)
     assert no_tripod(no_motion(0, 2), camera, "left") == ()
+
+
+def test_a_first_look_asks_whether_it_was_held_by_hand():
+    (said,) = moves_at_a_glance(179.4, "left")
+    assert "left moves by 179 px" in said.text
+    assert "Hand-held in step 3" in said.text
+    assert moves_at_a_glance(3.0, "left") == () == moves_at_a_glance(float("nan"), "left")

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Step 2: the videos, their times, and what is shown of them."""
 
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -8,7 +9,8 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntPropert
 from mathutils import Matrix
 
 from ....core.errors import RockfallError
-from ...scene import footage, new_videos, start_up, store, video_times, videos
+from ....core.footage.background import glance
+from ...scene import alignment, footage, new_videos, start_up, store, video_files, video_times, videos
 from ...view import workspace
 from ...view.first_import import FirstImport, begin_file
 from ...view.from_file import FromFile, remember_folder
@@ -65,6 +67,9 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
                 errors.append(str(error))
         if not added:
             raise RockfallError("\n".join(errors))
+        for camera in added:
+            with suppress(RockfallError):  # it is a look, no more
+                alignment.look_at_background(camera, glance(video_files.video_of(camera)))
         _look_through(context, added[0])
         if first:
             begin_file(context, opens_workspace=self.opens_workspace)

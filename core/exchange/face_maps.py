@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..georeference import GlobalShift
+from ..hazard.classes import classes_in
 from ..hazard.face_tally import FACE_LAYERS, FaceMaps
 from ..vectors import cross, norm
 from .geopackage import FeatureLayer, write_geopackage
 from .map_output import CONDITIONAL
+from .qgis_styles import polygon_style
 from .tables import write_columns
 
+SHOWN = "Reach_probability"
+"""The column whose classes are shown when the file is opened."""
 GEOPACKAGE, TABLE = "faces.gpkg", "faces.csv"
 
 
@@ -49,9 +53,11 @@ def write_face_maps(
     said = {"blocks": str(maps.blocks), "conditional": CONDITIONAL, **(about or {})}
     said |= {name: f"{layer.meaning}{f' [{layer.unit}]' if layer.unit else ''}" for name, layer in FACE_LAYERS.items()}
     rings = corners[:, [0, 1, 2, 0]].reshape(-1, 3)
+    reach = maps.layers[SHOWN]
+    style = polygon_style(SHOWN, classes_in("%", reach), float(reach.max(initial=0.0)), "%")
     layer = FeatureLayer(
         "faces", "Faces of the mesh that blocks touch, and what happens there", rings,
-        np.arange(len(corners) + 1) * 4, columns, closed=True,
+        np.arange(len(corners) + 1) * 4, columns, style, closed=True,
     )  # fmt: skip
     write_geopackage(folder / GEOPACKAGE, [layer], shift, said)
     places = dict(zip(("x_m", "y_m", "z_m"), shift.to_survey(corners.mean(axis=1)).T, strict=True))

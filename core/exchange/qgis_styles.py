@@ -78,25 +78,62 @@ def point_style(colour: Sequence[float], size_mm: float, shape: str = "circle", 
     return _single_symbol("marker", "SimpleMarker", options, opacity)
 
 
-def _single_symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float) -> str:
-    told = "\n".join(
-        f'            <Option type="QString" name="{name}" value="{value}"/>' for name, value in options.items()
+def polygon_style(column: str, classes: Classes, greatest: float, unit: str) -> str:
+    """The style of polygons in the classes of a column; those without a value are not drawn.
+
+    Parameters
+    ----------
+    greatest : value of the column.
+    """
+    edges = [0.0, *classes.limits, max(greatest, classes.limits[-1])]
+    ranges = "\n".join(
+        f'      <range lower="{low:.10g}" upper="{high:.10g}" symbol="{i}" render="true" '
+        f"label={quoteattr(f'{label} {unit}'.strip())}/>"
+        for i, (low, high, label) in enumerate(zip(edges[:-1], edges[1:], classes.labels, strict=True))
+    )
+    symbols = "\n".join(
+        _symbol(
+            "fill", "SimpleFill", {"color": _rgba(colour), "style": "solid", "outline_style": "no"}, OPACITY, str(i)
+        )
+        for i, colour in enumerate(classes.colours.tolist())
     )
     return f"""{HEAD}<qgis version="{VERSION}" styleCategories="Symbology">
-  <renderer-v2 type="singleSymbol" symbollevels="0" enableorderby="0" forceraster="0">
+  <renderer-v2 type="graduatedSymbol" attr="{column}" graduatedMethod="GraduatedColor" symbollevels="0" forceraster="0">
+    <ranges>
+{ranges}
+    </ranges>
     <symbols>
-      <symbol type="{kind}" name="0" alpha="{opacity:g}" clip_to_extent="1" force_rhr="0">
-        <layer class="{layer}" enabled="1" pass="0" locked="0">
-          <Option type="Map">
-{told}
-          </Option>
-        </layer>
-      </symbol>
+{symbols}
     </symbols>
   </renderer-v2>
   <blendMode>0</blendMode>
 </qgis>
 """
+
+
+def _single_symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float) -> str:
+    return f"""{HEAD}<qgis version="{VERSION}" styleCategories="Symbology">
+  <renderer-v2 type="singleSymbol" symbollevels="0" enableorderby="0" forceraster="0">
+    <symbols>
+{_symbol(kind, layer, options, opacity, "0")}
+    </symbols>
+  </renderer-v2>
+  <blendMode>0</blendMode>
+</qgis>
+"""
+
+
+def _symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float, name: str) -> str:
+    told = "\n".join(
+        f'            <Option type="QString" name="{option}" value="{value}"/>' for option, value in options.items()
+    )
+    return f"""      <symbol type="{kind}" name="{name}" alpha="{opacity:g}" clip_to_extent="1" force_rhr="0">
+        <layer class="{layer}" enabled="1" pass="0" locked="0">
+          <Option type="Map">
+{told}
+          </Option>
+        </layer>
+      </symbol>"""
 
 
 def _hex(colour: Array) -> str:

@@ -2,8 +2,12 @@
 """Maps of faces as files: read by GDAL and as a table, against what the runs themselves did."""
 
 import csv
+import sqlite3
 from collections import Counter
+from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -77,3 +81,21 @@ def test_an_outline_that_is_not_closed_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not closed"):
         write_geopackage(tmp_path / "open.gpkg", [layer], GlobalShift())
     assert not (tmp_path / "open.gpkg").exists()
+
+
+def test_the_style_has_a_class_for_each_face(output: Path) -> None:
+    """As QGIS reads it: ranges that follow each other, each with a symbol, from 0 to the greatest value."""
+    with closing(sqlite3.connect(output / "maps" / "faces.gpkg")) as database:
+        ((text,),) = database.execute("SELECT styleQML FROM layer_styles WHERE f_table_name = 'faces'").fetchall()
+    renderer = ElementTree.fromstring(text).find("renderer-v2")
+    assert renderer.get("attr") == "Reach_probability"
+    ranges = renderer.findall("ranges/range")
+    edges = [(float(one.get("lower")), float(one.get("upper"))) for one in ranges]
+    assert edges[0][0] == 0
+    assert all(high == low for (_, high), (low, _) in pairwise(edges))
+    greatest = max(float(row["Reach_probability"]) for row in rows_of(output / "maps" / "faces.csv"))
+    assert edges[-1][1] >= greatest * (1 - 1e-6)
+    symbols = {one.get("name"): one for one in renderer.findall("symbols/symbol")}
+    assert {one.get("symbol") for one in ranges} == set(symbols)
+    colours = {one.find(".//Option[@name='color']").get("value") for one in symbols.values()}
+    assert len(colours) == len(symbols)

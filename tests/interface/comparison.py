@@ -123,7 +123,7 @@ def case_drag_a_slider_calibrate_and_undo(window):
     job = window.part("rockfall_addon.view.job")
     with window.override("NODE_EDITOR"):
         bpy.ops.rockfall.calibrate("INVOKE_DEFAULT")
-    yield 1.5
+    yield from window.wait_for(lambda: job.is_running() and job._running[0].share > 0, 20, "at work")
     window.screenshot("calibrating")
     yield from window.press("ESC", *window.centre())
     yield from window.wait_for(lambda: not job.is_running(), 60, "stopped")

@@ -167,7 +167,7 @@ class Window:
     def theme(self, name: str) -> None:
         """Blender's own theme of a name: "Dark" or "Light"."""
         presets = f"{bpy.utils.system_resource('SCRIPTS')}/presets/interface_theme"
-        with self.override():
+        with bpy.context.temp_override(window=self.window):
             bpy.ops.script.execute_preset(
                 filepath=f"{presets}/Blender_{name}.xml", menu_idname="USERPREF_MT_interface_theme_presets"
             )

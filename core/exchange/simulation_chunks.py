@@ -87,7 +87,7 @@ def simulate_in_chunks(
     ------
     InputError, CancelledError : see `run_ensemble`.
     """
-    recorded = recorded_for(record, bool(ground.structures))
+    recorded = kept_records = recorded_for(record, bool(ground.structures))
     tables = TablesOf(tuple(sorted(record)), recorded, drawn_names(settings))
     tallies: dict[str, Tally] = {RUNS: RunTally()}
     if cell_m is not None:
@@ -106,7 +106,7 @@ def simulate_in_chunks(
         began = time.perf_counter()
         decides = (ground, releases, one, first_run, size, tables, cell_m, faces, tuple(screens), versions())
         store = ChunkStore(kept / content_digest(*decides)[:KEY_LETTERS])
-        work = Work(ground, one, tallies, recorded, tables)
+        work = Work(ground, one, tallies, recorded, tables, kept_records)
         found = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)
         if cell_m is not None:
             maps[one.model] = cast(CellTally, found[MAPS])

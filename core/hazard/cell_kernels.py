@@ -14,9 +14,10 @@ from math import ceil, floor, inf, isnan, nan, sqrt
 import numpy as np
 
 from ..compiled import borrowing, kernel
+from ..simulation.drag_kernels import DRAG_CHANGE, with_drag
 from ..simulation.height_kernels import flight_height
-from ..simulation.motion_kernels import DRAG_CHANGE, ON_GROUND, with_drag
 from ..simulation.plan_kernels import triangle_below
+from ..simulation.record_kernels import ON_GROUND
 from ..terrain.kernels import STACK_SIZE
 
 STRAIGHT_M = 0.001

@@ -6,7 +6,7 @@ from math import sqrt
 import numpy as np
 
 from ..compiled import kernel
-from ..simulation.motion_kernels import IMPACT, ON_GROUND, TREE
+from ..simulation.record_kernels import IMPACT, ON_GROUND, TREE
 
 
 @kernel

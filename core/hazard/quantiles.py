@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled import in_chunks
 from ..errors import InputError, RockfallError
 from ..vectors import Array, Indices
 from .tally import Arrays
@@ -97,9 +98,13 @@ class Sketches:
         store, (slots, key) = self._fold(), self._slots()
         k, q = len(slots), len(self.units)
         mean, error, quantiles = np.empty((k, q)), np.empty((k, q)), np.empty((k, q, len(shares)))
-        figures(
-            slots, np.array(shares, np.float64), erring, self.units, edges(), store.pool, store.floats, store.counts,
-            store.sums, store.greatest, store.raw, store.runs, mean, quantiles, error,
+        wanted, edge = np.array(shares, np.float64), edges()
+        in_chunks(
+            lambda i, j: figures(
+                slots[i:j], wanted, erring, self.units, edge, store.pool, store.floats, store.counts, store.sums,
+                store.greatest, store.raw, store.runs, mean[i:j], quantiles[i:j], error[i:j],
+            ),
+            k,
         )  # fmt: skip
         greatest = np.where(np.isnan(mean), np.nan, store.greatest[slots])
         counts = store.counts[slots]
@@ -107,20 +112,25 @@ class Sketches:
 
     def arrays(self) -> Arrays:
         """All of it, in the order of the keys."""
-        from .sketch_kernels import FEW, export
+        from .sketch_kernels import FEW, count_bins, export
 
         store, (slots, key) = self._fold(), self._slots()
         q, counts = len(self.units), store.counts[slots]
         rows_begin = np.concatenate([[0], np.cumsum(np.where(counts[:, 0] <= FEW, counts[:, 0], 0))])
-        rows, bin_begin = np.empty((int(rows_begin[-1]), q), np.float32), np.zeros((len(slots), q + 1), np.int64)
-        bins, bin_counts = np.empty(0, np.int16), np.empty(0, np.uint32)
-        for _ in range(2):  # first to see how many there are
-            total = export(
-                slots, store.pool, store.floats, store.counts, store.raw, store.runs, q, rows_begin, rows, bin_begin,
-                bins, bin_counts,
-            )  # fmt: skip
-            if total > len(bins):
-                bins, bin_counts = np.empty(total, np.int16), np.empty(total, np.uint32)
+        number = np.empty((len(slots), q), np.int64)
+        in_chunks(lambda i, j: count_bins(slots[i:j], store.pool, q, store.runs, number[i:j]), len(slots))
+        ends = np.cumsum(number.ravel()).reshape(number.shape)
+        bin_begin = np.column_stack([ends[:, :1] - number[:, :1], ends])
+        total = int(ends[-1, -1]) if len(slots) else 0
+        rows = np.empty((int(rows_begin[-1]), q), np.float32)
+        bins, bin_counts = np.empty(total, np.int16), np.empty(total, np.uint32)
+        in_chunks(
+            lambda i, j: export(
+                slots[i:j], store.pool, store.floats, store.raw, store.runs, q, rows_begin[i : j + 1], rows,
+                bin_begin[i:j], bins, bin_counts,
+            ),
+            len(slots),
+        )  # fmt: skip
         return {
             "kind": np.array([self.keys, self.column]), "units": self.units, "limits": self.limits,
             "key": key.astype(np.int32), "counts": counts, "sums": store.sums[slots],

@@ -25,6 +25,8 @@ OCTAVE, LOWEST, OCTAVES = 35, -10, 50
 MOST_BINS = OCTAVE * OCTAVES
 MOST_BLOCKS = MOST_BINS // WIDTH + 1
 """Of one column; raw runs are shorter."""
+SHORT = 48
+"""Up to so many values are sorted by insertion: quicker, and most keys have few."""
 USED, SLOTS = MOST_BLOCKS + 1, MOST_BLOCKS + 2
 """Where `state` has them."""
 FULL = 2.0**62
@@ -268,42 +270,70 @@ def fold_bins(  # type: ignore[no-untyped-def]
     return len(wanted), DONE
 
 
+@borrowing
+def _sort(values):  # type: ignore[no-untyped-def]
+    """Sort (n,) in place; what is no number comes last."""
+    for i in range(1, len(values)):
+        value, j = values[i], i
+        while j > 0 and (values[j - 1] > value or (values[j - 1] != values[j - 1] and value == value)):
+            values[j] = values[j - 1]
+            j -= 1
+        values[j] = value
+
+
 @kernel
-def export(slots, pool, floats, counts, raw, runs, columns, rows_begin, rows, bin_begin, bins, bin_counts):  # type: ignore[no-untyped-def]
-    """Rows and bins of slots (k,), each column of the rows in rising order; returns how many bins.
+def _in_order(values):  # type: ignore[no-untyped-def]
+    if len(values) <= SHORT:
+        _sort(values)
+    else:
+        values.sort()
+
+
+@kernel
+def count_bins(slots, pool, columns, runs, number):  # type: ignore[no-untyped-def]
+    """Fill `number` (k, q): how many bins of each slot have a value."""
+    for i in range(len(slots)):
+        for c in range(columns):
+            first, blocks = runs[slots[i], c, 0], runs[slots[i], c, 2]
+            number[i, c] = 0
+            for b in range(first, first + blocks):
+                for k in range(WIDTH):
+                    number[i, c] += pool[b, k] > 0
+
+
+@kernel
+def export(slots, pool, floats, raw, runs, columns, rows_begin, rows, bin_begin, bins, bin_counts):  # type: ignore[no-untyped-def]
+    """Fill rows and bins of slots (k,), each column of the rows in rising order.
 
     Parameters
     ----------
-    rows_begin : (k + 1,) of each slot in `rows` (p, q).
-    bin_begin : (k, q + 1), filled. bins, bin_counts : filled where they are long enough.
+    rows_begin : (k + 1,) of each slot in `rows` (p, q); bin_begin : (k, q + 1) in `bins` and `bin_counts`.
     """
-    each, total = WIDTH // columns, 0
+    each = WIDTH // columns
+    held = np.empty(FEW, np.float32)
     for i in range(len(slots)):
         slot = slots[i]
-        first = rows_begin[i]
-        for r in range(rows_begin[i + 1] - first):
-            for c in range(columns):
-                rows[first + r, c] = floats[raw[slot, 0] + r // each, r % each * columns + c]
+        first, n = rows_begin[i], rows_begin[i + 1] - rows_begin[i]
         for c in range(columns):
-            if rows_begin[i + 1] > first:
-                rows[first : rows_begin[i + 1], c] = np.sort(rows[first : rows_begin[i + 1], c])
-            bin_begin[i, c] = total
+            for r in range(n):
+                held[r] = floats[raw[slot, 0] + r // each, r % each * columns + c]
+            _in_order(held[:n])
+            for r in range(n):
+                rows[first + r, c] = held[r]
+            at = bin_begin[i, c]
             for b in range(runs[slot, c, 2]):
                 for k in range(WIDTH):
                     count = pool[runs[slot, c, 0] + b, k]
                     if count:
-                        if total < len(bins):
-                            bins[total], bin_counts[total] = WIDTH * (runs[slot, c, 1] + b) + k, count
-                        total += 1
-        bin_begin[i, columns] = total
-    return total
+                        bins[at], bin_counts[at] = WIDTH * (runs[slot, c, 1] + b) + k, count
+                        at += 1
 
 
 @borrowing
-def _at_rank(rows, c, first, n, rank):  # type: ignore[no-untyped-def]
+def _at_rank(values, n, rank):  # type: ignore[no-untyped-def]
     low = min(np.int64(rank), n - 1)
     high = min(low + 1, n - 1)
-    a, b = np.float64(rows[first + low, c]), np.float64(rows[first + high, c])
+    a, b = np.float64(values[low]), np.float64(values[high])
     return a + (rank - low) * (b - a)
 
 
@@ -343,7 +373,7 @@ def figures(  # type: ignore[no-untyped-def]
     """
     columns = sums.shape[1]
     each = WIDTH // columns
-    held = np.empty((FEW, columns), np.float32)
+    held = np.empty(FEW, np.float32)
     for i in range(len(slots)):
         slot = slots[i]
         deviation = sqrt(erring * (1.0 - erring) / counts[slot, 1])
@@ -353,9 +383,9 @@ def figures(  # type: ignore[no-untyped-def]
                 for r in range(counts[slot, 0]):
                     value = floats[raw[slot, 0] + r // each, r % each * columns + c]
                     if value == value:
-                        held[n, c] = value
+                        held[n] = value
                         n += 1
-                held[:n, c] = np.sort(held[:n, c])
+                _in_order(held[:n])
             else:
                 for b in range(runs[slot, c, 2]):
                     for k in range(WIDTH):
@@ -367,14 +397,14 @@ def figures(  # type: ignore[no-untyped-def]
             mean[i, c] = sums[slot, c] * units[c] / n
             for s in range(len(shares)):
                 if raw[slot, 1]:
-                    quantiles[i, c, s] = _at_rank(held, c, 0, n, shares[s] * (n - 1))
+                    quantiles[i, c, s] = _at_rank(held, n, shares[s] * (n - 1))
                 else:
                     value = _in_bins(pool, runs[slot, c], edge, shares[s] * (n - 1), False)
                     quantiles[i, c, s] = min(value, np.float64(greatest[slot, c]))
             if erring - deviation > 0.0 and erring + deviation < 1.0:
                 low, high = (erring - deviation) * (n - 1), (erring + deviation) * (n - 1)
                 if raw[slot, 1]:
-                    error[i, c] = 0.5 * (_at_rank(held, c, 0, n, high) - _at_rank(held, c, 0, n, low))
+                    error[i, c] = 0.5 * (_at_rank(held, n, high) - _at_rank(held, n, low))
                 else:
                     run = runs[slot, c]
                     error[i, c] = 0.5 * (_in_bins(pool, run, edge, high, True) - _in_bins(pool, run, edge, low, True))

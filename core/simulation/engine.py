@@ -38,6 +38,8 @@ RECORDED: tuple[Recorded, ...] = ("ends", "impacts", "all")
 """How each run begins and ends; also flights and impacts; also each step on the ground. In the kernels' order."""
 FRICTION = 0.5
 """Coefficient of friction on the ground where none is given."""
+ROOM: dict[Recorded, int] = {"ends": 8, "impacts": 64, "all": 256}
+"""Records of one run that there is room for at first, among those of a batch."""
 ENOUGH = 1000
 """So many runs tell how much memory all will need."""
 
@@ -202,17 +204,15 @@ class Simulation:
         return replace(self, records=Records(**columns), recorded=record)
 
 
+AT_ONCE = 512
+"""Runs that are best simulated and looked at together: the records of more leave the processor's cache."""
+
+
 class RecordSpace:
     """Memory for the records of one simulation after the other: to take fresh memory costs more than to fill it."""
 
     def __init__(self) -> None:
-        self._rows = np.empty((0, 0))
-
-    def rows(self, number: int, columns: int) -> Array:
-        """(number, columns); what was there before is lost."""
-        if number > len(self._rows) or columns != self._rows.shape[1]:
-            self._rows = np.empty((number + number // 4, columns))
-        return self._rows[:number]
+        self.rows = np.empty((0, 0))
 
 
 _OF_RUNS = ("end", "time_s", "length_m", "v_max_mps", "impacts", "tree_hits", "position", "number")
@@ -239,7 +239,8 @@ def simulate(
     runs : (n,) all their numbers, rising, where they do not follow one another.
     record : what to keep of the motion, see `RECORDED`; it changes nothing of the runs.
     threads : None takes all cores. The result does not depend on it.
-    space : where the records go. They are lost when it is used again.
+    space : where the records go: one thread writes them there, run after run, and progress is not asked between. They
+        are lost when it is used again.
     progress : called with the number of finished blocks. A `CancelledError` raised in it ends the simulation with the
         runs that are finished, from the first on without a gap; for that it goes on for up to `WINDOW_S` or one batch.
 
@@ -254,9 +255,9 @@ def simulate(
         raise InputError("There is nothing to simulate: no block is released", advice="Give at least one release")
     ground.refuse_small(releases.radius_m)
     tree, zone = ground.tree, ground.zone_in_tree
-    results, moments, count = np.empty((n, 6)), list[Array](), np.zeros(n, np.intp)
+    results = np.empty((n, 7))
 
-    from .motion_kernels import COLUMNS, in_turn
+    from .record_kernels import COLUMNS, in_turn
 
     progress("Compiling where needed, then simulating", 0, n)
     facets, stems = ground.facets, in_cells(settings.trees)
@@ -269,37 +270,49 @@ def simulate(
     runs = np.arange(first_run, first_run + n) if runs is None else runs
     own = _own_rows(settings, len(ground.zones), runs)
     law, level = ROLLING.index(settings.rolling), RECORDED.index(record)
+    room = ROOM[record]
 
-    def batch(part: Indices) -> int:
-        ended = np.empty((part.size, 6))
-        rows = run_blocks(
-            tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, runs[part],
+    def recorded(part: Indices, rows: Array) -> tuple[Array, int]:
+        """The records of some runs, one run after the other: in these rows, or in more of them; and how many."""
+        ended = np.empty((part.size, 7))
+        rows, count = run_blocks(
+            tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, part, runs[part],
             settings.seed, *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts,
-            settings.most_s, level, stems, ended,
+            settings.most_s, level, stems, ended, rows,
         )  # fmt: skip
         results[part] = ended
-        count[part] = np.diff(np.flatnonzero(rows[:, 1] == RELEASED), append=len(rows))
-        rows[:, 0] = np.repeat(part, count[part])
-        moments.append(rows)
-        return len(rows)
+        return rows, count
 
-    there, started, recorded = available_bytes(), time.perf_counter(), 0
+    there, started, moments, whole = available_bytes(), time.perf_counter(), list[Array](), n
 
-    def told(moments: int, finished: int) -> None:
-        nonlocal recorded
-        recorded += moments
+    def batch(part: Indices) -> int:
+        rows, count = recorded(part, np.empty((room * part.size, COLUMNS)))
+        moments.append(rows[:count].copy())
+        return count
+
+    so_many = 0
+
+    def told(count: int, finished: int) -> None:
+        nonlocal so_many
+        so_many += count
         if finished >= ENOUGH:
-            check_records(n, finished, recorded, there)
+            check_records(n, finished, so_many, there)
         progress("Simulating", finished, n)
 
     progress("Simulating", 0, n)
-    cores = threads or os.cpu_count() or 1
-    with ThreadPoolExecutor(cores) as pool:
-        whole = take_turns(pool, cores, batch, releases.position[:, :2], told)
-        begin = np.cumsum(count) - count
-        rows = (space or RecordSpace()).rows(int(count.sum()), COLUMNS)
-        # Each batch is given up for its place among all, so that memory lasts.
-        list(pool.map(lambda _: in_turn(moments.pop(), begin, rows), range(len(moments))))
+    if space is not None:
+        if len(space.rows) < room * n:
+            space.rows = np.empty((room * n, COLUMNS))
+        space.rows, count = recorded(np.arange(n), space.rows)
+        rows = space.rows[:count]
+    else:
+        cores = threads or os.cpu_count() or 1
+        with ThreadPoolExecutor(cores) as pool:
+            whole = take_turns(pool, cores, batch, releases.position[:, :2], told)
+            begin = np.concatenate([[0], np.cumsum(results[:whole, 6].astype(np.intp))])
+            rows = np.empty((begin[-1], COLUMNS))
+            # Each batch is given up for its place among all, so that memory lasts.
+            list(pool.map(lambda _: in_turn(moments.pop(), begin, rows), range(len(moments))))
     records = _records(rows, ground.element)
     end = results[:whole, 0].astype(np.intp)
     last = np.flatnonzero(records.what == ENDED)
@@ -410,9 +423,10 @@ def _compiled_for(tree_type: Any, facets_type: Any, stems_type: Any) -> Any:
     block = (lines, lines, lines, line, line, line, lines, line)
     run_blocks.disable_compile(False)
     run_blocks.compile(
-        numba_types.Array(types.float64, 2, "C")(
+        numba_types.Tuple((lines, types.int64))(
             tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, types.intp[::1], whole,
-            types.int64[::1], whole, *block, number, whole, whole, number, whole, stems_type, lines,
+            types.intp[::1], types.int64[::1], whole, *block, number, whole, whole, number, whole, stems_type, lines,
+            lines,
         )
     )  # fmt: skip
     run_blocks.disable_compile()

@@ -28,6 +28,7 @@ from ..compiled import borrowing, kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
+from .drag_kernels import DRAG_CHANGE, with_drag
 from .edge_kernels import onto, over
 from .facet_kernels import NOWHERE
 from .ground_kernels import box, first_contact
@@ -35,17 +36,13 @@ from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
 from .near_point_kernels import KNOWN, MOST_CLOSE, forget
 from .point_kernels import closest
+from .record_kernels import ALL, ENDED, FLIES_OFF, IMPACT, IMPACTS, ON_GROUND, RELEASED, TREE, grown, write
 from .rotation import drawn_axes, turn
 from .tree_kernels import MOST_FALLEN, PARTS, against_stem, first_stem, let_fall, round_stem, stem_on_way
 
 STOPPED, LEFT, LIMIT = 0, 1, 2
 """How a run ends."""
-RELEASED, IMPACT, ON_GROUND, FLIES_OFF, ENDED, TREE = 0, 1, 2, 3, 4, 5
-"""What a record is about."""
 NO_ROLLING, AZZONI, COULOMB = 0, 1, 2
-ENDS_ONLY, IMPACTS, ALL = 0, 1, 2
-"""What is recorded beside release and end: nothing; impacts, where blocks fly off, the first step on the ground each
-time; all."""
 
 HOP = 0.1
 """A rebound that rises less than this part of the radius above the ground is none."""
@@ -53,8 +50,6 @@ STEP, FALL = 0.5, 0.05
 """A step on the ground is shorter than these parts of the radius: along the ground, and in free fall."""
 SHARP = 0.866
 """Cosine between the normals of two steps below which a concave edge takes the speed towards it."""
-DRAG_CHANGE = 0.005
-"""With drag, the speed changes by less than this part on one parabola."""
 HELD, MOST_HELD = 1e-4, 100
 """A block that moves less than this part of its radius in so many steps is held where it is."""
 LINGERS = 0.3
@@ -71,8 +66,6 @@ SAME_MOMENT_S, MOST_AT_ONCE = 1e-7, 12
 DRIFTS = 1e-6
 """A block that flies more slowly than this in plan [m/s] meets no stem: it falls."""
 UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-COLUMNS = 22
-"""run, what, time; centre; velocity, spin after; velocity, spin before; normal; place in the tree."""
 
 
 @borrowing
@@ -87,38 +80,6 @@ def _at(p, v, a, t):  # type: ignore[no-untyped-def]
     return (
         (p[0] + (v[0] + a[0] * h) * t, p[1] + (v[1] + a[1] * h) * t, p[2] + (v[2] + a[2] * h) * t),
         (v[0] + a[0] * t, v[1] + a[1] * t, v[2] + a[2] * t),
-    )
-
-
-@borrowing
-def slowed(v, drag, gravity):  # type: ignore[no-untyped-def]
-    """The acceleration by gravity and drag."""
-    k = drag * sqrt(_dot(v, v))
-    return -k * v[0], -k * v[1], -k * v[2] - gravity
-
-
-@borrowing
-def with_drag(v, drag, gravity, h):  # type: ignore[no-untyped-def]
-    """Displacement and velocity after a time h, by a step of Runge and Kutta's fourth order."""
-    a = slowed(v, drag, gravity)
-    v2 = (v[0] + 0.5 * h * a[0], v[1] + 0.5 * h * a[1], v[2] + 0.5 * h * a[2])
-    b = slowed(v2, drag, gravity)
-    v3 = (v[0] + 0.5 * h * b[0], v[1] + 0.5 * h * b[1], v[2] + 0.5 * h * b[2])
-    c = slowed(v3, drag, gravity)
-    v4 = (v[0] + h * c[0], v[1] + h * c[1], v[2] + h * c[2])
-    d = slowed(v4, drag, gravity)
-    s = h / 6.0
-    return (
-        (
-            s * (v[0] + 2.0 * (v2[0] + v3[0]) + v4[0]),
-            s * (v[1] + 2.0 * (v2[1] + v3[1]) + v4[1]),
-            s * (v[2] + 2.0 * (v2[2] + v3[2]) + v4[2]),
-        ),
-        (
-            v[0] + s * (a[0] + 2.0 * (b[0] + c[0]) + d[0]),
-            v[1] + s * (a[1] + 2.0 * (b[1] + c[1]) + d[1]),
-            v[2] + s * (a[2] + 2.0 * (b[2] + c[2]) + d[2]),
-        ),
     )
 
 
@@ -145,22 +106,6 @@ def _rolling(n, v, radius):  # type: ignore[no-untyped-def]
         (n[2] * v[0] - n[0] * v[2]) / radius,
         (n[0] * v[1] - n[1] * v[0]) / radius,
     )
-
-
-@kernel
-def _grown(rows):  # type: ignore[no-untyped-def]
-    more = np.empty((2 * rows.shape[0], rows.shape[1]))
-    more[: rows.shape[0]] = rows
-    return more
-
-
-@borrowing
-def _write(rows, k, run, what, time, p, v, w, v1, w1, n, place):  # type: ignore[no-untyped-def]
-    rows[k, 0], rows[k, 1], rows[k, 2] = run, what, time
-    for axis in range(3):
-        rows[k, 3 + axis], rows[k, 6 + axis], rows[k, 9 + axis] = p[axis], v[axis], w[axis]
-        rows[k, 12 + axis], rows[k, 15 + axis], rows[k, 18 + axis] = v1[axis], w1[axis], n[axis]
-    rows[k, 21] = place
 
 
 @inlined
@@ -319,11 +264,11 @@ def run_block(  # type: ignore[no-untyped-def]
         u = np.empty(3)
         fill_uniform(seed, run, ATTITUDE, u)
         axes = drawn_axes(u)
-    _write(rows, count, run, RELEASED, time, p, v, w, v, w, n, -1)
+    write(rows, count, run, RELEASED, time, p, v, w, v, w, n, -1)
     count += 1
     while end < 0:
         if count + 2 >= rows.shape[0]:
-            rows = _grown(rows)
+            rows = grown(rows)
         if impacts + trees >= most_impacts or time >= most_s:
             end = LIMIT
             break
@@ -367,7 +312,7 @@ def run_block(  # type: ignore[no-untyped-def]
                     if not stands:
                         let_fall(fallen, stems[4][struck])
                     if record >= IMPACTS:
-                        _write(rows, count, run, TREE, time, p, v, w, v1, w1, away, stems[4][struck])
+                        write(rows, count, run, TREE, time, p, v, w, v1, w1, away, stems[4][struck])
                         count += 1
                     continue
             if hit < 0:
@@ -403,7 +348,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 v, w = rebound(v1, n, w1, radius, mass, parameters[z], draws)
                 impacts += 1
                 if record >= IMPACTS:
-                    _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, n, place)
+                    write(rows, count, run, IMPACT, time, p, v, w, v1, w1, n, place)
                     count += 1
                 v_max = max(v_max, sqrt(_dot(v, v)))
             rises = _dot(v, n)
@@ -461,7 +406,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 if not moves:
                     grounded, known, at_once = False, drag == 0.0, 0
                     if record >= IMPACTS:
-                        _write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
+                        write(rows, count, run, FLIES_OFF, time, p, v, w, v, w, n, place)
                         count += 1
                     if drag > 0.0:  # from off the ground: where it touches, its flight would end at once
                         p, v, time, length = free, falling, time + dt, length + speed * dt
@@ -499,7 +444,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 v, w = rebound(v1, against, w1, radius, mass, parameters[own + zone[other]], draws)
                 impacts += 1
                 if record >= IMPACTS:
-                    _write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
+                    write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
                     count += 1
                 marked = False
                 rises = _dot(v, against)
@@ -568,7 +513,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 w = _rolling(n, v, radius)
                 v_max = max(v_max, sqrt(_dot(v, v)))
                 if record == ALL or (record == IMPACTS and not marked):
-                    _write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
+                    write(rows, count, run, ON_GROUND, time, p, v, w, v, w, n, place)
                     count, marked = count + 1, True
                 if not goes_round:
                     v1, w1 = v, w
@@ -580,7 +525,7 @@ def run_block(  # type: ignore[no-untyped-def]
                     if not stands:
                         let_fall(fallen, stems[4][struck])
                     if record >= IMPACTS:
-                        _write(rows, count, run, TREE, time, p, v, w, v1, w1, away, stems[4][struck])
+                        write(rows, count, run, TREE, time, p, v, w, v1, w1, away, stems[4][struck])
                         count += 1
                 gone = (p[0] - anchor[0], p[1] - anchor[1], p[2] - anchor[2])
                 lingers += 1
@@ -592,31 +537,34 @@ def run_block(  # type: ignore[no-untyped-def]
         w = _rolling(n, v, radius)
         v_max = max(v_max, sqrt(_dot(v, v)))
         if record == ALL or (record == IMPACTS and not marked):
-            _write(rows, count, run, ON_GROUND, time, p, v, w, came if moves else v, w, n, place)
+            write(rows, count, run, ON_GROUND, time, p, v, w, came if moves else v, w, n, place)
             count, marked = count + 1, True
     if tumbles and not grounded:
         axes, w = turn(moments, axes, w, time - spun)
     if count + 2 >= rows.shape[0]:
-        rows = _grown(rows)
-    _write(rows, count, run, ENDED, time, p, v, w, v, w, n, place)
+        rows = grown(rows)
+    write(rows, count, run, ENDED, time, p, v, w, v, w, n, place)
     return rows, count + 1, end, time, impacts, length, v_max, trees
 
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, own, draw_count, runs, seed, place, velocity, spin, radius, mass,
-    inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems, results,
+    tree, facets, zone, rebound, parameters, friction, own, draw_count, among, runs, seed, place, velocity, spin,
+    radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems, results, rows,
 ):  # fmt: skip
-    """Simulate n blocks, `own` (n,) their sets; returns the records.
+    """Simulate n blocks, `own` (n,) their sets; returns their records, in `rows` or in a longer array, and how many.
 
-    Fills `results` (n, 6): end, time, impacts, length, v_max, hits of trees.
+    Parameters
+    ----------
+    among : (n,) the place of each, which its records have; runs : (n,) its number.
+    results : (n, 7) to be filled: end, time, impacts, length, v_max, hits of trees, records.
     """
     stack, times = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE)
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
-    draws, fallen = np.empty(draw_count), np.empty(1 + MOST_FALLEN, np.int64)
-    rows, count = np.empty(((256 if record == ALL else 64) * len(runs), COLUMNS)), np.int64(0)
+    draws, fallen, count = np.empty(draw_count), np.empty(1 + MOST_FALLEN, np.int64), np.int64(0)
     for i in range(len(runs)):
+        first = count
         rows, count, end, time, impacts, length, v_max, trees = run_block(
             tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows, count,
             runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
@@ -625,18 +573,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
             (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record, stems,
             fallen,
         )  # fmt: skip
+        rows[first:count, 0] = among[i]
         results[i, 0], results[i, 1], results[i, 2] = end, time, impacts
-        results[i, 3], results[i, 4], results[i, 5] = length, v_max, trees
-    return rows[:count].copy()
-
-
-@kernel
-def in_turn(moments, begin, rows):  # type: ignore[no-untyped-def]
-    """Put the records of some runs where those of each begin among all."""
-    place, last = 0, -1.0
-    for i in range(len(moments)):
-        if moments[i, 0] != last:
-            last = moments[i, 0]
-            place = begin[np.int64(last)]
-        rows[place] = moments[i]
-        place += 1
+        results[i, 3], results[i, 4], results[i, 5], results[i, 6] = length, v_max, trees, count - first
+    return rows, count

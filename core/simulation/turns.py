@@ -14,7 +14,7 @@ from ..vectors import Array, Indices
 
 BATCH = 64
 """Runs that one thread takes at a time; larger ones leave a thread without work at the end."""
-WINDOW, WINDOW_S = 4096, 0.5
+WINDOW, WINDOW_S = 16384, 1.0
 """Of so many runs, and of no more than take so long, those that are released near one another are taken one after the
 other: they find the terrain in the processor's cache. After a cancel a window that is begun is finished, so that no
 finished run is lost."""

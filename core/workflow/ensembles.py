@@ -9,14 +9,16 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..hazard.tally import Arrays, Tally
 from ..progress import CancelledError, Progress, silent
-from ..simulation.engine import Recorded, Settings, Simulation, simulate
+from ..simulation.engine import AT_ONCE, Recorded, RecordSpace, Settings, Simulation, joined, simulate
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
+from ..terrain.ordering import along_curve
 
 CHUNK = 4096
 """Runs of a chunk: about a second of work, and a lost one costs no more."""
@@ -32,8 +34,9 @@ class Work:
     Attributes
     ----------
     tallies : name → an empty one.
-    record : what is recorded while a chunk is computed.
+    record : what is recorded for the tallies and tables.
     tables : makes the rows of a chunk; None for none.
+    kept : what is kept of the records until the tables are made.
     """
 
     ground: Ground
@@ -41,16 +44,26 @@ class Work:
     tallies: Mapping[str, Tally]
     record: Recorded = "all"
     tables: Callable[[Simulation], Tables] | None = None
+    kept: Recorded = "all"
 
     def chunk(self, releases: Releases, first_run: int) -> "Chunk":
         """Simulate some runs on one thread, and count them; several threads may do so at once."""
-        simulation = simulate(self.ground, releases, self.settings, record=self.record, first_run=first_run, threads=1)
-        arrays = {}
-        for name, tally in self.tallies.items():
-            own = tally.empty()
-            own.add(simulation)
-            arrays[name] = own.arrays()
-        return Chunk(arrays, {} if self.tables is None else self.tables(simulation))
+        tallies = {name: tally.empty() for name, tally in self.tallies.items()}
+        order = np.argsort(along_curve(releases.position[:, :2]), kind="stable")
+        parts, space = list[Simulation](), RecordSpace()
+        for start in range(0, order.size, AT_ONCE):
+            part = np.sort(order[start : start + AT_ONCE])
+            simulation = simulate(
+                self.ground, releases.take(part), self.settings, record=self.record, runs=first_run + part, space=space
+            )
+            for tally in tallies.values():
+                tally.add(simulation)
+            if self.tables is not None:
+                parts.append(simulation.with_records(self.kept))
+                if parts[-1] is simulation:
+                    space = RecordSpace()
+        arrays = {name: tally.arrays() for name, tally in tallies.items()}
+        return Chunk(arrays, {} if self.tables is None else self.tables(joined(parts, releases)))
 
 
 @dataclass(frozen=True, eq=False)

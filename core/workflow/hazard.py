@@ -20,14 +20,12 @@ from ..hazard.barriers import with_barriers
 from ..hazard.screens import Screen, check_screens, hits_at
 from ..hazard.tally import Tally
 from ..progress import CancelledError, Progress, silent
-from ..simulation.engine import Recorded, RecordSpace, Settings, Simulation, check_settings, simulate
+from ..simulation.engine import AT_ONCE, Recorded, RecordSpace, Settings, Simulation, check_settings, simulate
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
 from ..simulation.turns import take_turns
 from ..vectors import Indices
 
-CHUNK = 512
-"""Runs that are simulated and counted at once: the records of more leave the processor's cache."""
 ROUND = 1024
 """Runs after which it is first asked whether they are enough."""
 
@@ -119,9 +117,7 @@ def run_chunks(
     def chunk(part: Indices) -> _Chunk:
         part = np.sort(part)
         space = spaces.pop() if spaces else RecordSpace()
-        simulation = simulate(
-            ground, releases.take(part), settings, record="all", runs=first_run + part, threads=1, space=space
-        )
+        simulation = simulate(ground, releases.take(part), settings, record="all", runs=first_run + part, space=space)
         own, later = [each.empty() for each in tallies], [each.empty() for each in behind]
         for each in own:
             each.add(simulation)
@@ -153,7 +149,7 @@ def run_chunks(
             def of_round(part: Indices, begin: int = begin) -> _Chunk:
                 return chunk(begin + part)
 
-            done = take_turns(pool, cores, of_round, releases.position[begin:end, :2], add, CHUNK)
+            done = take_turns(pool, cores, of_round, releases.position[begin:end, :2], add, AT_ONCE)
             counted += done
             if done < end - begin or (enough is not None and enough(counted)):
                 break

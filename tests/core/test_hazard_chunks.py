@@ -53,7 +53,7 @@ def at_once(ground: Ground, releases: Releases) -> CellTally:
 def test_maps_do_not_depend_on_chunks_and_threads(
     ground: Ground, releases: Releases, at_once: CellTally, chunk: int, threads: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hazard, "CHUNK", chunk)
+    monkeypatch.setattr(hazard, "AT_ONCE", chunk)
     tally = at_once.empty()
     counted = run_chunks(ground, releases, SETTINGS, [tally], threads=threads)
     assert (counted.blocks, counted.wanted) == (BLOCKS, BLOCKS)
@@ -78,7 +78,7 @@ def test_nor_on_the_order_in_which_parts_are_merged_even_over_files(
 
 
 def test_each_chunk_is_handed_on(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hazard, "CHUNK", 64)
+    monkeypatch.setattr(hazard, "AT_ONCE", 64)
     taken: list[Simulation] = []
     run_chunks(ground, releases, SETTINGS, [], threads=3, take=taken.append)
     assert len(taken) > 4
@@ -102,7 +102,7 @@ def test_runs_may_have_any_numbers(ground: Ground, releases: Releases) -> None:
 def test_a_cancel_keeps_the_first_blocks(
     ground: Ground, releases: Releases, at_once: CellTally, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(hazard, "CHUNK", 64)
+    monkeypatch.setattr(hazard, "AT_ONCE", 64)
 
     def stop(text: str, done: int = 0, total: int = 0) -> None:
         assert total == BLOCKS

@@ -51,7 +51,7 @@ def test_chunks_give_what_all_runs_at_once_give(
     whole = ScreenTally(SCREENS)
     whole.add(simulation)
     for size, threads in ((64, 1), (150, 2)):
-        monkeypatch.setattr(hazard, "CHUNK", size)
+        monkeypatch.setattr(hazard, "AT_ONCE", size)
         tally = ScreenTally(SCREENS)
         counted = hazard.run_chunks(ground, releases, SETTINGS, [tally], threads=threads)
         same(tally, whole)
@@ -86,7 +86,7 @@ def test_it_ends_when_enough_are_known(ground: Ground, releases: Releases, monke
 
 
 def test_a_cancel_keeps_what_has_begun(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hazard, "CHUNK", 50)
+    monkeypatch.setattr(hazard, "AT_ONCE", 50)
 
     def stop(text: str, done: int, total: int) -> None:
         if done >= 100:

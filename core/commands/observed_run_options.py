@@ -163,7 +163,7 @@ def _of_table(
     from ..exchange.simulation_tables import read_releases
     from ..exchange.tables import read_picks
     from ..exchange.trees import open_trees
-    from ..exchange.whole_run_tables import read_stops
+    from ..exchange.whole_run_tables import stopped_runs
     from ..impact_models.registry import COMPARED, find_model
     from ..reconstruction.block import Block
     from ..reconstruction.drag import Drag
@@ -209,9 +209,8 @@ def _of_table(
             raise InputError(
                 f"The model {drawing[0]} draws from measured impacts, and stops have none", advice="Give picks.csv"
             )
-        releases = scenario.releases(ground)
-        observed = read_stops(arguments.stops, releases, ground)
-        return ObservedCase(scenario, ground, observed, releases, inputs | {"stops": Path(arguments.stops)})
+        runs = stopped_runs(ground, scenario.releases, arguments.stops)
+        return ObservedCase(scenario, ground, runs.observed, runs.releases, inputs | {"stops": Path(arguments.stops)})
     picks = read_picks(arguments.table, surface.shift)
     block = Block(diameter, diameter, diameter, density)
     ends = flights or "contacts"
@@ -232,11 +231,10 @@ def _measured(
     inputs: dict[str, Path],
 ) -> ObservedCase:
     """Runs that were reconstructed from picks."""
-    from ..analysis.observed_runs import observe_runs
-    from ..workflow.whole_runs import released_as_observed
+    from ..workflow.whole_runs import measured_runs
 
-    observed = observe_runs(made, ground)
-    return ObservedCase(scenario, ground, observed, released_as_observed(ground, observed, made, number), inputs)
+    runs = measured_runs(ground, made, number)
+    return ObservedCase(scenario, ground, runs.observed, runs.releases, inputs)
 
 
 def sections_as_asked(arguments: argparse.Namespace, ground: "Ground") -> "tuple[Section, ...]":

@@ -5,10 +5,11 @@ compared.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.observed_runs import Observed
+from ..analysis.observed_runs import Observed, observe_runs
 from ..analysis.paths import Paths, simulated_paths
 from ..analysis.ranks import FEWEST
 from ..analysis.sections import Section, default_sections
@@ -25,6 +26,14 @@ from ..simulation.release import Releases, standing_on
 from ..terrain.raycast import closest_points
 from ..vectors import Array, Mask
 from .simulation import remarks_of, run_models
+
+
+class ObservedRuns(NamedTuple):
+    """What was observed, and blocks that start as the observed ones did: one or several of the name of each."""
+
+    observed: Observed
+    releases: Releases
+
 
 NUMBER = 100
 """Blocks for each observed run."""
@@ -114,6 +123,12 @@ def _from_others(
         simulation = simulate(ground, part, others, first_run=first, threads=threads)
         parts.append(replace(simulation, settings=settings))
     return joined(parts, releases)
+
+
+def measured_runs(ground: Ground, made: Reconstruction, number: int = NUMBER) -> ObservedRuns:
+    """The runs that were reconstructed, and `number` blocks that start as each; see `released_as_observed`."""
+    observed = observe_runs(made, ground)
+    return ObservedRuns(observed, released_as_observed(ground, observed, made, number))
 
 
 def released_as_observed(

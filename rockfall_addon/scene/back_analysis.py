@@ -2,25 +2,31 @@
 """Back-analysis in the scene: what is asked, without Blender, and what is kept of the answer."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import bpy
 
 from ...core.analysis.calibration import usual_names
-from ...core.analysis.observed_runs import observe_runs
 from ...core.analysis.priors import Prior, laws_in, make_priors
 from ...core.errors import RockfallError
-from ...core.exchange.simulation_entry import ReleaseEntry
+from ...core.exchange.job_inputs import input_hashes
+from ...core.exchange.opening import reconstruct_project
+from ...core.exchange.simulation_entry import TABLE, ReleaseEntry, SimulationEntry
+from ...core.exchange.simulation_project import placed_source
+from ...core.exchange.tables import read_picks
+from ...core.exchange.whole_run_tables import stopped_runs
 from ...core.impact_models.registry import MODELS, find_model
 from ...core.progress import Progress
-from ...core.reconstruction.picks import Picks
-from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, to_plain
+from ...core.simulation.ground import Ground
 from ...core.simulation.parameter_draws import FRICTION_NAME
+from ...core.terrain.surface import Surface
 from ...core.workflow.back_analysis import BackAnalysis, back_analyse
-from ...core.workflow.simulation import Scenario, ground_of
-from ...core.workflow.whole_runs import released_as_observed
+from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of
+from ...core.workflow.whole_runs import ObservedRuns, measured_runs
 from . import (
     fingerprints,
     model_parameters,
@@ -38,6 +44,8 @@ from . import (
 
 CHOICES = [choice for choice in models.CHOICES if not MODELS[choice[0]].draws_from_impacts]
 """Models with coefficients."""
+CENTRES = "centres"
+"""Observed flights join what simulated ones do."""
 VARIANTS = 64
 """Starts of each observed run, moved by the errors of its picks where these are known."""
 STALE = "Picks, terrain or other settings were changed since: these are parameters of what was before. Analyse again."
@@ -50,28 +58,35 @@ class Question:
     Attributes
     ----------
     scenario : of the model alone, with what is not fitted.
-    reconstruct : gives the observed runs.
+    runs : gives the observed runs on a ground.
     priors : of the parameters that are fitted.
     sets, rounds : of parameters.
+    observed : see `posterior.Kept`.
     print : of all that.
     remarks : what of the measured trajectories is missing.
     """
 
     scenario: Scenario
-    reconstruct: "partial[Reconstruction]"
+    runs: Callable[[Ground], ObservedRuns]
     priors: tuple[Prior, ...]
     sets: int
     rounds: int
+    observed: tuple[str, ...]
     print: str
     remarks: tuple[Remark, ...]
 
 
 def missing(scene: bpy.types.Scene) -> str:
     """What is still needed, in a sentence; empty when all is there."""
+    settings = scene.rockfall_back_analysis
     if not terrain.tiles(scene):
         return "Blocks fall on the terrain: import it first, in step 1."
-    if not store.has_role(scene, store.PICK_ROLE):
-        return "Pick impacts first: observed runs say which parameters fit."
+    if settings.source == "SCENE" and not store.has_role(scene, store.PICK_ROLE):
+        return "Pick impacts first, or choose a table of observed runs: they say which parameters fit."
+    if settings.source != "SCENE" and not settings.table:
+        return f"Choose the table of {'picks' if settings.source == 'PICKS' else 'releases'}."
+    if settings.source == "STOPS" and not settings.stops:
+        return "Choose the table of stops."
     if scene.rockfall_simulation.contact != "mesh":
         return "Observed runs are on the surface: choose Blocks meet: Surface, under Motion."
     return simulated_trees.missing(scene) or structures.problem(scene)
@@ -109,19 +124,47 @@ def ask(scene: bpy.types.Scene) -> Question:
         raise RockfallError(lacking)
     settings = scene.rockfall_back_analysis
     model = find_model(settings.model)
-    priors = make_priors(model, list(fitted_names(scene, model.name)), laws_in(settings.priors))
+    names, observed = fitted_names(scene, model.name), _observed_by(scene)
+    priors = make_priors(model, list(names), laws_in(settings.priors))
     entry = replace(simulated_sources.motion_entry(scene), models=(model.name,), releases=ReleaseEntry())
-    planned = simulation_setup.planned(scene, entry)
-    picks, left_out = reconstruction.good_picks(scene)
+    surface, known = simulation_setup.ground(scene), _print(scene, model.name, names, observed)
+    runs, source, left_out = _observed(scene, entry, surface)
+    scenario = simulation_setup.scenario_of(scene, entry, surface, source)
     return Question(
-        replace(planned.scenario, draws={}),
-        _reconstruction(scene, picks),
-        priors,
-        settings.sets,
-        settings.rounds,
-        _print(scene),
-        left_out,
+        replace(scenario, draws={}), runs, priors, settings.sets, settings.rounds, observed, known, left_out
     )
+
+
+def _observed(
+    scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface
+) -> tuple[Callable[[Ground], ObservedRuns], ReleaseSource, tuple[Remark, ...]]:
+    """What gives the observed runs, and blocks for them; and what of the measured trajectories is missing.
+
+    Raises
+    ------
+    RockfallError : no picks, or none that can be used; whatever is wrong with a table.
+    """
+    settings, project = scene.rockfall_back_analysis, reconstruction.project_settings(scene, [])
+    table, stops = (Path(bpy.path.abspath(text)) for text in (settings.table, settings.stops))
+    if settings.source == "STOPS":
+        source = placed_source(replace(entry, releases=ReleaseEntry(TABLE, number=VARIANTS, file=table)), project.block)
+        return lambda ground: stopped_runs(ground, source, stops), source, ()
+    if settings.source == "PICKS":
+        how = replace(project.reconstruction, flights=CENTRES)
+        made, left_out = (
+            partial(
+                reconstruct_project, replace(project, reconstruction=how), surface, read_picks(table, surface.shift)
+            ),
+            (),
+        )
+    else:
+        picks, left_out = reconstruction.good_picks(scene)
+        made = partial(reconstruction.reconstruction_of(scene, picks, surface), flights=CENTRES)
+
+    def runs(ground: Ground) -> ObservedRuns:
+        return measured_runs(ground, made(), VARIANTS)
+
+    return runs, lambda ground: runs(ground).releases, left_out
 
 
 def run(question: Question, progress: Progress) -> BackAnalysis:
@@ -134,11 +177,8 @@ def run(question: Question, progress: Progress) -> BackAnalysis:
     """
     progress("Preparing the ground", 0, 0)
     ground = ground_of(question.scenario)
-    made = question.reconstruct()
-    observed = observe_runs(made, ground)
-    releases = released_as_observed(ground, observed, made, VARIANTS)
     return back_analyse(
-        ground, observed, releases, question.scenario.settings[0], question.priors,
+        ground, *question.runs(ground), question.scenario.settings[0], question.priors,
         sets=question.sets, rounds=question.rounds, progress=progress,
     )  # fmt: skip
 
@@ -152,8 +192,9 @@ def keep(scene: bpy.types.Scene, question: Question, found: BackAnalysis) -> Non
     said = f"{n} observed run{'s' * (n != 1)}, {found.runs:,} simulated in {found.seconds:.0f} s."
     remarks = (*question.remarks, *found.remarks)
     posterior.keep(
-        scene, found.model, found.draws, rows=rows, said=said, remarks=to_plain(remarks), print=question.print
-    )
+        scene, found.model, found.draws, rows=rows, said=said, remarks=to_plain(remarks), print=question.print,
+        observed=question.observed,
+    )  # fmt: skip
 
 
 def use_medians(scene: bpy.types.Scene) -> None:
@@ -177,24 +218,24 @@ def use_medians(scene: bpy.types.Scene) -> None:
 
 def is_stale(scene: bpy.types.Scene, kept: posterior.Kept) -> bool:
     """Whether it was computed from something else than the scene now says."""
-    return bool(kept.print) and kept.print != _print(scene, kept.model, tuple(row.name for row in kept.rows))
+    names = tuple(row.name for row in kept.rows)
+    return bool(kept.print) and kept.print != _print(scene, kept.model, names, kept.observed)
 
 
-def _reconstruction(scene: bpy.types.Scene, picks: Picks) -> "partial[Reconstruction]":
-    """Flights are between centres of blocks, as those of simulated ones."""
-    return partial(reconstruction.reconstruction_of(scene, picks, simulation_setup.ground(scene)), flights="centres")
+def _observed_by(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """Where the observed runs are asked for: the kind, and the files that it takes."""
+    settings = scene.rockfall_back_analysis
+    table = "" if settings.source == "SCENE" else settings.table
+    return settings.source, table, settings.stops if settings.source == "STOPS" else ""
 
 
-def _print(scene: bpy.types.Scene, model: str = "", names: tuple[str, ...] = ()) -> str:
+def _print(scene: bpy.types.Scene, model: str, names: tuple[str, ...], observed: tuple[str, ...]) -> str:
     settings = scene.rockfall_simulation
-    model = model or scene.rockfall_back_analysis.model
-    names = names or fitted_names(scene, model)
     own = models.parameters_of(scene).get(model, {})
     parts = [
         fingerprints.ground(scene),
         fingerprints.ground_contents(scene),
-        sorted(fingerprints.remembered(scene).items()),
-        scene.get(store.BLOCKS, ""),
+        *_print_of_runs(scene, observed),
         sorted((name, value) for name, value in own.items() if name not in names),
         reconstruction.project_settings(scene, []).reconstruction,
         settings.rolling,
@@ -205,3 +246,12 @@ def _print(scene: bpy.types.Scene, model: str = "", names: tuple[str, ...] = ())
         *simulated_trees.fingerprint(scene),
     ]
     return hashlib.sha1(repr(parts).encode(), usedforsecurity=False).hexdigest()
+
+
+def _print_of_runs(scene: bpy.types.Scene, observed: tuple[str, ...]) -> list[object]:
+    """Of the observed runs; of tables by what they contain, wherever they are."""
+    source, *files = observed
+    if source == "SCENE":
+        return [sorted(fingerprints.remembered(scene).items()), scene.get(store.BLOCKS, "")]
+    found = input_hashes({str(i): Path(bpy.path.abspath(file)) for i, file in enumerate(files) if file})
+    return [source, reconstruction.project_settings(scene, []).block, found]

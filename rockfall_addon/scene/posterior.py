@@ -18,6 +18,8 @@ from ...core.remarks import Remark, from_plain
 from ...core.simulation.parameter_draws import ParameterDraws
 from . import store
 
+OF_SCENE = ("SCENE", "", "")
+"""The measured trajectories of the scene."""
 INTERVAL = np.array([0.025, 0.5, 0.975])
 
 
@@ -45,6 +47,7 @@ class Kept:
     said : of how many runs it is; empty when read from a table.
     remarks : what it is worth, the gravest first.
     print : of all that it was computed from; empty when read from a table.
+    observed : where the runs came from: the scene, or which kind of tables, and their files.
     """
 
     model: str
@@ -53,6 +56,7 @@ class Kept:
     said: str
     remarks: tuple[Remark, ...]
     print: str
+    observed: tuple[str, ...]
 
 
 def kept_of(scene: bpy.types.Scene) -> Kept | None:
@@ -68,7 +72,7 @@ def _kept(text: str) -> Kept:
     rows = tuple(Row(*each[:6], tuple(from_plain(each[6], "note"))) for each in found["rows"])
     return Kept(
         found["model"], draws_in(found), rows, found["said"], tuple(from_plain(found["remarks"], "note")),
-        found["print"],
+        found["print"], tuple(found.get("observed", OF_SCENE)),
     )  # fmt: skip
 
 
@@ -78,7 +82,7 @@ def draws_in(found: Mapping[str, Any]) -> ParameterDraws:
 
 
 def keep(scene: bpy.types.Scene, model: str, draws: ParameterDraws, **more: object) -> None:
-    """Keep a posterior; `rows`, `said`, `remarks` and `print` where they are known."""
+    """Keep a posterior; `rows`, `said`, `remarks`, `print` and `observed` where they are known."""
     ends = [weighted_quantiles(column, draws.weight, INTERVAL).tolist() for column in draws.values.T]
     plain = [[name, "", mid, low, high, "", []] for name, (low, mid, high) in zip(draws.names, ends, strict=True)]
     content = {"rows": plain, "said": "", "remarks": [], "print": ""} | more

@@ -26,7 +26,7 @@ from ...core.simulation.engine import Simulation
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
 from ...core.workflow.screens import screen_remarks, tallies_of
-from ...core.workflow.simulation import Scenario, ground_of, remarks_of, run_models
+from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of, remarks_of, run_models
 from . import (
     fingerprints,
     models,
@@ -92,20 +92,31 @@ def planned(scene: bpy.types.Scene, entry: SimulationEntry) -> Plan:
     RockfallError : something cannot be.
     """
     surface = ground(scene)
-    met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
     source, origins, left_out = simulated_sources.source_of(scene, entry, surface)
-    how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
+    scenario = scenario_of(scene, entry, surface, source)
     measured = None
     if any(MODELS[name].draws_from_impacts for name in entry.models):
         good, left_out = reconstruction.reconstruct_good(scene)
         measured = measured_rebounds(good.impacts)
+    scenario = replace(scenario, measured=measured)
+    return Plan(scenario, screens.screens_of(scene), origins, {"print": fingerprint(scene)}, left_out)
+
+
+def scenario_of(scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface, source: ReleaseSource) -> Scenario:
+    """How blocks from a source fall on the scene's terrain.
+
+    Raises
+    ------
+    RockfallError : something cannot be.
+    """
+    met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
+    how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
     trees = None if entry.trees is None else open_trees(entry.trees, surface, entry.seed)[0]
     drawn = posterior.in_use(scene, entry.models)
-    scenario = Scenario(
+    return Scenario(
         met,
         source,
         {name: parameters.get(name, {}) for name in entry.models},
-        measured,
         draws={} if drawn is None else {drawn.model: drawn.draws},
         structures=structures.met_of(scene),
         rolling=entry.rolling,
@@ -116,7 +127,6 @@ def planned(scene: bpy.types.Scene, entry: SimulationEntry) -> Plan:
         seed=entry.seed,
         trees=trees,
     )
-    return Plan(scenario, screens.screens_of(scene), origins, {"print": fingerprint(scene)}, left_out)
 
 
 @dataclass(frozen=True, eq=False)

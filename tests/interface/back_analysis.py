@@ -2,6 +2,7 @@
 """A person asks which parameters make whole falls come out as the observed ones, and lets blocks draw from them."""
 
 import json
+from pathlib import Path
 
 import bpy
 
@@ -57,3 +58,31 @@ def case_back_analysis_of_the_demo(window):
         bpy.ops.ed.undo()
         bpy.ops.ed.undo()
     assert KEY not in bpy.context.scene, "a step of undo each"
+
+
+def case_back_analysis_of_tables(window):
+    """Without footage: the tables of Tschamut, releases and stops, chosen in the panel on a terrain of its own."""
+    job = window.part("rockfall_addon.view.job")
+    data = Path(__file__).parents[1] / "data"
+    with window.override():
+        assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
+    bpy.context.scene.rockfall_back_analysis.source = "STOPS"
+    window.unfold("ROCKFALL_PT_back_analysis")
+    for name in ("simulated_run", "simulation_screens"):
+        window.unfold(f"ROCKFALL_PT_{name}", is_open=False)
+    yield from window.show_sidebar()
+    yield from window.open_panel("ROCKFALL_PT_simulation")
+    yield from window.scroll(60)
+    yield 1.0
+    window.screenshot("1-no-table-yet")
+    settings = bpy.context.scene.rockfall_back_analysis
+    settings.table, settings.stops = str(data / "tschamut_2014_releases.csv"), str(data / "tschamut_2014_stops.csv")
+    yield from window.scroll(10)
+    yield 1.0
+    window.screenshot("2-tables-chosen")
+    with window.override():
+        bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: not job.is_running(), 60, "refused")
+    yield 1.0
+    window.screenshot("3-tables-of-another-site")
+    assert KEY not in bpy.context.scene

@@ -8,7 +8,7 @@ from ....core.impact_models.registry import MODELS
 from ....core.progress import Progress
 from ....core.simulation.parameter_draws import FRICTION_NAME
 from ....core.workflow.back_analysis import ROUNDS, SETS
-from ...scene import back_analysis, model_parameters, posterior, store
+from ...scene import back_analysis, model_parameters, posterior, store, terrain
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.panel import RockfallPanel, paragraph, show_remarks
@@ -19,6 +19,23 @@ class BackAnalysisSettings(bpy.types.PropertyGroup):
     """What is fitted, and whether blocks draw from what was found."""
 
     model: EnumProperty(name="Model", description="Whose parameters are fitted", items=back_analysis.CHOICES)
+    source: EnumProperty(
+        name="Observed", description="What blocks were seen to do",
+        items=[
+            ("SCENE", "Measured trajectories", "Those of this scene"),
+            ("PICKS", "A table of picks", "Trajectories from elsewhere: picks.csv, reconstructed on this terrain with "
+             "the settings of the steps above"),
+            ("STOPS", "Releases and stops", "Blocks without footage: where each started, and where it stopped"),
+        ],
+    )  # fmt: skip
+    table: StringProperty(
+        name="Table", description="Picks, or releases: release, x_m, y_m; if known z_m, velocity, diameter, density",
+        subtype="FILE_PATH",
+    )  # fmt: skip
+    stops: StringProperty(
+        name="Stops", description="Where each block stopped: release, x_m, y_m; z_m where it is not on the terrain",
+        subtype="FILE_PATH",
+    )  # fmt: skip
     names: StringProperty(description="Parameters that are fitted, each behind its model and a point")
     priors: StringProperty(
         name="Before", description="What was thought possible before, for example: rn = 0.2..0.6, friction = "
@@ -130,11 +147,23 @@ class ROCKFALL_PT_back_analysis(RockfallPanel, bpy.types.Panel):
         elif kept is None:
             text = "Which parameters make whole falls come out as the observed ones? All that fit, not only the best."
             paragraph(context, layout, text, "INFO")
+        if terrain.tiles(scene):
+            _draw_observed(layout, settings)
         if not lacking:
             _draw_question(layout, scene, settings)
         job.draw(context, layout, "back_analysis")
         if kept is not None:
             _draw_result(context, layout, kept, settings)
+
+
+def _draw_observed(layout: bpy.types.UILayout, settings: BackAnalysisSettings) -> None:
+    column = layout.column(align=True)
+    column.use_property_split, column.use_property_decorate = True, False
+    column.prop(settings, "source")
+    if settings.source != "SCENE":
+        column.prop(settings, "table", text="Picks" if settings.source == "PICKS" else "Releases")
+    if settings.source == "STOPS":
+        column.prop(settings, "stops")
 
 
 def _draw_question(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings: BackAnalysisSettings) -> None:
@@ -173,11 +202,15 @@ def _draw_result(
     for row in kept.rows:
         name = f"{row.name} [{row.unit}]" if row.unit else row.name
         _draw_row(column, name, f"{row.median:.3g}", f"{row.low:.3g} … {row.high:.3g}")
+        if row.prior:
+            before = column.row()
+            before.active = False
+            before.label(text=f"      before: {row.prior}")
     for row in kept.rows:
         said = [one for one in row.remarks if one.severity != "note"]
         if said:
             column = box.column(align=True)
-            column.label(text=f"{row.name}, before {row.prior}:" if row.prior else f"{row.name}:")
+            column.label(text=f"{row.name}:")
             show_remarks(context, column, said)
     box.prop(settings, "draw", toggle=True, icon="MOD_ARRAY")
     if settings.draw and kept.model not in context.scene.rockfall_simulation.models:

@@ -4,7 +4,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..vectors import Array, Mask, cross, dot
+from ..vectors import Array, Mask
 
 CHUNK = 1 << 15
 FLAT = 1e-12
@@ -54,19 +54,12 @@ def _hashes(vertices: Array) -> NDArray[np.uint64]:
 
 
 def examine_faces(vertices: Array, faces: NDArray[np.int32]) -> tuple[Mask, Array, Mask]:
-    """Chunk by chunk, to stay small: (m,) degenerate; (3,) twice the total vector area; (2,) any face up, any down."""
+    """(m,) degenerate; (3,) twice the total vector area; (2,) any face up, any down."""
+    from .triangle_kernels import examine
+
     degenerate = np.zeros(len(faces), np.bool_)
-    total = np.zeros(3)
-    up_down = np.zeros(2, np.bool_)
-    for start in range(0, len(faces), CHUNK):
-        a, b, c = (vertices[faces[start : start + CHUNK, k]] for k in range(3))
-        u, v, w = b - a, c - a, c - b
-        twice = cross(u, v)
-        longest2 = np.maximum(np.maximum(dot(u, u), dot(v, v)), dot(w, w))
-        degenerate[start : start + CHUNK] = dot(twice, twice) <= (FLAT * longest2) ** 2
-        total += twice.sum(axis=0)
-        up_down |= ((twice[:, 2] > 0).any(), (twice[:, 2] < 0).any())
-    return degenerate, total, up_down
+    *total, up, down = examine(vertices, faces, FLAT, degenerate)
+    return degenerate, np.array(total), np.array([up, down])
 
 
 def drop_loose(vertices: Array, faces: NDArray[np.int32]) -> tuple[Array, NDArray[np.int32], int]:

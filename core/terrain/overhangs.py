@@ -18,6 +18,8 @@ AROUND = 32
 """So many points make the plane of a sheet: enough that the scanner's noise does not make it thick."""
 FLAT = 0.15
 """They are a sheet when they spread across it by less than this part (squared) of how they spread along it."""
+SPARSE = 16
+"""So many columns for each point are too many to have them all in memory."""
 TOGETHER = 16
 """So many cells that touch each other are an overhang; single ones are branches and birds."""
 
@@ -73,7 +75,8 @@ def find_overhangs(points: Array) -> Overhangs | None:
         return None
     cell = CELL * spacing
     cells = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / cell).astype(np.int64)
-    order = np.lexsort((points[:, 2], cells[:, 1], cells[:, 0]))
+    columns, high = _columns(cells, points[:, 2], APART * cell)
+    order = high[np.lexsort((points[high, 2], cells[high, 1], cells[high, 0]))]
     cells, ordered = cells[order], points[order]
     same = (cells[1:] == cells[:-1]).all(axis=1)
     gaps = np.flatnonzero(same & (np.diff(ordered[:, 2]) > APART * cell))
@@ -86,7 +89,7 @@ def find_overhangs(points: Array) -> Overhangs | None:
     upper = ordered[gaps + 1]
     in_largest = upper[patch == sizes.argmax()]
     middle = in_largest[np.abs(in_largest - np.median(in_largest, axis=0)).sum(axis=1).argmin()]
-    columns, hung = 1 + int((~same).sum()), np.unique(cells[gaps], axis=0)
+    hung = np.unique(cells[gaps], axis=0)
     return Overhangs(
         int((sizes >= TOGETHER).sum()),
         len(hung) * cell**2,
@@ -97,6 +100,20 @@ def find_overhangs(points: Array) -> Overhangs | None:
         cell,
         points[:, :2].min(axis=0),
     )
+
+
+def _columns(cells: NDArray[np.int64], z: Array, apart_m: float) -> tuple[int, NDArray[np.int64]]:
+    """How many columns of cells (n, 2) have points; the points in those that reach over more than a height."""
+    from .triangle_kernels import heights_in
+
+    size = cells.max(axis=0) + 1
+    number = cells[:, 0] * size[1] + cells[:, 1]
+    if size.prod() > SPARSE * len(cells):  # a few points lie far off
+        number = np.unique(number, return_inverse=True)[1]
+    low = np.full(int(number.max()) + 1, np.inf)
+    high = -low
+    heights_in(number, z, low, high)
+    return int((high >= low).sum()), np.flatnonzero((high - low > apart_m)[number])
 
 
 def _two_sheets(points: Array, lower: Array, upper: Array, apart_m: float) -> Mask:

@@ -12,6 +12,8 @@ from .ordering import along_curve
 
 MAX_EDGE_SPACINGS = 10.0
 """Longest edge of a meshed cloud by default, in multiples of its mean point spacing: longer ones bridge holes."""
+AT_ONCE = 100_000
+"""Points that the library is given: it holds more memory for more of them."""
 SNAPPED_M = 1e-9
 """Points of a cloud that are nearer in plan are one."""
 
@@ -93,8 +95,10 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
     ------
     InputError : fewer than three points, or all on a line in plan.
     """
+    from .triangle_kernels import wind
+
     total = len(points)
-    origin = np.lexsort((points[:, 2], points[:, 1], points[:, 0]))
+    origin = _in_plan(points)
     if total:
         origin = origin[np.r_[True, (np.diff(points[origin, :2], axis=0) != 0).any(axis=1)]]
     points = points[origin]
@@ -110,13 +114,10 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
     faces = _delaunay(plan)
     if not len(faces):
         raise _on_a_line()
-    a, b, c = (plan[faces[:, k]] for k in range(3))
-    twice_area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-    faces = np.where((twice_area < 0)[:, None], faces[:, ::-1], faces)
-    edges = np.stack([np.hypot(*(q - p).T) for p, q in ((a, b), (b, c), (c, a))], axis=1)
-    spacing = float(np.sqrt(np.abs(twice_area).sum() / 2 / len(points)))
+    longest2 = np.empty(len(faces))
+    spacing = float(np.sqrt(wind(plan, faces, longest2) / len(points)))
     limit = MAX_EDGE_SPACINGS * spacing if max_edge_m is None else float(max_edge_m)
-    short = (edges.max(axis=1) <= limit) & (twice_area != 0)
+    short = longest2 <= limit * limit
     if not short.any():
         raise InputError(
             f"No triangle has all edges below {limit:g} m",
@@ -127,20 +128,38 @@ def mesh_cloud(points: Array, max_edge_m: float | None) -> Meshed:
         f"Edges over {limit:.3g} m in plan were left out, with {int((~short).sum()):,} of {len(faces):,} triangles"
         + (f"; the maximum is {MAX_EDGE_SPACINGS:g} times the spacing." if max_edge_m is None else "."),
     ]
-    return Meshed(points, np.ascontiguousarray(faces[short], dtype=np.int32), tuple(notes), origin)
+    return Meshed(points, faces[short], tuple(notes), origin)
 
 
-def _delaunay(plan: Array) -> NDArray[np.int64]:
-    """(m, 3) Delaunay triangles of points in plan (n, 2)."""
+def _in_plan(points: Array) -> NDArray[np.int64]:
+    """(n,) the order of points (n, 3) along a curve in plan; of those at one place the lowest comes first."""
+    if not len(points):
+        return np.empty(0, np.int64)
+    curve = along_curve(points[:, :2])
+    order = np.argsort(curve, kind="stable")
+    curve = curve[order]
+    same = np.r_[False, curve[1:] == curve[:-1], False]
+    rows = np.flatnonzero(same[1:] | same[:-1])
+    among = order[rows]
+    order[rows] = among[np.lexsort((*points[among, ::-1].T, curve[rows]))]
+    return order
+
+
+def _delaunay(plan: Array) -> NDArray[np.int32]:
+    """(m, 3) Delaunay triangles of points in plan (n, 2), of which near ones follow each other: each is sought from the
+    one before.
+    """
     import startinpy
 
-    order = np.argsort(along_curve(plan), kind="stable")  # each point is sought from the one before
     made = startinpy.DT()
     made.snap_tolerance = SNAPPED_M
-    made.insert(np.column_stack([plan[order], order]))  # heights are not looked at: they carry the points' numbers
+    for start in range(0, len(plan), AT_ONCE):
+        part = plan[start : start + AT_ONCE]
+        number = np.arange(start, start + len(part), dtype=np.float64)
+        made.insert(np.column_stack([part, number]))  # heights carry the points' numbers
     number = made.points[:, 2]
     number[0] = 0.0  # the first point is at infinity
-    return np.asarray(number.astype(np.int64)[made.triangles])
+    return np.asarray(number.astype(np.int32)[made.triangles])
 
 
 def _on_a_line() -> InputError:

@@ -258,7 +258,7 @@ def sections_as_asked(arguments: argparse.Namespace, ground: "Ground") -> "tuple
         name, equals, file = text.partition("=")
         if not (equals and name.strip() and file):
             raise InputError(f"--section {text} names no file", advice="Write NAME=FILE, for example road=road.csv")
-        sections.append(read_section(name.strip(), file, ground))
+        sections.append(read_section(file, name.strip(), ground))
     names = [section.name for section in sections]
     for name in names:
         if names.count(name) > 1:

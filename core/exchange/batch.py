@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 from ..children import TIED, child
 from ..errors import RockfallError
-from ..output import output_folder, write_text
+from ..output import LOCK, output_folder, write_text
 from ..progress import CancelledError, Progress, silent
 from .job_inputs import digest_of, input_files, input_hashes
 from .sweep import Job
@@ -166,7 +166,9 @@ def _run_job(batch: Batch, job: Job, make_command: MakeCommand, stop: Event) -> 
             seconds = round(time.monotonic() - started, 3)
             if status != 0:
                 raise _JobError(problem or f"It ended with the status {status} and said nothing")
-            files = sorted(one.relative_to(draft).as_posix() for one in draft.rglob("*") if one.is_file())
+            files = sorted(
+                one.relative_to(draft).as_posix() for one in draft.rglob("*") if one.is_file() and one.name != LOCK
+            )
             said = said.replace(str(draft), str(folder))
             record = {
                 "command": batch.command,
@@ -227,21 +229,24 @@ def _finished(command: Sequence[str], stop: Event) -> tuple[int, str, str]:
 
 
 def _record_of(folder: Path) -> dict[str, Any] | None:
-    """What a finished job has left; None where there is none, or one that is damaged or not whole."""
+    """What a finished job has left; None where there is none, or one that is damaged or not whole.
+
+    Its files are in the folder, whatever somebody has written into it: they are removed when the job is done again.
+    """
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        files, _ = [Path(name) for name in record["files"]], float(record["seconds"])
+        inside = not any(file.is_absolute() or file.drive or ".." in file.parts for file in files)
+        return record if inside and all((folder / file).is_file() for file in files) else None
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError):
         return None
-    if not isinstance(record, dict) or not all((folder / str(name)).is_file() for name in record.get("files", ())):
-        return None
-    return record
 
 
 def _remove_outdated(folder: Path, record: dict[str, Any] | None) -> None:
     """Remove what the same job has made of other inputs, so that the new folder appears in one step."""
     if record is None:
         return
-    for name in (RECORD, *map(str, record.get("files", ()))):
+    for name in (RECORD, *record["files"]):
         with suppress(OSError):
             (folder / name).unlink()
     for inner in sorted((one for one in folder.rglob("*") if one.is_dir()), reverse=True):

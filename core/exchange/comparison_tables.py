@@ -3,6 +3,7 @@
 
 import csv
 from dataclasses import astuple, fields
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -52,10 +53,8 @@ def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
     rows = where[(model == 0) & (replicate == 0)]
     shape = (len(models), int(replicate.max()) + 1, rows.size)
     order = np.lexsort((_rank(where, rows), replicate, model))
-    expected = np.stack([index.ravel() for index in np.indices(shape)])
-    if len(table) != np.prod(shape) or not np.array_equal(
-        np.stack([model, replicate, _rank(where, rows)])[:, order], expected
-    ):
+    found = np.stack([model, replicate, _rank(where, rows)])[:, order]
+    if len(table) != prod(shape) or not np.array_equal(found, [index.ravel() for index in np.indices(shape)]):
         raise InputError(
             f"The {len(table)} rows are not {shape[0]} models with runs 0…{shape[1] - 1} of {shape[2]} impacts",
             file=path,

@@ -28,7 +28,7 @@ def input_files(project: Path, options: Sequence[str]) -> dict[str, Path]:
     found = {project.name: project}
     try:
         content: Any = tomllib.loads(project.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+    except (OSError, ValueError, RecursionError):  # no text, no TOML, nested too deeply
         content = None
     for text in _texts(content):
         if (file := _file(project.parent, text)) is not None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From project.toml to a scenario: its terrain, structures, releases and models."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +107,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         inputs |= tree_files
     scenario = Scenario(
         met,
-        release_source(project, terrain, entry),
+        _named_source(project, terrain, entry, file),
         {name: known.get(name, {}) for name in models},
         _drawn_from(project, terrain, entry) if drawing else None,
         structures=structures,
@@ -128,6 +130,29 @@ def _drawn_from(project: Project, terrain: Surface, entry: SimulationEntry) -> M
     if entry.observed is not None:
         return measured_rebounds(read_impacts(entry.observed))
     return measured_rebounds(reconstruct_project(project, terrain).impacts)
+
+
+def _named_source(project: Project, terrain: Surface, entry: SimulationEntry, file: Path) -> ReleaseSource:
+    """`release_source`, whose errors name the project."""
+    with _naming(file):
+        source = release_source(project, terrain, entry)
+
+    def release(ground: Ground) -> Releases:
+        with _naming(file):
+            return source(ground)
+
+    return release
+
+
+@contextmanager
+def _naming(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        place = error.file or file
+        raise InputError(
+            error.problem, file=place, row=error.row, trajectory=error.trajectory, advice=error.advice
+        ) from error
 
 
 def release_source(project: Project, terrain: Surface, entry: SimulationEntry) -> ReleaseSource:

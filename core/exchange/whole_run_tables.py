@@ -20,7 +20,8 @@ from .tables import Columns, write_columns, write_tables
 QUANTILE_NAMES = tuple(f"q{round(100 * part):02d}" for part in QUANTILES)
 
 
-def read_section(name: str, path: str | Path, ground: Ground) -> Section:
+@reader("table of a section")
+def read_section(path: str | Path, name: str, ground: Ground) -> Section:
     """Read a line in plan, its points in order: x_m, y_m in survey coordinates.
 
     Raises
@@ -32,7 +33,9 @@ def read_section(name: str, path: str | Path, ground: Ground) -> Section:
     line = points - ground.shift.vector[:2]
     apart = np.hypot(*np.diff(line, axis=0).T) > 0
     if not apart.size or not apart.all():
-        raise InputError("A section needs two points or more, each at a place of its own", file=path)
+        raise InputError(
+            "A section needs two points or more, each at a place of its own", file=path, advice="Correct its points"
+        )
     low, high = ground.terrain.bounds
     if (line.max(axis=0) < low[:2]).any() or (line.min(axis=0) > high[:2]).any():
         raise InputError(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import examples
 import numpy as np
+import simulations
 from examples import CAMERAS, DATA, FOOTAGE, SHIFT, head_of
 from rockfall.core.cli import main
 
@@ -49,13 +50,13 @@ def _ran(*words: str, out: bool = True) -> Callable[[Path], object]:
 def cases(folder: Path) -> dict[str, Case]:
     """Name → case; `folder` is for files that libraries write only to a disc."""
     terrains = examples.terrain_files(folder)
-    found = {**_terrains(terrains), **_tables(), **_videos(), **_projects(terrains["b.ply"])}
+    found = {**_terrains(terrains), **_tables(), **_videos(), **_projects(terrains["b.ply"]), **_coloured()}
     (folder / "impacts.csv").write_bytes(examples.IMPACTS)
     main(["merge", str(folder / "impacts.csv"), "--out", str(folder / "package")])
     package = {f"package/{path.name}": path.read_bytes() for path in (folder / "package").glob("*.[cj]s*")}
     found["package"] = Case(package, tuple(package), lambda at: _package(at / "package"))
     shutil.rmtree(folder, ignore_errors=True)
-    return found | _commands(terrains["b.ply"])
+    return found | _simulations(terrains["b.ply"]) | _commands(terrains["b.ply"])
 
 
 def _package(path: Path) -> object:
@@ -78,6 +79,29 @@ def _terrains(files: dict[str, bytes]) -> dict[str, Case]:
         {"b.ply": files["b.ply"]}, ("b.ply",), lambda at: read_ply_attribute(at / "b.ply", "zone")
     )
     return found
+
+
+def _coloured() -> dict[str, Case]:
+    """Terrains with colours, and the texture of one."""
+    from rockfall.core.terrain.readers import read_terrain
+
+    files = simulations.coloured()
+    textured = {name: files.pop(name) for name in ("t.obj", "t.mtl", "t.png")}
+    found = {
+        f"colours {name}": Case({name: data}, (name,), lambda at, name=name: _finite(read_terrain(at / name)))
+        for name, data in files.items()
+    }
+    return found | {"texture": Case(textured, tuple(textured), lambda at: _finite(read_terrain(at / "t.obj")))}
+
+
+def _simulations(terrain: bytes) -> dict[str, Case]:
+    """What simulations read: by the readers, and by the commands."""
+    files = {"terrain.ply": terrain, **simulations.files()}
+    found = {name: Case(files, damaged, read) for name, (damaged, read) in simulations.readers().items()}
+    return found | {
+        f"rockfall {name}": Case(files, damaged, _ran(*words), command=True, slow=True)
+        for name, (damaged, words) in simulations.COMMANDS.items()
+    }
 
 
 def _tables() -> dict[str, Case]:

@@ -164,7 +164,7 @@ def chosen(every: dict[str, Case], options: argparse.Namespace) -> dict[str, Cas
     return {
         name: case
         for name, case in every.items()
-        if (not options.only or options.only in name) and not (options.quick and case.slow)
+        if any(word in name for word in options.only) and not (options.quick and case.slow)
     }
 
 
@@ -220,7 +220,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=500)
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="", help="cases whose name has this in it")
+    parser.add_argument("--only", nargs="+", default=[""], help="cases whose name has one of these in it")
     parser.add_argument("--quick", action="store_true", help="leave out what takes long")
     parser.add_argument("--seconds", type=float, default=np.inf, help="end after so long")
     parser.add_argument("--keep", type=Path, help="folder for the files of cases that fail")

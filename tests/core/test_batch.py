@@ -238,3 +238,38 @@ def test_places_in_the_options_stand_for_the_project(sites, tmp_path):
     finally:
         rockfall_command.reset(token)
     assert (out / "west" / "told.txt").read_text() == f"terrain {sites / 'west'}/terrain.ply --up z"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda record, stranger: {**record, "files": [str(stranger)]},
+        lambda record, stranger: {**record, "files": ["../../mine.txt"]},
+        lambda record, stranger: {**record, "files": 5},
+        lambda record, stranger: {**record, "files": [5]},
+        lambda record, stranger: {**record, "seconds": "long"},
+        lambda record, stranger: {name: value for name, value in record.items() if name != "files"},
+        lambda record, stranger: [record],
+    ],
+)
+def test_a_damaged_record_of_a_job_does_it_again_and_removes_nothing_elsewhere(sites, tmp_path, damage):
+    out, stranger = tmp_path / "out", tmp_path / "mine.txt"
+    stranger.write_text("mine")
+    run(batch_of(sites, out))
+    record = json.loads((out / "west" / "job.json").read_text())
+    (out / "west" / "job.json").write_text(json.dumps(damage(record, stranger)))
+    with (sites / "west" / "project.toml").open("a") as project:
+        project.write("# other")
+    assert run(batch_of(sites, out))["west"].state == "done"
+    assert stranger.read_text() == "mine"
+    assert run(batch_of(sites, out))["west"].state == "already done"
+
+
+def test_a_record_or_a_project_that_is_nested_too_deeply_ends_no_batch(sites, tmp_path):
+    run(batch_of(sites, tmp_path / "out"))
+    (tmp_path / "out" / "west" / "job.json").write_text("[" * 200_000)
+    (sites / "east" / "project.toml").write_text("a = " + "[" * 200_000)
+    found = run(batch_of(sites, tmp_path / "out"))
+    assert {name: one.state for name, one in found.items()} == {
+        "east": "done", "north": "already done", "west": "done",
+    }  # fmt: skip

@@ -203,6 +203,9 @@ def test_bad_tables(site: Path, tmp_path: Path, capsys) -> None:
     far.write_text("x_m,y_m\n0,0\n5,5\n", encoding="utf-8")
     assert main(asked(site, out, "--section", f"far={far}")) == 1
     assert "The section far is beside the terrain" in capsys.readouterr().err
+    far.write_text("x_m,y_m\n5,5\n5,5\n", encoding="utf-8")
+    assert main(asked(site, out, "--section", f"far={far}")) == 1
+    assert capsys.readouterr().err.endswith("each at a place of its own. Correct its points.\n")
     stops = tmp_path / "stops.csv"
     stops.write_text(f"release,x_m,y_m\nB9,{EAST + 50},{NORTH + 50}\n", encoding="utf-8")
     assert main(asked(site, out, "--stops", str(stops), observed="releases.csv")) == 1

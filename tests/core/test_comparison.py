@@ -205,6 +205,17 @@ def test_predictions_round_trip(tmp_path):
             np.testing.assert_allclose(getattr(again, name), getattr(predictions, name), rtol=1e-15)
 
 
+@pytest.mark.parametrize("replicate", ["1000000000000", "1e15", "-3"])
+def test_a_run_of_a_huge_number_takes_no_memory(tmp_path, replicate):
+    impacts, path = bounces(), tmp_path / "predictions.csv"
+    write_predictions(compare(impacts, ["dorren_2015"], replicates=1), path)
+    lines = path.read_text().splitlines()
+    model, _, *rest = lines[-1].split(",")
+    path.write_text("\n".join([*lines[:-1], ",".join([model, replicate, *rest])]))
+    with pytest.raises(InputError, match=r"rows are not 1 models with runs 0…\d+ of \d+ impacts"):
+        read_predictions(path, impacts)
+
+
 def test_the_columns_of_the_format(tmp_path):
     write_predictions(compare(bounces(), ["dorren_2015"], replicates=3), tmp_path / "predictions.csv")
     lines = (tmp_path / "predictions.csv").read_text(encoding="utf-8").splitlines()

@@ -144,12 +144,18 @@ def test_options_go_before_the_project(folder: Path, capsys) -> None:
         ('[simulation.releases]\ntrajectory = "B09"', "There is no trajectory 'B09' to release blocks from"),
         ('[simulation.releases]\nfrom = "steep"\nsteeper_than_deg = 60', "No terrain is steeper than 60"),
         ('[simulation.releases]\nfrom = "points"\npoints_m = [[0, 0]]', "There is no terrain"),
+        (
+            '[simulation.releases]\nfrom = "line"\npoints_m = [[0, 0], [9, 9]]\ndiameter_m = 4e9',
+            "is larger than the terrain",
+        ),
     ],
 )
 def test_what_cannot_be_released_is_said(folder: Path, capsys, simulation: str, problem: str) -> None:
     out = folder / "out"
     assert main(["simulate", str(project(folder, simulation)), "--out", str(out)]) == 1
-    assert problem in capsys.readouterr().err
+    place, _, said = capsys.readouterr().err.partition("project.toml: ")
+    assert place.endswith(f"rockfall: {folder}/")
+    assert problem in said
     assert not out.exists()
 
 

@@ -3,6 +3,7 @@
 
 import json
 import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -129,6 +130,56 @@ def test_the_texture_of_an_obj_and_one_that_is_missing(tmp_path: Path) -> None:
     surface = read_terrain(path)
     assert surface.colours is None
     assert any("left out" in sentence for sentence in surface.summary)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("a\x1b[31mb.mtl", "a\\x1b[31mb.mtl is not beside it"),
+        ("x" * 5000, "x is not beside it"),
+        (".", ". is not beside"),
+    ],
+)
+def test_names_of_materials_and_pictures_that_no_file_has_leave_the_terrain(tmp_path, name, said) -> None:
+    path, library = textured(tmp_path), tmp_path / "slope.mtl"
+    library.write_text(f"newmtl rock\nmap_Kd {name}\n")
+    found = [read_terrain(path)]
+    path.write_text(path.read_text().replace("slope.mtl", name))
+    found.append(read_terrain(path))
+    for surface in found:
+        assert surface.colours is None
+        (sentence,) = (one for one in surface.summary if "left out" in one)
+        assert said in sentence
+        assert len(sentence) < 400
+        assert "\x1b" not in sentence
+
+
+def _header(side: int) -> bytes:
+    """The beginning of a PNG of so many pixels, as far as its size is told."""
+    parts = (b"IHDR" + struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0), b"IDAT" + zlib.compress(bytes(100)))
+    sized = (struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(sized)
+
+
+@pytest.mark.parametrize(
+    ("side", "said"), [(1 << 20, "the texture needs 17592.2 GB of memory"), (14_000, "left out: ")]
+)
+def test_a_picture_that_promises_too_much_costs_the_colours_alone(tmp_path: Path, capfd, side, said) -> None:
+    path = textured(tmp_path)
+    (tmp_path / "rock.png").write_bytes(_header(side))
+    surface = read_terrain(path)
+    assert surface.colours is None
+    assert any(said in sentence for sentence in surface.summary)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_texture_may_have_more_pixels_than_pillow_takes_for_harmless(tmp_path: Path, monkeypatch, recwarn) -> None:
+    from PIL import Image
+
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 20)  # of 196: nine times that, and Pillow refuses
+    check(read_terrain(textured(tmp_path)))
+    assert Image.MAX_IMAGE_PIXELS == 20
+    assert not [one for one in recwarn if "bomb" in str(one.message)]
 
 
 def test_e57(tmp_path: Path) -> None:

@@ -92,7 +92,8 @@ def _ground_sentence(path: Path, count: int) -> str:
     ground = int((some == GROUND_CLASS).sum())
     if not ground:
         known = "No point" if count <= LOOKED_AT else f"None of the first {LOOKED_AT:,} points"
-        return f"{known} is classified as ground: vegetation, if there is any, becomes part of the surface."
+        said = "vegetation, if there is any, becomes part of the surface; the ground filter takes it out."
+        return f"{known} is classified as ground: {said}"
     share = f"{100 * ground / len(some):.0f} %"
     of = f"{ground:,} of them ({share})" if count <= LOOKED_AT else f"Of the first {LOOKED_AT:,}, {share}"
     return f"{of} are classified as ground; only these are used unless others are asked for."

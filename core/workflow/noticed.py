@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What somebody who looks over one's shoulder would notice: tracks off the motion, sizes that cannot be."""
+"""What somebody notices who looks over one's shoulder: tracks off the motion, trees in a scan, impossible sizes."""
 
 from collections.abc import Iterable, Iterator
 
@@ -12,6 +12,7 @@ from ..footage.background import BackgroundMotion, stabilise
 from ..reconstruction.block import per_pick
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
+from ..terrain.surface import Surface
 from ..vectors import Array, norm
 
 OFF_PX = 10.0
@@ -27,6 +28,32 @@ GLANCE_PX = 6.0
 """A first look at reduced pictures is not much more exact than this."""
 TREMBLE_PX = 2.0
 """A background that moves further than this is not that of a tripod in the wind."""
+STANDS_OUT_M = 1.0
+"""No single point of the ground stands this far above or below all that surround it, but leaves and branches do."""
+MOST_STANDING_OUT = 0.02
+"""Of the vertices. Forested tiles with all their points have 0.1, bare ones with steps and boulders 0.003 at most."""
+
+
+def standing_out(surface: Surface) -> float:
+    """Share of the vertices that are higher or lower than all their neighbours by `STANDS_OUT_M`, 0…1."""
+    height = surface.vertices[:, 2]
+    highest, lowest = np.full(len(height), -np.inf), np.full(len(height), np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0), (1, 0), (2, 1), (0, 2)):
+        np.maximum.at(highest, surface.faces[:, i], height[surface.faces[:, j]])
+        np.minimum.at(lowest, surface.faces[:, i], height[surface.faces[:, j]])
+    out = np.maximum(height - highest, lowest - height)
+    return float((np.isfinite(out) & (out > STANDS_OUT_M)).mean()) if len(height) else 0.0
+
+
+def vegetated(share: float, name: str) -> tuple[Remark, ...]:
+    """A warning on a terrain of which such a share stands out, as `standing_out` gives it."""
+    if share <= MOST_STANDING_OUT:
+        return ()
+    text = (
+        f"{name} looks like trees and bushes, not ground: {100 * share:.0f} % of its points stand out by more than "
+        f"{STANDS_OUT_M:g} m. Read it again with the ground filter."
+    )
+    return (Remark(text, "warning", "vegetation"),)
 
 
 def tracks_off_the_motion(courses: Iterable[MotionCourse]) -> tuple[Remark, ...]:

@@ -158,6 +158,8 @@ def hint(scene: bpy.types.Scene, camera: bpy.types.Object | None) -> str:
     if waiting := sum(bool(each.proposed) for each in pairs):
         return f"Drag {waiting} dashed marks to where they are seen in this frame; click one that fits."
     if not pairs:
+        for remark in background_remarks(camera):
+            return remark.text
         return (
             "Click a place in the picture that you will find again on the terrain: a boulder's edge, a ledge, a crack."
         )

@@ -34,11 +34,13 @@ class NextStep:
     Attributes
     ----------
     video : id of the camera that is to be looked through, where that is an action.
+    tile : id of the terrain that is to be read again with the ground filter, where importing is an action.
     """
 
     sentence: str
     actions: tuple[str, ...] = ()
     video: str = ""
+    tile: str = ""
 
 
 def next_step(scene: bpy.types.Scene) -> NextStep:
@@ -50,6 +52,8 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if not store.has_role(scene, store.TERRAIN_ROLE) and not picks:
         demos = ("rockfall.load_footage_demo", "rockfall.load_demo")
         own = ("rockfall.import_terrain", "rockfall.open_project")
+        if camera is not None:
+            return NextStep("Now import the scan of the slope that the video shows.", own)
         return NextStep("Import your scan, or begin with a demo.", (*demos, *own))
     if terrain.displaced(scene):
         sentence = "The scan was moved, so nothing on it fits any more. Put it back; panel Terrain says how far it is."
@@ -59,6 +63,11 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if apart:
         actions = ("rockfall.recover_picks", "rockfall.select_set_aside", "rockfall.remove_set_aside")
         return NextStep(apart[0].text, actions)
+    wooded = terrain.with_trees(scene)
+    if wooded and not picks and (camera is None or not camera_paths.is_solved(camera)):
+        sentence = " ".join(said for said in terrain.warnings(scene) if said.startswith(f"{wooded[0].name} "))
+        rest = "rockfall.add_video" if camera is None else "rockfall.align_views"
+        return NextStep(sentence, ("rockfall.import_terrain", rest), tile=str(wooded[0].get(store.ID, "")))
     if camera is None and not picks:
         if store.has_role(scene, store.SIMULATED_BLOCKS_ROLE):
             sentence = "Play the simulated fall; step 7 has the numbers of each run."

@@ -113,7 +113,9 @@ def in_picture(
                 touching, ground_pixel = point[0], project(lens, point)[0]
     found = pick_on_terrain(lens, ground_pixel[None], surface, sigma_px)
     if np.isnan(found.point[0, 0]):
-        raise RockfallError("The ray through this pixel misses the terrain. Click on the surveyed slope.")
+        against = "If the block stands against the sky there, click where it touches the ground, with Click on: Ground."
+        advice = against if of_centre else "Click on the surveyed slope."
+        raise RockfallError(f"There is no terrain behind this pixel. {advice}")
     step = pictures.frame_step_s(camera)
     return Place(
         position=found.point[0] if touching is None else touching,

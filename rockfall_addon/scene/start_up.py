@@ -14,10 +14,10 @@ def is_untouched(scene: bpy.types.Scene) -> bool:
 
 
 def put_away(scene: bpy.types.Scene) -> None:
-    """Hide the cube and the light of the start-up scene; the cube is no longer the active object."""
+    """Hide the cube, the light and the camera of the start-up scene; the cube is no longer the active object."""
     for obj in scene.objects:
         cube = obj.name == "Cube" and obj.type == "MESH" and len(obj.data.vertices) == CUBE_VERTICES
-        if store.ROLE in obj or not (cube or (obj.name == "Light" and obj.type == "LIGHT")):
+        if store.ROLE in obj or not (cube or (obj.name, obj.type) in (("Light", "LIGHT"), ("Camera", "CAMERA"))):
             continue
         for layer in scene.view_layers:
             if obj.name not in layer.objects:

@@ -98,6 +98,7 @@ BLOCK_KEYS = "rockfall_block_keys"  # of a block's action: frame, place and pick
 # of a tile of the terrain
 TERRAIN_FILE, TERRAIN_SUMMARY = "rockfall_file", "rockfall_summary"
 THIN_SHARE, REACH = "rockfall_thin_share", "rockfall_reach_m"
+STANDING_OUT = "rockfall_standing_out"
 TURNED = "rockfall_turned"  # its file has y up
 FOOTAGE_OF = "rockfall_footage_of"  # id of a video's camera → digest of where it stood when it coloured the tile
 COARSE_VIEW_OF = "rockfall_view_of"  # of the full mesh: vertices, triangles, triangles that were wanted, checksums

@@ -165,7 +165,12 @@ BY_ROLE: dict[str, Kept] = {
     ),
     store.FACE_MAPS_ROLE: Kept({store.MAP_BLOCKS: count}, do="Compute the maps again"),
     store.TERRAIN_ROLE: Kept(
-        beside={store.REACH: _amount, store.THIN_SHARE: number(0.0, 1.0), store.FOOTAGE_OF: json_of(dict, _digests)}
+        beside={
+            store.REACH: _amount,
+            store.THIN_SHARE: number(0.0, 1.0),
+            store.STANDING_OUT: number(0.0, 1.0),
+            store.FOOTAGE_OF: json_of(dict, _digests),
+        }
     ),
 }
 

@@ -10,9 +10,11 @@ from mathutils import Matrix, Vector
 
 from ...core.errors import RockfallError
 from ...core.georeference import LARGE_COORDINATE_M
+from ...core.remarks import Remark
 from ...core.terrain.joining import join, moved
 from ...core.terrain.shading import Shading, thin_share
 from ...core.terrain.surface import Surface
+from ...core.workflow.noticed import standing_out, vegetated
 from . import georeference, materials, store, terrain_colours, terrain_look, terrain_mesh, terrain_view
 
 LEAST_THIN = 0.005
@@ -42,6 +44,7 @@ def add_terrain(scene: bpy.types.Scene, surface: Surface, shading: Shading) -> b
     obj[store.TERRAIN_SUMMARY], obj[store.TERRAIN_FILE] = list(surface.summary), surface.name
     obj[store.TURNED] = surface.turned
     obj[store.THIN_SHARE] = thin_share(surface, shading)
+    obj[store.STANDING_OUT] = standing_out(surface)
     obj[store.REACH] = float(np.abs(surface.bounds).max())
     set_locked(obj, True)
     store.link(store.collection(scene, "Terrain"), obj)
@@ -186,6 +189,15 @@ def downhill(scene: bpy.types.Scene) -> Vector:
     return fall.normalized() if fall.length > 1e-3 * mean.length else Vector((0.0, -1.0, 0.0))
 
 
+def with_trees(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Tiles that look as if vegetation were part of them."""
+    return [tile for tile in tiles(scene) if _vegetated(tile)]
+
+
+def _vegetated(tile: bpy.types.Object) -> tuple[Remark, ...]:
+    return vegetated(float(tile.get(store.STANDING_OUT, 0.0)), tile.name)
+
+
 def warnings(scene: bpy.types.Scene) -> list[str]:
     """What needs a person's attention, in sentences."""
     said = [
@@ -196,6 +208,7 @@ def warnings(scene: bpy.types.Scene) -> list[str]:
     for tile in store.with_role(scene, store.TERRAIN_ROLE):
         if not has_faces(tile):
             said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
+        said += [remark.text for remark in _vegetated(tile)]
         reach = float(tile.get(store.REACH, 0.0))
         if reach > LARGE_COORDINATE_M:
             step = float(np.spacing(np.float32(reach))) * 1000

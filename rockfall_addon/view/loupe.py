@@ -11,7 +11,7 @@ from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_ray
 from ...core.vectors import Array
 from ..scene import camera_paths, pictures, places, problems, reconstruction, video_files, videos
-from . import drawing, footage_view, image_view, pointing
+from . import drawing, footage_view, image_view, pointing, workspace
 
 SHOWN_BY = {"rockfall.pick_tool", "rockfall.spin_tool", "rockfall.align_tool"}
 SIDE = 25
@@ -93,11 +93,12 @@ def _draw(mouse: tuple[int, int]) -> None:
     except RockfallError:
         return  # the panel Videos tells that the file is gone
     side = SIDE * zoom
+    _, _, right, top = workspace.free_part(context.area, region)
     left = mouse[0] + AWAY * scale
-    if spot[0] + AWAY * scale + side > region.width:
+    if spot[0] + AWAY * scale + side > right:
         left = mouse[0] - AWAY * scale - side
     low = mouse[1] + AWAY * scale
-    if spot[1] + AWAY * scale + side > region.height:
+    if spot[1] + AWAY * scale + side > top:
         low = mouse[1] - AWAY * scale - side
     _picture(part, left, low, side)
     edge = outline(scene, camera, pixel) if tool.idname == "rockfall.pick_tool" else None

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What panels say of a selected impact, and that ⚠ never stands without its reason."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import bpy
 import pytest
 from two_runs import picks_of
+
+FOOTAGE = Path(__file__).resolve().parents[2] / "assets" / "demo" / "footage" / "footage.mp4"
 
 
 class Layout:
@@ -118,3 +121,20 @@ def test_the_block_panel_says_what_fell(scene, draw) -> None:
     assert ("NONE", "59.5 kg") in draw("ROCKFALL_PT_block")
     scene.rockfall_block.d1 = 1.5
     assert {("NONE", "255 kg"), ("NONE", "0.733 m")} <= set(draw("ROCKFALL_PT_block"))
+
+
+@pytest.mark.parametrize(
+    "name", ["ROCKFALL_PT_share", "ROCKFALL_PT_picks", "ROCKFALL_PT_terrain", "ROCKFALL_PT_videos"]
+)
+def test_nothing_is_ticked_before_it_is_done(name, draw) -> None:
+    assert not [text for icon, text in draw(name) if icon == "CHECKMARK"]
+
+
+def test_the_first_advice_is_the_terrain(draw) -> None:
+    assert any("Import the terrain first" in text for _, text in draw("ROCKFALL_PT_picks"))
+
+
+def test_with_a_video_alone_no_demo_is_offered(part) -> None:
+    part("rockfall_addon.scene.new_videos").add_video(bpy.context.scene, FOOTAGE)
+    step = part("rockfall_addon.scene.next_step").next_step(bpy.context.scene)
+    assert step.actions == ("rockfall.import_terrain", "rockfall.open_project")

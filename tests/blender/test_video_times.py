@@ -39,6 +39,7 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     reference, other = (add(part, "slower.mp4") for _ in range(2))
     assert times.reference_camera(scene()) == reference
     assert times.never_synchronised(scene()) == other
+    assert bpy.types.ROCKFALL_PT_videos.step_state(bpy.context) == "ATTENTION"
     drift = 0.02 if fit_drift else 0.0
     seen = videos.times_of(reference)[[30, 80, 110, 130]]
     truth = part("core.footage.clock").Clock(-0.3, drift, 0.2)
@@ -58,6 +59,8 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     assert part("rockfall_addon.steps.videos.wording").fit(other)[0] == said[0]
     assert clocks.clock_of(reference).offset_s == 0.0
     assert times.never_synchronised(scene()) is None
+    said = part("rockfall_addon.steps.videos.wording").warnings(scene(), other)
+    assert not [remark for remark in said if remark.about == "clock"]
 
 
 def test_next_video_begins_with_the_others(part: Part) -> None:

@@ -6,15 +6,19 @@ import pytest
 from rockfall.core.analysis.motion_graphs import MotionCourse, VideoResiduals
 from rockfall.core.camera.model import Camera
 from rockfall.core.footage.background import BackgroundMotion, no_motion
+from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.noticed import (
     impossible_sizes,
     moves_at_a_glance,
     no_tripod,
+    standing_out,
     tracks_off_the_motion,
     turn_deg,
+    vegetated,
 )
 
 
@@ -91,3 +95,30 @@ def test_a_first_look_asks_whether_it_was_held_by_hand():
     assert "left moves by 179 px" in said.text
     assert "Hand-held in step 3" in said.text
     assert moves_at_a_glance(3.0, "left") == () == moves_at_a_glance(float("nan"), "left")
+
+
+def slope(lifted):
+    """31 × 31 points every metre on a slope of 45°, some of them lifted [m]."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(31.0), np.arange(31.0)))
+    corner = np.arange(31 * 31).reshape(31, 31)
+    a, b, c, d = (each.ravel() for each in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    faces = np.r_[np.c_[a, b, c], np.c_[a, c, d]].astype(np.int32)
+    return Surface(np.c_[x, y, x + lifted], faces, GlobalShift(), "slope")
+
+
+def test_leaves_are_told_from_boulders_and_steps():
+    x = np.tile(np.arange(31), 31)
+    assert standing_out(slope(0.0 * x)) == 0.0
+    assert standing_out(slope(np.where(x > 15, 10.0, 0.0))) == 0.0, "a wall is no forest"
+    boulders = np.zeros(31 * 31)
+    boulders[[100, 300, 500]] = 3.0  # 2 m above the neighbour uphill
+    assert standing_out(slope(boulders)) == pytest.approx(3 / 961)
+    leaves = np.zeros((31, 31))
+    leaves[1:-1:3, 1:-1:3] = -4.0
+    assert standing_out(slope(leaves.ravel())) == pytest.approx(100 / 961), "points from below, too"
+    assert vegetated(3 / 961, "scan") == ()
+    (remark,) = vegetated(100 / 961, "scan.laz")
+    assert remark.severity == "warning"
+    assert "scan.laz" in remark.text
+    assert "10 %" in remark.text
+    assert "ground filter" in remark.text

@@ -400,8 +400,9 @@ class AlignTool(bpy.types.WorkSpaceTool):
 
     @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:
-        """What to do next, in the header."""
-        layout.label(text=alignment.hint(context.scene, videos.active_camera(context.scene)))
+        """What to do next, in the header, where it is not drawn over the view."""
+        if not context.space_data.overlay.show_overlays:
+            layout.label(text=alignment.hint(context.scene, videos.active_camera(context.scene)))
 
 
 CLASSES = (

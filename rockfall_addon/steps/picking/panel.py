@@ -29,6 +29,8 @@ class ROCKFALL_PT_picks(RockfallPanel, bpy.types.Panel):
             with_video = store.has_role(scene, store.CAMERA_ROLE)
             on_terrain = "Click the impacts on the terrain, each at its time in the timeline,"
             way = "Click the block at its impacts in the footage" if with_video else on_terrain
+            if not store.has_role(scene, store.TERRAIN_ROLE):
+                way = "Import the terrain first (step 1),"
             advise(context, layout, False, f"{way} or import a table of timed picks (picks.csv).")
             if store.has_role(scene, store.TERRAIN_ROLE) and not with_video:
                 layout.operator("wm.tool_set_by_id", text="Pick Impacts", icon="CURSOR").name = "rockfall.pick_tool"
@@ -56,7 +58,7 @@ class ROCKFALL_PT_picking(RockfallPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         settings, camera = scene.rockfall_picking, videos.active_camera(scene)
         layout.operator("wm.tool_set_by_id", text="Pick Impacts", icon="CURSOR").name = "rockfall.pick_tool"
-        advise(context, layout, *_advice(scene, camera))
+        advise(context, layout, False, _advice(scene, camera))
         fields(layout.column(), settings, ("trajectory", "kind", "aim", "sigma_px"))
         pick = pointing.active_pick(context)
         if pick is not None:
@@ -103,15 +105,15 @@ class ROCKFALL_PT_tracking(RockfallPanel, bpy.types.Panel):
         row.operator("rockfall.clear_track", text="", icon="X")
 
 
-def _advice(scene: bpy.types.Scene, camera: bpy.types.Object) -> tuple[bool, str]:
+def _advice(scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
     if not store.has_role(scene, store.TERRAIN_ROLE):
-        return False, "Import the terrain first: picks lie on it."
+        return "Import the terrain first: picks lie on it."
     if not camera_paths.is_solved(camera):
-        return True, (
+        return (
             f"{camera.name} is not aligned: clicks are taken as in a free view, at the time of the picture. "
             "Align it to pick in its pixels."
         )
-    return True, "Step to the picture of an impact (← →), look through the camera, and click the block."
+    return "Step to the picture of an impact (← →), look through the camera, and click the block."
 
 
 CLASSES = (ROCKFALL_PT_picks, ROCKFALL_PT_picking, ROCKFALL_PT_tracking)

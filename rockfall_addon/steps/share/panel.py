@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import store
 from ...view import job
-from ...view.panel import RockfallPanel, State, advise, paragraph
+from ...view.panel import RockfallPanel, State, paragraph
 
 
 class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
@@ -21,7 +21,7 @@ class ROCKFALL_PT_share(RockfallPanel, bpy.types.Panel):
         return "ANY_TIME"
 
     def draw(self, context: bpy.types.Context) -> None:
-        advise(context, self.layout, True, "Tables in survey coordinates, with units.")
+        paragraph(context, self.layout, "Tables in survey coordinates, with units:")
         self.layout.operator("rockfall.export_tables", icon="EXPORT")
         self.layout.operator("rockfall.export_graphs", icon="EXPORT")
         self.layout.operator("rockfall.export_simulation", icon="EXPORT")

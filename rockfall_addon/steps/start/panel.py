@@ -51,12 +51,16 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
         column.scale_y = 1.4
         for action in step.actions:
             text, icon = LOOKS[action]
+            if step.tile and action == "rockfall.import_terrain":
+                text = "Read Again with Ground Filter"
             operator = "wm.tool_set_by_id" if action == PICK_TOOL else action
             button = column.operator(operator, icon=icon, **({"text": text} if text else {}))
             if action == PICK_TOOL:
                 button.name = PICK_TOOL
             elif action == "rockfall.look_through":
                 button.identifier = step.video
+            elif step.tile and action == "rockfall.import_terrain":
+                button.replaces, button.ground = step.tile, "FILTER"
 
 
 CLASSES = (ROCKFALL_PT_start,)

@@ -199,7 +199,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         """The dialog after the file browser, whose operator ends with it. An error in an operator that is called by
         another is an exception, which Blender would show as a traceback."""
         try:
-            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=self.filepath, replaces=self.replaces)
+            told = {"filepath": self.filepath, "replaces": self.replaces, "ground": self.ground}
+            return bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", **told)
         except RuntimeError as error:
             raise RockfallError(str(error).removeprefix("Error: ").strip()) from None
 

@@ -40,6 +40,11 @@ class ROCKFALL_PT_terrain(RockfallPanel, bpy.types.Panel):
             paragraph(context, layout, sentence, "ERROR")
         if terrain.displaced(scene):
             layout.operator("rockfall.put_terrain_back", icon="LOOP_BACK")
+        for tile in terrain.with_trees(scene):
+            again = layout.operator(
+                "rockfall.import_terrain", text="Read Again with Ground Filter", icon="FILE_REFRESH"
+            )
+            again.replaces, again.ground = tile.get(store.ID, ""), "FILTER"
         if not warnings:
             advise(context, layout, True, "Ready.")
         self._list_tiles(grounds)

@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.remarks import Remark, from_plain, from_text
-from ...scene import clocks, footage, store, timing, video_files, video_times, videos
+from ...scene import clocks, footage, proposal, store, timing, video_files, video_times, videos
 from ...view import image_view
 
 OTHER_RATE = 1e-4
@@ -56,6 +56,12 @@ def missing(camera: bpy.types.Object) -> str:
 def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[Remark]:
     """What makes the view wrong."""
     said = []
+    unset = None if proposal.is_applied(scene) else video_times.never_synchronised(scene)
+    if unset is not None:
+        text = (
+            f"{unset.name} is not synchronised: both videos begin together until it is. Once both are aligned, do so."
+        )
+        said.append(Remark(text, "warning", "clock"))
     if scene.camera == camera and not image_view.shape_agrees(scene, camera):
         text = "The scene's render size has another shape than the video: footage and terrain do not fit."
         said.append(Remark(text, "warning", "render size"))

@@ -6,15 +6,18 @@
     python scripts/build_extension.py --develop DIR --python 3.14
 
 Wheels are fetched with pip, at the versions of constraints.txt, into wheels/, and fetched again only when a version
-changes. The tracked manifest lists no wheels: they are written into a staged copy. NumPy is Blender's own. No Blender
-is needed: the bpy module in this Python brings Blender's own packager, which also validates the zips.
+changes. They travel without their tests and the sources of compiled modules. The tracked manifest lists no wheels: they
+are written into a staged copy. NumPy is Blender's own. No Blender is needed: the bpy module in this Python brings
+Blender's own packager, which also validates the zips.
 
 With --develop nothing is packed: DIR becomes a Blender user directory (BLENDER_USER_RESOURCES) in which the extension
 has its wheels and is otherwise linked to this checkout, so that an edit runs at the next start.
 """
 
 import argparse
+import csv
 import importlib.util
+import io
 import json
 import os
 import re
@@ -43,6 +46,8 @@ BLENDER_PYTHON = "3.13"
 LARGEST_ZIP_BYTES = 175_000_000
 NOT_BUNDLED = {"numpy"}
 """Blender brings its own, and two copies in one process crash."""
+LEFT_OUT = {"pyi", "pyx", "pxd", "c", "cpp", "cu", "h", "hpp"}
+"""Endings of files that are of use to compilers and editors only."""
 ALSO_BUNDLED = ("llvmlite",)
 """What the dependencies depend on; a test compares the whole list with what the core asks for."""
 
@@ -105,6 +110,36 @@ def fits_any_python(name: str, system: str) -> bool:
     return fits and (abi == "abi3" or python.startswith("py"))
 
 
+def is_needed(name: str) -> bool:
+    """Whether a file of a wheel does anything in Blender: tests and the sources of compiled modules do not."""
+    folders, ending = name.split("/")[:-1], name.rpartition(".")[2]
+    if any(folder.endswith((".dist-info", ".data")) for folder in folders):
+        return True  # with the licences
+    return "tests" not in folders and ending not in LEFT_OUT
+
+
+def lean(wheel: Path) -> Path:
+    """The same wheel without what is not needed, nor that in its list of files; made once, in a folder beside."""
+    made = wheel.parent / "lean" / wheel.name
+    if made.exists() and made.stat().st_mtime >= wheel.stat().st_mtime:
+        return made
+    made.parent.mkdir(exist_ok=True)
+    draft = made.with_suffix(f".{os.getpid()}")
+    with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as new:
+        for info in old.infolist():
+            if not is_needed(info.filename):
+                continue
+            content = old.read(info)
+            if info.filename.endswith(".dist-info/RECORD"):
+                rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""))
+                listed = io.StringIO(newline="")
+                csv.writer(listed, lineterminator="\n").writerows(row for row in rows if row and is_needed(row[0]))
+                content = listed.getvalue().encode("utf-8")
+            new.writestr(info, content, zipfile.ZIP_DEFLATED)
+    draft.replace(made)
+    return made
+
+
 def stage(directory: Path, wheels: dict[str, list[Path]], *, link: bool = False) -> Path:
     """Write the extension's tree with the wheels of the systems in its manifest; copied, or linked to this checkout."""
     directory.mkdir(parents=True)
@@ -119,7 +154,7 @@ def stage(directory: Path, wheels: dict[str, list[Path]], *, link: bool = False)
         else:
             shutil.copy2(source, target)
     (directory / "wheels").mkdir()
-    for path in {path.name: path for paths in wheels.values() for path in paths}.values():
+    for path in {path.name: lean(path) for paths in wheels.values() for path in paths}.values():
         try:
             os.link(path, directory / "wheels" / path.name)
         except OSError:

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import zipfile
 from pathlib import Path
 from types import ModuleType
 
@@ -73,7 +74,8 @@ def test_wheels_that_fit_any_python(build_extension: ModuleType, name: str, syst
 
 
 def test_staged_manifest_lists_the_wheels(build_extension: ModuleType, tmp_path: Path) -> None:
-    (tmp_path / "scipy-1.0-py3-none-any.whl").write_bytes(b"PK")
+    with zipfile.ZipFile(tmp_path / "scipy-1.0-py3-none-any.whl", "w") as archive:
+        archive.writestr("scipy/__init__.py", "")
     wheels = {"linux-x64": [tmp_path / "scipy-1.0-py3-none-any.whl"]}
     staged = build_extension.stage(tmp_path / "rockfall", wheels)
     manifest = tomllib.loads((staged / "blender_manifest.toml").read_text(encoding="utf-8"))
@@ -81,7 +83,8 @@ def test_staged_manifest_lists_the_wheels(build_extension: ModuleType, tmp_path:
     assert manifest["platforms"] == ["linux-x64"]
     assert {key: manifest[key] for key in MANIFEST} == MANIFEST
     assert (staged / "core" / "errors.py").read_bytes() == (ROOT / "core" / "errors.py").read_bytes()
-    assert (staged / "wheels" / "scipy-1.0-py3-none-any.whl").read_bytes() == b"PK"
+    with zipfile.ZipFile(staged / "wheels" / "scipy-1.0-py3-none-any.whl") as archive:
+        assert archive.namelist() == ["scipy/__init__.py"]
     assert not [
         path for path in staged.rglob("*") if path.name in {"__pycache__", "tests", "scripts", "pyproject.toml"}
     ]
@@ -155,3 +158,49 @@ def test_set_up_script_refuses_another_python(tmp_path: Path) -> None:
     assert result.returncode == 1
     assert re.search(r"needs a 64-bit Python 3\.13.*this is 3\.12\.1", result.stderr)
     assert "scripts/run.py demo" in result.stderr
+
+
+def test_wheels_travel_without_tests_and_sources(build_extension: ModuleType, tmp_path: Path) -> None:
+    """What is left is a wheel still: pip takes it, its list of files is that of its files, and the licence is there."""
+    wheel = tmp_path / "stone-1.0-py3-none-any.whl"
+    files = {
+        "stone/__init__.py": "weight = 7\n",
+        "stone/tests/__init__.py": "",
+        "stone/tests/test_weight.py": "assert False\n",
+        "stone/fast.pyx": "cdef int weight\n",
+        "stone/__init__.pyi": "weight: int\n",
+        "stone/testing.py": "helps = True\n",
+        "stone-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: stone\nVersion: 1.0\n",
+        "stone-1.0.dist-info/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        "stone-1.0.dist-info/licenses/tests/LICENSE": "free\n",
+    }
+    record = "stone-1.0.dist-info/RECORD"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+        archive.writestr(record, "".join(f"{name},,\n" for name in (*files, record)))
+    lean = build_extension.lean(wheel)
+    with zipfile.ZipFile(lean) as archive:
+        assert archive.testzip() is None
+        names = set(archive.namelist())
+        listed = {line.split(",")[0] for line in archive.read(record).decode().splitlines()}
+    gone = {"stone/tests/__init__.py", "stone/tests/test_weight.py", "stone/fast.pyx", "stone/__init__.pyi"}
+    assert names == listed == {*files, record} - gone
+    target = tmp_path / "there"
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "-q",
+        "--no-index",
+        "--no-deps",
+        "--target",
+        str(target),
+        str(lean),
+    ]
+    subprocess.run(command, check=True)
+    assert (target / "stone" / "testing.py").exists()
+    before = lean.stat().st_mtime_ns
+    assert build_extension.lean(wheel) == lean
+    assert lean.stat().st_mtime_ns == before, "made once"

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from ..analysis.motion_graphs import MotionCourse, VideoResiduals
-from ..camera.model import Camera
+from ..camera.model import Camera, project, rays
 from ..constants import GRAVITY_MPS2
 from ..footage.background import BackgroundMotion, stabilise
 from ..reconstruction.block import per_pick
@@ -28,6 +28,9 @@ GLANCE_PX = 6.0
 """A first look at reduced pictures is not much more exact than this."""
 TREMBLE_PX = 2.0
 """A background that moves further than this is not that of a tripod in the wind."""
+BEYOND_S = 1.0
+"""A block that is followed for longer than this after its last pick may well have hit the ground again."""
+FAR_M = 1e6
 STANDS_OUT_M = 1.0
 """No single point of the ground stands this far above or below all that surround it, but leaves and branches do."""
 MOST_STANDING_OUT = 0.02
@@ -61,6 +64,23 @@ def tracks_off_the_motion(courses: Iterable[MotionCourse]) -> tuple[Remark, ...]
     return tuple(
         remark for course in courses for residuals in course.residuals for remark in _off(course.trajectory, residuals)
     )
+
+
+def tracked_beyond(trajectory: str, last_pick_s: float, until_s: float, moved_px: float) -> tuple[Remark, ...]:
+    """A note where a block was followed for long after its last pick, and moved on before the background [px]."""
+    if until_s - last_pick_s < BEYOND_S or not moved_px > OFF_PX:
+        return ()
+    text = (
+        f"{trajectory} is tracked until {until_s:.2f} s, but its last pick is at {last_pick_s:.2f} s: "
+        "pick what follows, or where it stops. Or refine what there is."
+    )
+    return (Remark(text, "note", trajectory),)
+
+
+def moved_on(first: Camera, first_px: Array, last: Camera, last_px: Array) -> float:
+    """How far a pixel moves between two pictures of a camera that turns, before what is far away [px]."""
+    _, direction = rays(last, last_px[None])
+    return float(norm(project(first, first.position + FAR_M * direction) - first_px)[0])
 
 
 def turn_deg(motion: BackgroundMotion, camera: Camera) -> float:

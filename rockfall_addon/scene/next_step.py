@@ -1,18 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What to do next, from what the scene holds: a sentence, and the operators or tools for it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from ...core.remarks import Remark
-from ...core.workflow.noticed import tracks_off_the_motion
+from ...core.workflow.noticed import moved_on, tracked_beyond, tracks_off_the_motion
 from . import (
     alignment,
     camera_paths,
+    clocks,
     migration,
     motion,
+    pictures,
     places,
     problems,
     proposal,
@@ -80,6 +83,12 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         hint = alignment.hint(scene, camera) or alignment.solution_of(camera).problem
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
         return NextStep(sentence, ("rockfall.align_views",))
+    waiting = next((one for one in videos.cameras(scene) if not camera_paths.is_solved(one)), None)
+    if waiting is not None and not picks:
+        sentence = (
+            f"{waiting.name} is not aligned yet: look through it and mark pairs there, too. Or pick with one video."
+        )
+        return NextStep(sentence, ("rockfall.look_through", PICK_TOOL), str(waiting[store.ID]))
     unset = None if proposal.is_applied(scene) else video_times.never_synchronised(scene)
     if unset is not None and all(map(camera_paths.is_solved, videos.cameras(scene))):
         return _on_clocks(scene, unset, camera)
@@ -133,6 +142,7 @@ def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks
         return NextStep(worries[0], (PICK_TOOL,) if lacking or refined else (PICK_TOOL, "rockfall.refine"))
     if not lacking and not refined:
         sentence = "Look at each pick and correct it. Refine fits them all to the tracked pixels."
+        sentence = next((remark.text for remark in _beyond(scene, picks)), sentence)
         return NextStep(sentence, (PICK_TOOL, "rockfall.refine"))
     sentence = "Play the fall; then models, simulation, film and tables: steps 6 to 10."
     return NextStep(sentence, ("screen.animation_play", "rockfall.export_tables"))
@@ -156,6 +166,25 @@ def _on_proposal(found: proposal.Proposal) -> NextStep:
 
 def _grave(remarks: Iterable[Remark]) -> list[str]:
     return [remark.text for remark in remarks if remark.severity in ("warning", "problem")]
+
+
+def _beyond(scene: bpy.types.Scene, picks: list[bpy.types.Object]) -> Iterator[Remark]:
+    """Blocks that were tracked for long after their last pick, unless that is where they stopped."""
+    last = {pick[store.TRAJECTORY]: pick for pick in sorted(picks, key=lambda pick: pick[store.TIME])}
+    for camera in filter(camera_paths.is_solved, videos.cameras(scene)):
+        clock = clocks.clock_of(camera)
+        for name in sightings.names_in(camera):
+            if name in last and last[name][store.KIND] != "stop":
+                seen, last_s = sightings.seen_in(camera, name), float(last[name][store.TIME])
+                later = np.flatnonzero(clock.to_common(seen.time_s) > last_s)
+                if later.size:
+                    ends = later[[np.argmin(seen.time_s[later]), np.argmax(seen.time_s[later])]]
+                    (one, other), (a, b) = (
+                        (pictures.posed(camera, float(s)) for s in seen.time_s[ends]),
+                        seen.pixel[ends],
+                    )
+                    until_s = float(clock.to_common(seen.time_s[ends[1]]))
+                    yield from tracked_beyond(name, last_s, until_s, moved_on(one, a, other, b))
 
 
 def tracks_off(scene: bpy.types.Scene) -> tuple[Remark, ...]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from math import radians
 
 import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Quaternion, Vector
 
 from ..scene import store, terrain, videos
@@ -51,6 +52,19 @@ def frame(context: bpy.types.Context, objects: Iterable[bpy.types.Object], *, be
     for area in [area for area in free if area != context.area] if beside else free or areas:
         _look_at(area, corners, rotation)
         area.tag_redraw()
+
+
+def is_seen(context: bpy.types.Context, point: Sequence[float]) -> bool:
+    """Whether a point is within every free 3-D view beside the one that is worked in."""
+    for area in _views(context):
+        if area == context.area or _is_through_footage(context.scene, area.spaces.active):
+            continue
+        region = next(each for each in area.regions if each.type == "WINDOW")
+        spot = location_3d_to_region_2d(region, area.spaces.active.region_3d, Vector(point))
+        left, bottom, right, top = free_part(area, region)
+        if spot is None or not (left < spot.x < right and bottom < spot.y < top):
+            return False
+    return True
 
 
 def _look_at(area: bpy.types.Area, points: Sequence[Vector], rotation: Quaternion) -> None:

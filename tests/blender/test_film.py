@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A film shows all trajectories, its captions tell the truth at every frame, and the scene can be had back."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -126,6 +127,20 @@ def test_blocks_are_there_while_they_move(scene, preset, part) -> None:
         scene.frame_set(frame)
         hidden[frame] = (a.hide_render, b.hide_render)
     assert hidden == {0: (False, True), 19: (False, True), 21: (False, False), scene.frame_end: (False, True)}
+
+
+def test_a_fall_late_in_its_video_is_in_the_first_preview(rockfall, picks: Path, preset, part) -> None:
+    """The film of one's own footage may begin long before the fall: its first frame would be an empty slope."""
+    rows = [row for row in picks.read_text(encoding="utf-8").splitlines() if not row.startswith("A,")]
+    rows.append("C,30,0,9,40,release,ok,0.5,0.0,0.8660254037844386")
+    rows.append("C,31,5,9,35,impact,ok,0.5,0.0,0.8660254037844386")
+    picks.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    scene = bpy.context.scene
+    assert bpy.ops.rockfall.import_picks(filepath=str(picks)) == {"FINISHED"}
+    bpy.context.scene.rockfall.playback = "REAL"
+    part("rockfall_addon.steps.film.dressing").set_up_film(scene, replace(preset, stagger_s=None), "cycles")
+    assert not scene.objects["B block"].hide_render
+    assert scene.objects["C block"].hide_render
 
 
 def test_trails_and_impact_rings_grow(scene, preset, part) -> None:

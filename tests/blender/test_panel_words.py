@@ -138,3 +138,26 @@ def test_with_a_video_alone_no_demo_is_offered(part) -> None:
     part("rockfall_addon.scene.new_videos").add_video(bpy.context.scene, FOOTAGE)
     step = part("rockfall_addon.scene.next_step").next_step(bpy.context.scene)
     assert step.actions == ("rockfall.import_terrain", "rockfall.open_project")
+
+
+def test_a_second_video_is_to_be_aligned_before_picking(part) -> None:
+    scene, following = bpy.context.scene, part("rockfall_addon.scene.next_step")
+    bpy.ops.rockfall.load_footage_demo()
+    assert "rockfall.propose_impacts" in following.next_step(scene).actions
+    first = part("rockfall_addon.scene.videos").active_camera(scene)
+    second = part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE)
+    bpy.ops.rockfall.look_through(identifier=first["rockfall_id"])
+    step = following.next_step(scene)
+    assert (step.actions[0], step.video) == ("rockfall.look_through", second["rockfall_id"])
+    assert second.name in step.sentence
+
+
+def test_a_track_after_the_last_pick_is_said_until_it_stopped_there(part) -> None:
+    scene, following = bpy.context.scene, part("rockfall_addon.scene.next_step")
+    bpy.ops.rockfall.load_footage_demo()
+    bpy.ops.rockfall.propose_impacts()
+    store = part("rockfall_addon.scene.store")
+    picks = sorted(store.with_role(scene, store.PICK_ROLE), key=lambda pick: pick[store.TIME])
+    assert "is tracked until" in following.next_step(scene).sentence, "it moves on by 1.5 m after its last impact"
+    picks[-1][store.KIND] = "stop"
+    assert following.next_step(scene).sentence.startswith("Look at each pick")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is noticed without being asked: a track off the motion, sizes that cannot be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rockfall.core.analysis.motion_graphs import MotionCourse, VideoResiduals
@@ -13,9 +15,11 @@ from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.noticed import (
     impossible_sizes,
+    moved_on,
     moves_at_a_glance,
     no_tripod,
     standing_out,
+    tracked_beyond,
     tracks_off_the_motion,
     turn_deg,
     vegetated,
@@ -122,3 +126,22 @@ def test_leaves_are_told_from_boulders_and_steps():
     assert "scan.laz" in remark.text
     assert "10 %" in remark.text
     assert "ground filter" in remark.text
+
+
+def test_a_track_that_goes_on_after_the_last_pick_is_told():
+    (remark,) = tracked_beyond("B01", 10.5, 12.0, 150.0)
+    assert remark.severity == "note"
+    assert "B01 is tracked until 12.00 s, but its last pick is at 10.50 s" in remark.text
+    assert tracked_beyond("B01", 11.5, 12.0, 150.0) == (), "the rest of a flight"
+    assert tracked_beyond("B01", 10.5, 12.0, 3.0) == (), "it lies still"
+    assert tracked_beyond("B01", 10.5, 12.0, np.nan) == ()
+
+
+def test_a_turn_of_the_camera_is_no_motion_of_the_block():
+    turn = 100 / 1000  # tangent of the angle
+    c, s = 1 / np.hypot(1, turn), turn / np.hypot(1, turn)
+    first = Camera(1280, 720, 1000.0, 1000.0, 640.0, 360.0)
+    turned = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]) @ first.rotation
+    last = replace(first, rotation=turned)
+    assert moved_on(first, np.array([740.0, 360.0]), last, np.array([640.0, 360.0])) == pytest.approx(0, abs=1e-6)
+    assert moved_on(first, np.array([640.0, 360.0]), last, np.array([640.0, 360.0])) == pytest.approx(100, abs=1e-6)

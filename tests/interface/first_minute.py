@@ -97,3 +97,29 @@ def on_region(area, here, obj):
 
     view = area.spaces.active.region_3d
     return [tuple(location_3d_to_region_2d(here, view, obj.matrix_world @ Vector(corner))) for corner in obj.bound_box]
+
+
+def case_trees_that_were_read_as_ground_are_noticed(window):
+    """A cloud that nobody has classified: the guide says so, and offers to read it again with the ground filter."""
+    scan = ROOT / "tests" / "data" / "sample_lareunion_epsg2975.laz"
+    following = window.part("rockfall_addon.scene.next_step")
+    yield from import_by_hand(window, scan)
+    window.screenshot("trees")
+    step = following.next_step(bpy.context.scene)
+    assert step.tile == grounds()[0]["rockfall_id"], step.sentence
+    height = grounds()[0].dimensions.z
+    with window.override():
+        bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=str(scan), replaces=step.tile, ground="FILTER")
+    yield 1.5
+    window.screenshot("again")
+    yield from window.press("RET", *window.centre())
+    job = window.part("rockfall_addon.view.job")
+    yield from window.wait_for(lambda: len(grounds()[0].data.polygons) < 10_000 and not job.is_running(), what="read")
+    yield 2.0
+    window.screenshot("ground")
+    window.theme("Light")
+    yield 1.5
+    window.screenshot("ground-light")
+    assert len(grounds()) == 1
+    assert grounds()[0].dimensions.z < height
+    assert not following.next_step(bpy.context.scene).tile

@@ -23,6 +23,8 @@ FILM_ROLE = "film"
 BLOCK_PX, TRAIL_PX, MARK_PX = 6.0, 2.2, 2.4
 """At least this many pixels of a picture 640 wide: a block, the width of a trail, the radius of an impact's ring."""
 SMALL_WIDTH = 640
+SOON_S = 0.3
+"""So long after a fall begins something of it is seen."""
 
 
 def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str, graphs: GraphKind | None = None) -> None:
@@ -75,7 +77,8 @@ def set_up_film(scene: bpy.types.Scene, preset: RenderPreset, engine: str, graph
         _add_graphs(scene, front, graphs, preset, words.speed_top_mps)
     presence.show_while_moving(scene, motions)
     use_engine(scene, engine)
-    scene.frame_set(0)
+    begin = min((float(each.time_s[0]) for each in motions), default=0.0)
+    scene.frame_set(min(last, int((begin + SOON_S) / film.frame_s)) if begin > 0 else 0)  # a preview shows the block
 
 
 def set_up_picture(

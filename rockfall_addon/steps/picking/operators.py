@@ -130,7 +130,7 @@ class ROCKFALL_OT_drag_pick(bpy.types.Operator):
         if self._place is not None:
             editing.move(scene, obj, camera, self._place)
         editing.finish(scene, obj)
-        if not self._flew:
+        if not self._flew or (self._new and not look.is_seen(context, obj.location)):
             look.frame(context, flights_of(scene, obj[store.TRAJECTORY]), beside=True)
         warning = self._place.warning if self._place is not None else ""
         if warning:

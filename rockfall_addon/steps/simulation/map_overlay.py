@@ -218,6 +218,7 @@ def _draw_legend() -> None:
         return
     scale = context.preferences.system.ui_scale
     left = context.region.width - legend.covered_right(context.area) - (LEGEND_WIDTH + legend.MARGIN) * scale
+    left = max(left, legend.covered_left(context.area) + legend.MARGIN * scale)
     rows = [(label, tuple(colour)) for label, colour in zip(classes.labels, classes.colours.tolist(), strict=True)]
     unit = f" [{layer.unit}]" if layer.unit else ""
     blocks = f"{terrain.grouped(int(obj[store.MAP_BLOCKS]))} blocks, {MODELS[str(obj[store.MODEL])].title}"

@@ -6,7 +6,7 @@ import bpy
 from ....core.impact_models.registry import find_model
 from ....core.progress import Progress
 from ...scene import simulated_sources, simulation, simulation_setup, store
-from ...view import job
+from ...view import job, look
 from ...view.job import InBackground, Work
 from ...view.parameters import OfModel
 from ...view.reporting import possible, reported
@@ -33,8 +33,12 @@ class ROCKFALL_OT_simulate(InBackground, bpy.types.Operator):
             return simulation_setup.run(plan, progress)
 
         def keep(scene: bpy.types.Scene, found: object) -> str:
+            first = not simulation.blocks_of(scene)
             simulation.show_prepared(scene, found.prepared, plan.origins, plan.scenario.trees)
             simulation_setup.keep(scene, plan.said, found.remarks, found.at_screens)
+            if first:
+                with job.in_window_of(scene) as there:
+                    look.frame(there, store.with_role(scene, store.SIMULATED_PATHS_ROLE), beside=True)
             return found.remarks[0].text
 
         return Work("simulation", compute, keep, keeps_part=True)

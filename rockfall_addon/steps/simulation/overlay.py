@@ -149,6 +149,7 @@ def _draw_legend() -> None:
         return
     settings, scale = scene.rockfall_simulation, context.preferences.system.ui_scale
     left = context.region.width - legend.covered_right(context.area) - (LEGEND_WIDTH + legend.MARGIN) * scale
+    left = max(left, legend.covered_left(context.area) + legend.MARGIN * scale)
     speed_top, energy_top = simulation.scale_tops(scene)
     legend.begin(scale)
     if settings.colour_by == "MODEL" or not settings.show_paths:

@@ -23,7 +23,7 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
         if camera is None:
             return "TO_DO"
         wrong = wording.is_missing(camera) or wording.warnings(scene, camera)
-        return "ATTENTION" if wrong or not image_view.shape_agrees(scene, camera) else "READY"
+        return "ATTENTION" if wrong else "READY"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
@@ -41,7 +41,7 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
             paragraph(context, layout, wording.missing(camera), "ERROR")
             layout.operator("rockfall.relink_video", icon="FILEBROWSER")
         show_remarks(context, layout, wording.warnings(scene, camera))
-        if not image_view.shape_agrees(scene, camera):
+        if scene.camera == camera and not image_view.shape_agrees(scene, camera):
             layout.operator("rockfall.use_video_size", icon="FULLSCREEN_ENTER")
         facts(layout, wording.facts(camera))
         show_remarks(context, layout, wording.remarks(camera))

@@ -5,6 +5,7 @@ import sqlite3
 import struct
 from collections.abc import Iterator, Mapping
 from contextlib import closing
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ TYPES = {1: "Point", 2: "LineString", 3: "Polygon", 4: "MultiPoint", 5: "MultiLi
 POINT, LINE, POLYGON = 1, 2, 3
 ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 ADVICE = "Save it again, or as GeoJSON"
+STEPS, LEAST_STEPS, STEPS_A_BYTE = 100_000, 50_000_000, 10
+"""Of SQLite's machine: between two looks, and so many that a file may take. A feature takes some ten; a view that is
+defined by itself has no end."""
 LAYERS = """
     SELECT g.table_name, g.column_name, s.organization, s.organization_coordsys_id
     FROM gpkg_geometry_columns AS g JOIN gpkg_contents AS c ON c.table_name = g.table_name
@@ -41,6 +45,8 @@ def read_features(path: Path, types: Mapping[str, str], kind: str) -> tuple[str,
     try:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
             database.row_factory = sqlite3.Row
+            looks, most = count(1), LEAST_STEPS + STEPS_A_BYTE * path.stat().st_size
+            database.set_progress_handler(lambda: STEPS * next(looks) > most, STEPS)
             found = []
             for table, column, organization, code in database.execute(LAYERS).fetchall():
                 features = list(_features(database, table, column))
@@ -48,7 +54,9 @@ def read_features(path: Path, types: Mapping[str, str], kind: str) -> tuple[str,
                     crs = f"EPSG:{code}" if str(organization).upper() == "EPSG" else ""
                     found.append((str(table), crs, features))
     except (sqlite3.Error, struct.error, ValueError, IndexError, KeyError, TypeError, OverflowError) as error:
-        raise InputError(f"This GeoPackage cannot be read: {error}", file=path, advice=ADVICE) from error
+        endless = getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT
+        said = "one of its layers has no end" if endless else error
+        raise InputError(f"This GeoPackage cannot be read: {said}", file=path, advice=ADVICE) from error
     if not found:
         raise InputError(f"No layer of this GeoPackage has {kind}s", file=path, advice=f"Give one with {kind}s")
     if len(found) > 1:
@@ -90,7 +98,7 @@ def _well_known(blob: bytes, at: int) -> tuple[int, list[Any], int]:
         raise ValueError(f"a geometry of the type {code}")
     width = (2, 3, 3, 4)[dimensions]
 
-    def count() -> int:
+    def number_of() -> int:
         nonlocal at
         (number,) = struct.unpack_from(f"{order}I", blob, at)
         at += 4
@@ -105,11 +113,11 @@ def _well_known(blob: bytes, at: int) -> tuple[int, list[Any], int]:
     if type_ == POINT:
         return type_, points(1)[0], at
     if type_ == LINE:
-        return type_, points(count()), at
+        return type_, points(number_of()), at
     if type_ == POLYGON:
-        return type_, [points(count()) for _ in range(count())], at
+        return type_, [points(number_of()) for _ in range(number_of())], at
     parts = []
-    for _ in range(count()):
+    for _ in range(number_of()):
         _, part, at = _well_known(blob, at)
         parts.append(part)
     return type_, parts, at

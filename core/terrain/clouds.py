@@ -111,6 +111,8 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     _check_promises(path, size)
     with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
         header = opened.header
+        if header.are_points_compressed:
+            _check_items(header, path)
     needed = header.offset_to_point_data + header.point_count * header.point_format.size
     compressed = header.are_points_compressed
     if compressed:
@@ -126,6 +128,19 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
     if not header.point_count:
         raise InputError("The cloud has no points", file=path, advice="Export it again")
     return header, *_las_crs(header, path)
+
+
+def _check_items(header: Any, path: Path) -> None:
+    """What the record of LASzip says of a point: the decoder divides by its size, and prints lines of its own."""
+    record = header.vlrs.get("LasZipVlr")[0].record_data
+    items = int.from_bytes(record[32:34], "little")
+    sizes = np.frombuffer(record, "<u2", 3 * items, 34)[1::3]
+    if int(sizes.sum()) != header.point_format.size:
+        raise InputError(
+            f"The file is damaged: it packs points of {sizes.sum()} bytes, and they have {header.point_format.size}",
+            file=path,
+            advice="Copy or export it again",
+        )
 
 
 def _check_promises(path: Path, size: int) -> None:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lines and polygons of GeoPackages that GDAL and Rockfall have written, and of damaged ones."""
 
+import sqlite3
 import struct
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -102,3 +104,16 @@ def test_damaged_geopackages_are_refused(tmp_path: Path) -> None:
         read_lines(path, SHIFT)
     with pytest.raises(InputError, match=r"missing\.gpkg"):
         read_lines(tmp_path / "missing.gpkg", SHIFT)
+
+
+def test_a_layer_without_end_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.gpkg"
+    column = {"height_m": np.array([1.0])}
+    layer = FeatureLayer("map", "a line", np.array(ROAD) - [2600000, 1200000, 0], np.array([0, 3]), column)
+    write_geopackage(path, [layer], SHIFT)
+    assert len(read_lines(path, SHIFT)) == 1
+    with closing(sqlite3.connect(path)) as database:
+        endless = "WITH RECURSIVE r(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM r) SELECT n, NULL AS geom FROM r"
+        database.executescript(f"DROP TABLE map; CREATE VIEW map AS {endless};")
+    with pytest.raises(InputError, match=r"one of its layers has no end\. Save it again"):
+        read_lines(path, SHIFT)

@@ -344,3 +344,23 @@ def test_ground_only_needs_classes(tmp_path):
     path = tmp_path / "a.xyz"
     path.write_text("0 0 0\n1 0 0\n0 1 0\n")
     refused(path, "Only LAS and LAZ", ground_only=True)
+
+
+def test_a_laz_whose_points_have_no_size(tmp_path, capfd):
+    header = laspy.LasHeader(point_format=1, version="1.2")
+    header.scales = [0.001] * 3
+    las = laspy.LasData(header)
+    las.x = las.y = las.z = np.arange(50.0)
+    path = tmp_path / "a.laz"
+    las.write(str(path))
+    data = bytearray(path.read_bytes())
+    inspect_terrain(path)
+    items = data.index(b"laszip encoded") - 2 + 54 + 32  # behind the record's own header, as the specification has it
+    assert data[items : items + 2] == b"\2\0"  # the point, and its time
+    for count in (b"\0\0", b"\1\0"):
+        data[items : items + 2] = count
+        path.write_bytes(data)
+        for read in (read_terrain, inspect_terrain):
+            with pytest.raises(InputError, match=r"packs points of (0|20) bytes, and they have 28\. Copy or export"):
+                read(path)
+    assert capfd.readouterr() == ("", "")

@@ -39,6 +39,7 @@ class PosteriorEstimate:
     name, unit, default : of the parameter. prior : in words.
     median, low, high : 95 % interval. half_low, half_high : 50 % interval.
     kept : how much of the prior the 95 % interval keeps, 0…1; that of the prior itself is 1.
+    place : of the median in the prior, 0…1: the share of it that is below.
     covered : of simulated data sets like the observed one with known parameters, the share whose parameter lies in its
         95 % interval.
     remarks : how far it can be trusted.
@@ -54,6 +55,7 @@ class PosteriorEstimate:
     half_low: float
     half_high: float
     kept: float
+    place: float
     covered: float
     remarks: tuple[Remark, ...]
 
@@ -61,6 +63,14 @@ class PosteriorEstimate:
     def verdict(self) -> str:
         """The remarks as one text."""
         return " ".join(map(str, self.remarks))
+
+    @property
+    def left(self) -> str:
+        """How much of the prior is left, and where in it, for people."""
+        where = (
+            "all over it" if self.kept > FLAT else ("lower", "middle", "upper")[min(int(3 * self.place), 2)] + " part"
+        )
+        return f"{100 * self.kept:.0f} % left, {where}"
 
     @property
     def is_determined(self) -> bool:
@@ -141,7 +151,7 @@ def estimates_of(priors: Sequence[Prior], found: Posterior, places: Array) -> tu
         made.append(
             PosteriorEstimate(
                 prior.name, prior.unit, prior.default, prior.text, median, low, high, half_low, half_high, kept,
-                covered, remarks,
+                float(at[2, j]), covered, remarks,
             )
         )  # fmt: skip
     return tuple(made)

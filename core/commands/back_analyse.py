@@ -110,11 +110,14 @@ def _summary(done: "BackAnalysis", friction: float) -> list[str]:
         f"{done.model}: {n} observed run{'s' * (n != 1)}, {runs} simulated in {done.seconds:.0f} s "
         f"({runs / done.seconds:.0f} a second)."
     )
-    lines.append(f"{'parameter':<18}{'default':>10}{'median':>10}   95 % interval")
+    lines.append(
+        f"{'parameter':<18}{'default':>10}{'median':>10}   {'95 % interval':<26}what was thought possible before"
+    )
     for one in done.estimates:
-        unit = f" {one.unit}" if one.unit else ""
-        lines.append(f"{one.name:<18}{one.default:>10.4g}{one.median:>10.4g}   {one.low:.4g} … {one.high:.4g}{unit}")
-        lines += wrapped(f"Before: {one.prior}. {one.verdict}", "    ")
+        interval = f"{one.low:.4g} … {one.high:.4g} {one.unit}"
+        before = f"{one.prior}: {one.left}"
+        lines.append(f"{one.name:<18}{one.default:>10.4g}{one.median:>10.4g}   {interval:<26}{before}")
+        lines += wrapped(one.verdict, "    ")
     if all(one.name != "friction" for one in done.estimates):
         lines.append(f"friction was {friction:g} throughout.")
     return lines + [line for remark in done.remarks if remark.severity == "note" for line in wrapped(str(remark))]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.figures import INK, MUTED, STYLE
+from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.scores import Score
 from ..analysis.variables import find_variable
 from ..hazard.design import LEVELS_KJ, DesignValues
@@ -26,6 +27,7 @@ from ..output import output_file, write_text
 from ..progress import Progress, silent
 from ..remarks import to_plain
 from ..simulation.convergence import Quantile
+from ..simulation.parameter_draws import FRICTION_NAME
 from ..simulation.trees import LAW, NOT_KNOWN
 from ..workflow.design_figures import figures_of
 from ..workflow.design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
@@ -41,6 +43,7 @@ A4_IN = (8.27, 11.69)
 LINES = 58
 """Lines of text on a page of the PDF."""
 KJ = 1e-3
+INTERVAL = np.array([0.025, 0.5, 0.975])
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,7 @@ def tables_of(sheet: DesignSheet) -> Iterator[Table]:
             "top, up to its capacity; what it does not hold goes on as it came.",
         )
     yield from _evidence_tables(sheet)
+    yield from _drawn_tables(sheet)
     yield Table(
         "Energy lines",
         ("model", "lowest", "5 %", "median", *(f"runs that end below {angle:g}°" for angle in ENERGY_LINES_DEG)),
@@ -207,6 +211,28 @@ def _evidence_tables(sheet: DesignSheet) -> Iterator[Table]:
         )  # fmt: skip
 
 
+def _drawn_tables(sheet: DesignSheet) -> Iterator[Table]:
+    """Parameters of which each block drew its own."""
+    rows = []
+    for one in sheet.models:
+        draws = one.settings.draws
+        for place, name in enumerate(() if draws is None else draws.names):
+            assert draws is not None
+            low, middle, high = weighted_quantiles(draws.values[:, place], draws.weight, INTERVAL).tolist()
+            before = draws.before[place] if draws.before else "not known"
+            rows.append((_title(one), name, f"{middle:.3g}", f"{low:.3g} to {high:.3g}", before))
+    if rows:
+        yield Table(
+            "Parameters: back-analysed from whole falls",
+            ("model", "parameter", "median", "95 % interval", "what was thought possible before"),
+            tuple(rows),
+            "Each block drew a set of its own from all that fit the observed runs, so that the values above have in "
+            "them what is not known of the parameters, beside chance. A parameter of which nearly all is left was not "
+            "told by the runs.",
+            words=(4,),
+        )
+
+
 def _score_cells(score: Score) -> tuple[str, ...]:
     variable = find_variable(score.quantity)
     unit = f" [{variable.unit}]" if variable.unit else ""
@@ -228,7 +254,7 @@ def provenance(sheet: DesignSheet, inputs: Mapping[str, Path]) -> dict[str, str]
         "Coordinates": sheet.ground.shift.crs or "system unknown",
         "Blocks": ", ".join(f"{_title(one)}: {one.counted.blocks}" for one in sheet.models),
         "Seed": str(settings.seed),
-        "Rolling, friction": f"{settings.rolling}, {settings.friction:g}",
+        "Rolling, friction": f"{settings.rolling}, {_friction(sheet)}",
         "Drag of air": "yes" if settings.drag is not None else "no",
         "Trees": "none" if settings.trees is None else f"{len(settings.trees)}. {LAW} {NOT_KNOWN}",
         "Ends": "; ".join(
@@ -238,10 +264,20 @@ def provenance(sheet: DesignSheet, inputs: Mapping[str, Path]) -> dict[str, str]
     }
     for one in sheet.models:
         values = find_model(one.settings.model).settings(one.settings.parameters)
-        facts[f"Parameters, {_title(one)}"] = ", ".join(f"{name} = {_plain(value)}" for name, value in values.items())
+        drawn = () if one.settings.draws is None else one.settings.draws.names
+        facts[f"Parameters, {_title(one)}"] = ", ".join(
+            f"{name} = {'drawn by each block' if name in drawn else _plain(value)}" for name, value in values.items()
+        )
     for name, about in inputs_with_digests(inputs).items():
         facts[f"File: {name}"] = f"{about['file']}, SHA-256 {about['sha256']}"
     return facts
+
+
+def _friction(sheet: DesignSheet) -> str:
+    """The coefficient on the ground, and whose blocks drew their own."""
+    value = f"{sheet.models[0].settings.friction:g}"
+    drawing = [_title(one) for one in sheet.models if one.settings.draws and FRICTION_NAME in one.settings.draws.names]
+    return f"{value}; of {', '.join(drawing)} drawn by each block" if drawing else value
 
 
 def plain(sheet: DesignSheet, facts: Mapping[str, str]) -> dict[str, Any]:

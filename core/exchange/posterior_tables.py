@@ -39,6 +39,10 @@ def read_posterior(path: str | Path) -> tuple[str, ParameterDraws]:
     ------
     InputError : anything that is wrong with the table, with the row; a parameter that the model does not have; several
         models; weights that are no weights.
+
+    Notes
+    -----
+    What was thought possible before stands in the back_analysis.json beside the table, where that is of the same model.
     """
     table = read_table(path, (MODEL,), (MODEL, WEIGHT))
     names = [name for name in table.columns if name not in (MODEL, WEIGHT)]
@@ -56,9 +60,19 @@ def read_posterior(path: str | Path) -> tuple[str, ParameterDraws]:
     wrong = np.flatnonzero(~(weight >= 0))
     if wrong.size:
         raise table.error(int(wrong[0]), f"The weight is {weight[wrong[0]]:g}", "Give zero or more")
-    draws = ParameterDraws(tuple(names), values, weight)
+    draws = ParameterDraws(tuple(names), values, weight, before=_before(Path(path), model.name, names))
     check_draws(draws, model)
     return model.name, draws
+
+
+def _before(table: Path, model: str, names: Sequence[str]) -> tuple[str, ...]:
+    """What was thought possible of each; none where it is not known."""
+    try:
+        said = json.loads((table.parent / "back_analysis.json").read_text(encoding="utf-8"))
+        found = {one["name"]: f"{one['prior']}: {one['left']}" for one in said["estimates"]}
+        return tuple(found[name] for name in names) if said["model"] == model else ()
+    except (OSError, ValueError, KeyError, TypeError):  # of a back-analysis of another kind, or of none
+        return ()
 
 
 def posteriors_of(files: Sequence[Path], models: Sequence[str]) -> dict[str, ParameterDraws]:
@@ -101,7 +115,7 @@ def back_analysis_content(analysis: BackAnalysis, inputs: dict[str, Path]) -> di
         "draws": len(analysis.draws),
         "effective_draws": round(analysis.effective, 1),
         "estimates": [
-            _plain({**asdict(one), "remarks": to_plain(one.remarks), "verdict": one.verdict})
+            _plain({**asdict(one), "left": one.left, "remarks": to_plain(one.remarks), "verdict": one.verdict})
             for one in analysis.estimates
         ],
         "correlation": {

@@ -25,6 +25,7 @@ class ParameterDraws:
     weight : (s,) zero or more: how probable a set is beside the others.
     runs_each : None lets each run draw its set by the weights, as a function of the seed and its number alone. A number
         gives the first so many runs the first set, the next so many the second, and begins again after the last.
+    before : for people, of each parameter what was thought possible, and what is left of it; none where not known.
 
     Raises
     ------
@@ -35,6 +36,7 @@ class ParameterDraws:
     values: Array
     weight: Array
     runs_each: int | None = None
+    before: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         sets = len(self.weight)

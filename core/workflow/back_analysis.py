@@ -145,7 +145,10 @@ def back_analyse(
     checks = predictive_checks(values, predicted, scales)
     folds = hold_out(values, table, simulated, sets, plain, settings.seed)
     remarks = posterior_remarks(settings.model, len(values), estimates, checks, folds, found.effective)
-    draws = ParameterDraws(tuple(prior.name for prior in priors), _values_at(priors, found.place), found.weight)
+    draws = ParameterDraws(
+        tuple(prior.name for prior in priors), _values_at(priors, found.place), found.weight,
+        before=tuple(f"{one.prior}: {one.left}" for one in estimates),
+    )  # fmt: skip
     return BackAnalysis(
         settings.model, settings, tuple(priors), values, draws, correlations(priors, found), estimates, checks, folds,
         predicted, found.effective, total * len(values), time.perf_counter() - started,

@@ -186,10 +186,12 @@ def run(question: Question, progress: Progress) -> BackAnalysis:
 def keep(scene: bpy.types.Scene, question: Question, found: BackAnalysis) -> None:
     """Keep the answer with the scene."""
     rows = [
-        [one.name, one.unit, one.median, one.low, one.high, one.prior, to_plain(one.remarks)] for one in found.estimates
+        [one.name, one.unit, one.median, one.low, one.high, one.prior, to_plain(one.remarks), one.left]
+        for one in found.estimates
     ]
-    n = len(found.observed)
-    said = f"{n} observed run{'s' * (n != 1)}, {found.runs:,} simulated in {found.seconds:.0f} s."
+    n, table = len(found.observed), Path(question.observed[1]).name
+    where = f" of {table}" if table else ""
+    said = f"{n} observed run{'s' * (n != 1)}{where}, {found.runs:,} simulated in {found.seconds:.0f} s."
     remarks = (*question.remarks, *found.remarks)
     posterior.keep(
         scene, found.model, found.draws, rows=rows, said=said, remarks=to_plain(remarks), print=question.print,

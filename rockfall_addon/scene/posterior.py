@@ -25,7 +25,7 @@ INTERVAL = np.array([0.025, 0.5, 0.975])
 
 @dataclass(frozen=True)
 class Row:
-    """One parameter: its median and 95 % interval, what was thought possible before, and what that is worth."""
+    """One parameter: its median and 95 % interval, what was thought possible before, what it is worth, what is left."""
 
     name: str
     unit: str
@@ -34,6 +34,7 @@ class Row:
     high: float
     prior: str
     remarks: tuple[Remark, ...]
+    left: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +70,7 @@ def kept_of(scene: bpy.types.Scene) -> Kept | None:
 @lru_cache(maxsize=4)
 def _kept(text: str) -> Kept:
     found = json.loads(text)  # checked when the file was opened
-    rows = tuple(Row(*each[:6], tuple(from_plain(each[6], "note"))) for each in found["rows"])
+    rows = tuple(Row(*each[:6], tuple(from_plain(each[6], "note")), *each[7:]) for each in found["rows"])
     return Kept(
         found["model"], draws_in(found), rows, found["said"], tuple(from_plain(found["remarks"], "note")),
         found["print"], tuple(found.get("observed", OF_SCENE)),
@@ -78,7 +79,10 @@ def _kept(text: str) -> Kept:
 
 def draws_in(found: Mapping[str, Any]) -> ParameterDraws:
     """The draws of what is kept as text."""
-    return ParameterDraws(tuple(found["names"]), np.array(found["values"], dtype=float), np.array(found["weight"]))
+    told = {row[0]: f"{row[5]}: {row[7]}" for row in found["rows"] if len(row) > 7 and row[5]}
+    before = tuple(told[name] for name in found["names"]) if set(told) >= set(found["names"]) else ()
+    values = np.array(found["values"], dtype=float)
+    return ParameterDraws(tuple(found["names"]), values, np.array(found["weight"]), before=before)
 
 
 def keep(scene: bpy.types.Scene, model: str, draws: ParameterDraws, **more: object) -> None:

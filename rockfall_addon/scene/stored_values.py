@@ -248,6 +248,11 @@ def _results_at_screens(value: object) -> None:
             raise ValueError(result)
 
 
+def _texts(found: list) -> None:
+    if not all(isinstance(value, str) for value in found):
+        raise TypeError
+
+
 def _posterior(value: dict) -> None:
     """Draws that the model can have, and a row for each parameter."""
     draws = ParameterDraws(tuple(value["names"]), np.array(value["values"], float), np.array(value["weight"], float))
@@ -255,9 +260,15 @@ def _posterior(value: dict) -> None:
     if not all(isinstance(value[key], str) for key in ("said", "print")):
         raise TypeError
     for row in value["rows"]:
-        _name, _unit, *numbers_of, _prior, remarks = row
-        if number()(numbers_of[0]) or len(numbers_of) != 3 or not isinstance(remarks, list):
+        _name, _unit, median, _low, _high, _prior, remarks, *left = row
+        if number()(median) or not isinstance(remarks, list) or len(left) > 1:
             raise ValueError(row)
+        _texts(left)
+    if (observed := value.get("observed")) is not None:
+        kind, _table, _stops = observed
+        _texts(observed)
+        if kind not in ("SCENE", "PICKS", "STOPS"):
+            raise ValueError(observed)
 
 
 AGAIN = "it was computed again"

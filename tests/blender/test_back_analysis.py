@@ -3,6 +3,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import bpy
@@ -50,12 +51,13 @@ def test_what_fits_is_kept_with_its_intervals_and_how_good_it_is(part, scene) ->
     values, weight = np.array(kept["values"]), np.array(kept["weight"])
     assert weight.sum() == pytest.approx(1.0)
     assert ((values[:, 0] >= 0.2) & (values[:, 0] <= 0.6)).all(), "within what was thought possible"
-    for column, (name, _, median, low, high, prior, _) in enumerate(kept["rows"]):
+    for column, (name, _, median, low, high, prior, _, left) in enumerate(kept["rows"]):
         assert low < median < high, name
         order = np.argsort(values[:, column])
         below = weight[order][values[order, column] < low].sum()
         assert below == pytest.approx(0.025, abs=0.02), name
         assert prior
+        assert re.fullmatch(r"\d+ % left, (lower part|middle part|upper part|all over it)", left)
     assert "normal, 0.5 ± 0.1" in kept["rows"][2][5]
     assert "15 observed runs" in kept["said"]
     assert "held out" in json.dumps(kept["remarks"])
@@ -239,7 +241,15 @@ def test_parameters_are_chosen_and_bad_laws_refused(part, scene) -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [{"model": "newton"}, {"values": [[0.1]]}, {"weight": [-1.0]}, {"rows": [["rn"]]}, {"names": ["mass"]}]
+    "change",
+    [
+        {"model": "newton"},
+        {"values": [[0.1]]},
+        {"weight": [-1.0]},
+        {"rows": [["rn"]]},
+        {"names": ["mass"]},
+        {"observed": ["STOPS", 3, ""]},
+    ],
 )
 def test_a_damaged_one_is_set_aside_and_named(part, scene, tmp_path: Path, change: dict) -> None:
     kept = {"model": MODEL, "names": ["rn"], "values": [[0.3], [0.4]], "weight": [0.5, 0.5], "rows": [], "said": "",

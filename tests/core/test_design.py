@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.design_page import write_design
+from rockfall.core.exchange.design_page import provenance, tables_of, write_design
 from rockfall.core.exchange.partial_factors import open_factors, read_factors, shipped_names
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.design import Factor, PartialFactors, design_values
 from rockfall.core.hazard.screens import Screen, ScreenHits
 from rockfall.core.simulation.engine import Settings
 from rockfall.core.simulation.ground import Ground, make_ground
+from rockfall.core.simulation.parameter_draws import ParameterDraws
 from rockfall.core.simulation.release import Releases, make_releases
 from rockfall.core.simulation.trees import random_trees
 from rockfall.core.terrain.surface import Surface
@@ -184,3 +185,22 @@ def test_a_screen_that_no_block_comes_to_is_refused(ground: Ground, releases: Re
     above = Screen("above", np.array([[-15.0, -80.0], [-15.0, 80.0]]))
     with pytest.raises(InputError, match="None of 400 blocks"):
         design_sheet(ground, releases, [Settings("noel_2017")], [above], NONE)
+
+
+def test_a_sheet_tells_what_its_blocks_drew_and_what_was_thought_before(
+    ground: Ground, releases: Releases, tmp_path: Path
+) -> None:
+    values = np.column_stack([np.linspace(0.2, 0.4, 41), np.linspace(0.5, 0.7, 41)])
+    for before, told in ((("even in 0…1: 20 % left, lower part",) * 2, "20 % left"), ((), "not known")):
+        draws = ParameterDraws(("rn", "friction"), values, np.ones(41), before=before)
+        made = design_sheet(ground, releases, [Settings("stevens_1998", draws=draws)], [Screen("road", LINE)], NONE)
+        table = next(one for one in tables_of(made) if one.title.startswith("Parameters"))
+        assert [row[1:3] for row in table.rows] == [("rn", "0.3"), ("friction", "0.6")]
+        ends = [float(end) for row in table.rows for end in row[3].split(" to ")]
+        assert ends == pytest.approx([0.205, 0.395, 0.505, 0.695], abs=0.003)
+        assert all(told in row[4] for row in table.rows)
+        facts = provenance(made, {})
+        said = next(text for name, text in facts.items() if name.startswith("Parameters"))
+        assert "rn = drawn by each block" in said
+        assert "rt = 0.85" in said
+        assert "drawn by each block" in facts["Rolling, friction"]

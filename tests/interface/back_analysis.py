@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A person asks which parameters make whole falls come out as the observed ones, and lets blocks draw from them."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -31,14 +32,14 @@ def case_back_analysis_of_the_demo(window):
     window.screenshot("1-question")
     with window.override():
         bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
-    yield from window.wait_for(lambda: job.is_running() and job._running[0].share > 0.1, 60, "sets are simulated")
+    yield from window.wait_for(lambda: job.is_running() and job._running[0].share > 0.1, 200, "sets are simulated")
     window.screenshot("2-at-work")
     yield from window.press("ESC", *window.centre())
     assert not job.is_running()
     assert KEY not in bpy.context.scene
     with window.override():
         bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
-    yield from window.wait_for(lambda: not job.is_running(), 120, "analysed")
+    yield from window.wait_for(lambda: not job.is_running(), 200, "analysed")
     yield 1.0
     yield from window.scroll(60)
     scene = bpy.context.scene
@@ -86,3 +87,62 @@ def case_back_analysis_of_tables(window):
     yield 1.0
     window.screenshot("3-tables-of-another-site")
     assert KEY not in bpy.context.scene
+
+
+def case_back_analysis_of_tables_on_a_bare_terrain(window):
+    """Eighty real blocks of which only starts and stops are known: no footage, no picks."""
+    job = window.part("rockfall_addon.view.job")
+    with window.override():
+        assert bpy.ops.rockfall.import_terrain(
+            filepath=str(Path(__file__).parents[1] / "data" / "tschamut_2014_terrain.asc")
+        ) == {"FINISHED"}
+        bpy.ops.rockfall.show_relief(frame_all=True)
+    scene = bpy.context.scene
+    settings = scene.rockfall_back_analysis
+    window.unfold("ROCKFALL_PT_back_analysis")
+    for name in ("simulated_run", "simulation_screens"):
+        window.unfold(f"ROCKFALL_PT_{name}", is_open=False)
+    yield from window.show_sidebar()
+    yield from window.open_panel("ROCKFALL_PT_simulation")
+    yield from window.scroll(60)
+    yield 1.0
+    window.screenshot("1-nothing-picked")
+    settings.source = "STOPS"
+    yield 1.0
+    yield from window.scroll(60)
+    window.screenshot("2-which-tables")
+    settings.table, settings.stops = (str(tables(name)) for name in ("releases", "stops"))
+    settings.model, settings.sets, settings.rounds = "stevens_1998", 300, 1
+    yield 1.0
+    yield from window.scroll(60)
+    window.screenshot("3-question")
+    with window.override():
+        bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
+    yield from window.wait_for(lambda: not job.is_running(), 200, "analysed")
+    yield 1.0
+    yield from window.scroll(60)
+    kept = json.loads(bpy.context.scene[KEY])
+    assert "80 observed runs of releases.csv" in kept["said"]
+    assert all(row[5] and row[7] for row in kept["rows"]), "before, and what is left, of each"
+    window.screenshot("4-answer")
+    window.theme("Light")
+    yield 1.0
+    window.screenshot("5-light-theme")
+    window.theme("Dark")
+    with window.override():
+        bpy.ops.ed.undo()
+    assert KEY not in bpy.context.scene
+
+
+def tables(name):
+    """The rows of Tschamut 2014 as a user would give them: places in plan, so that blocks lie on the terrain."""
+    with (Path(__file__).parents[1] / "data" / f"tschamut_2014_{name}.csv").open(
+        encoding="utf-8", newline=""
+    ) as stream:
+        rows = list(csv.DictReader(stream))
+    columns = ["x_m", "y_m"] + ["vx_mps", "vy_mps", "vz_mps"] * (name == "releases")
+    lines = [",".join(["release", *columns])]
+    lines += [",".join([row["trajectory_id"], *(row[column] for column in columns)]) for row in rows]
+    path = Path(bpy.app.tempdir) / f"{name}.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path

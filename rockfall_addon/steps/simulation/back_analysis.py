@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Back-analysis: which parameters make whole falls come out as the observed ones; then blocks can draw from these."""
 
+from math import floor, log10
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
@@ -201,11 +203,11 @@ def _draw_result(
     _draw_row(column, "", "median", "95 %")
     for row in kept.rows:
         name = f"{row.name} [{row.unit}]" if row.unit else row.name
-        _draw_row(column, name, f"{row.median:.3g}", f"{row.low:.3g} … {row.high:.3g}")
+        low, median, high = _rounded(row.low, row.median, row.high)
+        _draw_row(column, name, median, f"{low} … {high}")
         if row.prior:
-            before = column.row()
-            before.active = False
-            before.label(text=f"      before: {row.prior}")
+            paragraph(context, column, f"before {row.prior}" + (f": {row.left}" if row.left else ""))
+            column.separator()
     for row in kept.rows:
         said = [one for one in row.remarks if one.severity != "note"]
         if said:
@@ -221,6 +223,12 @@ def _draw_result(
     show_remarks(context, box, [one for one in kept.remarks if one not in grave])
     if kept.said:
         paragraph(context, box, kept.said, "INFO")
+
+
+def _rounded(low: float, median: float, high: float) -> list[str]:
+    """With as many decimals as the width of the interval is worth, so that a row has room."""
+    decimals = min(max(2 - floor(log10(high - low)), 0), 9) if high > low else 3
+    return [f"{value:.{decimals}f}" for value in (low, median, high)]
 
 
 def _draw_row(layout: bpy.types.UILayout, name: str, median: str, interval: str) -> None:

@@ -49,9 +49,14 @@ class InputError(RockfallError):
             if text
         ]
         where = f"{', '.join(place)}: " if place else ""
-        what_to_do = f" {readable(advice, MOST_OF_ADVICE)}." if advice else ""
+        what_to_do = f" {_ended(readable(advice, MOST_OF_ADVICE))}" if advice else ""
         room = max(MOST_LETTERS - len(where) - len(what_to_do), LEAST_OF_PROBLEM)
         super().__init__(f"{where}{readable(problem, room)}.{what_to_do}")
+
+
+def _ended(text: str) -> str:
+    """A sentence with its full stop; a question has its own mark."""
+    return text if text.endswith("?") else f"{text}."
 
 
 class DependencyError(RockfallError):

@@ -3,22 +3,18 @@
 
 import argparse
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError, RockfallError
 from .options import whole
 from .progress import PrintedProgress, stopped_by_interrupt
+from .simulation_work import Work
 
 if TYPE_CHECKING:
     from ..exchange.chunk_store import ChunkStore
-    from ..hazard.screens import Screen
-    from ..reconstruction.trajectory import Reconstruction
     from ..remarks import Remark
-    from ..simulation.ground import Ground
-    from ..simulation.release import Releases
-    from ..workflow.simulation import Scenario
 
 CHUNKS = ".chunks"
 """Ends the name of the folder beside the output in which finished chunks are kept until all are."""
@@ -48,30 +44,21 @@ def several_workers(arguments: argparse.Namespace) -> bool:
         raise InputError("--workers 0 compute nothing", advice="Give at least one")
     if arguments.threads is not None:
         raise InputError("--threads is of one process, and each worker has its own", advice="Leave out --threads")
+    if arguments.until_known is not None:
+        raise InputError("Workers do not ask what is known already", advice="Leave out --workers or --until-known")
     return True
 
 
-def simulate_on_workers(
-    arguments: argparse.Namespace,
-    scenario: "Scenario",
-    ground: "Ground",
-    releases: "Releases",
-    *,
-    record: Collection[str],
-    cell_m: float | None,
-    faces: bool,
-    screens: "Sequence[Screen]",
-    first_run: int,
-    measured: "Reconstruction | None",
-    folder: Path,
-    inputs: Mapping[str, Path],
-    progress: PrintedProgress,
-) -> "tuple[list[str], Sequence[Remark], tuple[ChunkStore, ...]]":
-    """Simulate, and write the tables into the folder.
+class Done(NamedTuple):
+    """The names of the files that were written, what to say, and what is kept of it until the folder is complete."""
 
-    Returns
-    -------
-    The names of the files, what to say, and what is kept of it until the folder is complete.
+    written: list[str]
+    remarks: "Sequence[Remark]"
+    kept: "tuple[ChunkStore, ...]" = ()
+
+
+def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path, progress: PrintedProgress) -> Done:
+    """Simulate, and write the tables into the folder.
 
     Raises
     ------
@@ -90,8 +77,9 @@ def simulate_on_workers(
     from ..workflow.screens import screen_remarks
     from ..workflow.simulation import check_models, remarks_of
 
-    check_models(ground, scenario.settings)
-    if arguments.geopackage and record:
+    scenario = work.scenario
+    check_models(work.ground, scenario.settings)
+    if arguments.geopackage and work.record:
         raise InputError(
             "Blocks on workers leave no paths and impacts for a GeoPackage",
             advice="Give --record none, for one with the releases, stops and screens, or leave out --workers",
@@ -104,8 +92,8 @@ def simulate_on_workers(
         with stopped_by_interrupt(progress) as counted, DaskPool(arguments.scheduler, arguments.workers or 1) as pool:
             try:
                 mapped, stores = simulate_in_chunks(
-                    ground, releases, scenario.settings, pool, kept,
-                    record=record, cell_m=cell_m, faces=faces, screens=screens, first_run=first_run, progress=counted,
+                    work.ground, work.releases, scenario.settings, pool, kept, record=work.record, cell_m=work.cell_m,
+                    faces=work.faces, screens=work.screens, first_run=work.first_run, progress=counted,
                 )  # fmt: skip
             except CancelledError as error:
                 raise Interrupt(said=goes_on) from error
@@ -121,15 +109,15 @@ def simulate_on_workers(
         written += write_met_trees(simulations, folder)
         if arguments.geopackage:
             write_simulation_geopackage(
-                simulations, folder / GEOPACKAGE, measured=measured, screens=screens, progress=progress
+                simulations, folder / GEOPACKAGE, measured=work.measured, screens=work.screens, progress=progress
             )
             written.append(GEOPACKAGE)
-        write_summary(summary(simulations, inputs, remarks), folder / "summary.json")
+        write_summary(summary(simulations, work.inputs, remarks), folder / "summary.json")
     except RockfallError:
         if kept.is_dir():
             print(f"rockfall: {goes_on[:1].upper()}{goes_on[1:]}.", file=sys.stderr)
         raise
-    return [*written, "summary.json"], remarks, stores
+    return Done([*written, "summary.json"], remarks, stores)
 
 
 def forget_chunks(stores: "tuple[ChunkStore, ...]") -> None:

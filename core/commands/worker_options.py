@@ -45,7 +45,7 @@ def several_workers(arguments: argparse.Namespace) -> bool:
     if arguments.threads is not None:
         raise InputError("--threads is of one process, and each worker has its own", advice="Leave out --threads")
     if arguments.until_known is not None:
-        raise InputError("Workers do not ask what is known already", advice="Leave out --workers or --until-known")
+        raise InputError("--until-known is of one process, and workers do not ask it", advice="Leave out one of them")
     return True
 
 

@@ -137,7 +137,7 @@ def test_what_a_chunk_cannot_be_computed_with_is_said(cluster):
 def test_options_that_exclude_each_other(tmp_path, capsys):
     (tmp_path / "releases.csv").write_text("x_m,y_m\n10,30\n")
     command = ["simulate", str(tmp_path / "releases.csv"), "--out", str(tmp_path / "out")]
-    for options in (["--workers", "2", "--scheduler", "a"], ["--workers", "0"], ["--workers", "2", "--threads", "2"]):
-        assert main([*command, *options]) == 1
+    for options in (["2", "--scheduler", "a"], ["0"], ["2", "--threads", "2"], ["2", "--until-known", "0.95"]):
+        assert main([*command, "--workers", *options]) == 1
     said = capsys.readouterr().err
-    assert said.count("rockfall: --") == 3
+    assert said.count("rockfall: --") == 4

@@ -247,12 +247,12 @@ def test_an_interrupted_simulation_keeps_and_says_what_is_finished(
     terrain: Path, tmp_path: Path, capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "releases.csv"
-    path.write_text(f"x_m,y_m,number\n{EAST + 10},{NORTH + 40},20000\n", encoding="utf-8")
+    path.write_text(f"x_m,y_m,number\n{EAST + 10},{NORTH + 40},300\n", encoding="utf-8")
     argv = ["simulate", str(path), "--terrain", str(terrain), "--model", "noel_2017", "--record", "none"]
     assert main([*argv, "--out", str(tmp_path / "whole")]) == 0
 
     def told(self: PrintedProgress, text: str, done: int = 0, total: int = 0) -> None:
-        if total == 20000 and done and not interrupted:
+        if total == 300 and done and not interrupted:
             interrupted.append(done)
             signal.raise_signal(signal.SIGINT)
 
@@ -261,9 +261,9 @@ def test_an_interrupted_simulation_keeps_and_says_what_is_finished(
     capsys.readouterr()
     assert main([*argv, "--threads", "1", "--out", str(tmp_path / "cut")]) == 0
     runs, whole = (rows_of(tmp_path / name / "runs.csv") for name in ("cut", "whole"))
-    assert 0 < len(runs) < 20000
+    assert 0 < len(runs) < 300
     assert runs == whole[: len(runs)]
-    said = f"Stopped by you: {len(runs)} of 20000 blocks with noel_2017 are finished and kept."
+    said = f"Stopped by you: {len(runs)} of 300 blocks with noel_2017 are finished and kept."
     assert said in capsys.readouterr().out
     summary = json.loads((tmp_path / "cut" / "summary.json").read_text(encoding="utf-8"))
-    assert (summary["blocks_wanted"], sum(summary["models"]["noel_2017"]["ends"].values())) == (20000, len(runs))
+    assert (summary["blocks_wanted"], sum(summary["models"]["noel_2017"]["ends"].values())) == (300, len(runs))

@@ -185,13 +185,14 @@ def _evidence_tables(sheet: DesignSheet) -> Iterator[Table]:
         for score in evidence.scores:
             rows.append((_title(one), *_score_cells(score)))
     evidence = known[0][1]
+    drawn = ", of those that blocks drew their means" if any(one.settings.draws for one, _ in known) else ""
     yield Table(
         "Evidence: the impacts that were measured on this site",
         ("model", "quantity", "impacts", "bias", "RMSE", "95 % interval", "measured within the model's 90 %"),
         tuple(rows),
         f"{evidence.impacts} impacts of {evidence.trajectories} trajectories, which were filmed here. Each model gets "
-        "their incident velocity, with the parameters of this simulation. Bias is model − measured. The last column "
-        "should be 90 %; a model without chance has 0.",
+        f"their incident velocity, with the parameters of this simulation{drawn}. Bias is model − measured. The last "
+        "column should be 90 %; a model without chance has 0.",
     )
     folds = [(one, e.calibration) for one, e in known if e.calibration is not None]
     if folds:

@@ -27,6 +27,7 @@ from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark, gravest_first
 from ..simulation.engine import Settings, Simulation, simulate
 from ..simulation.ground import Ground
+from ..simulation.parameter_draws import FRICTION_NAME
 from ..simulation.release import Releases
 from ..simulation.results import run_figures
 from ..vectors import Array
@@ -50,7 +51,7 @@ class Evidence:
     Attributes
     ----------
     impacts, trajectories : that could be compared.
-    scores : of the model with the parameters of the simulation.
+    scores : of the model with the parameters of the simulation; where blocks drew them, with their means.
     calibration : of its usual parameters to these impacts, with trajectories held out; None where it was not asked for
         or the impacts are too few.
     """
@@ -222,7 +223,7 @@ def evidence_of(
     progress(f"{model.name} against the measured impacts", 0, 0)
     try:
         predictions = compare(
-            impacts, [model.name], {model.name: settings.parameters}, replicates=REPLICATES, seed=settings.seed
+            impacts, [model.name], {model.name: _parameters(settings)}, replicates=REPLICATES, seed=settings.seed
         )
     except InputError:  # none of them can be compared
         return None
@@ -235,6 +236,12 @@ def evidence_of(
         options = FitOptions(resamples=50, seed=settings.seed)
         found = calibrate(impacts, model.name, usual_names(model), None, options, progress=progress)
     return Evidence(int(row.size), int(np.unique(impacts.trajectory[row]).size), marks, found)
+
+
+def _parameters(settings: Settings) -> dict[str, object]:
+    """Of the model; the means of those that each block drew."""
+    drawn = {} if settings.draws is None else settings.draws.mean()
+    return {**settings.parameters, **{name: value for name, value in drawn.items() if name != FRICTION_NAME}}
 
 
 def held_share(tally: ScreenTally, screen: Screen) -> float:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.design_page import provenance, tables_of, write_design
+from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.partial_factors import open_factors, read_factors, shipped_names
+from rockfall.core.exchange.project import read_project
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.design import Factor, PartialFactors, design_values
 from rockfall.core.hazard.screens import Screen, ScreenHits
@@ -18,8 +20,9 @@ from rockfall.core.simulation.parameter_draws import ParameterDraws
 from rockfall.core.simulation.release import Releases, make_releases
 from rockfall.core.simulation.trees import random_trees
 from rockfall.core.terrain.surface import Surface
-from rockfall.core.workflow.design_sheet import DesignSheet, design_sheet
+from rockfall.core.workflow.design_sheet import DesignSheet, design_sheet, evidence_of
 
+DEMO = Path(__file__).parents[2] / "assets" / "demo" / "project.toml"
 LINE = np.array([[30.0, -90.0], [30.0, 90.0]])
 NONE = PartialFactors("none", "", 0.95, 0.0, ())
 
@@ -204,3 +207,21 @@ def test_a_sheet_tells_what_its_blocks_drew_and_what_was_thought_before(
         assert "rn = drawn by each block" in said
         assert "rt = 0.85" in said
         assert "drawn by each block" in facts["Rolling, friction"]
+
+
+def test_the_evidence_is_of_the_parameters_that_blocks_drew() -> None:
+    """As of a model that was set to the mean of the draws, and not to its defaults."""
+    _, measured = open_project(read_project(DEMO))
+    draws = ParameterDraws(("rn", "friction"), np.array([[0.5, 0.3], [0.7, 0.9]]), np.array([1.0, 3.0]))
+    drawn, same, default = (
+        evidence_of(measured.impacts, settings, holdout=False)
+        for settings in (
+            Settings("stevens_1998", draws=draws), Settings("stevens_1998", {"rn": 0.65}), Settings("stevens_1998"),
+        )
+    )  # fmt: skip
+    assert drawn is not None
+    assert same is not None
+    assert default is not None
+    rmse = [[score.rmse for score in one.scores] for one in (drawn, same, default)]
+    assert rmse[0] == pytest.approx(rmse[1])
+    assert rmse[0] != pytest.approx(rmse[2], rel=0.01)

@@ -50,15 +50,24 @@ def camera_views(screen: bpy.types.Screen) -> Iterator[tuple[bpy.types.Area, bpy
             yield area, next(region for region in area.regions if region.type == "WINDOW")
 
 
-def show_tab(screen: bpy.types.Screen) -> None:
-    """Turn the open sidebars of the 3-D views to our tab; a file does not keep which was shown."""
+def show_tab(screen: bpy.types.Screen) -> bool:
+    """Turn the open sidebars of 3-D views and graphs to our tab; a file does not keep which was shown.
+
+    Returns whether all were at it before: an area that has just changed its type forgets it when it is drawn.
+    """
+    stays = True
     for area in screen.areas:
-        if area.type != "VIEW_3D" or not area.spaces.active.show_region_ui:
+        ours = area.type == "VIEW_3D" or area.ui_type.startswith(NAME)
+        if not ours or not area.spaces.active.show_region_ui:
             continue
         for region in area.regions:
-            if region.type == "UI" and region.active_panel_category != "UNSUPPORTED":  # until it is drawn
+            if region.type != "UI":
+                continue
+            stays = stays and region.active_panel_category == NAME
+            if region.active_panel_category != "UNSUPPORTED":  # until it is drawn
                 region.active_panel_category = NAME
                 region.tag_redraw()
+    return stays
 
 
 def look_through_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:

@@ -137,8 +137,10 @@ def test_a_fall_late_in_its_video_is_in_the_first_preview(rockfall, picks: Path,
     picks.write_text("\n".join(rows) + "\n", encoding="utf-8")
     scene = bpy.context.scene
     assert bpy.ops.rockfall.import_picks(filepath=str(picks)) == {"FINISHED"}
-    bpy.context.scene.rockfall.playback = "REAL"
+    scene[part("rockfall_addon.scene.store").TIME_ORIGIN] = 12.0  # a video that began 8 s before the fall
+    part("rockfall_addon.scene.sync").recompute(scene)
     part("rockfall_addon.steps.film.dressing").set_up_film(scene, replace(preset, stagger_s=None), "cycles")
+    assert scene.frame_current > 0
     assert not scene.objects["B block"].hide_render
     assert scene.objects["C block"].hide_render
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ...scene import problems, store
-from ...view import look
+from ...view import look, workspace
 from ...view.graphs import areas, editor
 from ...view.reporting import InWindow, reported
 
@@ -65,12 +65,22 @@ def _arrange() -> None:
         if store.has_role(window.scene, store.TERRAIN_ROLE):
             with bpy.context.temp_override(window=window):
                 look.show_relief(bpy.context, frame_all=True)
+    bpy.app.timers.register(_show_tab, first_interval=AFTER_S)
+
+
+@problems.guarded
+def _show_tab() -> float | None:
+    """Once the sidebars are drawn, and as long as the workspace is shown."""
+    shown = [each.screen for each in bpy.context.window_manager.windows if store.GRAPHS_WORKSPACE in each.workspace]
+    turned = [workspace.show_tab(screen) for screen in shown]
+    return None if all(turned) else AFTER_S
 
 
 def unregister() -> None:
     """Nothing of ours is to run any more."""
-    if bpy.app.timers.is_registered(_arrange):
-        bpy.app.timers.unregister(_arrange)
+    for timer in (_arrange, _show_tab):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
 
 
 CLASSES = (ROCKFALL_OT_open_graphs, ROCKFALL_OT_open_graphs_workspace)

@@ -48,7 +48,9 @@ class ParameterDraws:
         for name in self.names:
             if self.names.count(name) > 1:
                 raise InputError(f"The drawn parameter {name} is there twice", advice="Give it once")
-        if not (np.isfinite(self.weight).all() and (self.weight >= 0).all() and self.weight.sum() > 0):
+        with np.errstate(over="ignore"):
+            total = self.weight.sum()
+        if not ((self.weight >= 0).all() and 0 < total < np.inf):
             raise InputError("The weights of the drawn parameters are no weights", advice="Give zero or more each")
 
     def __len__(self) -> int:

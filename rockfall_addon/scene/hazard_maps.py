@@ -177,9 +177,15 @@ def maps_of(scene: bpy.types.Scene) -> bpy.types.Object | None:
 def faces_of(scene: bpy.types.Scene) -> FaceMaps | None:
     """The maps of the faces, kept until they are others; layers that are not there any more are left out."""
     obj = next(iter(store.with_role(scene, store.FACE_MAPS_ROLE)), None)
-    if obj is None or obj.type != "MESH" or any(name not in obj.data.attributes for name in (FACE, OF)):
+    if obj is None or obj.type != "MESH":
         return None
-    mesh = obj.data
+    mesh, called = obj.data, obj.get(OF)
+    if not isinstance(called, list) or not called:
+        return None
+    for name in (FACE, OF):
+        attribute = mesh.attributes.get(name)
+        if attribute is None or (attribute.data_type, attribute.domain) != ("INT", "FACE"):
+            return None
     count = len(mesh.polygons)
     key = mesh.session_uid, count
     if len(mesh.vertices) != 3 * count or not count:
@@ -198,7 +204,7 @@ def faces_of(scene: bpy.types.Scene) -> FaceMaps | None:
                 values = np.empty(count, np.float32)
                 attribute.data.foreach_get("value", values)
                 layers[name] = values.astype(np.float64)
-        names = np.array([str(name) for name in obj.get(OF, ["terrain"])])
+        names = np.array([str(name) for name in called])
         of = names[np.clip(numbers[OF], 0, len(names) - 1)]
         corners = corners.astype(np.float64).reshape(count, 3, 3)
         _faces[:] = [(key, FaceMaps(numbers[FACE], corners, of, int(obj[store.MAP_BLOCKS]), layers))]

@@ -260,10 +260,12 @@ def _posterior(value: dict) -> None:
     if not all(isinstance(value[key], str) for key in ("said", "print")):
         raise TypeError
     for row in value["rows"]:
-        _name, _unit, median, _low, _high, _prior, remarks, *left = row
-        if number()(median) or not isinstance(remarks, list) or len(left) > 1:
+        called, unit, median, low, high, prior, remarks, *left = row
+        if any(number()(each) for each in (median, low, high)) or len(left) > 1:
             raise ValueError(row)
-        _texts(left)
+        _texts([called, unit, prior, *left])
+        _ = [remark.text + remark.severity for remark in from_plain(remarks)]
+    _ = [remark.text + remark.severity for remark in from_plain(value["remarks"])]
     if (observed := value.get("observed")) is not None:
         kind, _table, _stops = observed
         _texts(observed)

@@ -264,3 +264,29 @@ def test_a_damaged_one_is_set_aside_and_named(part, scene, tmp_path: Path, chang
     said += [str(one) for one in part("rockfall_addon.scene.problems").remarks(scene)] if not said else []
     assert any("analyse again" in sentence for sentence in said), said
     assert part("rockfall_addon.scene.simulation_setup").plan(scene).scenario.draws == {}
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"rows": [["rn", "", 0.3, None, 0.4, "", []]]},
+        {"rows": [["rn", "", 0.3, 0.2, float("nan"), "", []]]},
+        {"rows": [["rn", "", 0.3, 0.2, 0.4, 5, []]]},
+        {"rows": [["rn", "", 0.3, 0.2, 0.4, "", [5]]]},
+        {"rows": [["rn", "", 0.3, 0.2, 0.4, ""]]},
+        {"remarks": 5},
+        {"remarks": [{"said": "so"}]},
+        {"observed": 5},
+        {"observed": ["a", 5]},
+        {"weight": [1e308, 1e308]},
+        {"values": [[0.3], [float("nan")]]},
+    ],
+)
+def test_what_is_kept_is_set_aside_where_it_cannot_be_shown(part, scene, damage) -> None:
+    posterior, values = part("rockfall_addon.scene.posterior"), part("rockfall_addon.scene.stored_values")
+    draws = part("core.simulation.parameter_draws").ParameterDraws(("rn",), np.array([[0.3], [0.35]]), np.ones(2))
+    posterior.keep(scene, MODEL, draws)
+    check, _ = values.OF_THE_SCENE[KEY]
+    assert check(scene[KEY]) == ""
+    assert posterior.kept_of(scene).rows[0].name == "rn"
+    assert check(json.dumps(json.loads(scene[KEY]) | damage)) == "does not hold what it should"

@@ -154,8 +154,16 @@ def test_faces_are_mapped_beside_the_cells(mapped: bpy.types.Scene, part, tmp_pa
     rows = (tmp_path / "maps" / "faces.csv").read_text().splitlines()
     assert len(rows) == len(found.faces) + 1
     assert (tmp_path / "maps" / "faces.gpkg").is_file()
+    obj = next(one for one in bpy.data.objects if one.get("rockfall_role") == "face_maps")
+    names = list(obj["face_of"])
+    for damage in ([], 5, "terrain"):
+        obj["face_of"] = damage
+        assert module.faces_of(bpy.context.scene) is None
+    obj["face_of"] = names
+    assert module.faces_of(bpy.context.scene) is not None
     assert bpy.ops.rockfall.remove_maps() == {"FINISHED"}
     assert module.faces_of(bpy.context.scene) is None
+    assert not [one for one in bpy.data.objects if one.get("rockfall_role") == "face_maps"]
 
 
 def test_the_probe_tells_the_numbers_of_the_face(mapped: bpy.types.Scene, part) -> None:

@@ -237,6 +237,7 @@ def test_a_posterior_is_read_as_it_was_written(tmp_path: Path) -> None:
         (f"model,weight,rn\n{MODEL},1,\n", "row 2"),
         (f"model,weight,rn\n{MODEL},1,0.3\nnoel_2017,1,0.3\n", "row 3: The row is of 'noel_2017'"),
         (f"model,weight,rn\n{MODEL},0,0.3\n", "no weights"),
+        (f"model,weight,rn\n{MODEL},1e308,0.3\n{MODEL},1e308,0.4\n", "no weights"),
     ],
 )
 def test_bad_posteriors(tmp_path: Path, text: str, problem: str) -> None:

@@ -15,6 +15,8 @@ NUMBERS = (
     *(b"", b" ", b'"', b'""', b"1,5", b"1_0", b"0x10", b"true", b"[]", b"{}", b"null", b"[1, 2]", b"\xc3\xa9", b"\xff"),
     *(b"\x1b[31m", b"\x07", b"\0", b"\r", b"\xe2\x80\xae", b"\xd9\xa1\xd9\xa2", b"x" * 5000, b"1e5", b"1e-9", b"-7"),
 )
+MOST_BYTES = 100_000_000
+"""Damages multiply: what is larger is not damaged again."""
 WHOLE = (0, 1, 2, 3, 127, 128, 255, 256, 32767, 65535, 65536, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**64 - 1)
 REALS = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-310, 1e9, -0.0, 1e18)
 
@@ -22,6 +24,8 @@ REALS = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-310, 1e9, -0.0, 1e18)
 def damaged(data: bytes, random: np.random.Generator) -> bytes:
     """The data with one to four damages."""
     for _ in range(int(random.choice([1, 1, 1, 2, 3, 4]))):
+        if len(data) > MOST_BYTES:
+            break
         ways = BINARY_WAYS if b"\0" in data[:4096] or random.random() < 0.08 else TEXT_WAYS
         data = ways[int(random.integers(len(ways)))](data, random)
     return data

@@ -136,7 +136,7 @@ def placed_trees(
     foot = _heights(terrain, position)
     there: Mask = np.isfinite(foot)
     if not there.any():
-        raise InputError("No tree stands on the terrain", advice="Are their coordinates in the terrain's system?")
+        raise InputError("No tree stands on the terrain", advice="Give their coordinates in the terrain's system")
     left_out: tuple[str, ...] = ()
     if not there.all():
         beside = np.flatnonzero(~there)

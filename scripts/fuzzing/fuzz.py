@@ -57,7 +57,7 @@ def message_problem(message: str, folder: Path) -> str:
         return "the message names no file"
     if UNFORESEEN in message:
         return "unforeseen"
-    if not message.endswith(".") or message.count(". ") < 1:
+    if not message.endswith((".", "?")) or message.count(". ") < 1:
         return "the message has no advice"
     return ""
 

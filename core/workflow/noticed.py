@@ -24,6 +24,8 @@ LARGEST_GAIN = 3.0
 FASTEST_MPS = 150.0
 """No rockfall is this fast: that of a fall of 1 100 m in a vacuum."""
 FEWEST_FLIGHTS = 3
+STILL_PX = 0.5
+"""Pictures that lie less apart are of a camera that stood still, as far as a few pictures tell."""
 GLANCE_PX = 6.0
 """A first look at reduced pictures is not much more exact than this."""
 TREMBLE_PX = 2.0

@@ -14,7 +14,7 @@ from ...core.footage.background import BackgroundMotion
 from ...core.remarks import Remark, from_plain, from_text, to_plain, to_text
 from ...core.vectors import Array
 from ...core.workflow.alignment import counting_pairs, reference_frame
-from ...core.workflow.noticed import moves_at_a_glance, no_tripod
+from ...core.workflow.noticed import STILL_PX, moves_at_a_glance, no_tripod
 from . import camera_paths, georeference, store, terrain, videos
 from .pairs import POINT, complete_of, open_pair, pairs_of, table
 
@@ -84,10 +84,10 @@ def keep_background(camera: bpy.types.Object, motion: BackgroundMotion) -> None:
 
 
 def look_at_background(camera: bpy.types.Object, moved_px: float) -> None:
-    """Remember that the pictures of a video lie apart; what was found by following its background is not touched."""
+    """Remember whether the pictures of a video lie apart; what was found by following its background is not touched."""
     said = moves_at_a_glance(moved_px, camera.name)
-    if said and store.BACKGROUND not in camera:
-        camera[store.BACKGROUND] = to_text(said)
+    if store.BACKGROUND not in camera and (said or moved_px < STILL_PX):
+        camera[store.BACKGROUND] = to_text(said)  # nothing said: nobody needs to ask
 
 
 def background_remarks(camera: bpy.types.Object) -> tuple[Remark, ...]:

@@ -220,3 +220,7 @@ def test_a_tripod_is_not_asked_about(scan, part: Part, tmp_path: Path) -> None:
     writer.release()
     assert bpy.ops.rockfall.add_video(filepath=str(tmp_path / "still.mp4")) == {"FINISHED"}
     assert "held by hand" not in part("rockfall_addon.scene.next_step").next_step(scene()).sentence
+    (camera,) = part("rockfall_addon.scene.videos").cameras(scene())
+    alignment = part("rockfall_addon.scene.alignment")
+    assert not alignment.background_remarks(camera)
+    assert not alignment.is_taken_for_a_tripod(camera), "somebody has looked, and it stood still"

@@ -160,13 +160,17 @@ def sweep(number: int, jobs: int) -> None:
         print(f"the rest took {time.perf_counter() - began:.0f} s", flush=True)
         for project in sorted((root / "sites").glob("*/project.toml")):
             with redirect_stdout(io.StringIO()):
-                main_command(["simulate", str(project), "--out", str(root / "whole" / project.parent.name)])
+                done = main_command(["simulate", str(project), "--out", str(root / "whole" / project.parent.name)])
+            if done:
+                raise SystemExit(f"{project.parent.name} cannot be simulated by itself")
         states = [one["state"] for one in json.loads((root / "killed/summary.json").read_text())["jobs"]]
         tables = [path.relative_to(root / "whole") for path in (root / "whole").glob("*/*.csv")]
         same = sum(filecmp.cmp(root / "whole" / one, root / "killed" / one, shallow=False) for one in tables)
         print(f"{number} projects, killed after {kept}: {states.count('already done')} were not done again, "
               f"{states.count('done')} were done; {same} of {len(tables)} tables are the same bytes as those "
               f"of each by itself; left over: {sorted(p.name for p in (root / 'killed').glob('.*'))}")  # fmt: skip
+        if not 0 < same == len(tables):
+            raise SystemExit("The tables differ")
 
 
 def main() -> None:

@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..analysis.figures import INK, MUTED, STYLE
 from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.scores import Score
 from ..analysis.variables import find_variable
 from ..hazard.design import LEVELS_KJ, DesignValues
 from ..hazard.screens import OUTCOMES
 from ..impact_models.registry import find_model
-from ..output import output_file, write_text
+from ..output import write_text
 from ..progress import Progress, silent
 from ..remarks import to_plain
 from ..simulation.convergence import Quantile
@@ -32,6 +31,7 @@ from ..simulation.trees import LAW, NOT_KNOWN
 from ..workflow.design_figures import figures_of
 from ..workflow.design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
 from ..workflow.enough import KNOWN_TO
+from .pdf_pages import STYLES, Drawing, Element, Rows, Words, write_pdf
 from .simulation_tables import inputs_with_digests
 
 if TYPE_CHECKING:
@@ -39,9 +39,6 @@ if TYPE_CHECKING:
 
 STYLE_FILE = Path(__file__).parents[2] / "assets" / "report" / "design.css"
 DPI = 170
-A4_IN = (8.27, 11.69)
-LINES = 58
-"""Lines of text on a page of the PDF."""
 KJ = 1e-3
 INTERVAL = np.array([0.025, 0.5, 0.975])
 
@@ -88,7 +85,7 @@ def write_design(
     written = ["design.html"]
     if pdf and drawn:
         progress("Writing the PDF", 0, 0)
-        _write_pdf(sheet, tables, facts, figures, folder / "design.pdf")
+        write_pdf(list(_elements(sheet, tables, facts, figures)), folder / "design.pdf", _heading(sheet))
         written.append("design.pdf")
     write_text(folder / "design.json", json.dumps(plain(sheet, facts), indent=2, ensure_ascii=False) + "\n")
     return [*written, "design.json"]
@@ -378,83 +375,33 @@ def _picture(figure: "Figure") -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
-def _write_pdf(
+def _elements(
     sheet: DesignSheet,
     tables: Sequence[Table],
     facts: Mapping[str, str],
     figures: "Sequence[tuple[str, str, Figure]]",
-    path: Path,
-) -> None:
-    """Pages of text in the reading order of the HTML page, and the figures."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_pdf import PdfPages
-    from matplotlib.figure import Figure
-
-    first = [
-        ("h1", _heading(sheet)),
-        ("p", _summary(sheet)),
-        *((remark.severity, remark.text) for remark in sheet.remarks),
-    ]
-    rest = [line for table in tables[1:] for line in _lines(table)]
-    last = [("h2", "Inputs and versions"), *(("p", f"{name}: {text}") for name, text in facts.items())]
-    last += [("h2", "What this sheet does not say"), ("p", LIMITS)]
-    with output_file(path) as part, rc_context(STYLE), PdfPages(part, metadata={"Title": _heading(sheet)}) as pdf:
-
-        def text_pages(content: list[tuple[str, str]]) -> None:
-            for lines in _paginated(content):
-                sheet_of_paper = Figure(figsize=A4_IN)
-                for place, (kind, text) in enumerate(lines):
-                    sheet_of_paper.text(0.08, 0.95 - 0.9 * place / LINES, text, **_text_style(kind))
-                pdf.savefig(sheet_of_paper)
-
-        text_pages([*first, *_lines(tables[0])])
-        for _, _, figure in figures:
-            pdf.savefig(figure)
-        text_pages([*rest, *last])
+) -> Iterator[Element]:
+    """The PDF in the reading order of the HTML page."""
+    yield Words("h1", _heading(sheet))
+    yield Words("text", _summary(sheet))
+    for remark in sheet.remarks:
+        yield Words(remark.severity if remark.severity in STYLES else "text", remark.text)
+    yield from _on_paper(tables[0])
+    for _, caption, figure in figures:
+        yield Drawing(figure, caption)
+    for table in tables[1:]:
+        yield from _on_paper(table)
+    yield Words("h2", "Inputs and versions")
+    yield Rows(("", ""), tuple(facts.items()))
+    yield Words("h2", "What this sheet does not say")
+    yield Words("text", LIMITS)
 
 
-def _lines(table: Table) -> list[tuple[str, str]]:
-    """A table as lines: each row its cells with their heads, since columns of words are wider than a page."""
-    lines = [("h2", table.title)]
-    for row in table.rows:
-        cells = [f"{name}: {cell}" for name, cell in zip(table.head, row, strict=True) if cell not in ("", "–")]
-        lines.append(("p", "   ·   ".join(cells)))
-    return [*lines, ("note", table.note)] if table.note else lines
-
-
-def _paginated(content: Sequence[tuple[str, str]]) -> Iterator[list[tuple[str, str]]]:
-    """Lines that fit the width, so many on a page."""
-    from textwrap import wrap
-
-    lines: list[tuple[str, str]] = []
-    for kind, text in content:
-        width = {"h1": 60, "h2": 80}.get(kind, 112)
-        broken = [(kind, line) for line in wrap(text, width)]
-        space = 2 if kind == "h2" else (1 if kind == "h1" else 0)
-        if len(lines) + len(broken) + space > LINES and lines:
-            yield lines
-            lines = []
-        if lines:
-            lines += [("p", "")] * space
-        while len(lines) + len(broken) > LINES:
-            room = LINES - len(lines)
-            yield [*lines, *broken[:room]]
-            lines, broken = [], broken[room:]
-        lines += broken
-        lines.append(("p", ""))
-    if lines:
-        yield lines
-
-
-def _text_style(kind: str) -> dict[str, Any]:
-    styles: dict[str, dict[str, Any]] = {
-        "h1": {"fontsize": 15, "fontweight": "bold"},
-        "h2": {"fontsize": 10, "fontweight": "bold"},
-        "note": {"fontsize": 7.5, "color": MUTED},
-        "problem": {"fontsize": 8.5, "fontweight": "bold", "color": "#9b1c1c"},
-        "warning": {"fontsize": 8.5, "color": "#8f4a00"},
-    }
-    return {"va": "top", "color": INK, "fontsize": 8.5} | styles.get(kind, {})
+def _on_paper(table: Table) -> Iterator[Element]:
+    yield Words("h2", table.title)
+    yield Rows(table.head, table.rows, words=table.words)
+    if table.note:
+        yield Words("note", table.note)
 
 
 def _title(one: ModelDesign) -> str:

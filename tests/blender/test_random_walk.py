@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A random walk over all that can be done to a scene loses no pick, and nothing goes wrong."""
+"""A random walk over all that can be done to a scene loses no pick, and nothing goes wrong.
+
+More steps, or other walks: ROCKFALL_WALK_STEPS=1000 ROCKFALL_WALK_SEED=7,8.
+"""
 
 import importlib.util
+import os
 from pathlib import Path
 
 import pytest
 
-STEPS = 333
+STEPS = int(os.environ.get("ROCKFALL_WALK_STEPS", "333"))
+SEEDS = [int(text) for text in os.environ.get("ROCKFALL_WALK_SEED", "3,15").split(",")]
 
 
 def _walk() -> type:
@@ -16,7 +21,7 @@ def _walk() -> type:
     return module.Walk
 
 
-@pytest.mark.parametrize("seed", [3, 15])
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_random_walk(part, tmp_path: Path, seed: int) -> None:
     walk = _walk()(seed, tmp_path, part)
     walk.begin()

@@ -122,9 +122,9 @@ def _fate(group: Group, final_s: float) -> str:
     moving = int(np.count_nonzero(group.stopped & (group.end_s > final_s + 1e-9)))
     cut = int(np.count_nonzero(~group.stopped)) - group.left - group.lost
     numbers = (
-        (group.left, "leave the terrain"),
-        (group.lost, "lost from sight"),
-        (cut, "cut off"),
-        (moving, "move on"),
+        (group.left, "leaves the terrain", "leave the terrain"),
+        (group.lost, "goes out of sight", "go out of sight"),
+        (cut, "is cut off", "are cut off"),
+        (moving, "moves on", "move on"),
     )
-    return "".join(f"{number} {words}, " for number, words in numbers if number)
+    return "".join(f"{number} {one if number == 1 else more}, " for number, one, more in numbers if number)

@@ -138,11 +138,13 @@ def test_captions_count_the_blocks_that_have_stopped(scene: bpy.types.Scene, sim
     ends = np.unique(np.concatenate([np.ceil((begin_of(one) + one.time_s) * RATE) for one in simulations]))
     for frame in (0, *ends[:: max(len(ends) // 3, 1)].astype(int).tolist(), scene.frame_end):
         scene.frame_set(frame)
-        rows = [("measured", f"2 blocks, 1 lost from sight, {int(frame / RATE >= 2.4 - 1e-6)} stopped")]
+        rows = [("measured", f"2 blocks, 1 goes out of sight, {int(frame / RATE >= 2.4 - 1e-6)} stopped")]
         for one in simulations:
             n = int(((begin_of(one) + one.time_s <= frame / RATE + 1e-6) & (one.end == 0)).sum())
             left = int((one.end == 1).sum())
-            words = f"simulated: {len(one)} blocks, " + (f"{left} leave the terrain, " if left else "")
+            words = f"simulated: {len(one)} blocks, " + (
+                f"{left} {'leaves' if left == 1 else 'leave'} the terrain, " if left else ""
+            )
             rows.append((title[one.settings.model], f"{words}{n} stopped"))
             seen.add(n)
         for name, text in rows:

@@ -41,19 +41,19 @@ def test_the_film_waits_for_the_last_block_but_not_for_ever() -> None:
 def test_the_legend_counts_the_blocks_that_have_stopped_by_each_moment() -> None:
     moments = np.array([0.0, 3.999, 4.0, 5.5, 9.0])
     measured, simulated = legend(REAL, [model([5.5, 1.0, 8.0, 9.0], [True, True, False, True], left=1)], moments, 9.0)
-    assert (measured.name, measured.text, measured.unit) == ("measured", "3 blocks, 1 lost from sight, ", " stopped")
+    assert (measured.name, measured.text, measured.unit) == ("measured", "3 blocks, 1 goes out of sight, ", " stopped")
     assert measured.counts is not None
     assert simulated.counts is not None
     assert measured.counts.tolist() == [0, 0, 1, 2, 2]
     assert simulated.counts.tolist() == [0, 1, 1, 2, 3]
-    assert (simulated.name, simulated.text) == ("A model", "simulated: 4 blocks, 1 leave the terrain, ")
+    assert (simulated.name, simulated.text) == ("A model", "simulated: 4 blocks, 1 leaves the terrain, ")
 
 
 def test_the_legend_accounts_for_every_block() -> None:
     """Those that never stop in the film are told by what became of them; together they are all."""
     group = model([5.0, 70.0, 2.0, 3.0, 4.0], [True, True, False, False, False], left=2)
     (_, entry) = legend(REAL, [group], np.array([60.0]), 60.0)
-    assert entry.text == "simulated: 5 blocks, 2 leave the terrain, 1 cut off, 1 move on, "
+    assert entry.text == "simulated: 5 blocks, 2 leave the terrain, 1 is cut off, 1 moves on, "
     assert entry.counts is not None
     assert entry.counts.tolist() == [1]  # 2 + 1 + 1 + 1 = 5
 

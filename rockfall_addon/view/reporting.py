@@ -2,12 +2,15 @@
 """How an operator begins and ends: a scene of a newer version is refused; an error is reported in words."""
 
 import functools
+import re
 from collections.abc import Callable
 
 import bpy
 
 from ...core.errors import RockfallError
 from ..scene import migration
+
+TRACEBACK = "Traceback (most recent call last)"
 
 
 def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
@@ -24,6 +27,15 @@ def reported(execute: Callable[..., set[str]]) -> Callable[..., set[str]]:
         return ended
 
     return wrapper
+
+
+def told(error: Exception) -> str:
+    """What one of Blender's own operators says, without a full stop: of a traceback the error at its end."""
+    text = str(error).removeprefix("Error: ").strip()
+    if TRACEBACK in text:
+        ends = re.findall(r"^[A-Za-z_][\w.]*(?:Error|Exception)\b.*$", text, flags=re.MULTILINE)
+        text = ends[-1] if ends else text.partition(TRACEBACK)[0].strip(" :") or "its exporter failed"
+    return " ".join(text.split()).rstrip(".")
 
 
 def possible(cls: type[bpy.types.Operator], can: object, otherwise: str) -> bool:

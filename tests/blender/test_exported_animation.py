@@ -282,3 +282,22 @@ def test_a_full_disk_leaves_nothing(rockfall, part, tmp_path: Path, monkeypatch:
             part("core.outreach.animator").write_animation(made, [tmp_path / f"a.{ending}"], limited)
     assert [path.name for path in tmp_path.iterdir()] == ["a.usdc"]
     assert old.read_bytes() == b"old"
+
+
+def test_an_exporter_that_fails_is_told_in_a_line(part, tmp_path: Path, monkeypatch) -> None:
+    """Blender's glTF exporter is Python, and reports its whole traceback: only the error at its end is told."""
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no file here that is always full")
+    mesh = bpy.data.meshes.new("triangle")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("triangle", mesh))
+    file = tmp_path / "full.glb"
+    file.symlink_to("/dev/full")
+    with pytest.raises(part("core.errors").RockfallError) as caught:
+        part("rockfall_addon.steps.share.animation")._export(file, None)
+    said = str(caught.value)
+    assert "could not write full.glb" in said
+    assert "No space left on device" in said
+    assert len(said) < 400
+    assert "Traceback" not in said
+    assert ".py" not in said

@@ -10,6 +10,7 @@ from ....core.film.composed.kinds import CODECS
 from ....core.film.job import FilmJob
 from ....core.film.presets import blender_rate
 from ....core.progress import Progress
+from ...view.reporting import told
 
 
 def use_movie(scene: bpy.types.Scene, path: Path, codec: str = "h264") -> None:
@@ -49,7 +50,9 @@ def encode(job: FilmJob, progress: Progress) -> None:
         try:
             bpy.ops.render.render(animation=True, scene=scene.name)
         except RuntimeError as error:
-            reason = _lacking(job.codec, str(error)) if not written else f"Blender could not write the film: {error}"
+            reason = (
+                _lacking(job.codec, str(error)) if not written else f"Blender could not write the film: {told(error)}."
+            )
             raise RockfallError(reason) from error
         finally:
             bpy.app.handlers.render_write.remove(count)

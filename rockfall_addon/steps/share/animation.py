@@ -14,6 +14,7 @@ from ....core.errors import RockfallError
 from ....core.film.presets import blender_rate
 from ....core.outreach.animation import Animation, linear_rgba, load_animation
 from ....core.progress import Progress
+from ...view.reporting import told
 
 COLOUR = "Colour"
 CHANNELS = (("location", 3), ("rotation_quaternion", 4))
@@ -172,8 +173,7 @@ def _export(file: Path, animation: Animation) -> None:
     try:
         exporter(file, animation)
     except (RuntimeError, OSError) as error:
-        said = str(error).removeprefix("Error: ").strip().rstrip(".")
-        raise RockfallError(f"Blender could not write {file.name}: {said}. {ROOM}") from error
+        raise RockfallError(f"Blender could not write {file.name}: {told(error)}. {ROOM}") from error
     if not file.is_file() or not file.stat().st_size:
         raise RockfallError(f"Blender has not written {file.name} ({strerror(ENOSPC)}?). {ROOM}")
 

@@ -332,6 +332,18 @@ def test_a_killed_render_goes_on_and_gives_the_same_frames(tmp_path: Path) -> No
     assert not (tmp_path / "cut").exists()
 
 
+def test_frames_that_a_power_cut_has_spoilt_are_drawn_again(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (40, 60, 3), np.uint8)
+    with frame_store(tmp_path / "f", {}) as store:
+        store.fill(range(4), lambda _: noise, lambda *_: None)
+        good = store.file(0).read_bytes()
+        store.file(1).write_bytes(good[: len(good) // 2])
+        store.file(2).write_bytes(b"")
+        store.file(3).write_bytes(good[:-4] + bytes(4))
+        assert store.fill(range(4), lambda _: noise, lambda *_: None) == 1
+        assert all(store.file(k).read_bytes() == good for k in range(4))
+
+
 def test_a_full_disk_is_said_and_finished_frames_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rockfall.core.film.composed import frame_store as module
 

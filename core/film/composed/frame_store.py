@@ -19,6 +19,8 @@ from .canvas import Picture
 
 STATED = "film.json"
 LOCK = ".lock"
+LAST_BYTES = b"IEND\xaeB`\x82"
+"""Of every PNG."""
 COMPRESSION = 1
 """Of PNG: a film's frames are written once and read once."""
 
@@ -39,7 +41,7 @@ class FrameStore:
         return self.folder / f"{frame:06d}.png"
 
     def fill(self, frames: Sequence[int], draw: Callable[[int], Picture], progress: Progress) -> int:
-        """Draw the frames that are missing.
+        """Draw the frames that are missing, or of which a part is.
 
         Returns
         -------
@@ -49,7 +51,7 @@ class FrameStore:
         ------
         InputError : a frame cannot be written: the disk is full. Those that are finished stay.
         """
-        missing = [frame for frame in frames if not self.file(frame).is_file()]
+        missing = [frame for frame in frames if not _is_whole(self.file(frame))]
         there = len(frames) - len(missing)
         for done, frame in enumerate(missing, start=there + 1):
             _, data = opencv().imencode(".png", draw(frame), [opencv().IMWRITE_PNG_COMPRESSION, COMPRESSION])
@@ -71,6 +73,16 @@ class FrameStore:
         with suppress(OSError):
             (self.folder / LOCK).unlink()
             self.folder.rmdir()
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a picture is there up to its last bytes: after a power cut it may not be."""
+    try:
+        with file.open("rb") as picture:
+            picture.seek(-len(LAST_BYTES), os.SEEK_END)
+            return picture.read() == LAST_BYTES
+    except OSError:  # not there, or shorter
+        return False
 
 
 @contextmanager

@@ -6,7 +6,6 @@ handlers only say where to look, and a timer does the work, since data must not 
 While a person drags, picks are read where they are dragged to; what was done is absorbed when the mouse is released.
 """
 
-import uuid
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,9 +20,10 @@ from ...core.remarks import Remark
 from ...core.terrain.surface import Surface
 from . import (
     block_keys,
+    copies,
     fingerprints,
-    georeference,
     impact_rows,
+    keepers,
     keyframes,
     migration,
     models,
@@ -54,6 +54,8 @@ _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajecto
 
 _resting: list[bool] = []
 _recomputing: set[int] = set()  # session_uid of scenes
+_busy: list[int] = []
+"""session_uid of scenes that are looked at just now, one because of another."""
 
 
 @dataclass
@@ -179,11 +181,47 @@ def sync(
     """
     if migration.is_newer(scene):
         return Done([], [])
+    if dragging:
+        with store.looking(scene):
+            return _sync(scene, names, dragging, again, undone, {})
+    _busy.append(scene.session_uid)
+    try:
+        return _sync_with_keepers(scene, names, again, undone)
+    finally:
+        _busy.pop()
+
+
+def _sync_with_keepers(scene: bpy.types.Scene, names: Iterable[str] | None, again: bool, undone: bool) -> Done:
+    """A scene whose picks another one keeps: what was done to them is absorbed there, and written there afterwards."""
+    first = _ask_keepers(scene, names, undone)
     with store.looking(scene):
-        return _sync(scene, names, dragging, again, undone)
+        done = _sync(scene, names, False, again, undone, keepers.kept_elsewhere(scene))
+    after = _ask_keepers(scene, [*done.rebuilt, *done.failed], undone)
+    done.picks_changed = done.picks_changed or first or after
+    return done
 
 
-def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, again: bool, undone: bool) -> Done:
+def _ask_keepers(scene: bpy.types.Scene, names: Iterable[str] | None, undone: bool) -> bool:
+    """Look at these trajectories in the scenes that keep them; whether picks have changed."""
+    asked: dict[bpy.types.Scene, set[str]] = {}
+    for obj, keeper in keepers.kept_elsewhere(scene).items():
+        name = obj.get(store.TRAJECTORY)
+        if isinstance(name, str) and (names is None or name in names) and keeper.session_uid not in _busy:
+            asked.setdefault(keeper, set()).add(name)
+    changed = False
+    for keeper, which in asked.items():
+        changed = sync(keeper, which, undone=undone).picks_changed or changed
+    return changed
+
+
+def _sync(
+    scene: bpy.types.Scene,
+    names: Iterable[str] | None,
+    dragging: bool,
+    again: bool,
+    undone: bool,
+    elsewhere: keepers.Elsewhere,
+) -> Done:
     done = Done([], [])
     wanted = None if names is None else set(names)
     if not dragging:
@@ -200,13 +238,13 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
     parts = trajectories.parts_of(scene, wanted)
     edited: dict[str, str] = {}
     if dragging:
-        objects, resample = _originals(objects), False
+        objects, resample = copies.originals(objects), False
     else:
-        _heal(scene, objects)
+        copies.heal(scene, objects)
         again, resample = again or _ground_changed(scene), _rate_changed(scene)
         if (again or resample) and wanted is not None:
             wanted, objects, parts = None, picks.objects_of(scene), trajectories.parts_of(scene)
-        edited = _take_edits_of_blocks(scene, objects, parts, undone, done)
+        edited = _take_edits_of_blocks(scene, objects, parts, undone, elsewhere, done)
         objects = picks.objects_of(scene, wanted)
     groups = fingerprints.by_trajectory(objects)
     prints, said = fingerprints.remembered(scene), problems.of_trajectories(scene)
@@ -222,11 +260,13 @@ def _sync(scene: bpy.types.Scene, names: Iterable[str] | None, dragging: bool, a
     altered, blocks = again or bool(gone), {} if dragging else _blocks_of(scene, groups)
     for name, members in groups.items():
         held = _held(name, parts) if dragging else picks.NOTHING_HELD
-        changed = _has_changed(name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging, held)
+        changed = _has_changed(
+            name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging, held, elsewhere
+        )
         changed = changed or (name in blocks and _has_other_block(parts.get((store.FLIGHTS_ROLE, name)), blocks[name]))
         if changed or again or resample or name in edited:
             altered = altered or changed or name in edited
-            prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, held, done)
+            prints[name], said[name] = _try_rebuild(scene, name, members, parts, dragging, held, elsewhere, done)
             if edited.get(name):
                 said[name].append(Remark(edited[name], "warning", name))
     if not dragging:
@@ -305,7 +345,12 @@ def nudge(scene: bpy.types.Scene, obj: bpy.types.Object, frames: float) -> None:
 
 
 def _take_edits_of_blocks(
-    scene: bpy.types.Scene, objects: list[bpy.types.Object], parts: trajectories.Parts, undone: bool, done: Done
+    scene: bpy.types.Scene,
+    objects: list[bpy.types.Object],
+    parts: trajectories.Parts,
+    undone: bool,
+    elsewhere: keepers.Elsewhere,
+    done: Done,
 ) -> dict[str, str]:
     """Do to the picks what a person, or an undo, did to their blocks' keys.
 
@@ -316,7 +361,7 @@ def _take_edits_of_blocks(
     edited = {}
     for name, members in fingerprints.by_trajectory(objects).items():
         block = parts.get((store.BLOCK_ROLE, name))
-        if block is None:
+        if block is None or block in elsewhere:
             continue
         action, states = keyframes.action_of(block), block_keys.states_of(block)
         if action is not None and not states:
@@ -325,7 +370,7 @@ def _take_edits_of_blocks(
         written = int(action.get(store.WRITTEN, 0)) if action is not None else 0
         older = [one for one in members if one.get(store.WRITTEN, 0) < written]
         for obj in members:
-            if obj.get(store.WRITTEN, 0) > written and obj[store.ID] in states:
+            if obj.get(store.WRITTEN, 0) > written and obj[store.ID] in states and obj not in elsewhere:
                 picks.bring_back(obj, states[obj[store.ID]])
         edits = block_keys.edits_of(block)
         if not edits or older:
@@ -353,6 +398,7 @@ def _has_changed(
     rate: float,
     dragging: bool,
     held: picks.Held,
+    elsewhere: keepers.Elsewhere,
 ) -> bool:
     """Whether the picks differ from what is shown, hold an edit to be absorbed, or what is shown is damaged."""
     if not dragging and any(
@@ -364,7 +410,8 @@ def _has_changed(
         trail, block = (parts.get((role, name)) for role in (store.FLIGHTS_ROLE, store.BLOCK_ROLE))
         if trail is None or block is None:
             return True
-        if not dragging and not (fingerprints.is_marked(trail, block, now) and _of_one_version(members, block)):
+        asked = not dragging and block not in elsewhere
+        if asked and not (fingerprints.is_marked(trail, block, now) and _of_one_version(members, block)):
             return True
     return before.rstrip(fingerprints.COMPLETE) != now
 
@@ -395,15 +442,16 @@ def _try_rebuild(
     parts: trajectories.Parts,
     dragging: bool,
     held: picks.Held,
+    elsewhere: keepers.Elsewhere,
     done: Done,
 ) -> tuple[str, list[Remark]]:
     """Compute one trajectory and show it, or keep the last good flights; its fingerprint, and what there is to say."""
     try:
-        said = _rebuild(scene, name, members, parts, dragging, held)
+        said = _rebuild(scene, name, members, parts, dragging, held, elsewhere)
     except RockfallError as error:
         _grey(scene, name, parts)
         if not dragging:
-            _keep_keys(scene, name, members)
+            _keep_keys(scene, name, [obj for obj in members if obj not in elsewhere])
         done.failed.append(name)
         return fingerprints.fingerprint(members, timing.keyed_rate(scene), held), [Remark(str(error), "problem", name)]
     done.rebuilt.append(name)
@@ -421,6 +469,7 @@ def _rebuild(
     parts: trajectories.Parts,
     dragging: bool,
     held: picks.Held,
+    elsewhere: keepers.Elsewhere,
 ) -> list[Remark]:
     """Compute one trajectory and show it; returns what there is to say about it."""
     surface = reconstruction.ground(scene)
@@ -434,9 +483,12 @@ def _rebuild(
     if not dragging:
         result = spins.follow(scene, members, result)
     offset = timing.offset_of(scene, name, float(result.picks.time_s[0]))
-    trajectories.store_results(members, result)
+    trajectories.store_results(members, result, elsewhere)
     if not dragging:
-        _pose(scene, members, result, offset, parts.get((store.BLOCK_ROLE, name)))
+        _pose(scene, members, result, offset, parts.get((store.BLOCK_ROLE, name)), elsewhere)
+    if parts.get((store.BLOCK_ROLE, name)) in elsewhere:
+        impact_rows.fill(scene, name)
+        return problems.of_result(scene, result)[name]
     trail = trajectories.show_trajectory(scene, name, result, members, offset, surface, parts, held=dragging)
     if trail is not None:
         trails.paint_observed(scene, [trail])
@@ -450,17 +502,22 @@ def _pose(
     result: object,
     offset: float,
     block: bpy.types.Object | None,
+    elsewhere: keepers.Elsewhere,
 ) -> None:
     rate, radius = timing.keyed_rate(scene), scene.rockfall.marker_radius_m
     version = picks.next_version(members if block is None else [*members, block])
     scene[store.KEYED_RATE] = rate
     for obj, normal in zip(members, trajectories.normals_of(result), strict=True):
+        if obj in elsewhere:
+            continue
         frame = (float(obj[store.TIME]) - offset) * rate
         picks.pose(obj, normal, frame, radius, version)
 
 
 def _keep_keys(scene: bpy.types.Scene, name: str, members: list[bpy.types.Object]) -> None:
     """An edit with which the trajectory cannot be computed stays an edit: at the next frame the key would undo it."""
+    if not members:
+        return
     rate = timing.keyed_rate(scene)
     offset = timing.offset_of(scene, name, min(float(obj[store.TIME]) for obj in members))
     for obj in members:
@@ -520,40 +577,3 @@ def _rate_changed(scene: bpy.types.Scene) -> bool:
         return False
     scene[store.TICK_RATE] = rate
     return True
-
-
-def _heal(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
-    """Copies of picks become picks of their own; picks from another scene come to this one's origin."""
-    shift = georeference.read_shift(scene).vector
-    seen: dict[str, bpy.types.Object] = {}
-    for obj in sorted(objects, key=lambda one: one.session_uid):
-        identifier = obj.get(store.ID)
-        if identifier is None or identifier in seen:
-            obj[store.ID] = uuid.uuid4().hex
-            if identifier is not None:
-                _begin_copy(scene, obj, seen[identifier])
-        seen[obj[store.ID]] = obj
-        own = obj.get(store.PICK_SHIFT)
-        if own is None:
-            obj[store.PICK_SHIFT] = shift.tolist()
-        elif list(own) != shift.tolist() and picks.home_of(obj, scene) is None:
-            place = np.array(obj[store.POSITION]) + np.array(own) - shift
-            obj[store.POSITION], obj[store.PICK_SHIFT] = place.tolist(), shift.tolist()
-            obj.location = place
-
-
-def _originals(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Without the copies that a person is just placing: they are picks once they are let go."""
-    first: dict[str | None, bpy.types.Object] = {}
-    for obj in sorted(objects, key=lambda one: one.session_uid):
-        first.setdefault(obj.get(store.ID), obj)
-    return list(first.values())
-
-
-def _begin_copy(scene: bpy.types.Scene, copy: bpy.types.Object, original: bpy.types.Object) -> None:
-    """A copy is a pick at the moment that the scene shows, when that is another one than the original's."""
-    copy[store.ROW] = 0
-    frame = scene.frame_current + scene.frame_subframe
-    kept = original.get(store.KEY_FRAME)
-    if kept is not None and abs(frame - kept) > 0.5 and copy[store.TIME] == original[store.TIME]:
-        copy[store.TIME] = float(copy[store.TIME]) + (frame - kept) / timing.keyed_rate(scene)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.reconstruction.picks import Picks
-from . import block_keys, store
+from . import block_keys, keepers, store
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:
@@ -86,7 +86,8 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
         return False
     factor = rate / keyed
     roles = (store.BLOCK_ROLE, store.PICK_ROLE, store.MODEL_BLOCK_ROLE)
-    objects = [obj for role in roles for obj in store.with_role(scene, role)]
+    elsewhere = keepers.kept_elsewhere(scene)
+    objects = [obj for role in roles for obj in store.with_role(scene, role) if obj not in elsewhere]
     actions = {o.animation_data.action for o in objects if o.animation_data and o.animation_data.action}
     for action in actions:
         for layer in action.layers:
@@ -94,11 +95,11 @@ def follow_frame_rate(scene: bpy.types.Scene) -> bool:
                 for bag in strip.channelbags:
                     for curve in bag.fcurves:
                         _stretch(curve, factor)
-    for obj in store.with_role(scene, store.PICK_ROLE):
-        if store.KEY_FRAME in obj:
+    for obj in objects:
+        if obj[store.ROLE] == store.PICK_ROLE and store.KEY_FRAME in obj:
             obj[store.KEY_FRAME] *= factor
-    for obj in store.with_role(scene, store.BLOCK_ROLE):
-        block_keys.stretch(obj, factor)
+        elif obj[store.ROLE] == store.BLOCK_ROLE:
+            block_keys.stretch(obj, factor)
     scene[store.KEYED_RATE] = rate
     scene.frame_end = max(1, round(scene.frame_end * factor))
     return True

@@ -5,7 +5,7 @@ Of each trajectory: its picks, one polyline of its flights with colours, its blo
 numbers of its impacts. What is there already is brought in line, not made anew.
 """
 
-from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import bpy
@@ -307,10 +307,13 @@ def normals_of(result: Reconstruction) -> np.ndarray:
     return normals
 
 
-def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -> None:
+def store_results(
+    objects: Sequence[bpy.types.Object], result: Reconstruction, but: Container[bpy.types.Object] = ()
+) -> None:
     """Write each impact's numbers into its object, where panels and exports find them.
 
     objects : the object of each of the reconstruction's picks.
+    but : objects that are left alone: another scene writes them.
     """
     impacts, flags = result.impacts, result.impacts.flag_text()
     columns = {
@@ -340,14 +343,13 @@ def store_results(objects: Sequence[bpy.types.Object], result: Reconstruction) -
     impact_marks.results_written(set(result.picks.trajectory.tolist()))
     i = 0
     for obj, kind in zip(objects, result.picks.kind.tolist(), strict=True):
-        if kind != "impact":
-            obj.pop(store.RESULT, None)
-            continue
-        obj[store.RESULT] = {name: values[i] for name, values in rows.items()} | {
-            "number": int(impacts.impact[i]),
-            "flags": flags[i],
-        }
-        i += 1
+        if obj not in but:
+            if kind == "impact":
+                numbers = {name: values[i] for name, values in rows.items()}
+                obj[store.RESULT] = numbers | {"number": int(impacts.impact[i]), "flags": flags[i]}
+            else:
+                obj.pop(store.RESULT, None)
+        i += kind == "impact"
 
 
 def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] = MEASURED_COLOUR) -> bpy.types.Mesh:

@@ -287,6 +287,15 @@ def frames_moved(obj: bpy.types.Object) -> float:
     return 0.0
 
 
+def keyed_elsewhere(obj: bpy.types.Object) -> bool:
+    """Whether an object that is where its pick is has keys elsewhere: an undo has brought back the object alone."""
+    return not moved(obj) and any(
+        point.co[1] != obj.location[curve.array_index]
+        for curve in keyframes.location_curves(obj)
+        for point in curve.keyframe_points
+    )
+
+
 def time_of(obj: bpy.types.Object, rate: float, held: Held = NOTHING_HELD) -> float:
     """The pick's time on the common clock [s], with the edit of its key. `rate` is the one that the keys have."""
     shift = frames_moved(obj) or _held(obj, held).frames

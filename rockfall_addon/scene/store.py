@@ -158,6 +158,7 @@ def read_json(holder: bpy.types.ID, key: str, empty: Any) -> Any:
 
 
 _Table = dict[tuple[str, str | None], list[bpy.types.Object]]
+_comings = [0]
 _tables: dict[int, _Table | None] = {}  # session_uid of a scene → what `looking` has found, None before
 
 
@@ -177,6 +178,11 @@ def looking(scene: bpy.types.Scene) -> Iterator[None]:
 def look_again() -> None:
     """Objects of ours came or went."""
     _tables.update(dict.fromkeys(_tables))
+
+
+def comings() -> int:
+    """How often objects or collections of ours came or went: what differs between two moments has changed."""
+    return _comings[0]
 
 
 def of_role(scene: bpy.types.Scene, role: str, trajectory: str | None = None) -> list[bpy.types.Object]:
@@ -220,6 +226,7 @@ def with_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
 def link(folder: bpy.types.Collection, obj: bpy.types.Object) -> None:
     """Put a new object of ours into a collection."""
     folder.objects.link(obj)
+    _comings[0] += 1
     look_again()
 
 
@@ -281,6 +288,7 @@ def _new_collection(parent: bpy.types.Collection, name: str) -> bpy.types.Collec
     child = bpy.data.collections.new(name)
     child[COLLECTION_NAME] = name
     parent.children.link(child)
+    _comings[0] += 1
     return child
 
 
@@ -293,6 +301,7 @@ def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = 
     for child in list(ours.children) if ours is not None else ():
         if child.get(COLLECTION_NAME) == name:
             inner = [each for each in child.children_recursive if each.get(COLLECTION_NAME) not in but]
+            _comings[0] += 1
             for each in (*inner, *(() if but else (child,))):
                 bpy.data.collections.remove(each)
             return
@@ -302,6 +311,7 @@ def remove_objects(objects: list[bpy.types.Object]) -> None:
     """Remove objects with the data and actions that nothing else uses."""
     look_again()
     for obj in objects:
+        _comings[0] += 1
         data, action = obj.data, obj.animation_data.action if obj.animation_data else None
         bpy.data.objects.remove(obj)
         if isinstance(data, bpy.types.Mesh) and not data.users:

@@ -60,13 +60,13 @@ _busy: list[int] = []
 
 @dataclass
 class Done:
-    """What a `sync` has done: trajectories it computed again or could not; whether picks came, went, followed their
-    block's keys, or have new names: the step that Blender has stored for undo has to know of these.
+    """What a `sync` has done: trajectories it computed again or could not; whether picks followed their block's keys or
+    have new names, and objects came or went: the step that Blender has stored for undo has to know of these.
     """
 
     rebuilt: list[str]
     failed: list[str]
-    picks_changed: bool = False
+    step_changed: bool = False
 
 
 def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
@@ -146,7 +146,7 @@ def work() -> float | None:
         if scene.session_uid in waiting:
             names = waiting[scene.session_uid]
             done = sync(scene, names, dragging=dragging)
-            if done.picks_changed:
+            if done.step_changed:
                 undo.extend_last_step()
             if dragging:
                 _waiting[scene.session_uid] = names
@@ -197,7 +197,7 @@ def _sync_with_keepers(scene: bpy.types.Scene, names: Iterable[str] | None, agai
     with store.looking(scene):
         done = _sync(scene, names, False, again, undone, keepers.kept_elsewhere(scene))
     after = _ask_keepers(scene, [*done.rebuilt, *done.failed], undone)
-    done.picks_changed = done.picks_changed or first or after
+    done.step_changed = done.step_changed or first or after
     return done
 
 
@@ -210,7 +210,7 @@ def _ask_keepers(scene: bpy.types.Scene, names: Iterable[str] | None, undone: bo
             asked.setdefault(keeper, set()).add(name)
     changed = False
     for keeper, which in asked.items():
-        changed = sync(keeper, which, undone=undone).picks_changed or changed
+        changed = sync(keeper, which, undone=undone).step_changed or changed
     return changed
 
 
@@ -222,7 +222,7 @@ def _sync(
     undone: bool,
     elsewhere: keepers.Elsewhere,
 ) -> Done:
-    done = Done([], [])
+    done, before = Done([], []), store.comings()
     wanted = None if names is None else set(names)
     if not dragging:
         came = set_aside.look(scene, wanted)
@@ -263,6 +263,7 @@ def _sync(
         changed = _has_changed(
             name, members, prints.get(name, ""), parts, timing.keyed_rate(scene), dragging, held, elsewhere
         )
+        changed = changed or (undone and any(picks.keyed_elsewhere(one) for one in members))
         changed = changed or (name in blocks and _has_other_block(parts.get((store.FLIGHTS_ROLE, name)), blocks[name]))
         if changed or again or resample or name in edited:
             altered = altered or changed or name in edited
@@ -271,12 +272,13 @@ def _sync(
                 said[name].append(Remark(edited[name], "warning", name))
     if not dragging:
         for members in groups.values():
-            done.picks_changed = pick_names.follow(members) or done.picks_changed
+            done.step_changed = pick_names.follow(members) or done.step_changed
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:
         _finish(scene, done.rebuilt)
     problems.update(scene)
+    done.step_changed = done.step_changed or store.comings() != before
     return done
 
 
@@ -380,7 +382,7 @@ def _take_edits_of_blocks(
             continue
         picks.take_edits(scene, members, edits)
         block_keys.remember(block, [picks.with_id(scene, one) for one in edits.identifiers])
-        done.picks_changed = True
+        done.step_changed = True
     return edited
 
 

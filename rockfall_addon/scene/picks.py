@@ -171,7 +171,7 @@ def pose(
     like : see `keyframes.key_location_once`.
     """
     marker = _marker(obj[store.KIND])
-    if obj.data is not marker:
+    if obj.data is not marker and obj.type == "MESH":  # one whose mesh somebody deleted is an empty, and takes none
         obj.data = marker
     up = Vector(normal) if np.isfinite(normal).all() else Vector((0.0, 0.0, 1.0))
     turn = up.to_track_quat("Z", "Y")

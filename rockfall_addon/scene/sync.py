@@ -272,7 +272,8 @@ def _sync(
                 said[name].append(Remark(edited[name], "warning", name))
     if not dragging:
         for members in groups.values():
-            done.step_changed = pick_names.follow(members) or done.step_changed
+            if not any(one in elsewhere for one in members):
+                done.step_changed = pick_names.follow(members) or done.step_changed
     fingerprints.remember(scene, prints)
     problems.keep_trajectories(scene, said)
     if altered and not dragging:

@@ -66,3 +66,12 @@ def test_another_frame_rate_of_the_scene_that_only_shows_it_leaves_its_key(
     look(part, other, scene)
     assert key_frames(pick) == [[pytest.approx(frame * 30 / RATE, rel=1e-6)] for (frame,) in before]
     assert pick["rockfall_time_s"] == time
+
+
+def test_its_name_is_its_number_in_the_scene_that_keeps_it(
+    scene: bpy.types.Scene, other: bpy.types.Scene, part
+) -> None:
+    pick = picks_of(scene, "A")[2]
+    look(part, scene, other)
+    assert pick.name == "A impact 2", "not 1, which it would be in the other scene"
+    assert not part("rockfall_addon.scene.sync").sync(other).step_changed

@@ -301,8 +301,8 @@ def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = 
     for child in list(ours.children) if ours is not None else ():
         if child.get(COLLECTION_NAME) == name:
             inner = [each for each in child.children_recursive if each.get(COLLECTION_NAME) not in but]
-            _comings[0] += 1
             for each in (*inner, *(() if but else (child,))):
+                _comings[0] += 1
                 bpy.data.collections.remove(each)
             return
 

@@ -9,14 +9,20 @@ import numpy as np
 from . import georeference, picks, store, timing
 
 
-def heal(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
-    """Copies of picks become picks of their own; picks from another scene come to this one's origin."""
+def heal(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> bool:
+    """Copies of picks become picks of their own; picks from another scene come to this one's origin.
+
+    Returns
+    -------
+    Whether there were any.
+    """
     shift = georeference.read_shift(scene).vector
+    changed = False
     seen: dict[str, bpy.types.Object] = {}
     for obj in sorted(objects, key=lambda one: one.session_uid):
         identifier = obj.get(store.ID)
         if identifier is None or identifier in seen:
-            obj[store.ID] = uuid.uuid4().hex
+            obj[store.ID], changed = uuid.uuid4().hex, True
             if identifier is not None:
                 _begin_copy(scene, obj, seen[identifier])
         seen[obj[store.ID]] = obj
@@ -26,7 +32,8 @@ def heal(scene: bpy.types.Scene, objects: list[bpy.types.Object]) -> None:
         elif list(own) != shift.tolist() and picks.home_of(obj, scene) is None:
             place = np.array(obj[store.POSITION]) + np.array(own) - shift
             obj[store.POSITION], obj[store.PICK_SHIFT] = place.tolist(), shift.tolist()
-            obj.location = place
+            obj.location, changed = place, True
+    return changed
 
 
 def originals(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -240,7 +240,7 @@ def _sync(
     if dragging:
         objects, resample = copies.originals(objects), False
     else:
-        copies.heal(scene, objects)
+        done.step_changed = copies.heal(scene, objects)
         again, resample = again or _ground_changed(scene), _rate_changed(scene)
         if (again or resample) and wanted is not None:
             wanted, objects, parts = None, picks.objects_of(scene), trajectories.parts_of(scene)

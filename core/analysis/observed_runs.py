@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs that were observed: reconstructed from picks, with what errors may change, or known by their stops alone."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -31,11 +33,13 @@ class Observed:
     paths : each of a name of its own.
     from_impact : (n,) the release was not seen: the run is known from an impact on.
     moved : the same with all picks moved at random by their standard deviations; none where these are not known.
+    errors_known : (n,) whether they are, of each run; None for all or, without `moved`, none.
     """
 
     paths: Paths
     from_impact: Mask
     moved: tuple[Paths, ...] = ()
+    errors_known: Mask | None = None
 
 
 def observe_runs(reconstruction: "Reconstruction", ground: Ground, draws: int = ERROR_DRAWS, seed: int = 0) -> Observed:
@@ -63,6 +67,31 @@ def observe_runs(reconstruction: "Reconstruction", ground: Ground, draws: int = 
         flights = solve_flights(others, find_segments(others), reconstruction.gravity_mps2, drag_per_m)
         moved.append(observed_paths(replace(reconstruction, picks=others, flights=flights)))
     return Observed(paths, from_impact, tuple(moved))
+
+
+def join_observed(parts: Sequence[Observed]) -> Observed:
+    """All runs of several sources.
+
+    Raises
+    ------
+    InputError : runs of two sources have one name.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    names = Counter(name for one in parts for name in dict.fromkeys(one.paths.name.tolist()))
+    for name in (name for name, number in names.items() if number > 1):
+        raise InputError(f"Observed runs of two sources are called {name}", advice="Rename them in one of the sources")
+    draws = max(len(one.moved) for one in parts)
+    known = np.concatenate([np.full(len(one.paths), bool(one.moved)) for one in parts])
+    return Observed(
+        Paths.joined([one.paths for one in parts]),
+        np.concatenate([one.from_impact for one in parts]),
+        tuple(
+            Paths.joined([one.moved[i % len(one.moved)] if one.moved else one.paths for one in parts])
+            for i in range(draws)
+        ),
+        known,
+    )
 
 
 def observe_stops(name: Names, start: Array, stop: Array, mass_kg: Array) -> Observed:

@@ -4,7 +4,8 @@
 What is read off both is then read off in one way: exactly, from the flights themselves, without time steps.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -105,6 +106,20 @@ class Paths:
             self.start[pieces], self.end[pieces], self.start_velocity[pieces], self.end_velocity[pieces],
             self.drag_per_m[pieces], np.flatnonzero(struck[pieces]), self.gravity_mps2,
         )  # fmt: skip
+
+    @classmethod
+    def joined(cls, parts: Sequence["Paths"]) -> "Paths":
+        """The runs of all parts, in their order, with the gravity of the first."""
+        plain = [one.name for one in fields(cls) if one.name not in ("run", "impact_piece", "gravity_mps2")]
+        columns = {name: np.concatenate([getattr(one, name) for one in parts]) for name in plain}
+        runs = np.cumsum([0, *(len(one) for one in parts[:-1])])
+        pieces = np.cumsum([0, *(one.run.size for one in parts[:-1])])
+        return cls(
+            **columns,
+            run=np.concatenate([one.run + first for one, first in zip(parts, runs, strict=True)]),
+            impact_piece=np.concatenate([one.impact_piece + first for one, first in zip(parts, pieces, strict=True)]),
+            gravity_mps2=parts[0].gravity_mps2,
+        )
 
     def states(self, piece: Indices, elapsed_s: Array) -> tuple[Array, Array]:
         """Places and velocities (q, 3) on pieces (q,) so long (q,) after their start."""

@@ -121,6 +121,8 @@ def errors_of(
         drawn = np.stack([draw[key] for draw in draws])
         enough = np.isfinite(column) & (2 * np.isfinite(drawn).sum(axis=0) >= len(draws))
         sigma[key] = np.full(column.size, np.nan)
+        if observed.errors_known is not None:
+            enough &= observed.errors_known
         sigma[key][enough] = np.nanstd(drawn[:, enough], axis=0, ddof=1)
     return sigma
 

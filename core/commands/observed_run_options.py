@@ -19,6 +19,7 @@ from .options import (
     add_terrain_options,
     model_parameters,
     models_as_asked,
+    naming,
     positive,
     terrain_as_asked,
     whole,
@@ -28,13 +29,16 @@ from .release_options import add_zone_options, zones_as_asked
 from .tree_options import add_tree_options, trees_said
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..analysis.observed_runs import Observed
     from ..analysis.sections import Section
     from ..reconstruction.choices import FlightEnds
+    from ..reconstruction.picks import Picks
     from ..reconstruction.trajectory import Reconstruction
     from ..simulation.ground import Ground
     from ..simulation.release import Releases
-    from ..workflow.simulation import Scenario
+    from ..workflow.simulation import ReleaseSource, Scenario
 
 DIAMETER_M = 0.35
 
@@ -48,6 +52,15 @@ def add_observed_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--stops", metavar="FILE", help="where blocks stopped, without footage: release, x_m, y_m (z_m)"
     )
+    more = parser.add_argument_group("further observed runs, on the same terrain; each can be given again")
+    more.add_argument(
+        "--more-picks", action="append", default=[], metavar="FILE",
+        help="trajectories of another picks.csv, reconstructed as those of OBSERVED",
+    )  # fmt: skip
+    more.add_argument(
+        "--more-stops", action="append", default=[], nargs=2, metavar=("RELEASES", "STOPS"),
+        help="blocks without footage: their releases.csv, and where they stopped",
+    )  # fmt: skip
     add_terrain_files(parser, "mesh, grid or cloud; a project names its own")
     add_parameter_options(parser)
     parser.add_argument(
@@ -117,9 +130,10 @@ def _of_project(
     """The measured runs of a project; options replace what its [simulation] says."""
     from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
-    from ..exchange.simulation_entry import ReleaseEntry
-    from ..exchange.simulation_project import open_simulation
+    from ..exchange.simulation_entry import TABLE, ReleaseEntry
+    from ..exchange.simulation_project import open_simulation, placed_source
     from ..workflow.simulation import ground_of
+    from ..workflow.whole_runs import measured_runs
 
     for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density", "--zone-attribute"):
         if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, []):
@@ -147,7 +161,14 @@ def _of_project(
     progress("Reconstructing")
     if flights is not None:
         project = replace(project, reconstruction=replace(project.reconstruction, flights=flights))
-    return _measured(number, scenario, ground, reconstruct_project(project, ground.surface), inputs)
+    measured = measured_runs(ground, reconstruct_project(project, ground.surface), number)
+    case = ObservedCase(scenario, ground, measured.observed, measured.releases, inputs)
+
+    def placed(file: str) -> "ReleaseSource":
+        table = replace(entry, releases=ReleaseEntry(TABLE, number=number, file=Path(file)))
+        return placed_source(table, project.block)
+
+    return _with_more(arguments, case, number, partial(reconstruct_project, project, ground.surface), placed, progress)
 
 
 def _of_table(
@@ -171,6 +192,7 @@ def _of_table(
     from ..simulation.blocks import block_of
     from ..simulation.measured_releases import from_reconstruction
     from ..workflow.simulation import Scenario, ground_of
+    from ..workflow.whole_runs import measured_runs
 
     if not arguments.terrain:
         raise InputError("--terrain is missing", advice="Only a project, project.toml, can do without it")
@@ -185,14 +207,14 @@ def _of_table(
     entry = trees_said(arguments)
     trees, tree_files = (None, {}) if entry is None else open_trees(entry, surface, arguments.seed or 0)
     progress(f"Reading {arguments.table}")
+    blocks = block_of("sphere", diameter, diameter, diameter, density)
+
+    def placed(file: str) -> "ReleaseSource":
+        return partial(read_releases, file, blocks=blocks, number=number)
+
     scenario = Scenario(
         surface,
-        partial(
-            read_releases,
-            arguments.table,
-            blocks=block_of("sphere", diameter, diameter, diameter, density),
-            number=number,
-        ),
+        placed(arguments.table),
         {model.name: parameters.get(model.name, {}) for model in models},
         zones=zones,
         trees=trees,
@@ -204,74 +226,83 @@ def _of_table(
     inputs = {"observed": Path(arguments.table), **terrain_inputs(arguments.terrain), **zone_files, **tree_files}
     drawing = [model.name for model in models if model.draws_from_impacts]
     ground = ground_of(scenario)
+    made_of = partial(
+        reconstruct,
+        surface=surface,
+        block=Block(diameter, diameter, diameter, density),
+        gravity_mps2=gravity,
+        drag=scenario.drag,
+        flights=flights or "contacts",
+    )
     if arguments.stops:
-        if drawing:
-            raise InputError(
-                f"The model {drawing[0]} draws from measured impacts, and stops have none", advice="Give picks.csv"
-            )
+        _refuse_drawing(drawing)
         runs = stopped_runs(ground, scenario.releases, arguments.stops)
-        return ObservedCase(scenario, ground, runs.observed, runs.releases, inputs | {"stops": Path(arguments.stops)})
-    picks = read_picks(arguments.table, surface.shift)
-    block = Block(diameter, diameter, diameter, density)
-    ends = flights or "contacts"
-    made = reconstruct(picks, surface=surface, block=block, gravity_mps2=gravity, drag=scenario.drag, flights=ends)
+        inputs["stops"] = Path(arguments.stops)
+        case = ObservedCase(scenario, ground, runs.observed, runs.releases, inputs)
+        return _with_more(arguments, case, number, made_of, placed, progress)
+    made = made_of(read_picks(arguments.table, surface.shift))
     scenario = replace(
         scenario,
         releases=partial(from_reconstruction, reconstruction=made, number=number),
         measured=measured_rebounds(made.impacts) if drawing else None,
     )
-    return _measured(number, scenario, ground, made, inputs)
-
-
-def _measured(
-    number: int,
-    scenario: "Scenario",
-    ground: "Ground",
-    made: "Reconstruction",
-    inputs: dict[str, Path],
-) -> ObservedCase:
-    """Runs that were reconstructed from picks."""
-    from ..workflow.whole_runs import measured_runs
-
     runs = measured_runs(ground, made, number)
-    return ObservedCase(scenario, ground, runs.observed, runs.releases, inputs)
+    case = ObservedCase(scenario, ground, runs.observed, runs.releases, inputs)
+    return _with_more(arguments, case, number, made_of, placed, progress)
+
+
+def _refuse_drawing(models: Sequence[str]) -> None:
+    """Models that draw from measured impacts have none of runs known by their stops."""
+    for name in models:
+        raise InputError(f"The model {name} draws from measured impacts, and stops have none", advice="Give picks.csv")
+
+
+def _with_more(
+    arguments: argparse.Namespace,
+    case: ObservedCase,
+    number: int,
+    reconstruct: "Callable[[Picks], Reconstruction]",
+    placed: "Callable[[str], ReleaseSource]",
+    progress: PrintedProgress,
+) -> ObservedCase:
+    """The same with the runs of further tables.
+
+    Parameters
+    ----------
+    reconstruct : picks as those of the first table.
+    placed : the blocks of a table of releases.
+    """
+    from ..exchange.tables import read_picks
+    from ..exchange.whole_run_tables import stopped_runs
+    from ..impact_models.registry import find_model
+    from ..workflow.whole_runs import ObservedRuns, join_runs, measured_runs
+
+    if arguments.more_stops:
+        _refuse_drawing([name for name in case.scenario.models if find_model(name).draws_from_impacts])
+    parts, inputs = [ObservedRuns(case.observed, case.releases)], dict(case.inputs)
+    for i, file in enumerate(arguments.more_picks, start=1):
+        progress(f"Reading {file}")
+        with naming(file):
+            made = reconstruct(read_picks(file, case.ground.surface.shift))
+        parts.append(measured_runs(case.ground, made, number))
+        inputs[f"more_picks_{i}"] = Path(file)
+    for i, (releases, stops) in enumerate(arguments.more_stops, start=1):
+        progress(f"Reading {stops}")
+        parts.append(stopped_runs(case.ground, placed(releases), stops))
+        inputs |= {f"more_releases_{i}": Path(releases), f"more_stops_{i}": Path(stops)}
+    runs = join_runs(parts)
+    return case._replace(observed=runs.observed, releases=runs.releases, inputs=inputs)
 
 
 def sections_as_asked(arguments: argparse.Namespace, ground: "Ground") -> "tuple[Section, ...]":
     """Those that were asked for."""
-    from ..analysis.sections import Section
     from ..exchange.whole_run_tables import read_section
+    from ..workflow.whole_runs import stated_sections
 
-    low, high = ground.shift.to_survey(ground.terrain.bounds)[:, 2].tolist()
-    sections = []
-    for z in _numbers(arguments.contours, "--contours"):
-        if not low <= z <= high:
-            raise InputError(
-                f"--contours has {z:g}, where there is no terrain", advice=f"It reaches from {low:.0f} to {high:.0f} m"
-            )
-        sections.append(Section(f"{z:g} m", level_m=z - ground.shift.z))
-    for height in _numbers(arguments.drops, "--drops"):
-        if height <= 0:
-            raise InputError(f"--drops has {height:g}", advice="Give heights above zero: so far below the start")
-        sections.append(Section(f"{height:g} m below the start", drop_m=height))
+    lines = []
     for text in arguments.section:
         name, equals, file = text.partition("=")
         if not (equals and name.strip() and file):
             raise InputError(f"--section {text} names no file", advice="Write NAME=FILE, for example road=road.csv")
-        sections.append(read_section(file, name.strip(), ground))
-    names = [section.name for section in sections]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"The section {name} is given twice", advice="Give each section once, with its own name")
-    return tuple(sections)
-
-
-def _numbers(text: str | None, option: str) -> list[float]:
-    values = []
-    for part in (text or "").split(","):
-        if part.strip():
-            try:
-                values.append(float(part))
-            except ValueError:
-                raise InputError(f"{option} has '{part}'", advice="Give numbers between commas") from None
-    return values
+        lines.append(read_section(file, name.strip(), ground))
+    return stated_sections(ground, arguments.contours or "", arguments.drops or "", lines)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where blocks start, and as what: n releases, one a block."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -103,6 +104,13 @@ class Releases:
     def with_remarks(self, *remarks: Remark) -> "Releases":
         """The same with more to say."""
         return replace(self, remarks=(*self.remarks, *remarks))
+
+
+def join_releases(parts: Sequence[Releases]) -> Releases:
+    """All blocks of several releases, in their order."""
+    columns = [field.name for field in fields(Releases) if field.name != "remarks"]
+    joined = {name: np.concatenate([getattr(one, name) for one in parts]) for name in columns}
+    return Releases(**joined, remarks=tuple(dict.fromkeys(remark for one in parts for remark in one.remarks)))
 
 
 def make_releases(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..analysis.observed_runs import Observed, observe_runs
+from ..analysis.observed_runs import Observed, join_observed, observe_runs
 from ..analysis.paths import Paths, simulated_paths
 from ..analysis.ranks import FEWEST
 from ..analysis.sections import Section, default_sections
@@ -22,7 +22,7 @@ from ..remarks import Remark
 from ..simulation.engine import Settings, Simulation, joined, simulate
 from ..simulation.ground import Ground
 from ..simulation.measured_releases import from_reconstruction
-from ..simulation.release import Releases, standing_on
+from ..simulation.release import Releases, join_releases, standing_on
 from ..terrain.raycast import closest_points
 from ..vectors import Array, Mask
 from .simulation import remarks_of, run_models
@@ -33,6 +33,19 @@ class ObservedRuns(NamedTuple):
 
     observed: Observed
     releases: Releases
+
+
+def join_runs(parts: Sequence[ObservedRuns]) -> ObservedRuns:
+    """The runs of several sources, as of trajectories that were filmed and of blocks of which the stop is known.
+
+    Raises
+    ------
+    InputError : runs of two sources have one name.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    observed, releases = zip(*parts, strict=True)
+    return ObservedRuns(join_observed(observed), join_releases(releases))
 
 
 NUMBER = 100
@@ -123,6 +136,54 @@ def _from_others(
         simulation = simulate(ground, part, others, first_run=first, threads=threads)
         parts.append(replace(simulation, settings=settings))
     return joined(parts, releases)
+
+
+def stated_sections(
+    ground: Ground, contours: str = "", drops: str = "", lines: Sequence[Section] = ()
+) -> tuple[Section, ...]:
+    """The sections that somebody has stated.
+
+    Parameters
+    ----------
+    contours : heights in survey coordinates, between commas, below which blocks fall [m].
+    drops : heights below each block's own start [m].
+    lines : sections with a line in plan.
+
+    Raises
+    ------
+    InputError : what is no number, a contour beside the terrain, a drop that is not positive, two of one name.
+    """
+    low, high = ground.shift.to_survey(ground.terrain.bounds)[:, 2].tolist()
+    sections = []
+    for z in _numbers(contours, "contours"):
+        if not low <= z <= high:
+            raise InputError(
+                f"The contour {z:g} m is where there is no terrain",
+                advice=f"It reaches from {low:.0f} to {high:.0f} m",
+            )
+        sections.append(Section(f"{z:g} m", level_m=z - ground.shift.z))
+    for height in _numbers(drops, "drops"):
+        if height <= 0:
+            raise InputError(f"A drop is {height:g} m", advice="Give heights above zero: so far below the start")
+        sections.append(Section(f"{height:g} m below the start", drop_m=height))
+    sections += lines
+    names = [section.name for section in sections]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"The section {name} is given twice", advice="Give each section once, with its own name")
+    return tuple(sections)
+
+
+def _numbers(text: str, what: str) -> list[float]:
+    values = []
+    for part in (one.strip() for one in text.split(",") if one.strip()):
+        try:
+            values.append(float(part))
+        except ValueError:
+            raise InputError(f"One of the {what} is '{part}'", advice="Give numbers between commas") from None
+        if not np.isfinite(values[-1]):
+            raise InputError(f"One of the {what} is '{part}'", advice="Give finite numbers between commas")
+    return values
 
 
 def measured_runs(ground: Ground, made: Reconstruction, number: int = NUMBER) -> ObservedRuns:

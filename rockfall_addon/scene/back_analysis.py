@@ -11,6 +11,7 @@ import bpy
 
 from ...core.analysis.calibration import usual_names
 from ...core.analysis.priors import Prior, laws_in, make_priors
+from ...core.analysis.sections import Section
 from ...core.errors import RockfallError
 from ...core.exchange.job_inputs import input_hashes
 from ...core.exchange.opening import reconstruct_project
@@ -20,19 +21,21 @@ from ...core.exchange.tables import read_picks
 from ...core.exchange.whole_run_tables import stopped_runs
 from ...core.impact_models.registry import MODELS, find_model
 from ...core.progress import Progress
+from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, to_plain
 from ...core.simulation.ground import Ground
 from ...core.simulation.parameter_draws import FRICTION_NAME
 from ...core.terrain.surface import Surface
 from ...core.workflow.back_analysis import BackAnalysis, back_analyse
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of
-from ...core.workflow.whole_runs import ObservedRuns, measured_runs
+from ...core.workflow.whole_runs import ObservedRuns, join_runs, measured_runs, stated_sections
 from . import (
     fingerprints,
     model_parameters,
     models,
     posterior,
     reconstruction,
+    screens,
     simulated_sources,
     simulated_trees,
     simulated_zones,
@@ -59,6 +62,7 @@ class Question:
     ----------
     scenario : of the model alone, with what is not fitted.
     runs : gives the observed runs on a ground.
+    sections : gives where they are compared, none for the usual ones.
     priors : of the parameters that are fitted.
     sets, rounds : of parameters.
     observed : see `posterior.Kept`.
@@ -68,6 +72,7 @@ class Question:
 
     scenario: Scenario
     runs: Callable[[Ground], ObservedRuns]
+    sections: Callable[[Ground], tuple[Section, ...]]
     priors: tuple[Prior, ...]
     sets: int
     rounds: int
@@ -81,12 +86,13 @@ def missing(scene: bpy.types.Scene) -> str:
     settings = scene.rockfall_back_analysis
     if not terrain.tiles(scene):
         return "Blocks fall on the terrain: import it first, in step 1."
-    if settings.source == "SCENE" and not store.has_role(scene, store.PICK_ROLE):
-        return "Pick impacts first, or choose a table of observed runs: they say which parameters fit."
-    if settings.source != "SCENE" and not settings.table:
-        return f"Choose the table of {'picks' if settings.source == 'PICKS' else 'releases'}."
-    if settings.source == "STOPS" and not settings.stops:
-        return "Choose the table of stops."
+    if not settings.source:
+        return "Choose what blocks were observed: under Observed."
+    if "SCENE" in settings.source and not store.has_role(scene, store.PICK_ROLE):
+        return "Pick impacts first, or choose only tables of observed runs: they say which parameters fit."
+    for kind, name in (("PICKS", "picks"), ("STOPS", "releases"), ("STOPS", "stops")):
+        if kind in settings.source and not getattr(settings, name):
+            return f"Choose the table of {name}."
     if scene.rockfall_simulation.contact != "mesh":
         return "Observed runs are on the surface: choose Blocks meet: Surface, under Motion."
     return simulated_trees.missing(scene) or structures.problem(scene)
@@ -131,7 +137,15 @@ def ask(scene: bpy.types.Scene) -> Question:
     runs, source, left_out = _observed(scene, entry, surface)
     scenario = simulation_setup.scenario_of(scene, entry, surface, source)
     return Question(
-        replace(scenario, draws={}), runs, priors, settings.sets, settings.rounds, observed, known, left_out
+        replace(scenario, draws={}),
+        runs,
+        _sections(scene),
+        priors,
+        settings.sets,
+        settings.rounds,
+        observed,
+        known,
+        left_out,
     )
 
 
@@ -145,26 +159,35 @@ def _observed(
     RockfallError : no picks, or none that can be used; whatever is wrong with a table.
     """
     settings, project = scene.rockfall_back_analysis, reconstruction.project_settings(scene, [])
-    table, stops = (Path(bpy.path.abspath(text)) for text in (settings.table, settings.stops))
-    if settings.source == "STOPS":
-        source = placed_source(replace(entry, releases=ReleaseEntry(TABLE, number=VARIANTS, file=table)), project.block)
-        return lambda ground: stopped_runs(ground, source, stops), source, ()
-    if settings.source == "PICKS":
-        how = replace(project.reconstruction, flights=CENTRES)
-        made, left_out = (
-            partial(
-                reconstruct_project, replace(project, reconstruction=how), surface, read_picks(table, surface.shift)
-            ),
-            (),
-        )
-    else:
+    made: list[Callable[[], Reconstruction]] = []
+    left_out: tuple[Remark, ...] = ()
+    if "SCENE" in settings.source:
         picks, left_out = reconstruction.good_picks(scene)
-        made = partial(reconstruction.reconstruction_of(scene, picks, surface), flights=CENTRES)
+        made.append(partial(reconstruction.reconstruction_of(scene, picks, surface), flights=CENTRES))
+    if "PICKS" in settings.source:
+        how = replace(project, reconstruction=replace(project.reconstruction, flights=CENTRES))
+        made.append(partial(reconstruct_project, how, surface, read_picks(_path(settings.picks), surface.shift)))
+    stops = _path(settings.stops)
+    table = replace(entry, releases=ReleaseEntry(TABLE, number=VARIANTS, file=_path(settings.releases)))
+    placed = placed_source(table, project.block) if "STOPS" in settings.source else None
 
     def runs(ground: Ground) -> ObservedRuns:
-        return measured_runs(ground, made(), VARIANTS)
+        found = [measured_runs(ground, one(), VARIANTS) for one in made]
+        return join_runs([*found, *([stopped_runs(ground, placed, stops)] if placed is not None else [])])
 
     return runs, lambda ground: runs(ground).releases, left_out
+
+
+def _sections(scene: bpy.types.Scene) -> Callable[[Ground], tuple[Section, ...]]:
+    """Where runs are compared, as the scene says it now."""
+    settings, lines = scene.rockfall_back_analysis, []
+    if settings.at_screens:
+        lines = [Section(obj.name, line=screens.line_of(obj)[:, :2].copy()) for obj in screens.objects_of(scene)]
+    return partial(stated_sections, contours=settings.contours, drops=settings.drops, lines=lines)
+
+
+def _path(text: str) -> Path:
+    return Path(bpy.path.abspath(text))
 
 
 def run(question: Question, progress: Progress) -> BackAnalysis:
@@ -178,7 +201,7 @@ def run(question: Question, progress: Progress) -> BackAnalysis:
     progress("Preparing the ground", 0, 0)
     ground = ground_of(question.scenario)
     return back_analyse(
-        ground, *question.runs(ground), question.scenario.settings[0], question.priors,
+        ground, *question.runs(ground), question.scenario.settings[0], question.priors, question.sections(ground),
         sets=question.sets, rounds=question.rounds, progress=progress,
     )  # fmt: skip
 
@@ -189,8 +212,9 @@ def keep(scene: bpy.types.Scene, question: Question, found: BackAnalysis) -> Non
         [one.name, one.unit, one.median, one.low, one.high, one.prior, to_plain(one.remarks), one.left]
         for one in found.estimates
     ]
-    n, table = len(found.observed), Path(question.observed[1]).name
-    where = f" of {table}" if table else ""
+    n, tables = len(found.observed), [Path(file).name for file in question.observed[1:3]]
+    named = [name for name in tables if name]
+    where = f" of {' and '.join(['this scene'] * ('SCENE' in question.observed[0]) + named)}" if named else ""
     said = f"{n} observed run{'s' * (n != 1)}{where}, {found.runs:,} simulated in {found.seconds:.0f} s."
     remarks = (*question.remarks, *found.remarks)
     posterior.keep(
@@ -225,10 +249,12 @@ def is_stale(scene: bpy.types.Scene, kept: posterior.Kept) -> bool:
 
 
 def _observed_by(scene: bpy.types.Scene) -> tuple[str, ...]:
-    """Where the observed runs are asked for: the kind, and the files that it takes."""
+    """Where the observed runs are asked for: the kinds, the files that these take, and the sections."""
     settings = scene.rockfall_back_analysis
-    table = "" if settings.source == "SCENE" else settings.table
-    return settings.source, table, settings.stops if settings.source == "STOPS" else ""
+    taken = (("PICKS", settings.picks), ("STOPS", settings.releases), ("STOPS", settings.stops))
+    files = [file if kind in settings.source else "" for kind, file in taken]
+    sections = (settings.contours.strip(), settings.drops.strip(), "screens" if settings.at_screens else "")
+    return " ".join(sorted(settings.source)), *files, ";".join(sections)
 
 
 def _print(scene: bpy.types.Scene, model: str, names: tuple[str, ...], observed: tuple[str, ...]) -> str:
@@ -252,8 +278,14 @@ def _print(scene: bpy.types.Scene, model: str, names: tuple[str, ...], observed:
 
 def _print_of_runs(scene: bpy.types.Scene, observed: tuple[str, ...]) -> list[object]:
     """Of the observed runs; of tables by what they contain, wherever they are."""
-    source, *files = observed
-    if source == "SCENE":
-        return [sorted(fingerprints.remembered(scene).items()), scene.get(store.BLOCKS, "")]
-    found = input_hashes({str(i): Path(bpy.path.abspath(file)) for i, file in enumerate(files) if file})
-    return [source, reconstruction.project_settings(scene, []).block, found]
+    kinds, *files, sections = observed
+    found: list[object] = [sections]
+    if "SCENE" in kinds:
+        found += [sorted(fingerprints.remembered(scene).items()), scene.get(store.BLOCKS, "")]
+    if any(files):
+        read = input_hashes({str(i): _path(file) for i, file in enumerate(files) if file})
+        found += [kinds, reconstruction.project_settings(scene, []).block, read]
+    if sections.endswith("screens"):
+        lines = [(obj.name, screens.line_of(obj).tolist()) for obj in screens.objects_of(scene)]
+        found.append(lines)
+    return found

@@ -18,7 +18,7 @@ from ...core.remarks import Remark, from_plain
 from ...core.simulation.parameter_draws import ParameterDraws
 from . import store
 
-OF_SCENE = ("SCENE", "", "")
+OF_SCENE = ("SCENE", "", "", "", ";;")
 """The measured trajectories of the scene."""
 INTERVAL = np.array([0.025, 0.5, 0.975])
 

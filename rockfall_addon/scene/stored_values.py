@@ -267,9 +267,9 @@ def _posterior(value: dict) -> None:
         _ = [remark.text + remark.severity for remark in from_plain(remarks)]
     _ = [remark.text + remark.severity for remark in from_plain(value["remarks"])]
     if (observed := value.get("observed")) is not None:
-        kind, _table, _stops = observed
+        kinds, _picks, _releases, _stops, _sections = observed
         _texts(observed)
-        if kind not in ("SCENE", "PICKS", "STOPS"):
+        if not kinds or not set(kinds.split()) <= {"SCENE", "PICKS", "STOPS"}:
             raise ValueError(observed)
 
 

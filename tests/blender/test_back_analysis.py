@@ -155,7 +155,7 @@ def test_stops_of_a_table_say_the_same_as_on_the_command_line(part, scene, seen,
     assert bpy.ops.rockfall.import_terrain(filepath=str(DEMO / "terrain.ply")) == {"FINISHED"}
     scene = bpy.context.scene
     settings = ask_little(scene)
-    settings.source, settings.table, settings.stops = "STOPS", str(table), str(stops)
+    settings.source, settings.releases, settings.stops = {"STOPS"}, str(table), str(stops)
     kept = analysed(scene)
     n = len(stops.read_text().splitlines()) - 1
     assert n >= 4
@@ -172,7 +172,7 @@ def test_stops_of_a_table_say_the_same_as_on_the_command_line(part, scene, seen,
         assert row[:1] == [one["name"]]
         assert row[2] == pytest.approx(one["median"], abs=0.4 * (one["high"] - one["low"]))
         assert row[5] == one["prior"]
-    settings.source = "SCENE"
+    settings.source = {"SCENE"}
     assert not analysis.is_stale(scene, posterior.kept_of(scene)), "another question changes no answer"
     lines = stops.read_text().splitlines()
     stops.write_text("\n".join(lines[:-1]) + "\n")
@@ -186,7 +186,7 @@ def test_picks_of_a_table(part, scene) -> None:
         bpy.data.objects.remove(obj)
     settings = scene.rockfall_back_analysis
     assert not bpy.ops.rockfall.back_analyse.poll()
-    settings.source, settings.table = "PICKS", str(DEMO / "picks.csv")
+    settings.source, settings.picks = {"PICKS"}, str(DEMO / "picks.csv")
     assert "15 observed runs" in of_scene["said"]
     assert analysed(scene)["values"] == of_scene["values"]
 
@@ -203,14 +203,55 @@ def test_bad_tables_are_named(scene, seen, tmp_path: Path, source: str, rows: st
     bad = tmp_path / "bad.csv"
     bad.write_text(rows)
     settings = scene.rockfall_back_analysis
-    settings.source, settings.table, settings.stops = source, str(bad if source == "PICKS" else seen[0]), str(bad)
+    settings.source, settings.picks, settings.releases, settings.stops = {source}, str(bad), str(seen[0]), str(bad)
     with pytest.raises(RuntimeError, match=told):
         bpy.ops.rockfall.back_analyse()
-    settings.table = str(tmp_path / "gone.csv")
+    settings.picks = settings.stops = str(tmp_path / "gone.csv")
     with pytest.raises(RuntimeError, match=r"gone\.csv"):
         bpy.ops.rockfall.back_analyse()
-    settings.table = ""
+    settings.picks = settings.stops = ""
     with pytest.raises(RuntimeError, match="Choose the table"):
+        bpy.ops.rockfall.back_analyse()
+    assert KEY not in scene
+
+
+def test_the_scene_and_tables_together_with_sections_of_ones_own(part, scene, seen, monkeypatch) -> None:
+    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    settings, asked = scene.rockfall_back_analysis, []
+    real = part("core.workflow.back_analysis").back_analyse
+    monkeypatch.setattr(analysis, "back_analyse", lambda *given, **how: asked.append(given) or real(*given, **how))
+    settings.source, settings.releases, settings.stops = {"SCENE", "STOPS"}, str(seen[0]), str(seen[1])
+    picks = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
+    x, y, z = np.mean([obj.location for obj in picks], axis=0)
+    ends = [np.array([x, y - 20, z]), np.array([x, y + 20, z])]
+    screen = part("rockfall_addon.scene.screens").make(scene, ends, "Road")
+    top = max(obj.location.z for obj in picks) + part("rockfall_addon.scene.georeference").read_shift(scene).z
+    settings.contours, settings.drops, settings.at_screens = f"{top - 6:.1f}", "4, 8", True
+    kept = analysed(scene)
+    n = len(seen[1].read_text().splitlines()) - 1
+    assert f"{15 + n} observed runs of this scene and releases.csv" in kept["said"]
+    _, observed, _, _, _, sections = asked[0]
+    assert len(observed.paths) == 15 + n
+    assert [one.name for one in sections] == [
+        f"{float(f'{top - 6:.1f}'):g} m",
+        "4 m below the start",
+        "8 m below the start",
+        "Road",
+    ]
+    np.testing.assert_allclose(sections[3].line, [[x, y - 20], [x, y + 20]], atol=1e-3)
+    settings.contours = ""
+    assert not analysis.is_stale(scene, posterior.kept_of(scene)), "another question changes no answer"
+    screen.data.vertices[0].co.x += 1.0
+    assert analysis.is_stale(scene, posterior.kept_of(scene)), "the section is elsewhere now"
+
+
+@pytest.mark.parametrize(
+    ("contours", "drops", "told"),
+    [("99999", "", "where there is no terrain"), ("", "-1", "A drop is -1 m"), ("high", "", "'high'")],
+)
+def test_bad_sections_are_named(scene, contours: str, drops: str, told: str) -> None:
+    scene.rockfall_back_analysis.contours, scene.rockfall_back_analysis.drops = contours, drops
+    with pytest.raises(RuntimeError, match=told):
         bpy.ops.rockfall.back_analyse()
     assert KEY not in scene
 
@@ -248,7 +289,7 @@ def test_parameters_are_chosen_and_bad_laws_refused(part, scene) -> None:
         {"weight": [-1.0]},
         {"rows": [["rn"]]},
         {"names": ["mass"]},
-        {"observed": ["STOPS", 3, ""]},
+        {"observed": ["STOPS", "", 3, "", ""]},
     ],
 )
 def test_a_damaged_one_is_set_aside_and_named(part, scene, tmp_path: Path, change: dict) -> None:

@@ -247,3 +247,25 @@ def test_bad_posteriors(tmp_path: Path, text: str, problem: str) -> None:
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=re.escape(problem)):
         read_posterior(path)
+
+
+def test_filmed_runs_and_stops_of_others_find_the_truth_together(site: Path, tmp_path: Path, capsys) -> None:
+    tables = []
+    for name in ("releases.csv", "stops.csv"):
+        lines = (site / name).read_text(encoding="utf-8").splitlines()
+        tables.append(str(tmp_path / name))
+        (tmp_path / name).write_text(
+            "\n".join([lines[0], *(f"un{line}" for line in lines[1:])]) + "\n", encoding="utf-8"
+        )
+    out = tmp_path / "out"
+    asked_for = asked(site, out, "--fit", "rn", "rt", "--sets", "900", "--rounds", "2", "--tables-only")
+    assert main([*asked_for, "--more-stops", *tables]) == 0
+    assert f"{2 * RUNS} observed runs" in capsys.readouterr().out
+    kept = json.loads((out / "back_analysis.json").read_text(encoding="utf-8"))
+    assert {"observed", "more_stops_1"} <= set(kept["inputs"])
+    _, draws = read_posterior(out / "posterior.csv")
+    for name, truth in TRUTH.items():
+        values = draws.values[:, draws.names.index(name)]
+        order = np.argsort(values)
+        low, high = np.interp([0.005, 0.995], np.cumsum(draws.weight[order]) / draws.weight.sum(), values[order])
+        assert low < truth < high

@@ -182,9 +182,9 @@ def test_zones_have_parameters_of_their_own(site: Path, tmp_path: Path, observed
     [
         (["--zone-attribute", "soil"], "--zone-attribute says which values, not what they mean"),
         (["--number", "0"], "0 blocks cannot be released|number of blocks"),
-        (["--contours", "900"], "--contours has 900, where there is no terrain"),
-        (["--contours", "high"], "--contours has 'high'"),
-        (["--drops", "-3"], "--drops has -3"),
+        (["--contours", "900"], "The contour 900 m is where there is no terrain"),
+        (["--contours", "high"], "One of the contours is 'high'"),
+        (["--drops", "-3"], "A drop is -3 m"),
         (["--drops", "3,3"], "The section 3 m below the start is given twice"),
         (["--section", "road"], "--section road names no file"),
         (["--model", "noel_2016"], "There is no impact model 'noel_2016'"),
@@ -216,3 +216,56 @@ def test_bad_tables(site: Path, tmp_path: Path, capsys) -> None:
     assert main(["compare-runs", str(site / "picks.csv"), "--out", str(out)]) == 1
     assert "--terrain is missing" in capsys.readouterr().err
     assert not out.exists()
+
+
+def renamed(site: Path, folder: Path) -> list[str]:
+    """The tables of releases and stops with other names: as of blocks that nobody filmed."""
+    found = []
+    for name in ("releases.csv", "stops.csv"):
+        lines = (site / name).read_text(encoding="utf-8").splitlines()
+        found.append(str(folder / name))
+        (folder / name).write_text("\n".join([lines[0], *(f"un{line}" for line in lines[1:])]) + "\n", encoding="utf-8")
+    return found
+
+
+def test_runs_of_several_tables_say_together_what_each_says(site: Path, tmp_path: Path) -> None:
+    options = ["--contours", "480", "--number", "20", "--model", "noel_2017", "--tables-only"]
+    tables = renamed(site, tmp_path)
+    assert main(asked(site, tmp_path / "picks", *options)) == 0
+    assert (
+        main([*asked(site, tmp_path / "stops", *options, observed="releases.csv"), "--stops", str(site / "stops.csv")])
+        == 0
+    )
+    assert main(asked(site, tmp_path / "both", *options, "--more-stops", *tables)) == 0
+
+    def said(folder: str, prefix: str = "") -> dict[tuple[str, ...], tuple[str, str]]:
+        return {
+            (prefix + row["trajectory"], row["section"], row["quantity"]): (row["observed"], row["sigma_observed"])
+            for row in rows_of(tmp_path / folder / "whole_values.csv")
+        }
+
+    both, picks, stops = said("both"), said("picks"), said("stops", "un")
+    for one in (picks, stops):
+        for key, (value, sigma) in one.items():
+            if "aside" not in key[2] and "along" not in key[2]:  # of the mean line of all runs, which is another one
+                assert both[key][0] == value, key
+                assert both[key][1] == sigma, key
+    assert {key[0] for key in both} == {f"B{i}" for i in range(6)} | {f"unB{i}" for i in range(6)}
+    inputs = json.loads((tmp_path / "both" / "summary.json").read_text(encoding="utf-8"))["inputs"]
+    assert {"observed", "more_releases_1", "more_stops_1"} <= set(inputs)
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        (["--more-picks", "picks.csv"], "Observed runs of two sources are called B0"),
+        (["--more-stops", "releases.csv", "stops.csv"], "Observed runs of two sources are called B0"),
+        (["--more-picks", "nothing.csv"], "no such file"),
+        (["--model", "observed", "--more-stops", "releases.csv", "stops.csv"], "and stops have none"),
+    ],
+)
+def test_bad_further_tables(site: Path, tmp_path: Path, capsys, more: list[str], problem: str) -> None:
+    more = [str(site / one) if one.endswith(".csv") else one for one in more]
+    assert main(asked(site, tmp_path / "out", "--number", "10", *more)) == 1
+    assert problem in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -67,7 +67,7 @@ def case_back_analysis_of_tables(window):
     data = Path(__file__).parents[1] / "data"
     with window.override():
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
-    bpy.context.scene.rockfall_back_analysis.source = "STOPS"
+    bpy.context.scene.rockfall_back_analysis.source = {"STOPS"}
     window.unfold("ROCKFALL_PT_back_analysis")
     for name in ("simulated_run", "simulation_screens"):
         window.unfold(f"ROCKFALL_PT_{name}", is_open=False)
@@ -76,11 +76,20 @@ def case_back_analysis_of_tables(window):
     yield from window.scroll(60)
     yield 1.0
     window.screenshot("1-no-table-yet")
+    scene = bpy.context.scene
+    picks = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
+    x, y, z = (sum(obj.location[axis] for obj in picks) / len(picks) for axis in range(3))
+    window.part("rockfall_addon.scene.screens").make(scene, [(x, y - 20, z), (x, y + 20, z)], "Road")
+    scene.rockfall_back_analysis.source = {"SCENE", "STOPS"}
     settings = bpy.context.scene.rockfall_back_analysis
-    settings.table, settings.stops = str(data / "tschamut_2014_releases.csv"), str(data / "tschamut_2014_stops.csv")
+    settings.releases, settings.stops = str(data / "tschamut_2014_releases.csv"), str(data / "tschamut_2014_stops.csv")
     yield from window.scroll(10)
     yield 1.0
     window.screenshot("2-tables-chosen")
+    window.theme("Light")
+    yield 1.0
+    window.screenshot("2-tables-chosen-light")
+    window.theme("Dark")
     with window.override():
         bpy.ops.rockfall.back_analyse("INVOKE_DEFAULT")
     yield from window.wait_for(lambda: not job.is_running(), 60, "refused")
@@ -107,11 +116,11 @@ def case_back_analysis_of_tables_on_a_bare_terrain(window):
     yield from window.scroll(60)
     yield 1.0
     window.screenshot("1-nothing-picked")
-    settings.source = "STOPS"
+    settings.source = {"STOPS"}
     yield 1.0
     yield from window.scroll(60)
     window.screenshot("2-which-tables")
-    settings.table, settings.stops = (str(tables(name)) for name in ("releases", "stops"))
+    settings.releases, settings.stops = (str(tables(name)) for name in ("releases", "stops"))
     settings.model, settings.sets, settings.rounds = "stevens_1998", 300, 1
     yield 1.0
     yield from window.scroll(60)

@@ -10,7 +10,7 @@ from ....core.impact_models.registry import MODELS
 from ....core.progress import Progress
 from ....core.simulation.parameter_draws import FRICTION_NAME
 from ....core.workflow.back_analysis import ROUNDS, SETS
-from ...scene import back_analysis, model_parameters, posterior, store, terrain
+from ...scene import back_analysis, model_parameters, posterior, screens, store, terrain
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.panel import RockfallPanel, paragraph, show_remarks
@@ -22,22 +22,37 @@ class BackAnalysisSettings(bpy.types.PropertyGroup):
 
     model: EnumProperty(name="Model", description="Whose parameters are fitted", items=back_analysis.CHOICES)
     source: EnumProperty(
-        name="Observed", description="What blocks were seen to do",
+        name="Observed", description="What blocks were seen to do. Shift-click takes several together",
         items=[
             ("SCENE", "Measured trajectories", "Those of this scene"),
             ("PICKS", "A table of picks", "Trajectories from elsewhere: picks.csv, reconstructed on this terrain with "
              "the settings of the steps above"),
             ("STOPS", "Releases and stops", "Blocks without footage: where each started, and where it stopped"),
         ],
+        options={"ENUM_FLAG"}, default={"SCENE"},
     )  # fmt: skip
-    table: StringProperty(
-        name="Table", description="Picks, or releases: release, x_m, y_m; if known z_m, velocity, diameter, density",
+    picks: StringProperty(
+        name="Picks", description="Trajectories: trajectory, time_s, x_m, y_m, z_m, kind", subtype="FILE_PATH"
+    )
+    releases: StringProperty(
+        name="Releases", description="Blocks: release, x_m, y_m; if known z_m, velocity, diameter, density",
         subtype="FILE_PATH",
     )  # fmt: skip
     stops: StringProperty(
         name="Stops", description="Where each block stopped: release, x_m, y_m; z_m where it is not on the terrain",
         subtype="FILE_PATH",
     )  # fmt: skip
+    contours: StringProperty(
+        name="Contours", description="Heights in survey coordinates, between commas: speed, height and place are "
+        "compared where blocks fall below them [m]. Without any section, three are chosen",
+    )  # fmt: skip
+    drops: StringProperty(
+        name="Drops", description="Heights below each block's own start, between commas: as contours, where "
+        "blocks start at different heights [m]",
+    )  # fmt: skip
+    at_screens: BoolProperty(
+        name="Screens", description="What passes the drawn screens is compared there; barriers hold nothing in this"
+    )
     names: StringProperty(description="Parameters that are fitted, each behind its model and a point")
     priors: StringProperty(
         name="Before", description="What was thought possible before, for example: rn = 0.2..0.6, friction = "
@@ -152,6 +167,7 @@ class ROCKFALL_PT_back_analysis(RockfallPanel, bpy.types.Panel):
         if terrain.tiles(scene):
             _draw_observed(layout, settings)
         if not lacking:
+            _draw_sections(layout, scene, settings)
             _draw_question(layout, scene, settings)
         job.draw(context, layout, "back_analysis")
         if kept is not None:
@@ -162,10 +178,22 @@ def _draw_observed(layout: bpy.types.UILayout, settings: BackAnalysisSettings) -
     column = layout.column(align=True)
     column.use_property_split, column.use_property_decorate = True, False
     column.prop(settings, "source")
-    if settings.source != "SCENE":
-        column.prop(settings, "table", text="Picks" if settings.source == "PICKS" else "Releases")
-    if settings.source == "STOPS":
+    column.separator(factor=0.5)
+    if "PICKS" in settings.source:
+        column.prop(settings, "picks")
+    if "STOPS" in settings.source:
+        column.prop(settings, "releases")
         column.prop(settings, "stops")
+
+
+def _draw_sections(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings: BackAnalysisSettings) -> None:
+    column = layout.column(align=True)
+    column.use_property_split, column.use_property_decorate = True, False
+    if screens.objects_of(scene):
+        row = column.row(heading="Compared at")
+        row.prop(settings, "at_screens", text="Drawn Screens")
+    column.prop(settings, "contours", placeholder="1540, 1520")
+    column.prop(settings, "drops", placeholder="5, 10")
 
 
 def _draw_question(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings: BackAnalysisSettings) -> None:

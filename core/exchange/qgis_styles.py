@@ -15,6 +15,8 @@ HEAD = "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n"
 VERSION = "3.34"
 OPACITY = 0.8
 """Of maps, so that the hillshade below is seen."""
+LIGHT = 0.8
+"""Points with no less in each channel have a dark edge: the paper of a map is white."""
 
 
 def raster_style(classes: Classes, unit: str) -> str:
@@ -67,13 +69,14 @@ def line_style(colour: Sequence[float], width_mm: float, opacity: float = 1.0) -
 
 def point_style(colour: Sequence[float], size_mm: float, shape: str = "circle", opacity: float = 1.0) -> str:
     """The style of points in one colour, sRGB in 0…1. shape : one of QGIS's, such as "circle" or "triangle"."""
+    light = min(colour) > LIGHT
     options = {
         "name": shape,
         "color": _rgba(colour),
         "size": f"{size_mm:g}",
         "size_unit": "MM",
-        "outline_color": "255,255,255,160",
-        "outline_width": "0.1",
+        "outline_color": "40,40,40,255" if light else "255,255,255,160",
+        "outline_width": "0.2" if light else "0.1",
     }
     return _single_symbol("marker", "SimpleMarker", options, opacity)
 

@@ -25,8 +25,6 @@ OCTAVE, LOWEST, OCTAVES = 35, -10, 50
 MOST_BINS = OCTAVE * OCTAVES
 MOST_BLOCKS = MOST_BINS // WIDTH + 1
 """Of one column; raw runs are shorter."""
-SHORT = 48
-"""Up to so many values are sorted by insertion: quicker, and most keys have few."""
 USED, SLOTS = MOST_BLOCKS + 1, MOST_BLOCKS + 2
 """Where `state` has them."""
 FULL = 2.0**62
@@ -271,22 +269,26 @@ def fold_bins(  # type: ignore[no-untyped-def]
 
 
 @borrowing
-def _sort(values):  # type: ignore[no-untyped-def]
-    """Sort (n,) in place; what is no number comes last."""
-    for i in range(1, len(values)):
-        value, j = values[i], i
-        while j > 0 and (values[j - 1] > value or (values[j - 1] != values[j - 1] and value == value)):
-            values[j] = values[j - 1]
-            j -= 1
-        values[j] = value
+def put_in_order(values, n, out):  # type: ignore[no-untyped-def]
+    """Fill `out` with the first n values in rising order, at most `FEW`; then what is no number. Returns how many are.
 
-
-@kernel
-def _in_order(values):  # type: ignore[no-untyped-def]
-    if len(values) <= SHORT:
-        _sort(values)
-    else:
-        values.sort()
+    Each goes where as many are smaller: n² comparisons, but eight in a step and without a branch, several times as
+    quick as to sort so few.
+    """
+    for j in range(n):
+        out[j] = nan
+    count = 0
+    for i in range(n):
+        value = values[i]
+        place = np.uint32(0)
+        for j in range(n):
+            place = np.uint32(place + np.uint32(values[j] < value))
+        if value == value:
+            while out[place] == value:  # one of the same has come before
+                place += np.uint32(1)
+            out[place] = value
+            count += 1
+    return count
 
 
 @kernel
@@ -310,16 +312,16 @@ def export(slots, pool, floats, raw, runs, columns, rows_begin, rows, bin_begin,
     rows_begin : (k + 1,) of each slot in `rows` (p, q); bin_begin : (k, q + 1) in `bins` and `bin_counts`.
     """
     each = WIDTH // columns
-    held = np.empty(FEW, np.float32)
+    held, ordered = np.empty(FEW, np.float32), np.empty(FEW, np.float32)
     for i in range(len(slots)):
         slot = slots[i]
         first, n = rows_begin[i], rows_begin[i + 1] - rows_begin[i]
         for c in range(columns):
             for r in range(n):
                 held[r] = floats[raw[slot, 0] + r // each, r % each * columns + c]
-            _in_order(held[:n])
+            put_in_order(held, n, ordered)
             for r in range(n):
-                rows[first + r, c] = held[r]
+                rows[first + r, c] = ordered[r]
             at = bin_begin[i, c]
             for b in range(runs[slot, c, 2]):
                 for k in range(WIDTH):
@@ -373,7 +375,7 @@ def figures(  # type: ignore[no-untyped-def]
     """
     columns = sums.shape[1]
     each = WIDTH // columns
-    held = np.empty(FEW, np.float32)
+    held, ordered = np.empty(FEW, np.float32), np.empty(FEW, np.float32)
     for i in range(len(slots)):
         slot = slots[i]
         deviation = sqrt(erring * (1.0 - erring) / counts[slot, 1])
@@ -381,11 +383,8 @@ def figures(  # type: ignore[no-untyped-def]
             n = 0
             if raw[slot, 1]:
                 for r in range(counts[slot, 0]):
-                    value = floats[raw[slot, 0] + r // each, r % each * columns + c]
-                    if value == value:
-                        held[n] = value
-                        n += 1
-                _in_order(held[:n])
+                    held[r] = floats[raw[slot, 0] + r // each, r % each * columns + c]
+                n = put_in_order(held, counts[slot, 0], ordered)
             else:
                 for b in range(runs[slot, c, 2]):
                     for k in range(WIDTH):
@@ -397,14 +396,14 @@ def figures(  # type: ignore[no-untyped-def]
             mean[i, c] = sums[slot, c] * units[c] / n
             for s in range(len(shares)):
                 if raw[slot, 1]:
-                    quantiles[i, c, s] = _at_rank(held, n, shares[s] * (n - 1))
+                    quantiles[i, c, s] = _at_rank(ordered, n, shares[s] * (n - 1))
                 else:
                     value = _in_bins(pool, runs[slot, c], edge, shares[s] * (n - 1), False)
                     quantiles[i, c, s] = min(value, np.float64(greatest[slot, c]))
             if erring - deviation > 0.0 and erring + deviation < 1.0:
                 low, high = (erring - deviation) * (n - 1), (erring + deviation) * (n - 1)
                 if raw[slot, 1]:
-                    error[i, c] = 0.5 * (_at_rank(held, n, high) - _at_rank(held, n, low))
+                    error[i, c] = 0.5 * (_at_rank(ordered, n, high) - _at_rank(ordered, n, low))
                 else:
                     run = runs[slot, c]
                     error[i, c] = 0.5 * (_in_bins(pool, run, edge, high, True) - _in_bins(pool, run, edge, low, True))

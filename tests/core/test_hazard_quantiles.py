@@ -55,6 +55,18 @@ def test_few_values_are_exact() -> None:
         np.testing.assert_allclose(quantiles, np.quantile(own, SHARES, axis=0).T, rtol=1e-12)
 
 
+def test_values_are_put_in_order_with_ties_and_with_what_is_no_number_last() -> None:
+    from rockfall.core.hazard.sketch_kernels import FEW, put_in_order
+
+    rng, out = np.random.default_rng(5), np.empty(FEW, np.float32)
+    for n in (0, 1, 2, 7, 8, 9, 33, FEW):
+        for steps in (3, 10, 10_000):  # of which many are the same
+            values = rng.integers(-steps, steps, n).astype(np.float32)
+            values[rng.random(n) < 0.2] = np.nan
+            assert put_in_order(values, n, out) == np.isfinite(values).sum()
+            np.testing.assert_array_equal(out[:n], np.sort(values))
+
+
 def test_the_standard_error_is_what_the_95_percent_value_scatters_by() -> None:
     rng = np.random.default_rng(6)
     runs, values = 400, 2000

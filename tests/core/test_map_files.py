@@ -174,6 +174,13 @@ def test_styles_of_lines_and_points_are_well_formed():
         assert root.find("renderer-v2/symbols/symbol/layer/Option/Option") is not None
 
 
+def test_points_have_an_edge_that_is_seen_on_white_paper():
+    for colour, dark in (((1.0, 1.0, 1.0), True), ((0.1, 0.4, 0.8), False)):
+        root = ElementTree.fromstring(point_style(colour, 1.5).partition("\n")[2])
+        edge = root.find("renderer-v2/symbols/symbol/layer/Option/Option[@name='outline_color']")
+        assert (max(map(int, edge.attrib["value"].split(",")[:3])) < 100) == dark
+
+
 def test_codes_of_systems():
     assert geotiff_maps.epsg_code(" epsg:25832 ") == 25832
     assert geotiff_maps.epsg_code("LV95") is None

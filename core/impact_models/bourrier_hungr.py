@@ -52,7 +52,7 @@ def rebound(v1: Vector, n: Vector, omega1: Vector, radius: float, mass: float, p
 
 MODEL = ImpactModel(
     name="bourrier_hungr",
-    title="Friction-limited rebound (Bourrier, Hungr)",
+    title="Friction limit (Bourrier, Hungr)",
     reference="Bourrier, F. et al. (2009): Nat. Hazards Earth Syst. Sci. 9, 831–842, for the idea; see the module.",
     function=rebound,
     parameter_type=Parameters,

@@ -95,7 +95,8 @@ def missing(scene: bpy.types.Scene) -> str:
             return f"Choose the table of {name}."
     if scene.rockfall_simulation.contact != "mesh":
         return "Observed runs are on the surface: choose Blocks meet: Surface, under Motion."
-    return simulated_trees.missing(scene) or structures.problem(scene)
+    lines = screens.problem(scene) if settings.at_screens else ""
+    return lines or simulated_trees.missing(scene) or structures.problem(scene)
 
 
 def fitted_names(scene: bpy.types.Scene, model: str) -> tuple[str, ...]:
@@ -286,6 +287,6 @@ def _print_of_runs(scene: bpy.types.Scene, observed: tuple[str, ...]) -> list[ob
         read = input_hashes({str(i): _path(file) for i, file in enumerate(files) if file})
         found += [kinds, reconstruction.project_settings(scene, []).block, read]
     if sections.endswith("screens"):
-        lines = [(obj.name, screens.line_of(obj).tolist()) for obj in screens.objects_of(scene)]
-        found.append(lines)
+        broken = screens.problem(scene)
+        found.append(broken or [(obj.name, screens.line_of(obj).tolist()) for obj in screens.objects_of(scene)])
     return found

@@ -16,6 +16,10 @@ type State = Literal["TO_DO", "READY", "ATTENTION", "ANY_TIME"]
 MARKS: dict[State, str] = {"TO_DO": "RADIOBUT_OFF", "READY": "CHECKMARK", "ATTENTION": "ERROR", "ANY_TIME": "DOT"}
 
 
+SHORT = 36
+"""Characters that have room beside one another in a sidebar as wide as ours is at first."""
+
+
 class RockfallPanel:
     """Mix-in: where the panels live, and the mark in the header of those that are a step."""
 
@@ -107,6 +111,20 @@ def field(layout: bpy.types.UILayout, name: str) -> bpy.types.UILayout:
     before.alignment = "RIGHT"
     before.label(text=name)
     return row.row(align=True)
+
+
+def numbers(layout: bpy.types.UILayout, name: str, values: Iterable[str], part: float) -> None:
+    """Numbers to the right of a name, which has this part of the width; a name that is longer stands above them."""
+    if len(name) > SHORT * part:
+        layout.label(text=name)
+        name = ""
+    row = layout.split(factor=part)
+    row.label(text=name)
+    cells = row.row()
+    for text in values:
+        cell = cells.row()
+        cell.alignment = "RIGHT"
+        cell.label(text=text)
 
 
 def kilograms(mass_kg: float) -> str:

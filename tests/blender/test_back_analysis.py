@@ -331,3 +331,20 @@ def test_what_is_kept_is_set_aside_where_it_cannot_be_shown(part, scene, damage)
     assert check(scene[KEY]) == ""
     assert posterior.kept_of(scene).rows[0].name == "rn"
     assert check(json.dumps(json.loads(scene[KEY]) | damage)) == "does not hold what it should"
+
+
+def test_a_screen_that_is_no_line_any_more_stops_the_question_and_not_the_panel(part, scene) -> None:
+    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    middle = np.mean([obj.location for obj in scene.objects if obj.get("rockfall_role") == "pick"], axis=0)
+    aside = np.array([0.0, 20.0, 0.0])
+    line = [middle - aside, middle + aside]
+    screen = part("rockfall_addon.scene.screens").make(scene, line, "Road")
+    scene.rockfall_back_analysis.at_screens = True
+    analysed(scene)
+    assert not analysis.is_stale(scene, posterior.kept_of(scene))
+    screen.data.clear_geometry()
+    screen.data.from_pydata([(0.0, 0.0, 0.0)], [], [])
+    assert analysis.is_stale(scene, posterior.kept_of(scene))
+    assert "Road" in analysis.missing(scene)
+    scene.rockfall_back_analysis.at_screens = False
+    assert analysis.missing(scene) == ""

@@ -161,3 +161,13 @@ def test_a_track_after_the_last_pick_is_said_until_it_stopped_there(part) -> Non
     assert "is tracked until" in following.next_step(scene).sentence, "it moves on by 1.5 m after its last impact"
     picks[-1][store.KIND] = "stop"
     assert following.next_step(scene).sentence.startswith("Look at each pick")
+
+
+def test_a_camera_from_a_file_is_not_asked_for_pairs_and_not_called_a_tripod(part, draw) -> None:
+    assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+    written = " ".join(text for _, text in draw("ROCKFALL_PT_alignment"))
+    assert "comes from a file" in written
+    assert "Click a place" not in written
+    moving = " ".join(text for _, text in draw("ROCKFALL_PT_alignment_motion"))
+    assert "a pose for each frame" in moving
+    assert "One pose" not in moving

@@ -87,8 +87,8 @@ class Window:
 
         Returns the place of its header in the window.
         """
-        sidebar = self.region("UI", area)
-        x, top = sidebar.x + 90, sidebar.y + sidebar.height - HEADER_PX // 2
+        sidebar, header = self.region("UI", area), round(HEADER_PX * bpy.context.preferences.view.ui_scale)
+        x, top = sidebar.x + 90, sidebar.y + sidebar.height - header // 2
         yield from self.click(x, top, ctrl=True)  # folds all but the first, however high they were
         yield 0.5
         yield from self.click(x, top)
@@ -107,18 +107,20 @@ class Window:
         draw = panel.draw
         panel.draw = lambda self, context: (drawn.append(name), draw(self, context))[-1]
         try:
-            yield from self.click(x, top - HEADER_PX * names.index(name))
+            yield from self.click(x, top - header * names.index(name))
             yield 1.0
         finally:
             panel.draw = draw
         assert drawn, f"{name} is not open"
-        return x, top - HEADER_PX * names.index(name)
+        return x, top - header * names.index(name)
 
     def unfold(self, name: str, is_open: bool = True) -> None:
         """Let a panel, also one within another, be open when it is drawn for the first time, or closed."""
         panel = next(one for one in self.part("rockfall_addon.steps").classes() if one.__name__ == name)
         bpy.utils.unregister_class(panel)
-        panel.bl_options = panel.bl_options - {"DEFAULT_CLOSED"} | (set() if is_open else {"DEFAULT_CLOSED"})
+        panel.bl_options = getattr(panel, "bl_options", set()) - {"DEFAULT_CLOSED"} | (
+            set() if is_open else {"DEFAULT_CLOSED"}
+        )
         bpy.utils.register_class(panel)
 
     def scroll(self, steps: int, area: str = "VIEW_3D") -> Steps:

@@ -13,6 +13,9 @@ from . import following
 COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, pairs.COLOURS + 1))
 
 
+TRIPOD = "One pose for all frames. If the picture moves, choose Hand-held."
+
+
 class ROCKFALL_UL_pairs(Rows, bpy.types.UIList):
     """Rows: use, colour, name, residuals."""
 
@@ -93,7 +96,7 @@ class ROCKFALL_PT_alignment(RockfallPanel, bpy.types.Panel):
             paragraph(
                 context, layout, "The focal length has changed since the camera was followed. Follow again.", "ERROR"
             )
-        if next_step:
+        if next_step and (placed != alignment.FROM_FILE or len(camera.rockfall_alignment.rows)):
             advise(context, layout, False, next_step)
 
     def _pairs(self, context: bpy.types.Context, settings: bpy.types.PropertyGroup) -> None:
@@ -181,7 +184,9 @@ class ROCKFALL_PT_alignment_motion(RockfallPanel, bpy.types.Panel):
         settings = camera.rockfall_alignment
         layout.row(align=True).prop(settings, "motion", expand=True)
         if settings.motion == "FIXED":
-            paragraph(context, layout, "One pose for all frames. If the picture moves, choose Hand-held.", "INFO")
+            fixed = camera_paths.camera_path(camera).is_fixed
+            text = TRIPOD if fixed else "It moves as its file says, a pose for each frame."
+            paragraph(context, layout, text, "INFO")
             show_remarks(context, layout, alignment.background_remarks(camera))
             return
         known = following.followed(camera)

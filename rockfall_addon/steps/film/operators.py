@@ -7,7 +7,7 @@ from ....core.errors import RockfallError
 from ....core.progress import Progress
 from ...scene import store
 from ...scene.film_preset import preset_of
-from ...view import job
+from ...view import job, workspace
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
 from . import beside, dressing, remembered, stopwatch, up_to_date
@@ -37,11 +37,17 @@ class ROCKFALL_OT_set_up_film(bpy.types.Operator):
         engine = quickest_engine() if preset.engine == "auto" else preset.engine
         dressing.set_up_film(scene, preset, engine, graphs_of(scene))
         up_to_date.keep(scene)
-        for area in context.screen.areas if context.screen else ():
-            if area.type == "VIEW_3D":
-                area.spaces.active.region_3d.view_perspective = "CAMERA"
+        _look_through_camera(context.screen)
         self.report({"INFO"}, "Press Preview Frame or Render Film, or play: the camera view shows the film")
         return {"FINISHED"}
+
+
+def _look_through_camera(screen: bpy.types.Screen | None) -> None:
+    """The largest view shows the film, unless one looks through the camera already; free views stay as they are."""
+    views = [area for area in screen.areas if area.type == "VIEW_3D"] if screen else []
+    if views and not any(workspace.camera_views(screen)):
+        largest = max(views, key=lambda area: area.width * area.height)
+        largest.spaces.active.region_3d.view_perspective = "CAMERA"
 
 
 class ROCKFALL_OT_preview_film(bpy.types.Operator):

@@ -26,7 +26,7 @@ class ROCKFALL_PT_playback(RockfallPanel, bpy.types.Panel):
         layout.operator("rockfall.frame_trajectory", icon="ZOOM_SELECTED")
         layout.operator("rockfall.open_motion_graphs", icon="FCURVE")
         layout.operator("rockfall.open_keys", icon="ACTION")
-        layout.use_property_split = True
+        layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(settings, "playback", expand=True)
         column = layout.column(align=True)
         if settings.playback == "TOGETHER":

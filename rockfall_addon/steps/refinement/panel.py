@@ -6,7 +6,7 @@ import bpy
 from ...scene import proposal
 from ...scene.proposal import Proposal
 from ...view import job
-from ...view.panel import RockfallPanel, State, advise, facts, is_grave, paragraph, show_remarks
+from ...view.panel import RockfallPanel, State, advise, facts, is_grave, numbers, paragraph, show_remarks
 
 MOST_ROWS = 12
 
@@ -86,11 +86,8 @@ def _draw_what_if(layout: bpy.types.UILayout, found: Proposal) -> None:
     if not found.what_if:
         return
     column = layout.column(align=True)
-    for cells in (("What if: at most", "Speed", "R"), *found.what_if):
-        row = column.split(factor=0.56)
-        row.label(text=cells[0])
-        for text in cells[1:]:
-            row.label(text=text)
+    for name, *values in (("What if: at most", "Speed", "R"), *found.what_if):
+        numbers(column, name, values, 0.5)
 
 
 CLASSES = (ROCKFALL_PT_refinement,)

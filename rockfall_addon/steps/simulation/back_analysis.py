@@ -13,8 +13,11 @@ from ....core.workflow.back_analysis import ROUNDS, SETS
 from ...scene import back_analysis, model_parameters, posterior, screens, store, terrain
 from ...view import job
 from ...view.job import InBackground, Work
-from ...view.panel import RockfallPanel, paragraph, show_remarks
+from ...view.panel import RockfallPanel, numbers, paragraph, show_remarks
 from ...view.reporting import possible, reported
+
+NAMES_PART = 0.26
+"""Of the width, for the names of parameters: most have few letters, and their numbers many digits."""
 
 
 class BackAnalysisSettings(bpy.types.PropertyGroup):
@@ -43,12 +46,12 @@ class BackAnalysisSettings(bpy.types.PropertyGroup):
         subtype="FILE_PATH",
     )  # fmt: skip
     contours: StringProperty(
-        name="Contours", description="Heights in survey coordinates, between commas: speed, height and place are "
-        "compared where blocks fall below them [m]. Without any section, three are chosen",
+        name="Contours [m]", description="Heights in survey coordinates, between commas: speed, height and place are "
+        "compared where blocks fall below them. Without any section, three are chosen",
     )  # fmt: skip
     drops: StringProperty(
-        name="Drops", description="Heights below each block's own start, between commas: as contours, where "
-        "blocks start at different heights [m]",
+        name="Drops [m]", description="Heights below each block's own start, between commas: as contours, where "
+        "blocks start at different heights",
     )  # fmt: skip
     at_screens: BoolProperty(
         name="Screens", description="What passes the drawn screens is compared there; barriers hold nothing in this"
@@ -107,6 +110,12 @@ class ROCKFALL_OT_choose_back_analysed(bpy.types.Operator):
 
     model: StringProperty()
     parameter: StringProperty()
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        if properties.parameter == FRICTION_NAME:
+            return "Coefficient μ of rolling or sliding on the ground"
+        return model_parameters.tooltip(MODELS[properties.model].parameter(properties.parameter))
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -200,11 +209,11 @@ def _draw_question(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings:
     layout.prop(settings, "model", text="")
     names = back_analysis.fitted_names(scene, settings.model)
     column = layout.column(align=True)
-    labels = {spec.name: model_parameters.label(spec) for spec in MODELS[settings.model].parameters if not spec.choices}
-    for name, text in (labels | {FRICTION_NAME: "friction μ on the ground"}).items():
+    units = {spec.name: spec.unit for spec in MODELS[settings.model].parameters if not spec.choices}
+    for name, unit in (units | {FRICTION_NAME: ""}).items():
         on = name in names
         icon = "CHECKBOX_HLT" if on else "CHECKBOX_DEHLT"
-        button = column.operator("rockfall.choose_back_analysed", text=text, icon=icon, depress=on)
+        button = column.operator("rockfall.choose_back_analysed", text=_named(name, unit), icon=icon, depress=on)
         button.model, button.parameter = settings.model, name
     column = layout.column(align=True)
     column.label(text="Thought possible before:")
@@ -228,11 +237,10 @@ def _draw_result(
     grave = [one for one in kept.remarks if one.severity in ("problem", "warning")]
     show_remarks(context, box, grave)
     column = box.column(align=True)
-    _draw_row(column, "", "median", "95 %")
+    numbers(column, "", ("median", "95 %"), NAMES_PART)
     for row in kept.rows:
-        name = f"{row.name} [{row.unit}]" if row.unit else row.name
         low, median, high = _rounded(row.low, row.median, row.high)
-        _draw_row(column, name, median, f"{low} … {high}")
+        numbers(column, _named(row.name, row.unit), (median, f"{low} … {high}"), NAMES_PART)
         if row.prior:
             paragraph(context, column, f"before {row.prior}" + (f": {row.left}" if row.left else ""))
             column.separator()
@@ -259,14 +267,9 @@ def _rounded(low: float, median: float, high: float) -> list[str]:
     return [f"{value:.{decimals}f}" for value in (low, median, high)]
 
 
-def _draw_row(layout: bpy.types.UILayout, name: str, median: str, interval: str) -> None:
-    row = layout.split(factor=0.34)
-    row.label(text=name)
-    row = row.split(factor=0.36)
-    for text in (median, interval):
-        cell = row.row()
-        cell.alignment = "RIGHT"
-        cell.label(text=text)
+def _named(name: str, unit: str) -> str:
+    """A parameter as it is typed in front of what was thought possible."""
+    return f"{name} [{unit}]" if unit else name
 
 
 CLASSES = (

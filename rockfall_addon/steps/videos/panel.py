@@ -5,7 +5,7 @@ import bpy
 
 from ...scene import camera_paths, store, video_times, videos
 from ...view import image_view
-from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
+from ...view.panel import RockfallPanel, State, advise, facts, fields, paragraph, show_remarks
 from . import proxies, wording
 
 
@@ -92,10 +92,8 @@ class ROCKFALL_PT_video_times(RockfallPanel, bpy.types.Panel):
         layout.operator_menu_enum(
             "rockfall.time_origin_here", "what", text="Time Origin Here", icon="TRACKING_FORWARDS"
         )
-        layout.use_property_split, layout.use_property_decorate = True, False
-        column = layout.column(align=True)
-        for name in ("capture_rate_hz", "offset_s", "drift_ppm", "row_time_us"):
-            column.prop(camera.rockfall_video, name)
+        names = ("capture_rate_hz", "offset_s", "drift_ppm", "row_time_us")
+        fields(layout.column(align=True), camera.rockfall_video, names)
         if len(videos.cameras(scene)) > 1:
             self._synchronise(context, camera)
 

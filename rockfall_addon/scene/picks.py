@@ -185,13 +185,16 @@ def pose(
 
 
 def key(obj: bpy.types.Object, frame: float, version: int, like: bpy.types.Action | None = None) -> None:
-    """Put a pick's object, and its one key, where its state says."""
+    """Put a pick's object, and its one key, where its state says.
+
+    A key that rounding alone separates from the frame stays: its time has followed it exactly, and follows it back.
+    """
     place = list(obj[store.POSITION])
     if not _same_place(obj.location, place):
         obj.location = place
     if not _keyed_at(obj, frame):
         keyframes.key_location_once(obj, frame, like)
-    obj[store.KEY_FRAME] = float(np.float32(frame))
+    obj[store.KEY_FRAME] = float(keyframes.location_curves(obj)[0].keyframe_points[0].co[0])
     obj[store.WRITTEN] = keyframes.action_of(obj)[store.WRITTEN] = version
 
 
@@ -429,11 +432,11 @@ def _same_place(location: Vector, stored: Sequence[float]) -> bool:
 
 def _keyed_at(obj: bpy.types.Object, frame: float) -> bool:
     """Whether the object has the one key that it should have."""
-    curves = list(keyframes.location_curves(obj))
-    wanted = float(np.float32(frame))
+    curves = keyframes.location_curves(obj)
     return len(curves) == 3 and all(
         len(curve.keyframe_points) == 1
-        and curve.keyframe_points[0].co[0] == wanted
+        and curve.keyframe_points[0].co[0] == curves[0].keyframe_points[0].co[0]
+        and block_keys.same_frame(curve.keyframe_points[0].co[0], frame)
         and curve.keyframe_points[0].co[1] == obj.location[curve.array_index]
         for curve in curves
     )

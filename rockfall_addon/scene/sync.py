@@ -52,6 +52,9 @@ POLL_S = 0.015
 
 _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajectories to look at, None for all
 
+_owing = [False]
+"""Whether the step that Blender has stored for undo is to be extended, which waits until nobody drags: what is half
+done belongs to no step."""
 _resting: list[bool] = []
 _recomputing: set[int] = set()  # session_uid of scenes
 _busy: list[int] = []
@@ -145,12 +148,15 @@ def work() -> float | None:
     for scene in bpy.data.scenes:
         if scene.session_uid in waiting:
             names = waiting[scene.session_uid]
-            done = sync(scene, names, dragging=dragging)
-            if done.step_changed:
-                undo.extend_last_step()
+            _owing[0] = sync(scene, names, dragging=dragging).step_changed or _owing[0]
             if dragging:
                 _waiting[scene.session_uid] = names
-    return POLL_S if dragging else None
+    if dragging:
+        return POLL_S
+    if _owing[0]:
+        _owing[0] = False
+        undo.extend_last_step()
+    return None
 
 
 def is_dragging() -> bool:

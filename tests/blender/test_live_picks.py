@@ -56,6 +56,24 @@ def test_a_second_pick_that_is_still_held_makes_a_flight_of_which_nothing_is_put
     check_shown(slope, part)
 
 
+def test_what_comes_while_a_person_drags_belongs_to_an_undo_step_afterwards_and_once(
+    slope: bpy.types.Scene, part, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync, picks = part("rockfall_addon.scene.sync"), part("rockfall_addon.scene.picks")
+    held, stored = [True], []
+    monkeypatch.setattr(sync, "is_dragging", lambda: bool(held))
+    monkeypatch.setattr(part("rockfall_addon.scene.undo"), "extend_last_step", lambda: stored.append(bool(held)))
+    for time, x in ((20.0, 0.0), (21.0, 6.0)):
+        picks.add_pick(slope, "C", time, [x, 0.0, ground(x)])
+    sync.touch(slope, ["C"])
+    assert trail(slope, "C")
+    assert not stored
+    held.clear()
+    sync.work()
+    sync.work()
+    assert stored == [False]
+
+
 def test_a_moved_key_moves_the_time(scene: bpy.types.Scene, part) -> None:
     pick = picks_of(scene, "A")[2]
     place, time = list(pick["rockfall_position_m"]), pick["rockfall_time_s"]
@@ -68,6 +86,22 @@ def test_a_moved_key_moves_the_time(scene: bpy.types.Scene, part) -> None:
     assert pick["rockfall_time_s"] == time, "once is enough"
     frames = key_frames(pick)
     assert frames == [[pytest.approx((time - 10.0) * RATE, abs=1e-4)]] * 3
+
+
+@pytest.mark.parametrize("frames", [-9.117, 700.3])
+def test_a_key_that_is_moved_and_put_back_gives_the_time_back(scene: bpy.types.Scene, part, frames: float) -> None:
+    """As an undo does: to the last bit, though frames of another size are rounded in other steps."""
+    scene.render.fps = 240
+    update()
+    pick = picks_of(scene, "A")[3]
+    pick["rockfall_time_s"] = time = 10.0 + 515.123456789 / 240
+    part("rockfall_addon.scene.sync").sync(scene)
+    (before,) = key_frames(pick)[0]
+    for wanted in (before + frames, before):
+        for curve in pick.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
+            curve.keyframe_points[0].co[0] = wanted
+        update()
+    assert pick["rockfall_time_s"] == time
 
 
 def test_the_first_key_moves_without_moving_the_others(scene: bpy.types.Scene, part) -> None:

@@ -149,15 +149,21 @@ def clip_window(picture: np.ndarray, centre: Array, reach: float) -> tuple[int, 
 
 
 def disc(u: Array, v: Array, centre: Array, diameter: float, streak: Array) -> Array:
-    """Share of the pixels (u, v) that is covered by a disc swept along `streak` (2,) [px]."""
+    """(h, w) share of the pixels (u, v), (w,) and (h, 1), that is covered by a disc swept along `streak` (2,) [px]."""
+    return _discs(u, v, centre[None], np.array([diameter]), streak)[0]
+
+
+def _discs(u: Array, v: Array, centres: Array, diameters: Array, streak: Array) -> Array:
+    """(k, h, w) of k discs that differ little; the first tells in how many steps all are swept."""
     length = float(np.hypot(*streak))
-    count = 1 + int(np.ceil(length / max(1.0, 0.25 * diameter)))
-    soft = max(1.6, 0.15 * diameter)
-    share = np.zeros(np.broadcast_shapes(u.shape, v.shape))
-    for place in (np.arange(count) + 0.5) / count - 0.5:
-        distance = np.hypot(u - centre[0] - place * streak[0], v - centre[1] - place * streak[1])
-        share += np.clip((0.5 * diameter - distance) / soft + 0.5, 0.0, 1.0)
-    return share / count
+    count = 1 + int(np.ceil(length / max(1.0, 0.25 * float(diameters[0]))))
+    swept = centres[:, None] + ((np.arange(count) + 0.5) / count - 0.5)[:, None] * streak
+    along, down = u - swept[..., :1], v.ravel() - swept[..., 1:]
+    distance = np.sqrt(np.square(down)[..., :, None] + np.square(along)[..., None, :])
+    radius, soft = 0.5 * diameters, np.maximum(1.6, 0.15 * diameters)
+    share: Array = (radius[:, None, None, None] - distance) / soft[:, None, None, None] + 0.5
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    return share[:, 0] if count == 1 else share.mean(axis=1)
 
 
 def search(here: Cover, looks: Appearance, streak: Array) -> tuple[Array, Array]:
@@ -209,17 +215,17 @@ def fit(here: Cover, looks: Appearance, centre: Array, streak: Array) -> Sightin
     v = (np.arange(low[1], high[1]) + here.top + 0.5)[:, None]
     alpha, weight, noise = here.alpha[part], here.weight[part], here.noise[part]
 
-    def modelled(values: Array) -> Array:
-        return values[3] * disc(u, v, values[:2], diameter * float(np.exp(values[2])), streak)
-
     values = np.array([*centre, 0.0, 1.0])
-    step = np.array([0.05, 0.05, 0.02, 0.02])
+    step = np.array([0.05, 0.05, 0.02])
+    beside = np.vstack([np.zeros(3), np.diag(step)])
     prior = np.array([0.0, 0.0, 1 / 0.06**2, 1 / 0.5**2])
     far = np.array([0.35 * diameter + 1, 0.35 * diameter + 1, 0.3, 0.6])
     normal, factor = np.eye(4), 1.0
     for _ in range(STEPS):
-        now = modelled(values)
-        slope = np.stack([(modelled(values + d) - now) / d.sum() for d in np.diag(step)]).reshape(4, -1)
+        near = values[:3] + beside
+        shapes = _discs(u, v, near[:, :2], diameter * np.exp(near[:, 2]), streak)
+        now = values[3] * shapes[0]
+        slope = np.concatenate([values[3] * (shapes[1:] - shapes[0]) / step[:, None, None], shapes[:1]]).reshape(4, -1)
         residual = (alpha - now).ravel()
         robust = weight.ravel() / np.maximum(1, np.abs(residual) / np.sqrt(noise.ravel() + 0.25**2))
         normal = (slope * robust) @ slope.T + np.diag(prior)
@@ -232,7 +238,7 @@ def fit(here: Cover, looks: Appearance, centre: Array, streak: Array) -> Sightin
         factor = float(np.sum(robust * residual**2) / max(np.count_nonzero(robust > 0), 1))
         if np.hypot(*moved[:2]) < 0.003:
             break
-    shape = modelled(np.array([*values[:3], 1.0]))
+    shape = disc(u, v, values[:2], diameter * float(np.exp(values[2])), streak)
     found = 2 * np.sum(weight * alpha * shape)
     energy = max(np.sum(weight * (alpha**2 - noise)), 0) + np.sum(weight * shape**2)
     covariance = np.linalg.inv(normal + 1e-9 * np.eye(4))[:2, :2] * max(factor, 0.05)

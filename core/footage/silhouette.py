@@ -180,7 +180,7 @@ def _fitted(target: Array, u: Array, v: Array) -> Array:
         slopes = np.stack([edge * along / distance, edge * down / distance, 0.5 * edge, shape]).reshape(4, -1)
         gap = (target - values[3] * shape).ravel()
         weighted = slopes / np.sqrt(1 + (gap / FAR) ** 2)
-        step = damped_step(weighted @ slopes.T, weighted @ gap, 0.05)
+        step = damped_step((weighted @ slopes.T)[None], (weighted @ gap)[None], 0.05)[0]  # SciPy takes longer to load
         values = values + np.clip(step, -1.5, 1.5)
         if np.abs(step).max() < 1e-4:
             break

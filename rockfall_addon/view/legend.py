@@ -16,6 +16,10 @@ WIDTH, HEIGHT, MARGIN, TEXT = 220, 12, 28, 12  # in pixels at interface scale 1
 Colour = tuple[float, float, float]
 EDGE: Colour = (0.1, 0.1, 0.1)
 """Around a swatch, which may be white on a light ground."""
+GROUND = (0.08, 0.08, 0.09, 0.62)
+"""Behind a legend, so that it can be read on footage, trails and maps."""
+PAD = 7
+"""Of this ground beyond what stands on it, in pixels at interface scale 1."""
 
 
 def begin(scale: float) -> None:
@@ -37,6 +41,10 @@ def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], titl
     above : how much higher it begins [px], where another legend is below.
     """
     size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale + above
+    lines = title.split("; ")
+    top = bottom + (len(rows) + 0.2) * step + 1.4 * TEXT * (len(lines) - 1) * scale + TEXT * scale
+    right = left + max([*map(_wide, lines), *(1.6 * size + _wide(name) for name, _ in rows)])
+    _ground(left, right, bottom, top, scale)
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for i, (name, colour) in enumerate(reversed(rows)):
         low = bottom + i * step
@@ -45,7 +53,7 @@ def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], titl
             shader.uniform_float("color", (*shade, 1.0))
             batch_for_shader(shader, "TRI_STRIP", {"pos": [(a, c), (b, c), (a, d), (b, d)]}).draw(shader)
         text(left + 1.6 * size, low + 0.1 * size, name)
-    for i, words in enumerate(reversed(title.split("; "))):
+    for i, words in enumerate(reversed(lines)):
         text(left, bottom + (len(rows) + 0.2) * step + 1.4 * TEXT * i * scale, words)
 
 
@@ -59,7 +67,10 @@ def fitting(context: bpy.types.Context) -> tuple[float, float]:
 def bar(left: float, scale: float, top: float, title: str) -> None:
     """The scale of colours from 0 to `top`, and a title above, a line for each part of it that a semicolon ends."""
     bottom, width, height = (MARGIN + TEXT) * scale, WIDTH * scale, HEIGHT * scale
-    steps = len(SPEED_SCALE)
+    lines, steps = title.split("; "), len(SPEED_SCALE)
+    over = bottom + height + (6 + 1.4 * TEXT * (len(lines) - 1) + TEXT) * scale
+    right = left + max([width + _wide(f"{top:g}") / 2, *map(_wide, lines)])
+    _ground(left, right, bottom - (TEXT + 4) * scale, over, scale)
     places, colours = [], []
     for i, colour in enumerate(SPEED_SCALE):
         x = left + width * i / (steps - 1)
@@ -70,7 +81,7 @@ def bar(left: float, scale: float, top: float, title: str) -> None:
     for part in (0.0, 0.5, 1.0):
         words = f"{top * part:g}"
         text(left + width * part - blf.dimensions(0, words)[0] / 2, bottom - (TEXT + 4) * scale, words)
-    for i, words in enumerate(reversed(title.split("; "))):
+    for i, words in enumerate(reversed(lines)):
         text(left, bottom + height + (6 + 1.4 * TEXT * i) * scale, words)
 
 
@@ -78,6 +89,19 @@ def text(x: float, y: float, words: str) -> None:
     """Words at a place of the region."""
     blf.position(0, x, y, 0)
     blf.draw(0, words)
+
+
+def _wide(words: str) -> float:
+    return float(blf.dimensions(0, words)[0])
+
+
+def _ground(left: float, right: float, low: float, high: float, scale: float) -> None:
+    a, b, c, d = left - PAD * scale, right + PAD * scale, low - PAD * scale, high + PAD * scale
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", GROUND)
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "TRI_STRIP", {"pos": [(a, c), (b, c), (a, d), (b, d)]}).draw(shader)
+    gpu.state.blend_set("NONE")
 
 
 def covered_left(area: bpy.types.Area) -> float:

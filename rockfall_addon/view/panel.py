@@ -133,9 +133,11 @@ def kilograms(mass_kg: float) -> str:
 
 
 def facts(layout: bpy.types.UILayout, rows: list[tuple[str, str]]) -> None:
-    """A small table: names to the left, values to the right."""
+    """A small table: names to the left, values to the right, with room for the longest of both."""
     column = layout.column(align=True)
+    names, values = (max((len(row[i]) for row in rows), default=1) for i in (0, 1))
+    part = min(max(names / (names + values), 0.42), 0.55)
     for name, value in rows:
-        row = column.split(factor=0.55)
+        row = column.split(factor=part)
         row.label(text=name)
         row.label(text=value)

@@ -47,6 +47,16 @@ def test_a_block_of_its_own_is_used_for_its_trajectory_alone(scene, block) -> No
     assert mass_of(scene, "B") == pytest.approx(mass_of(scene, "A"))
 
 
+def test_numbers_that_no_block_has_end_at_the_range_of_their_field(scene, block) -> None:
+    block.d1 = block.d2 = block.d3 = 0.5
+    for given, kept in ((1e6, 5000.0), (0.0, 500.0), (2800.0, 2800.0)):
+        block.density = given
+        assert mass_of(scene, "B") == pytest.approx(math.pi / 6 * 0.5**3 * kept)
+    for given, kept in ((1e9, 100.0), (-1.0, 0.01)):
+        block.d1 = block.d2 = block.d3 = given
+        assert mass_of(scene, "B") == pytest.approx(math.pi / 6 * kept**3 * 2800, rel=1e-6)
+
+
 def test_tables_projects_and_files_have_it(slope, part, tmp_path: Path) -> None:
     bpy.context.view_layer.objects.active = picks_of(slope, "B")[3]
     block = slope.rockfall_block

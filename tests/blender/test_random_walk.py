@@ -25,7 +25,11 @@ def _walk() -> type:
 def test_a_random_walk(part, tmp_path: Path, seed: int) -> None:
     walk = _walk()(seed, tmp_path, part)
     walk.begin()
-    for _ in range(STEPS):
-        walk.step()
-        walk.check()
+    try:
+        for _ in range(STEPS):
+            walk.step()
+            walk.check()
+    except Exception as error:
+        error.add_note(f"after {len(walk.done)} steps, the last of them:\n" + "\n".join(walk.done[-12:]))
+        raise
     assert len({name.split()[0].split("(")[0] for name in walk.done}) > 50

@@ -12,6 +12,8 @@ from ...scene import impact_rows, own_blocks, places, store, sync
 from ...scene.settings import BLOCK_SHAPES
 from ...view.panel import RockfallPanel, facts, fields, kilograms, paragraph
 
+DIAMETERS_M, DENSITIES_KGPM3 = (0.01, 100.0), (500.0, 5000.0)
+
 
 def trajectory_in_hand(scene: bpy.types.Scene) -> str:
     """That of the selected pick, else the one that is picked."""
@@ -23,17 +25,17 @@ def _block(settings: bpy.types.PropertyGroup) -> Block:
     return places.block_of(settings.id_data, trajectory_in_hand(settings.id_data))
 
 
-def _number(name: str) -> dict[str, Callable]:
-    """How a property reads and writes one number of the block; the others keep all their digits."""
+def _number(name: str, least: float, most: float) -> dict[str, Callable | float]:
+    """How a property reads and writes one number of the block, and its range; the others keep all their digits."""
 
     def read(self: bpy.types.PropertyGroup) -> float:
         return getattr(_block(self), name)
 
     def write(self: bpy.types.PropertyGroup, value: float) -> None:
-        scene = self.id_data
+        scene, value = self.id_data, min(most, max(least, value))  # Blender keeps to the range in its fields alone
         own_blocks.give(scene, trajectory_in_hand(scene), replace(_block(self), **{name: store.double(value)}))
 
-    return {"get": read, "set": write, "update": _changed}
+    return {"get": read, "set": write, "update": _changed, "min": least, "max": most}
 
 
 def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -71,19 +73,19 @@ class BlockProperties(bpy.types.PropertyGroup):
     )  # fmt: skip
     d1: FloatProperty(
         name="Diameter 1", description="Of the three diameters at right angles to each other",
-        min=0.01, soft_max=5.0, unit="LENGTH", precision=3, **_number("d1"),
+        soft_max=5.0, unit="LENGTH", precision=3, **_number("d1", *DIAMETERS_M),
     )  # fmt: skip
     d2: FloatProperty(
         name="Diameter 2", description="Of the three diameters at right angles to each other",
-        min=0.01, soft_max=5.0, unit="LENGTH", precision=3, **_number("d2"),
+        soft_max=5.0, unit="LENGTH", precision=3, **_number("d2", *DIAMETERS_M),
     )  # fmt: skip
     d3: FloatProperty(
         name="Diameter 3", description="Of the three diameters at right angles to each other",
-        min=0.01, soft_max=5.0, unit="LENGTH", precision=3, **_number("d3"),
+        soft_max=5.0, unit="LENGTH", precision=3, **_number("d3", *DIAMETERS_M),
     )  # fmt: skip
     density: FloatProperty(
         name="Density [kg/m³]", description="Of the rock; mass and energies come from it",
-        min=500.0, max=5000.0, precision=0, **_number("density"),
+        precision=0, **_number("density", *DENSITIES_KGPM3),
     )  # fmt: skip
     shape: EnumProperty(
         name="Shape", description="Volume, mass and inertia come from it", items=BLOCK_SHAPES,

@@ -330,6 +330,12 @@ def test_a_killed_render_goes_on_and_gives_the_same_frames(tmp_path: Path) -> No
             pass
         store.remove()
     assert not (tmp_path / "cut").exists()
+    notes = tmp_path / "whole" / "1-annotated.png"
+    notes.write_bytes(b"a person's own")
+    with frame_store(tmp_path / "whole", {"film": "b"}) as store:
+        assert store.fill(range(2), draw, quiet) == 0
+        store.remove()
+    assert [file.name for file in notes.parent.iterdir()] == [notes.name]
 
 
 def test_frames_that_a_power_cut_has_spoilt_are_drawn_again(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ A frame is there as a whole or not at all. The folder says of what it is; frames
 
 import json
 import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,6 +20,7 @@ from .canvas import Picture
 
 STATED = "film.json"
 LOCK = ".lock"
+FRAME = re.compile(r"[0-9]{6,}\.png")
 LAST_BYTES = b"IEND\xaeB`\x82"
 """Of every PNG."""
 COMPRESSION = 1
@@ -67,8 +69,7 @@ class FrameStore:
 
     def remove(self) -> None:
         """Remove the frames and the folder."""
-        for file in self.folder.glob("[0-9]*.png"):
-            file.unlink()
+        _remove_frames(self.folder)
         (self.folder / STATED).unlink(missing_ok=True)
         with suppress(OSError):
             (self.folder / LOCK).unlink()
@@ -117,11 +118,7 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
 
 def _prepare(folder: Path, states: str) -> None:
     stated = folder / STATED
-    strangers = [
-        file.name
-        for file in folder.iterdir()
-        if not (file.name in (STATED, LOCK) or (file.stem.isdigit() and file.suffix == ".png"))
-    ]
+    strangers = [file.name for file in folder.iterdir() if not (file.name in (STATED, LOCK) or _is_frame(file))]
     if strangers and not stated.is_file():
         raise InputError(
             f"The folder for the frames holds other files ({strangers[0]})",
@@ -133,6 +130,16 @@ def _prepare(folder: Path, states: str) -> None:
     except (OSError, UnicodeDecodeError):
         same = False
     if not same:
-        for file in folder.glob("[0-9]*.png"):
-            file.unlink()
+        _remove_frames(folder)
         write_text(stated, states)
+
+
+def _is_frame(file: Path) -> bool:
+    """By its name, as `FrameStore.file` gives them: what somebody put beside them is none."""
+    return FRAME.fullmatch(file.name) is not None
+
+
+def _remove_frames(folder: Path) -> None:
+    for file in folder.iterdir():
+        if _is_frame(file):
+            file.unlink()

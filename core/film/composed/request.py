@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from ...errors import InputError
 from ...impact_models.machinery.parameters import Value
-from ..simulated import NUMBER
+from ..simulated import NUMBER, check_number
 from .ground import TerrainColours
 
 SUN_DEG = (315.0, 50.0)
+RATES, MOST_FREEZE_S = (0.005, 100.0), 60.0
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,10 @@ class FilmRequest:
     sun_deg : azimuth from north and elevation.
     dust : whether impacts raise some; it is drawn, not measured.
     terrain_colours : where the terrain has its colours from.
+
+    Raises
+    ------
+    InputError : a number that no film can have.
     """
 
     film: str
@@ -59,6 +65,18 @@ class FilmRequest:
     sun_deg: tuple[float, float] = SUN_DEG
     dust: bool = False
     terrain_colours: TerrainColours = "auto"
+
+    def __post_init__(self) -> None:
+        check_number(self.number, max(len(self.models), 1))
+        if self.rate is not None and not RATES[0] <= self.rate <= RATES[1]:
+            raise InputError(
+                f"{self.rate:g} seconds of the fall in a second of film are beyond what can be watched",
+                advice=f"Give --rate {RATES[0]:g} to {RATES[1]:g}; 0.25 is four times slower",
+            )
+        if not 0.0 <= self.freeze_s <= MOST_FREEZE_S:
+            raise InputError(
+                f"A film cannot stand still for {self.freeze_s:g} s", advice=f"Give --freeze 0 to {MOST_FREEZE_S:g}"
+            )
 
     @classmethod
     def from_json(cls, text: str) -> "FilmRequest":

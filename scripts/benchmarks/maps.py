@@ -25,9 +25,9 @@ from rockfall.core.hazard.screens import Screen
 from rockfall.core.hazard.tally import Tally
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import Ground
-from rockfall.core.simulation.release import Releases
+from rockfall.core.simulation.release import Releases, make_releases
 from rockfall.core.workflow.hazard import run_chunks
-from simulation import case, row
+from simulation import DROP_M, PLATROCK, case, row, run_platrock
 
 TRIANGLES, CELL_M = 5e5, 1.0
 MODELS = ("noel_2017", "pfeiffer_bowen_1989")
@@ -82,6 +82,36 @@ def costs(ground: Ground, releases: Releases, turns: int) -> None:
         )  # fmt: skip
 
 
+def beside_platrock(blocks: int, ground: Ground, releases: Releases) -> None:
+    """The maps of PlatRock (its post-processing, cells of 1 m) and ours, one core, each beside its own runs.
+
+    PlatRock has passages, stops, and the mean, 90, 95 and 99 % of height, speed and energy; ours also the median,
+    translational energy, shares above limits, maxima and standard errors.
+    """
+    print("\nMaps beside PlatRock's, one core, constant R_N 0.35 and R_T 0.85 (PlatRock: and a roughness of 0.1)")
+    found = run_platrock(blocks)
+    if found is None:
+        return
+    runs, _, metres, maps = found
+    row(f"{PLATROCK}, {blocks} blocks", f"{1e3 * maps:,.1f} ms", f"{maps / runs:.2f} of its runs; {metres:.0f} m each")
+    settings = Settings("azimi_desvarreux_1977", {"rn": 0.35, "rt": 0.85})
+    dropped = make_releases(releases.position + np.array([0.0, 0.0, DROP_M]), diameter_m=0.3)
+    simulate(ground, dropped.take(slice(0, 64)), settings)
+    run_chunks(ground, dropped.take(slice(0, 64)), settings, [CellTally(cells_over(ground.surface, CELL_M))], threads=1)
+    tally = CellTally(cells_over(ground.surface, CELL_M))
+    alone = processor(lambda: simulate(ground, dropped, settings, record="ends", threads=1))
+
+    def mapped() -> None:
+        run_chunks(ground, dropped, settings, [tally], threads=1)
+        tally.maps()
+
+    ours = (processor(mapped) - alone) / len(dropped)
+    length = simulate(ground, dropped, settings, record="ends").length_m.mean()
+    quicker = f"a metre {maps / metres / ours * length:,.0f} times as quick"
+    note = f"{ours * len(dropped) / alone:.2f} of its runs; {length:.0f} m each; {quicker}"
+    row(f"ours, {len(dropped):,} blocks", f"{1e3 * ours:,.4f} ms", note)
+
+
 def all_cores(blocks: int, model: str) -> None:
     """Run in a child: prints seconds and rate of blocks with all maps, and the greatest memory."""
     ground, releases = case(TRIANGLES, blocks)
@@ -103,6 +133,7 @@ def main() -> None:
     parser.add_argument("--blocks", type=int, default=4096, help="of the costs on one core")
     parser.add_argument("--turns", type=int, default=5)
     parser.add_argument("--large", type=int, nargs="*", default=[100_000], help="numbers of blocks on all cores")
+    parser.add_argument("--platrock", type=int, default=10, help="blocks of PlatRock; 0 leaves it out")
     parser.add_argument("--child", nargs=2, metavar=("BLOCKS", "MODEL"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.child:
@@ -114,6 +145,8 @@ def main() -> None:
     row("the terrain's triangles in plan, once", f"{seconds:.2f} s", "of CPU, compiled before" if seconds < 3 else "")
     if arguments.blocks:
         costs(ground, releases, arguments.turns)
+    if arguments.platrock:
+        beside_platrock(arguments.platrock, ground, releases)
     del ground, releases
     print("\nAll cores")
     for blocks in arguments.large:

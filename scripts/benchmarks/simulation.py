@@ -30,6 +30,8 @@ ROUGHNESS = 0.012
 """Standard deviation of the knots of each octave, as a part of its wave length."""
 ENVIRONMENT = Path("build/platrock")
 PLATROCK = "platrock==0.4.6"
+DROP_M = 2.0
+"""How far above the terrain blocks are released beside PlatRock."""
 CHILD = """
 import sys
 sys.path.insert(0, sys.argv[1])
@@ -197,21 +199,11 @@ def beside_platrock(blocks: int, ground: Ground, releases: Releases, repeats: in
     R_T, without roughness, and CRSP, which has that roughness and takes less where blocks are quick or slip.
     """
     print("\nBeside PlatRock on 500,000 triangles")
-    dropped = make_releases(releases.position + np.array([0.0, 0.0, 2.0]), diameter_m=0.3)
-    python = platrock_python()
-    if python is None:
+    dropped = make_releases(releases.position + np.array([0.0, 0.0, DROP_M]), diameter_m=0.3)
+    found = run_platrock(blocks)
+    if found is None:
         return
-    with tempfile.TemporaryDirectory() as folder:
-        volume = np.pi / 6 * 0.3**3
-        np.savez(Path(folder, "case.npz"), z=heights(1.0), starts=starts(blocks), volume=volume)
-        command = [str(python), str(Path(__file__).with_name("platrock_case.py")), folder]
-        path = f"{python.parent}{os.pathsep}{os.environ['PATH']}"
-        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"HOME": folder, "PATH": path})
-    words = done.stdout.split("RESULT")
-    if done.returncode or len(words) < 2:
-        row("PlatRock", "did not run", (done.stderr or done.stdout).strip().splitlines()[-1][:90])
-        return
-    seconds, contacts, metres = map(float, words[1].split()[:3])
+    seconds, contacts, metres, _ = found
     note = f"{contacts:.0f} contacts and {metres:.0f} m each, {contacts / seconds:,.0f} contacts/s"
     row(f"{PLATROCK}, {blocks} blocks", f"{1 / seconds:.2f} /s", note)
     coefficients = {"rn": 0.35, "rt": 0.85}
@@ -224,6 +216,25 @@ def beside_platrock(blocks: int, ground: Ground, releases: Releases, repeats: in
             f"{seconds / ours * impacts / contacts:,.0f} times for a contact"
         )
         row(f"ours, one core, {name}", f"{1 / ours:,.0f} /s", note)
+
+
+def run_platrock(blocks: int) -> tuple[float, float, float, float] | None:
+    """Of a block: seconds, contacts, metres, and seconds of its maps; None, with the reason, where it does not run."""
+    python = platrock_python()
+    if python is None:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        volume = np.pi / 6 * 0.3**3
+        np.savez(Path(folder, "case.npz"), z=heights(1.0), starts=starts(blocks), volume=volume)
+        command = [str(python), str(Path(__file__).with_name("platrock_case.py")), folder]
+        path = f"{python.parent}{os.pathsep}{os.environ['PATH']}"
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"HOME": folder, "PATH": path})
+    words = done.stdout.split("RESULT")
+    if done.returncode or len(words) < 2:
+        row("PlatRock", "did not run", (done.stderr or done.stdout).strip().splitlines()[-1][:90])
+        return None
+    seconds, contacts, metres, mapped = map(float, words[1].split()[:4])
+    return seconds, contacts, metres, mapped
 
 
 def platrock_python() -> Path | None:

@@ -6,8 +6,9 @@
     python scripts/build_extension.py --develop DIR --python 3.14
 
 Wheels are fetched with pip, at the versions of constraints.txt, into wheels/, and fetched again only when a version
-changes. They travel without their tests and the sources of compiled modules. The tracked manifest lists no wheels: they
-are written into a staged copy. NumPy is Blender's own. No Blender is needed: the bpy module in this Python brings
+changes. They travel without their tests, the sources of compiled modules and, where this machine has `strip`, the
+symbols of Linux's libraries that only debuggers read. The tracked manifest lists no wheels: they are written into a
+staged copy. NumPy is Blender's own. No Blender is needed: the bpy module in this Python brings
 Blender's own packager, which also validates the zips.
 
 With --develop nothing is packed: DIR becomes a Blender user directory (BLENDER_USER_RESOURCES) in which the extension
@@ -15,7 +16,9 @@ has its wheels and is otherwise linked to this checkout, so that an edit runs at
 """
 
 import argparse
+import base64
 import csv
+import hashlib
 import importlib.util
 import io
 import json
@@ -118,24 +121,45 @@ def is_needed(name: str) -> bool:
     return "tests" not in folders and ending not in LEFT_OUT
 
 
+def without_symbols(name: str, content: bytes) -> bytes:
+    """A library of Linux without the symbols that only debuggers read, where this machine has `strip`; else as it is.
+
+    Those in folders `.libs` stay: auditwheel has rewritten them in a way that not every `strip` understands.
+    """
+    strip = shutil.which("strip")
+    if strip is None or not content.startswith(b"\x7fELF") or ".libs/" in name:
+        return content
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "library.so"
+        file.write_bytes(content)
+        done = subprocess.run([strip, "--strip-unneeded", str(file)], check=False, capture_output=True)
+        return file.read_bytes() if done.returncode == 0 else content
+
+
 def lean(wheel: Path) -> Path:
-    """The same wheel without what is not needed, nor that in its list of files; made once, in a folder beside."""
+    """The same wheel without what is not needed, its list of files as it is then; made once, in a folder beside."""
     made = wheel.parent / "lean" / wheel.name
     if made.exists() and made.stat().st_mtime >= wheel.stat().st_mtime:
         return made
     made.parent.mkdir(exist_ok=True)
     draft = made.with_suffix(f".{os.getpid()}")
     with zipfile.ZipFile(wheel) as old, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as new:
+        lists = [info for info in old.infolist() if info.filename.endswith(".dist-info/RECORD")]
+        stripped = {}
         for info in old.infolist():
-            if not is_needed(info.filename):
+            if info in lists or not is_needed(info.filename):
                 continue
             content = old.read(info)
-            if info.filename.endswith(".dist-info/RECORD"):
-                rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""))
-                listed = io.StringIO(newline="")
-                csv.writer(listed, lineterminator="\n").writerows(row for row in rows if row and is_needed(row[0]))
-                content = listed.getvalue().encode("utf-8")
-            new.writestr(info, content, zipfile.ZIP_DEFLATED)
+            if (smaller := without_symbols(info.filename, content)) is not content:
+                digest = base64.urlsafe_b64encode(hashlib.sha256(smaller).digest()).rstrip(b"=").decode()
+                stripped[info.filename] = [info.filename, f"sha256={digest}", str(len(smaller))]
+            new.writestr(info, smaller, zipfile.ZIP_DEFLATED)
+        for info in lists:
+            rows = csv.reader(io.StringIO(old.read(info).decode("utf-8"), newline=""))
+            listed = io.StringIO(newline="")
+            kept = [stripped.get(row[0], row) for row in rows if row and is_needed(row[0])]
+            csv.writer(listed, lineterminator="\n").writerows(kept)
+            new.writestr(info, listed.getvalue().encode("utf-8"), zipfile.ZIP_DEFLATED)
     draft.replace(made)
     return made
 

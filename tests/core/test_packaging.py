@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The manifest, the project file, the pinned versions and the checks of dependencies agree with each other."""
 
+import base64
+import csv
+import ctypes
+import hashlib
 import importlib.util
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -204,3 +209,26 @@ def test_wheels_travel_without_tests_and_sources(build_extension: ModuleType, tm
     before = lean.stat().st_mtime_ns
     assert build_extension.lean(wheel) == lean
     assert lean.stat().st_mtime_ns == before, "made once"
+
+
+@pytest.mark.skipif(shutil.which("strip") is None, reason="this machine has no strip")
+def test_libraries_travel_without_symbols_and_are_listed_as_they_are_then(
+    build_extension: ModuleType, tmp_path: Path
+) -> None:
+    numba = Path(importlib.util.find_spec("numba").origin).parent
+    library = max((numba / "core" / "typeconv").glob("*.so"), key=lambda file: file.stat().st_size)
+    record, names = "stone-1.0.dist-info/RECORD", ("stone/fast.so", "stone.libs/rewritten.so")
+    wheel = tmp_path / "stone-1.0-cp313-cp313-linux_x86_64.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for name in names:
+            archive.write(library, name)
+        archive.writestr(record, "".join(f"{name},sha256=old,1\n" for name in names) + f"{record},,\n")
+    with zipfile.ZipFile(build_extension.lean(wheel)) as archive:
+        rows = {row[0]: row[1:] for row in csv.reader(archive.read(record).decode().splitlines())}
+        content = archive.read(names[0])
+        assert archive.read(names[1]) == library.read_bytes()
+    assert len(content) < library.stat().st_size
+    digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).decode().rstrip("=")
+    assert rows == {names[0]: [f"sha256={digest}", str(len(content))], names[1]: ["sha256=old", "1"], record: ["", ""]}
+    (tmp_path / "fast.so").write_bytes(content)
+    assert ctypes.CDLL(str(tmp_path / "fast.so")) is not None

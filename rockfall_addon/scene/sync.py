@@ -55,6 +55,8 @@ _waiting: dict[int, set[str] | None] = {}  # session_uid of a scene → trajecto
 _owing = [False]
 """Whether the step that Blender has stored for undo is to be extended, which waits until nobody drags: what is half
 done belongs to no step."""
+_field = [""]
+"""The panel's field that was edited last, and not looked at since."""
 _resting: list[bool] = []
 _recomputing: set[int] = set()  # session_uid of scenes
 _busy: list[int] = []
@@ -72,8 +74,12 @@ class Done:
     step_changed: bool = False
 
 
-def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None) -> None:
-    """Something may have changed in these trajectories (None: anywhere): look soon, in background at once."""
+def touch(scene: bpy.types.Scene, names: Iterable[str] | None = None, field: str = "") -> None:
+    """Something may have changed in these trajectories (None: anywhere): look soon, in background at once.
+
+    field : of a panel, which has changed it: Blender's step for undo has its name, not an operator's.
+    """
+    _field[0] = field or _field[0]
     key, asked = scene.session_uid, None if names is None else set(names)
     before = _waiting.get(key, set())
     _waiting[key] = None if asked is None or before is None else before | asked
@@ -153,9 +159,10 @@ def work() -> float | None:
                 _waiting[scene.session_uid] = names
     if dragging:
         return POLL_S
+    field, _field[0] = _field[0], ""
     if _owing[0]:
         _owing[0] = False
-        undo.extend_last_step()
+        undo.extend_last_step(field or None)
     return None
 
 

@@ -62,7 +62,7 @@ def test_what_comes_while_a_person_drags_belongs_to_an_undo_step_afterwards_and_
     sync, picks = part("rockfall_addon.scene.sync"), part("rockfall_addon.scene.picks")
     held, stored = [True], []
     monkeypatch.setattr(sync, "is_dragging", lambda: bool(held))
-    monkeypatch.setattr(part("rockfall_addon.scene.undo"), "extend_last_step", lambda: stored.append(bool(held)))
+    monkeypatch.setattr(part("rockfall_addon.scene.undo"), "extend_last_step", lambda name: stored.append(bool(held)))
     for time, x in ((20.0, 0.0), (21.0, 6.0)):
         picks.add_pick(slope, "C", time, [x, 0.0, ground(x)])
     sync.touch(slope, ["C"])

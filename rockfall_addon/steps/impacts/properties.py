@@ -13,11 +13,11 @@ from ...scene import store
 CONFIDENCES = ("", "1", "2", "3")
 
 
-def _edited(obj: bpy.types.Object) -> None:
+def _edited(pick: bpy.types.PropertyGroup, field: str) -> None:
     from ...scene import sync
 
-    for scene in obj.users_scene:
-        sync.touch(scene)
+    for scene in pick.id_data.users_scene:
+        sync.touch(scene, field=pick.bl_rna.properties[field].name)
 
 
 def _get_kind(self: bpy.types.PropertyGroup) -> int:
@@ -30,7 +30,7 @@ def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
 
     self.id_data[store.KIND] = KINDS[value]
     pick_names.follow_with(self.id_data)
-    _edited(self.id_data)
+    _edited(self, "kind")
 
 
 def _get_status(self: bpy.types.PropertyGroup) -> int:
@@ -40,7 +40,7 @@ def _get_status(self: bpy.types.PropertyGroup) -> int:
 
 def _set_status(self: bpy.types.PropertyGroup, value: int) -> None:
     self.id_data[store.STATUS] = STATUSES[value]
-    _edited(self.id_data)
+    _edited(self, "status")
 
 
 def _get_confidence(self: bpy.types.PropertyGroup) -> int:
@@ -54,7 +54,7 @@ def _set_confidence(self: bpy.types.PropertyGroup, value: int) -> None:
     from ...scene import picks
 
     picks.set_extra(self.id_data, "confidence", CONFIDENCES[value])
-    _edited(self.id_data)
+    _edited(self, "confidence")
 
 
 def _get_note(self: bpy.types.PropertyGroup) -> str:

@@ -118,9 +118,8 @@ class Window:
         """Let a panel, also one within another, be open when it is drawn for the first time, or closed."""
         panel = next(one for one in self.part("rockfall_addon.steps").classes() if one.__name__ == name)
         bpy.utils.unregister_class(panel)
-        panel.bl_options = getattr(panel, "bl_options", set()) - {"DEFAULT_CLOSED"} | (
-            set() if is_open else {"DEFAULT_CLOSED"}
-        )
+        others = getattr(panel, "bl_options", set()) - {"DEFAULT_CLOSED"}
+        panel.bl_options = others if is_open else others | {"DEFAULT_CLOSED"}
         bpy.utils.register_class(panel)
 
     def scroll(self, steps: int, area: str = "VIEW_3D") -> Steps:

@@ -106,8 +106,10 @@ def _model_figures(sheet: Iterable[Sequence[Graph]]) -> "Iterator[Figure]":
             for artist in drawn:
                 artist.remove()
             drawn = [one for each, graph in zip(axes, graphs, strict=False) for one in _draw(each, graph, size=1.0)]
-            title = figure.text(0.012, 0.988, _title(graphs[0]), fontsize=8.5, fontweight="bold", ha="left", va="top")
-            drawn.append(title)
+            place: dict[str, Any] = {"transform": figure.transFigure, "ha": "left", "va": "top"}
+            drawn.append(axes[0].text(0.012, 0.988, _title(graphs[0]), fontsize=8.5, fontweight="bold", **place))
+            for artist in drawn:
+                artist.set_animated(True)
         yield figure
 
 
@@ -135,7 +137,14 @@ def sheet_figure(sheet: Sequence[Sequence[Graph]]) -> "Figure":
                 _labels(each, graph, x=i == len(sheet) - 1, short=True)
             row[0].set_title(_title(graphs[0]), fontsize=7.5, fontweight="bold", loc="left", pad=7.0)
         _legend(figure, sheet[0][0])
+        for each in grid[:-1, 1:].flat:  # which have the places of those in the first column and in the last row
+            each.set_in_layout(False)
         _lay_out(figure)
+        for row in grid[:-1]:
+            side = row[0].get_position()
+            for each, last in zip(row[1:], grid[-1, 1:], strict=True):
+                below = last.get_position()
+                each.set_position((below.x0, side.y0, below.width, side.height))
         for row, graphs in zip(grid, sheet, strict=True):
             for each, graph in zip(row, graphs, strict=True):
                 _draw(each, graph, size=0.62)
@@ -170,10 +179,14 @@ def save_named(
     progress: Progress = silent,
     total: int = 0,
 ) -> tuple[Path, ...]:
-    """Write (name, figure) pairs into a folder, each in all formats; returns the files. `total`: how many there are."""
+    """Write (name, figure) pairs into a folder, each in all formats; returns the files. `total`: how many there are.
+
+    A figure that follows itself may have changed in its animated artists only.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     written = []
+    painter = _Painter()
     with ThreadPoolExecutor(1) as pool:  # packs a picture while the next figure is drawn
         packed: Future[None] | None = None
         for done, (name, figure) in enumerate(figures, start=1):
@@ -182,7 +195,7 @@ def save_named(
                 if kind != "png":
                     save_figure(figure, written[-1])
                     continue
-                picture = _picture(figure)
+                picture = painter.paint(figure)
                 if packed is not None:
                     packed.result()
                 packed = pool.submit(_save_picture, picture, written[-1])
@@ -197,25 +210,40 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
     from matplotlib import rc_context
 
     if Path(path).suffix == ".png":
-        _save_picture(_picture(figure), Path(path))
+        _save_picture(_Painter().paint(figure), Path(path))
         return
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
     with rc_context(STYLE), output_file(path) as draft:
         figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated)
 
 
-def _picture(figure: "Figure") -> "Image":
-    """Drawn once, without a place for transparency, where Matplotlib's own way to a PNG file draws twice."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from PIL import Image
+class _Painter:
+    """Draws figures as pictures, each once, where Matplotlib's own way to a PNG file draws twice; what stays behind the
+    animated artists of one that follows itself is not drawn again."""
 
-    with rc_context(STYLE):
-        figure.set_dpi(DPI)
-        canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
-        canvas.draw()
-        picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
-        return picture.convert("RGB")
+    def __init__(self) -> None:
+        self._figure: Figure | None = None
+        self._behind: Any = None
+
+    def paint(self, figure: "Figure") -> "Image":
+        from matplotlib import rc_context
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from PIL import Image
+
+        with rc_context(STYLE):
+            canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
+            moving = [one for axes in figure.axes for one in axes.get_children() if one.get_animated()]
+            moving.sort(key=lambda artist: artist.zorder)
+            if figure is not self._figure:
+                figure.set_dpi(DPI)
+                canvas.draw()
+                self._figure, self._behind = figure, canvas.copy_from_bbox(figure.bbox) if moving else None
+            elif moving:
+                canvas.restore_region(self._behind)
+            for artist in moving:
+                figure.draw_artist(artist)
+            picture = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
+            return picture.convert("RGB")  # which has no place for transparency
 
 
 def _save_picture(picture: "Image", path: Path) -> None:

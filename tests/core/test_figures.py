@@ -7,6 +7,7 @@ import struct
 import time
 from dataclasses import replace
 from html.parser import HTMLParser
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -111,11 +112,34 @@ def test_no_note_leaves_its_axes(impacts, predictions, many) -> None:
         for axes in figure.axes:
             box = axes.get_window_extent()
             for note in axes.texts:
+                if note.get_transform() is figure.transFigure:  # the title of the figure
+                    continue
                 listed += "Beyond" in note.get_text()
                 extent = note.get_window_extent()
                 assert box.x0 - 1 < extent.x0, note.get_text()
                 assert extent.x1 < box.x1 + 1, note.get_text()
     assert listed == 2 * 4 * (1 + len(sheet))
+
+
+def test_graphs_of_a_sheet_stand_in_rows_and_columns_without_touching(impacts, predictions) -> None:
+    pytest.importorskip("matplotlib", reason="matplotlib is not installed")
+    from rockfall.core.analysis.figures import sheet_figure
+
+    sheet = make_sheet(impacts, predictions)
+    figure = sheet_figure(sheet)
+    figure.canvas.draw()
+    places = np.array([axes.get_position().bounds for axes in figure.axes]).reshape(len(sheet), -1, 4)
+    np.testing.assert_allclose(places[:, :, [0, 2]], np.broadcast_to(places[:1, :, [0, 2]], places[..., :2].shape))
+    np.testing.assert_allclose(places[:, :, [1, 3]], np.broadcast_to(places[:, :1, [1, 3]], places[..., :2].shape))
+    grid = np.array(figure.axes).reshape(len(sheet), -1)
+    for row in grid:
+        for left, right in pairwise(row):
+            assert left.get_window_extent().x1 < right.yaxis.get_tightbbox().x0
+    for above, below in pairwise(grid):
+        # of the row above the lowest is its axis, without a name; of the row below the highest is its heading
+        assert above[0].get_window_extent().y0 > below[0].get_tightbbox().y1
+    assert grid[-1, 0].get_tightbbox().y0 >= 0.0
+    assert grid[0, 0].yaxis.get_tightbbox().x0 >= 0.0
 
 
 def test_the_same_figure_is_the_same_file(figures, impacts, predictions, tmp_path) -> None:

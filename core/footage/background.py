@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion of the background: how every frame of hand-held or stabilised footage lies on the first one.
 
-Corners are followed by pyramidal Lucas–Kanade (Bouguet 2001) with a forward-backward check (Kalal et al. 2010). They
-are always compared with the frame in which they were found, not with the one before, so that errors do not add up; a
-homography to the reference frame is estimated robustly (MAGSAC++, Barath et al. 2020), then by least squares.
+Corners are followed by pyramidal Lucas–Kanade (Bouguet 2001) in pictures of the same exposure, each now and then
+followed back to where it came from (Kalal et al. 2010). They are always compared with the frame in which they were
+found, not with the one before, so that errors do not add up; a homography to the reference frame is estimated robustly
+(MAGSAC++, Barath et al. 2020), then by least squares.
 """
 
 from dataclasses import dataclass
@@ -18,16 +19,20 @@ from .sources import Source, frames
 
 GRID = (16, 10)
 PER_CELL = 4
-WINDOW_PX = 21
+WINDOW_PX = 17
 LEVELS = 3
-FINE, COARSE = (30, 0.005), (10, 0.03)
+FINE, COARSE = (30, 0.02), (10, 0.03)
 """Most steps of Lucas and Kanade, and the step that ends them [px]."""
 GUESSED_FROM, GUESS_INLIER_PX = 100, 4.0
 """So many corners tell about where all have gone."""
 TOGETHER = 0.8
 LARGEST = 2_200_000
 """Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
+LEVELLED = 0.01
+"""By how much brightness may differ from frame to frame before it is made the same."""
 FORWARD_BACKWARD_PX = 0.5
+CHECKED = 4
+"""Each corner is followed back to where it came from in one of so many frames."""
 INLIER_PX = 1.5
 FEWEST = 12
 FEWEST_SHARE = 0.25
@@ -184,7 +189,7 @@ class _Follower:
         self.pixel = self.reference = np.zeros((0, 2))
         self.count = self.key_count = 0
         self.key, self.key_pixel = grey, self.pixel
-        self.small = _quartered(grey)
+        self.small = self.key_small = _quartered(grey)
         self._renew(grey)
         if self.names.size < FEWEST:
             raise _lost(frame, f"only {self.names.size} corners are found in it")
@@ -193,9 +198,11 @@ class _Follower:
         """Follow all corners into the next frame."""
         small = _quartered(grey)
         guess, levels = self._guess(small)
-        pixel, good = _flow(self.key, grey, self.key_pixel, guess, levels)
-        back, back_good = _flow(grey, self.key, np.where(good[:, None], pixel, guess), self.key_pixel, 0, COARSE)
-        good &= back_good & (np.hypot(*(back - self.key_pixel).T) < FORWARD_BACKWARD_PX)
+        bright = _as_bright(grey, _brightness(small, guess) / _brightness(self.key_small, self.key_pixel))
+        pixel, good = _flow(self.key, bright, self.key_pixel, guess, levels)
+        checked = np.flatnonzero(good & (self.names % CHECKED == frame % CHECKED))
+        back, back_good = _flow(bright, self.key, pixel[checked], self.key_pixel[checked], 0, COARSE)
+        good[checked] = back_good & (np.hypot(*(back - self.key_pixel[checked]).T) < FORWARD_BACKWARD_PX)
         height, width = grey.shape
         good &= (pixel > 1).all(axis=1) & (pixel < (width - 2, height - 2)).all(axis=1)
         if good.sum() < FEWEST:
@@ -234,7 +241,7 @@ class _Follower:
         self.count += len(fresh)
         self.pixel = np.concatenate([self.pixel, fresh])
         self.reference = np.concatenate([self.reference, _through(self.homography, fresh)])
-        self.key, self.key_pixel, self.key_count = grey, self.pixel, self.names.size
+        self.key, self.key_small, self.key_pixel, self.key_count = grey, self.small, self.pixel, self.names.size
 
 
 def _reduced(grey: np.ndarray) -> tuple[np.ndarray, float]:
@@ -250,6 +257,21 @@ def _quartered(grey: np.ndarray) -> np.ndarray:
     cv2 = opencv()
     small: np.ndarray = cv2.pyrDown(cv2.pyrDown(grey))
     return small
+
+
+def _brightness(small: np.ndarray, pixel: Array) -> Array:
+    """(n,) grey levels at corners, told from a picture a quarter as wide and high."""
+    column, row = (np.clip(pixel / 4, 0, (small.shape[1] - 1, small.shape[0] - 1)) + 0.5).astype(np.intp).T
+    return small[np.minimum(row, small.shape[0] - 1), np.minimum(column, small.shape[1] - 1)].astype(np.float64) + 1.0
+
+
+def _as_bright(grey: np.ndarray, ratio: Array) -> np.ndarray:
+    """A picture with the exposure of another one, which corners tell: the flow takes grey levels as kept."""
+    factor = float(np.median(ratio))
+    if abs(factor - 1.0) < LEVELLED:
+        return grey
+    levelled: np.ndarray = opencv().convertScaleAbs(grey, alpha=1.0 / factor)
+    return levelled
 
 
 def _corners(grey: np.ndarray, taken: Array) -> Array:

@@ -78,6 +78,24 @@ def test_hand_held_panning_is_followed_without_drift() -> None:
     assert motion.inliers.min() > 100
 
 
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_an_exposure_that_changes_does_not_bend_the_path(sign: int) -> None:
+    """The camera looks into the sun, or away from it, and the pictures change their brightness by a third."""
+    count = 40
+    pictures = film(count, noise=1.0)
+    exposed = [
+        np.clip(picture * (1 + sign * 0.33 * frame / count), 0, 255).astype(np.uint8)
+        for frame, picture in enumerate(pictures)
+    ]
+    points = np.array([[0.0, 0.0], [400, 0], [0, 300], [400, 300], [200, 150]])
+    motion, _ = background_motion(clip(exposed))
+    worst = max(
+        float(np.hypot(*(stabilise(motion, np.full(5, frame), points) - true_places(frame, points)).T).max())
+        for frame in range(count)
+    )
+    assert worst < 0.35
+
+
 def test_a_homography_is_the_least_squares_fit_to_the_corners_that_agree() -> None:
     rng = np.random.default_rng(2)
     reference = rng.uniform(0, 400, (120, 2))

@@ -23,6 +23,9 @@ DONE, BAD_INPUT, USAGE, SIGNALLED = 0, 1, 2, 128
 """The exit status; of a process that a signal has ended it is `SIGNALLED` plus its number: 130 after Ctrl+C."""
 TRACEBACK = "ROCKFALL_TRACEBACK"
 """Variable of the environment with which an error that nobody has foreseen is shown as Python shows it."""
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "1")
+"""Of linear algebra, unless somebody asks for more, before NumPy is loaded: the matrices are small, and threads that wait
+for each other take longer than the work. Rows are spread over the cores by Rockfall itself."""
 CLOSED_PIPE = 141
 """What a shell says of a tool that a closed pipe has ended, as in ``rockfall models | head -1``."""
 
@@ -67,6 +70,7 @@ examples:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted, 141 output closed."""
     end_with_parent_if_asked()
+    os.environ.setdefault(*ONE_THREAD)
     try:
         with handled(interrupt):
             status = _run(list(sys.argv[1:] if argv is None else argv))

@@ -54,7 +54,7 @@ class TextTable:
 
     def cells(self, name: str) -> list[str]:
         """(n,) of a column that is there, without surrounding blanks."""
-        if isinstance(self.columns, PlainCells):
+        if isinstance(self.columns, Cells):
             return self.columns.texts(name)
         return [cell for block in self.columns[name] for cell in block.split(BETWEEN)]
 

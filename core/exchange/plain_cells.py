@@ -20,7 +20,21 @@ LINE = 10
 
 
 class Cells(Mapping[str, Sequence[str]]):
-    """The columns of a table as texts of some rows each, which are also there as numbers."""
+    """The columns of a table as texts of some rows each, which are also there as single cells and as numbers.
+
+    `block` rows are a text, with `between` between their cells.
+    """
+
+    block: int
+    between: str
+
+    def __getitem__(self, name: str) -> list[str]:
+        cells = self.texts(name)
+        return [self.between.join(cells[i : i + self.block]) for i in range(0, len(cells), self.block)]
+
+    @abstractmethod
+    def texts(self, name: str) -> list[str]:
+        """(n,) cells of a column, without surrounding blanks."""
 
     @abstractmethod
     def numbers(self, name: str, required: bool) -> Array | None:
@@ -69,10 +83,6 @@ class PlainCells(Cells):
 
     def __len__(self) -> int:
         return len(self.place)
-
-    def __getitem__(self, name: str) -> list[str]:
-        cells = self.texts(name)
-        return [self.between.join(cells[i : i + self.block]) for i in range(0, len(cells), self.block)]
 
     def texts(self, name: str) -> list[str]:
         """(n,) cells of a column, without surrounding blanks."""

@@ -19,13 +19,14 @@ from ..plausibility import implausible, limits
 from ..reading import reader
 from ..vectors import Array, Names
 from .parquet_cells import SUFFIX, read_cells, renamed
-from .plain_cells import Cells, PlainCells, plain_rows
+from .plain_cells import Cells, PlainCells, PlainRows, plain_rows
 from .units import OtherUnit, if_in_unit, other_units, unknown_unit, unknown_units
 
 BLOCK_ROWS, BETWEEN = 20_000, "\0"
 """So many rows of a column are kept as one text, cells between zero bytes: a fifth of the memory of single cells."""
 MOST_OF_CELL = 60
 """Letters of a cell that a message shows."""
+LINE_END = re.compile(rb"[\r\n]")
 EXPORT_ADVICE = "Export it as comma-separated text in UTF-8, with . decimals"
 
 
@@ -53,6 +54,8 @@ class TextTable:
 
     def cells(self, name: str) -> list[str]:
         """(n,) of a column that is there, without surrounding blanks."""
+        if isinstance(self.columns, Cells):
+            return self.columns.texts(name)
         return [cell for block in self.columns[name] for cell in block.split(BETWEEN)]
 
     def text(self, name: str, default: str = "") -> list[str]:
@@ -160,7 +163,7 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     separator = _separator(data)
     plain = plain_rows(data) if separator == "," else None
     if plain is not None:
-        return _plain_table(path, *plain, required, known)
+        return _plain_table(path, plain, required, known)
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(data), "utf-8-sig", newline=""), strict=True, delimiter=separator)
     header: list[str] = []
     blocks: list[list[str]] = []
@@ -200,13 +203,11 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
     return _in_known_units(TextTable(path, columns, numbers, converted, _decimal(data, separator)), header, known, top)
 
 
-def _plain_table(
-    path: Path, names: list[str], data: bytes, begins: np.ndarray, required: Sequence[str], known: Sequence[str]
-) -> TextTable:
-    header, converted = _in_our_units(path, names, known, 1)
+def _plain_table(path: Path, rows: PlainRows, required: Sequence[str], known: Sequence[str]) -> TextTable:
+    header, converted = _in_our_units(path, list(rows.header), known, 1)
     _check_header(path, header, required, known, 1)
-    cells = PlainCells(np.frombuffer(data, np.uint8), begins, header, BLOCK_ROWS, BETWEEN)
-    return _in_known_units(TextTable(path, cells, range(2, len(begins) + 1), converted), header, known, 1)
+    cells = PlainCells(rows, header, BLOCK_ROWS, BETWEEN)
+    return _in_known_units(TextTable(path, cells, range(2, len(rows.begins) + 1), converted), header, known, 1)
 
 
 def _parquet_table(path: Path, required: Sequence[str], known: Sequence[str]) -> TextTable:
@@ -226,7 +227,10 @@ def _in_known_units(table: TextTable, header: list[str], known: Sequence[str], r
 
 def _separator(data: bytes) -> str:
     """What stands between the cells, by the header: a comma, else semicolons or tabs."""
-    header = next((line for line in data.splitlines() if line.strip()), b"")
+    blank = len(data) - len(data.lstrip())
+    start = max(data.rfind(b"\n", 0, blank), data.rfind(b"\r", 0, blank)) + 1
+    end = LINE_END.search(data, blank)
+    header = data[start : end.start() if end else len(data)] if blank < len(data) else b""
     return next((sign for sign in (",", ";", "\t") if sign.encode() in header), ",")
 
 
@@ -289,7 +293,8 @@ def _checked(path: Path, data: bytes) -> bytes:
     if b"\0" in data:
         raise InputError("This is a binary file, not a table", file=path, advice=EXPORT_ADVICE)
     try:
-        data.decode()
+        if not data.isascii():
+            data.decode()
     except UnicodeDecodeError as error:
         row = data.count(b"\n", 0, error.start) + 1
         raise InputError("The text is not in UTF-8", file=path, row=row, advice=EXPORT_ADVICE) from error

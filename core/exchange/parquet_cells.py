@@ -39,12 +39,11 @@ class ParquetCells(Cells):
     def __len__(self) -> int:
         return len(self.table.column_names)
 
-    def __getitem__(self, name: str) -> list[str]:
+    def texts(self, name: str) -> list[str]:
+        """(n,) cells of a column, without surrounding blanks."""
         if name not in self.table.column_names:
             raise KeyError(name)
-        cells = [_text(value) for value in self.table.column(name).to_pylist()]
-        starts = range(0, len(cells), self.block)
-        return [self.between.join(cells[start : start + self.block]) for start in starts]
+        return [_text(value) for value in self.table.column(name).to_pylist()]
 
     def numbers(self, name: str, required: bool) -> Array | None:
         """(n,) a column, NaN where it is null; None when it holds anything else, or a null if `required`."""

@@ -235,14 +235,15 @@ def read_impacts(path: str | Path, shift: GlobalShift | None = None) -> Impacts:
     arrays["position"] = shift.to_local(survey)
     marks = _marks(table.text("flags"))
 
-    computed = apparent(arrays["v1"], arrays["v2"], arrays["normal"])
-    judged = ("rn", "rt", "r", "theta1", "theta_dev")
-    for name, attribute, component, _ in _DERIVED:
-        if component is None and name not in table.columns:
+    derived = [column for column in _DERIVED if column[2] is None and column[0] not in table.columns]
+    if derived or "flags" not in table.columns:
+        computed = apparent(arrays["v1"], arrays["v2"], arrays["normal"])
+        for _, attribute, _, _ in derived:
             value = getattr(computed, attribute)
-            arrays[attribute] = np.where(computed.approach >= 0, np.nan, value) if attribute in judged else value
-    if "flags" not in table.columns:
-        marks["departing"], marks["into_ground"] = computed.approach >= 0, computed.escape < 0
+            judged = attribute in ("rn", "rt", "r", "theta1", "theta_dev")
+            arrays[attribute] = np.where(computed.approach >= 0, np.nan, value) if judged else value
+        if "flags" not in table.columns:
+            marks["departing"], marks["into_ground"] = computed.approach >= 0, computed.escape < 0
     if "kinetic1_J" not in table.columns:
         for name, velocity in (("kinetic1_j", arrays["v1"]), ("kinetic2_j", arrays["v2"])):
             arrays[name] = 0.5 * arrays["mass_kg"] * dot(velocity, velocity)

@@ -6,7 +6,8 @@ from math import inf, sqrt
 import numpy as np
 
 from ..compiled import kernel
-from ..terrain.kernels import STACK_SIZE, nearest_hit, nearest_point
+from ..terrain.kernels import STACK_SIZE, nearest_point
+from ..terrain.ray_kernels import hits_anything
 from .ground_kernels import first_contact, is_in
 
 ABOVE_M = 1e-6
@@ -35,7 +36,7 @@ def _is_free(tree, stack, p, q):  # type: ignore[no-untyped-def]
     if away == 0.0:
         return True
     direction = (way[0] / away, way[1] / away, way[2] / away)
-    return nearest_hit(tree, stack, p, direction, away)[1] < 0
+    return not hits_anything(tree, stack, p, direction, away)
 
 
 @kernel

@@ -55,8 +55,10 @@ def hits_anything(tree, stack, origin, direction, limit):  # type: ignore[no-unt
     kx, ky = (kz + 1) % 3, (kz + 2) % 3
     sz = 1.0 / direction[kz]
     sx, sy = direction[kx] * sz, direction[ky] * sz
-    stack[0] = 0
-    top = 1 if enter_box(bounds, 0, ox, oy, oz, ix, iy, iz, limit) < np.inf else 0
+    top = 0
+    if enter_box(bounds, 0, ox, oy, oz, ix, iy, iz, limit) < np.inf:
+        stack[0] = 0
+        top = 1
     while top:
         top -= 1
         node = stack[top]
@@ -68,12 +70,18 @@ def hits_anything(tree, stack, origin, direction, limit):  # type: ignore[no-unt
         left = first[node]
         near_left = enter_box(bounds, left, ox, oy, oz, ix, iy, iz, limit)
         near_right = enter_box(bounds, left + 1, ox, oy, oz, ix, iy, iz, limit)
-        nearer = left if near_left <= near_right else left + 1
-        if max(near_left, near_right) < np.inf:
-            stack[top] = 2 * left + 1 - nearer
-            top += 1
-        if min(near_left, near_right) < np.inf:
-            stack[top] = nearer
+        if near_left <= near_right:  # branches, which the processor foresees: choices by number take half as long again
+            if near_right < np.inf:
+                stack[top] = left + 1
+                top += 1
+            if near_left < np.inf:
+                stack[top] = left
+                top += 1
+        else:
+            if near_left < np.inf:
+                stack[top] = left
+                top += 1
+            stack[top] = left + 1
             top += 1
     return False
 

@@ -58,6 +58,46 @@ def test_cells_are_those_of_the_csv_module_and_numbers_those_of_python(tmp_path,
         np.testing.assert_array_equal(table.numbers(name), expected)
 
 
+def test_digits_of_any_number_are_those_of_python_wherever_a_part_of_the_file_ends(tmp_path, monkeypatch):
+    monkeypatch.setattr(plain_cells, "CHUNK_BYTES", 900)
+    rng = np.random.default_rng(6)
+    digits = rng.integers(0, 10, (6000, 24))
+    before, behind, zeros = rng.integers(0, 23, 6000), rng.integers(0, 23, 6000), rng.integers(0, 4, 6000)
+    cells = []
+    for i, row in enumerate(digits):
+        text = "".join(map(str, row))
+        whole, part = text[: before[i]], ("0" * int(zeros[i]) + text)[: behind[i]]
+        point = "." if part or not whole else ""
+        cells.append("-" * int(i % 3 == 0) + (whole or "0" * int(i % 2 or not part)) + point + part)
+    cells += ["0", "-0", "-0.0", "0.000", "00000000", "000000001", "99999999", "12345678.87654321", "5.", ".25", "1e3"]
+    rows = [f"b,{cells[i]},{cells[-i]}" for i in range(len(cells))]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["trajectory,x_m,v1x_mps", *rows]))
+    read = plain_cells.plain_rows(path.read_bytes())
+    assert read is not None
+    assert not read.kinds[1:].any()
+    expected = [[float(cell) for cell in row.split(",")[1:]] for row in rows]
+    np.testing.assert_array_equal(read.values[1:].T.view(np.uint64), np.array(expected).view(np.uint64))
+
+
+def test_a_column_is_text_when_a_part_of_the_file_has_text_in_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(plain_cells, "CHUNK_BYTES", 64)
+    names = [*map(str, range(50)), " block\u2028", "\x1cé\x0b", "", *map(str, range(50))]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["trajectory,x_m", *(f"{name},{i}" for i, name in enumerate(names))]), newline="")
+    table = read_table(path, ("trajectory",), KNOWN)
+    assert table.columns.numbers("trajectory", False) is None
+    assert table.text("trajectory") == [name.strip() for name in names]
+    assert table.numbers("x_m", required=True).tolist() == list(range(103))
+
+
+def test_blank_rows_above_the_header_are_passed_over(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n \t\n\r\n trajectory;x_m\na,b;1,5\n", newline="")
+    table = read_table(path, ("trajectory",), KNOWN)
+    assert (table.text("trajectory"), table.numbers("x_m").tolist()) == (["a,b"], [1.5])
+
+
 @pytest.mark.parametrize(
     ("bad", "problem"),
     [

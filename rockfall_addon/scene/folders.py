@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Collections of ours that an undo of Blender has left outside of all scenes come back to where they hung.
 
-Now and then (Blender 5.2, also without Rockfall), the undo of a deleted collection brings it back with all that is in it,
-but not into the collection or scene that it was in: the data-block that is read again for a while may lie where the
-deleted one lay, and what points there is then taken for a reference to itself.
+Now and then (Blender 5.2, also without Rockfall), the undo of a deleted collection brings it back with all that is in
+it, but not into what it hung in. Probably because Blender reads that again, for a while, to where the deleted one
+lay, and takes what points there for a reference to itself.
 """
 
 from collections.abc import Iterator

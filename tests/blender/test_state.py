@@ -246,7 +246,8 @@ def test_a_collection_that_was_taken_out_of_the_scene_stays_out_after_an_undo(sc
     scene.collection.objects.link(bpy.data.objects.new("other", None))
     bpy.ops.ed.undo_push(message="another")
     scene = undo()
-    assert "other" not in scene.objects and shown(scene) == (0, 0, 0, 0)
+    assert "other" not in scene.objects
+    assert shown(scene) == (0, 0, 0, 0)
     scene = undo()
     assert shown(scene) == (10, 2, 2, 6)
     assert shown(undo("redo")) == (0, 0, 0, 0)

@@ -10,7 +10,7 @@ from ..film.job import AS_SET_UP, BLEND, GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
 from . import render_film
-from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, whole
+from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, naming, whole
 from .progress import PrintedProgress
 
 FILES = {"film": "rockfall.mp4", "still": "rockfall.png", "slope": "slope.png"}
@@ -105,7 +105,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
     parameters = model_parameters(arguments, models or simulate, known)
-    preset = find_preset(project, arguments.preset or PREVIEW.name)
+    with naming(str(arguments.project)):
+        preset = find_preset(project, arguments.preset or PREVIEW.name)
     maker = film_maker()
     kind: Kind = "slope" if arguments.slope else "still" if arguments.still else "film"
     name = FILES[kind]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import add_terrain_colours, model_parameters, models_as_asked, not_negative, positive, whole
+from .options import add_terrain_colours, model_parameters, models_as_asked, naming, not_negative, positive, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -112,7 +112,8 @@ def _request(arguments: argparse.Namespace) -> "FilmRequest":
 
     find_kind(arguments.film)
     project = read_project(arguments.project)
-    preset = find_preset(project, arguments.preset or DEFAULT_PRESET)
+    with naming(str(arguments.project)):
+        preset = find_preset(project, arguments.preset or DEFAULT_PRESET)
     models = models_as_asked(arguments.model)
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
     if preset.time_scale != 1.0 and arguments.rate is None:

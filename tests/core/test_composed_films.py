@@ -469,6 +469,12 @@ def test_texts_stand_inside_the_picture(film: str, size: tuple[int, int], langua
             assert one.box.bottom <= made.height, (k, one)
 
 
+@pytest.mark.parametrize("size", [(32, 18), (120, 68), (400, 30)])
+def test_a_picture_too_small_for_its_impacts_is_refused(size: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match=rf"{size[0]} × {size[1]} pixels is too small for \d+ impacts.*--preset"):
+        compose(find_kind("contact_sheet"), open_material(FilmRequest("contact_sheet", DEMO / "project.toml", *size)))
+
+
 def test_simulated_blocks_keep_to_their_parabolas_up_to_the_impact() -> None:
     """Between two records of a run, as the engine wrote them, a block is where gravity alone brings it."""
     from rockfall.core.film.composed.falls import simulated_falls

@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="graphs beside the slope that follow the film's time: of the impacts, whose points appear as they happen, "
         "or of the motion (speed, height above ground, energy)",
     )
-    parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
+    parser.add_argument("--frames", metavar="A-B", type=_frames, help="only these frames; the first one is 0")
     render_film.add_arguments(parser)
     picture = parser.add_mutually_exclusive_group()
     picture.add_argument(
@@ -133,6 +133,13 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{preset.width}×{preset.height}{said}")
     print(f"Written: {Path(arguments.out) / name}")
     return 0
+
+
+def _frames(text: str) -> tuple[int, int]:
+    try:
+        return parse_frames(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is no frame, and no range of frames such as 25-50") from error
 
 
 def _render_scene(arguments: argparse.Namespace) -> int:

@@ -105,7 +105,7 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
             yield FrameStore(folder)
         finally:
             with suppress(OSError):
-                if [file.name for file in folder.iterdir()] == [LOCK]:  # not one frame could be written
+                if not (folder / STATED).exists():  # it is no folder of frames, and nothing could be written
                     (folder / LOCK).unlink()
             os.close(lock)
 

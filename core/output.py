@@ -42,36 +42,55 @@ def output_folder(path: str | Path) -> Iterator[Path]:
     KeyboardInterrupt : when it came while the files were moved, after that, with a message that says so.
     """
     path = Path(path).absolute()
-    if path.exists() and not path.is_dir():
-        raise InputError("This is a file, not a folder", file=path, advice="Give --out the name of a folder")
-    made = [folder for folder in (path.parent, *path.parent.parents) if not folder.exists()]
-    complete = False
+    _refuse_file(path)
+    with made_folder(path.parent, path), _staging(path) as staging:
+        draft = staging if staging.parent == path else staging / path.name
+        try:
+            draft.mkdir(exist_ok=True)
+            yield draft
+            files = [file for file in sorted(draft.rglob("*")) if not file.is_dir() and file != staging / LOCK]
+            for file in files:
+                with _told(file, final_path(file)):
+                    _sync(file)
+            with uninterrupted(f"{path} is complete"):
+                _move(draft, files, path)
+        except OSError as error:
+            in_the_way = error.filename is not None and str(error.filename).startswith((str(draft), str(path)))
+            if not in_the_way and error.errno not in FULL:
+                raise
+            place = path if error.filename is None else final_path(Path(error.filename))
+            raise _refusal("The output cannot be written", error, place) from error
+
+
+@contextmanager
+def made_folder(folder: Path, place: Path | None = None) -> Iterator[None]:
+    """A folder that is there, with those above it; on an error, what was made and is empty is removed again.
+
+    Parameters
+    ----------
+    place : what is named where it cannot be made; None for the folder.
+
+    Raises
+    ------
+    InputError : it cannot be made, or a file is in the way.
+    """
+    if place is None:
+        _refuse_file(folder)
+    made = [one for one in (folder.absolute(), *folder.absolute().parents) if not one.exists()]
     try:
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise _refusal("The output folder cannot be made", error, path) from error
-        with _staging(path) as staging:
-            draft = staging if staging.parent == path else staging / path.name
-            try:
-                draft.mkdir(exist_ok=True)
-                yield draft
-                files = [file for file in sorted(draft.rglob("*")) if not file.is_dir() and file != staging / LOCK]
-                for file in files:
-                    with _told(file, final_path(file)):
-                        _sync(file)
-                with uninterrupted(f"{path} is complete"):
-                    _move(draft, files, path)
-                    complete = True
-            except OSError as error:
-                in_the_way = error.filename is not None and str(error.filename).startswith((str(draft), str(path)))
-                if not in_the_way and error.errno not in FULL:
-                    raise
-                place = path if error.filename is None else final_path(Path(error.filename))
-                raise _refusal("The output cannot be written", error, place) from error
-    finally:
-        if not complete:
-            _remove_empty(made)
+            raise _refusal("The output folder cannot be made", error, place or folder) from error
+        yield
+    except BaseException:
+        _remove_empty(made)
+        raise
+
+
+def _refuse_file(path: Path) -> None:
+    if path.exists() and not path.is_dir():
+        raise InputError("This is a file, not a folder", file=path, advice="Give --out the name of a folder")
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from .scene import (
     comparison,
     defaults,
     fingerprints,
+    folders,
     footage,
     graph_settings,
     impact_rows,
@@ -78,6 +79,7 @@ def _restored(scene: bpy.types.Scene, _unused: object = None) -> None:
     strip.forget()
     trail_lines.forget()
     terrain_mesh.mistrust()
+    folders.put_back()
     _keep_rate(scene)
     footage.follow(scene)
     sync.sync(scene, undone=True)
@@ -115,6 +117,8 @@ def _chosen() -> None:
 @problems.guarded
 def _catch_up() -> None:
     """Files of older versions, and picks that were changed while nobody watched."""
+    if not any(map(migration.is_newer, bpy.data.scenes)):
+        folders.remember()
     for scene in bpy.data.scenes:
         migration.migrate(scene)
         defaults.begin(scene)

@@ -4,7 +4,7 @@
 import argparse
 from pathlib import Path
 
-from .options import add_out, positive
+from .options import add_out, naming, positive
 from .progress import PrintedProgress
 from .show_options import add_show_options, show_as_asked
 
@@ -46,7 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     command = animator_command()
     files = [Path(arguments.out) / f"{STEM}.{ending}" for ending in formats]
     with PrintedProgress() as progress:
-        show = open_show(request, progress)
+        with naming(str(arguments.project)):
+            show = open_show(request, progress)
         animation = animate(show, arguments.rate, arguments.block, progress)
         write_animation(animation, files, command, progress)
     for remark in show.remarks:

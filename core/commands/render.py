@@ -10,7 +10,7 @@ from ..film.job import AS_SET_UP, BLEND, GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
 from . import render_film
-from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, whole
+from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, naming, whole
 from .progress import PrintedProgress
 
 FILES = {"film": "rockfall.mp4", "still": "rockfall.png", "slope": "slope.png"}
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="graphs beside the slope that follow the film's time: of the impacts, whose points appear as they happen, "
         "or of the motion (speed, height above ground, energy)",
     )
-    parser.add_argument("--frames", metavar="A-B", type=parse_frames, help="only these frames; the first one is 0")
+    parser.add_argument("--frames", metavar="A-B", type=_frames, help="only these frames; the first one is 0")
     render_film.add_arguments(parser)
     picture = parser.add_mutually_exclusive_group()
     picture.add_argument(
@@ -105,7 +105,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
     parameters = model_parameters(arguments, models or simulate, known)
-    preset = find_preset(project, arguments.preset or PREVIEW.name)
+    with naming(str(arguments.project)):
+        preset = find_preset(project, arguments.preset or PREVIEW.name)
     maker = film_maker()
     kind: Kind = "slope" if arguments.slope else "still" if arguments.still else "film"
     name = FILES[kind]
@@ -132,6 +133,13 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"{preset.width}×{preset.height}{said}")
     print(f"Written: {Path(arguments.out) / name}")
     return 0
+
+
+def _frames(text: str) -> tuple[int, int]:
+    try:
+        return parse_frames(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text} is no frame, and no range of frames such as 25-50") from error
 
 
 def _render_scene(arguments: argparse.Namespace) -> int:

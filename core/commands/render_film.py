@@ -2,11 +2,12 @@
 """``rockfall render PROJECT --film NAME``: a film that is composed of footage, reconstruction and models."""
 
 import argparse
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .options import add_terrain_colours, model_parameters, models_as_asked, not_negative, positive, whole
+from .options import add_terrain_colours, model_parameters, models_as_asked, naming, not_negative, positive, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -112,7 +113,8 @@ def _request(arguments: argparse.Namespace) -> "FilmRequest":
 
     find_kind(arguments.film)
     project = read_project(arguments.project)
-    preset = find_preset(project, arguments.preset or DEFAULT_PRESET)
+    with naming(str(arguments.project)):
+        preset = find_preset(project, arguments.preset or DEFAULT_PRESET)
     models = models_as_asked(arguments.model)
     known = checked_parameters(project.extra["models"], arguments.project) if "models" in project.extra else None
     if preset.time_scale != 1.0 and arguments.rate is None:
@@ -142,11 +144,19 @@ def _request(arguments: argparse.Namespace) -> "FilmRequest":
 
 
 def _impacts(text: str) -> tuple[int, ...]:
-    return () if text == "none" else tuple(whole(part) for part in text.split(","))
+    try:
+        return () if text == "none" else tuple(whole(part) for part in text.split(","))
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{text} are not the numbers of impacts, such as 2,5, or none") from error
 
 
 def _sun(text: str) -> tuple[float, float]:
-    azimuth, elevation = (float(part) for part in text.split(","))
+    try:
+        azimuth, elevation = (float(part) for part in text.split(","))
+    except ValueError:
+        azimuth = elevation = nan
     if not (0 <= azimuth <= 360 and 0 < elevation <= 90):
-        raise ValueError(text)
+        raise argparse.ArgumentTypeError(
+            f"{text} is no place of the sun: azimuth 0 to 360 and elevation above 0 to 90, such as 315,50"
+        )
     return azimuth, elevation

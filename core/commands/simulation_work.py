@@ -3,6 +3,7 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,6 +14,7 @@ from .options import (
     measured_as_asked,
     model_parameters,
     models_as_asked,
+    naming,
     reading_as_asked,
     terrain_as_asked,
 )
@@ -111,10 +113,11 @@ def _screens(
     from ..hazard.screens import check_screens
 
     screens = (*stated, *(screen for file in files for screen in read_screens(file, ground.shift)))
-    check_screens(screens, ground)
-    for screen in screens:
-        if screen.name in ground.structures:
-            raise InputError(f"{screen.name!r} is a screen and a structure", advice="Give each a name of its own")
+    with naming(" and ".join(files)) if files else nullcontext():
+        check_screens(screens, ground)
+        for screen in screens:
+            if screen.name in ground.structures:
+                raise InputError(f"{screen.name!r} is a screen and a structure", advice="Give each a name of its own")
     return screens, {f"screens:{Path(file).name}": Path(file) for file in files}
 
 

@@ -4,7 +4,7 @@
 import argparse
 from pathlib import Path
 
-from .options import add_out
+from .options import add_out, naming
 from .progress import PrintedProgress
 from .show_options import add_show_options, show_as_asked
 
@@ -32,7 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_language(arguments.language)
     request = show_as_asked(arguments)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
-        show = open_show(request, progress)
+        with naming(str(arguments.project)):
+            show = open_show(request, progress)
         page = make_page(show, arguments.language, progress=progress)
         write_text(folder / NAME, page.text)
     for remark in show.remarks:

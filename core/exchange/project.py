@@ -232,19 +232,6 @@ class Project:
         """The block of a trajectory, or the project's default block."""
         return next((block for block in self.blocks if block.name == trajectory), self.block)
 
-    def preset(self, name: str) -> RenderPreset:
-        """A render preset by its name.
-
-        Raises
-        ------
-        InputError : the project has no such preset; the message lists those that it has.
-        """
-        found = next((preset for preset in self.render if preset.name == name), None)
-        if found is None:
-            known = ", ".join(preset.name for preset in self.render) or "none"
-            raise InputError(f"The project has no render preset {name!r}", advice=f"Known presets: {known}")
-        return found
-
 
 NO_PROJECT = (".csv", ".tsv", ".txt", ".parquet", ".ply", ".obj", ".las", ".laz", ".mp4", ".mov", ".blend", ".json")
 """Endings of files that people give in the place of a project."""

@@ -90,7 +90,7 @@ def read_attribute_zones(
     rest, found = table.rest(VALUE_KNOWN), _Properties()
     for i, name in enumerate(names):
         try:
-            _take(found, name, {key: cells[i] for key, cells in rest.items()}, models, Path(path))
+            _take(found, name, {key: str(cells[i]) for key, cells in rest.items()}, models, Path(path))
         except InputError as error:
             raise table.error(i, error.problem, error.advice or "Correct it") from error
     if isinstance(terrain, Surface) and not attribute.of_faces:

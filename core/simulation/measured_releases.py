@@ -184,19 +184,22 @@ def start_times(reconstruction: Reconstruction) -> dict[str, float]:
     }
 
 
+def _number(cell: str) -> float:
+    try:
+        return float(cell or "nan")
+    except ValueError:
+        raise InputError(
+            f"The place of a take-off is no number: {cell}", advice=f"Correct {', '.join(TAKE_OFF[:3])}"
+        ) from None
+
+
 def _take_off_places(impacts: Impacts) -> Array:
     """(n, 3) where blocks leave the ground, survey coordinates [m]: at the impact, but for those with a take-off."""
     landing = impacts.shift.to_survey(impacts.position)
     names = TAKE_OFF[:3]
     if not all(name in impacts.extra for name in names):
         return landing
-    try:
-        columns = [[float(cell or "nan") for cell in impacts.extra[name].tolist()] for name in names]
-    except ValueError as error:
-        raise InputError(
-            f"The place of a take-off is no number: {error}", advice=f"Correct {', '.join(names)}"
-        ) from None
-    place = np.array(columns).T
+    place = np.array([[_number(cell) for cell in impacts.extra[name].tolist()] for name in names]).T
     return np.where(np.isfinite(place).all(axis=1)[:, None], place, landing)
 
 

@@ -33,6 +33,7 @@ CAMERA_ROLE = "camera"
 SET_ASIDE = "rockfall_set_aside"  # of scenes, picks and actions: values that cannot be used, by their keys
 HAS_SET_ASIDE = "rockfall_has_set_aside"  # of the scene: whether picks or values are
 COLLECTION_NAME = "rockfall_name"  # of a collection: a person may rename it
+HANGS_IN = "rockfall_hangs_in"  # of a collection: the session's numbers of those that it is in
 
 # of the scene: the project
 SCHEMA = "rockfall_schema"
@@ -286,7 +287,7 @@ def out_of_view(scene: bpy.types.Scene, name: str) -> Iterator[None]:
 
 def _new_collection(parent: bpy.types.Collection, name: str) -> bpy.types.Collection:
     child = bpy.data.collections.new(name)
-    child[COLLECTION_NAME] = name
+    child[COLLECTION_NAME], child[HANGS_IN] = name, [parent.session_uid]
     parent.children.link(child)
     _comings[0] += 1
     return child

@@ -22,6 +22,7 @@ from . import (
     block_keys,
     copies,
     fingerprints,
+    folders,
     impact_rows,
     keepers,
     keyframes,
@@ -199,9 +200,11 @@ def sync(
             return _sync(scene, names, dragging, again, undone, {})
     _busy.append(scene.session_uid)
     try:
-        return _sync_with_keepers(scene, names, again, undone)
+        done = _sync_with_keepers(scene, names, again, undone)
     finally:
         _busy.pop()
+    done.step_changed = folders.remember() or done.step_changed
+    return done
 
 
 def _sync_with_keepers(scene: bpy.types.Scene, names: Iterable[str] | None, again: bool, undone: bool) -> Done:

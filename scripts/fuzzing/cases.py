@@ -8,6 +8,7 @@ from pathlib import Path
 
 import examples
 import numpy as np
+import shown
 import simulations
 from examples import CAMERAS, DATA, FOOTAGE, SHIFT, head_of
 from rockfall.core.cli import main
@@ -56,7 +57,7 @@ def cases(folder: Path) -> dict[str, Case]:
     package = {f"package/{path.name}": path.read_bytes() for path in (folder / "package").glob("*.[cj]s*")}
     found["package"] = Case(package, tuple(package), lambda at: _package(at / "package"))
     shutil.rmtree(folder, ignore_errors=True)
-    return found | _simulations(terrains["b.ply"]) | _commands(terrains["b.ply"])
+    return found | _simulations(terrains["b.ply"]) | _shown(terrains["b.ply"], folder) | _commands(terrains["b.ply"])
 
 
 def _package(path: Path) -> object:
@@ -101,6 +102,16 @@ def _simulations(terrain: bytes) -> dict[str, Case]:
     return found | {
         f"rockfall {name}": Case(files, damaged, _ran(*words), command=True, slow=True)
         for name, (damaged, words) in simulations.COMMANDS.items()
+    }
+
+
+def _shown(terrain: bytes, folder: Path) -> dict[str, Case]:
+    """What films, pages and animations read."""
+    files = {"terrain.ply": terrain, **shown.files(folder)}
+    found = {name: Case(files, damaged, read) for name, (damaged, read) in shown.readers().items()}
+    return found | {
+        f"rockfall {name}": Case(files, damaged, _ran(*words), command=True, slow=True)
+        for name, (damaged, words) in shown.COMMANDS.items()
     }
 
 

@@ -205,6 +205,54 @@ def test_a_deleted_collection(scene: bpy.types.Scene, part) -> None:
     assert shown(scene) == (10, 2, 2, 6)
 
 
+def folder_of(name: str) -> bpy.types.Collection:
+    return next(c for c in bpy.data.collections if c.get("rockfall_name") == name)
+
+
+def undo(how: str = "undo") -> bpy.types.Scene:
+    getattr(bpy.ops.ed, how)()
+    return bpy.context.scene
+
+
+@pytest.mark.parametrize("name", ["Rockfall", "Trajectories", "A"])
+def test_a_collection_that_an_undo_leaves_outside_of_the_scene_comes_back(scene: bpy.types.Scene, name: str) -> None:
+    """Blender forgets now and then where the collection hung that an undo brings back: here it is made to."""
+
+    def forget(*_unused: object) -> None:
+        for parent in (bpy.context.scene.collection, *bpy.context.scene.collection.children_recursive):
+            for child in parent.children:
+                if child.get("rockfall_name") == name:
+                    parent.children.unlink(child)
+
+    before, everything_in = shown(scene), sorted(obj.name for obj in scene.objects)
+    bpy.ops.ed.undo_push(message="before")
+    bpy.data.collections.remove(folder_of(name))
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="deleted")
+    bpy.app.handlers.undo_post.insert(0, forget)
+    try:
+        scene = undo()
+    finally:
+        bpy.app.handlers.undo_post.remove(forget)
+    assert shown(scene) == before
+    assert sorted(obj.name for obj in scene.objects) == everything_in
+
+
+def test_a_collection_that_was_taken_out_of_the_scene_stays_out_after_an_undo(scene: bpy.types.Scene, part) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    scene.collection.children.unlink(folder_of("Rockfall"))
+    part("rockfall_addon.scene.sync").sync(scene)
+    bpy.ops.ed.undo_push(message="taken out")
+    scene.collection.objects.link(bpy.data.objects.new("other", None))
+    bpy.ops.ed.undo_push(message="another")
+    scene = undo()
+    assert "other" not in scene.objects
+    assert shown(scene) == (0, 0, 0, 0)
+    scene = undo()
+    assert shown(scene) == (10, 2, 2, 6)
+    assert shown(undo("redo")) == (0, 0, 0, 0)
+
+
 def test_appended_into_a_scene_with_another_origin_and_rate(part, project: Path, tmp_path: Path) -> None:
     scene = bpy.context.scene
     part("rockfall_addon.scene.project").load_project(scene, project)

@@ -2,6 +2,8 @@
 """Composed films: what is drawn stands where the camera model of another library puts it, at the right moment."""
 
 import csv
+import errno
+import os
 from pathlib import Path
 
 import cv2
@@ -369,6 +371,59 @@ def test_a_full_disk_is_said_and_finished_frames_stay(tmp_path: Path, monkeypatc
     assert sorted(file.name for file in (tmp_path / "f").glob("*.png")) == ["000000.png", "000001.png"]
 
 
+def test_a_folder_of_frames_that_another_run_has_just_removed_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rockfall.core.film.composed import frame_store as module
+
+    lock, ended = module.try_lock, []
+
+    def other_run_ends(descriptor: int) -> bool:
+        if not ended:
+            ended.append((tmp_path / "f" / ".lock").unlink())
+            (tmp_path / "f").rmdir()
+        return lock(descriptor)
+
+    monkeypatch.setattr(module, "try_lock", other_run_ends)
+    with frame_store(tmp_path / "f", {}) as store:
+        assert store.fill(range(2), lambda _: np.zeros((2, 2, 3), np.uint8), lambda *_: None) == 0
+        with pytest.raises(InputError, match="Another run"), frame_store(tmp_path / "f", {}):
+            pass
+    assert ended
+
+
+@pytest.mark.parametrize("how", ["full", "a file", "below a file", "read-only"])
+@pytest.mark.parametrize("frames", [False, True])
+def test_frames_and_stills_that_cannot_be_written_leave_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, frames: bool
+) -> None:
+    """As on a full or read-only disk, or where a file is in the way of the folder; the old picture stays."""
+    from rockfall.core.film.composed import making
+
+    file, out = tmp_path / "a file", tmp_path / "new" / "film"
+    file.write_text("a person's")
+    wanted = {"a file": (file, "This is a file, not a folder"), "below a file": (file / "x", "Not a directory")}
+    out, words = wanted.get(how, (out, "No space left" if how == "full" else "Read-only file system"))
+
+    def refuse(*_unused: object, **_also: object) -> None:
+        number = errno.ENOSPC if how == "full" else errno.EROFS
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(making, "open_material", lambda request, progress: type("M", (), {"remarks": []})())
+    monkeypatch.setattr(making, "_states", lambda request: {})
+    picture = type("P", (), {"picture": np.zeros((8, 8, 3), np.uint8)})
+    film = type("F", (), {"frames": 3, "width": 8, "height": 8, "fps": 25.0, "canvas": lambda self, frame: picture})()
+    monkeypatch.setattr(making, "compose", lambda kind, material: film)
+    if how in ("full", "read-only"):
+        monkeypatch.setattr(os, "fsync" if how == "full" else "mkdir", refuse)
+    with pytest.raises(InputError) as refused:
+        making.make_film(FilmRequest("turntable", tmp_path / "p.toml"), out, still=not frames, images=frames)
+    assert words in refused.value.problem
+    assert refused.value.advice
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+    assert file.read_text() == "a person's"
+
+
 def test_films_are_found_by_name_and_the_nearest_is_named() -> None:
     assert [kind.name for kind in KINDS if kind.is_picture] == list(PICTURES)
     assert {*FILMS, *PICTURES} == set(NAMES)
@@ -412,6 +467,12 @@ def test_texts_stand_inside_the_picture(film: str, size: tuple[int, int], langua
             assert one.box.top >= 0, (k, one)
             assert one.box.right <= made.width, (k, one)
             assert one.box.bottom <= made.height, (k, one)
+
+
+@pytest.mark.parametrize("size", [(32, 18), (120, 68), (400, 30)])
+def test_a_picture_too_small_for_its_impacts_is_refused(size: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match=rf"{size[0]} × {size[1]} pixels is too small for \d+ impacts.*--preset"):
+        compose(find_kind("contact_sheet"), open_material(FilmRequest("contact_sheet", DEMO / "project.toml", *size)))
 
 
 def test_simulated_blocks_keep_to_their_parabolas_up_to_the_impact() -> None:

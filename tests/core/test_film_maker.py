@@ -146,7 +146,7 @@ def test_a_film_that_succeeds_is_moved_into_place(
     assert (job.kind, job.engine, job.preset, job.frames) == ("film", "cycles", "hd", (5, 9))
     printed = capsys.readouterr()
     assert "1920×1080, rendered with Cycles" in printed.out
-    assert "There is no render preset 'blue'" in printed.err
+    assert f"{project}: There is no render preset 'blue'" in printed.err
 
 
 def test_a_blend_is_rendered_as_it_says(project: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -134,7 +134,7 @@ def test_everything_is_read(folder: Path) -> None:
     )
     assert right == VideoEntry("right")
     assert project.refinement == RefinementSettings(("clock", "camera"), loss="cauchy", extra={"kept": 1})
-    preset = project.preset("preview")
+    (preset,) = (one for one in project.render if one.name == "preview")
     assert (preset.width, preset.height, preset.engine, preset.stagger_s) == (640, 360, "cycles", 0.0)
     assert preset.camera == CameraPlacement((2600050.25, 1200000.0, 1300.0), (2600000.0, 1200000.0, 1250.0))
 
@@ -145,7 +145,7 @@ def test_unknown_keys_and_sections_survive_reading_and_writing(folder: Path) -> 
     assert project.extra["picks"] == {"encoding": "kept"}
     assert project.terrain is not None
     assert project.terrain.extra == {"tiles": ["kept"]}
-    assert project.preset("preview").extra == {"samples": 16}
+    assert [one.extra for one in project.render if one.name == "preview"] == [{"samples": 16}]
     write_project(project, folder / "again.toml")
     assert read_project(folder / "again.toml") == project
 
@@ -251,11 +251,6 @@ def test_a_file_that_is_missing_or_no_text(folder: Path) -> None:
 def test_a_project_without_picks_is_not_reconstructed() -> None:
     with pytest.raises(RockfallError, match=r"names no table of picks. Add \[picks\]"):
         open_project(Project())
-
-
-def test_an_unknown_preset_lists_the_known_ones(folder: Path) -> None:
-    with pytest.raises(InputError, match=r"cinema.*preview"):
-        read(folder, FULL).preset("cinema")
 
 
 def test_a_project_cannot_be_changed_in_place(folder: Path) -> None:

@@ -30,7 +30,7 @@ def case_random_walk(window):
     yield 1.0
     undo = window.part("rockfall_addon.scene.undo")
     extend = undo.extend_last_step
-    undo.extend_last_step = lambda: extend(walk.pushed)  # the walk stores the steps, not operators
+    undo.extend_last_step = lambda _name=None: extend(walk.pushed)  # the walk stores the steps, not operators
     try:
         for number in range(steps):
             with window.override():

@@ -12,9 +12,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...errors import InputError
-from ...file_locks import try_lock
+from ...file_locks import holds, try_lock
 from ...opencv import opencv
-from ...output import write_bytes, write_text
+from ...output import TRIES, made_folder, write_bytes, write_text
 from ...progress import Progress
 from .canvas import Picture
 
@@ -98,22 +98,39 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
     ------
     InputError : the folder cannot be made or holds other things, or another process is drawing into it.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
-    except OSError as error:
-        raise InputError(
-            f"The frames cannot be written ({error.strerror})", file=folder, advice="Choose another folder with --out"
-        ) from error
-    try:
-        if not try_lock(lock):
+    with made_folder(folder):
+        lock = _claim(folder)
+        try:
+            _prepare(folder, json.dumps(states, indent=2, sort_keys=True))
+            yield FrameStore(folder)
+        finally:
+            with suppress(OSError):
+                if not (folder / STATED).exists():  # it is no folder of frames, and nothing could be written
+                    (folder / LOCK).unlink()
+            os.close(lock)
+
+
+def _claim(folder: Path) -> int:
+    """The descriptor that holds a folder's lock, which a run that ends meanwhile removes with the folder."""
+    for _ in range(TRIES):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
             raise InputError(
-                "Another run of Rockfall is drawing these frames", file=folder, advice="Wait until it has ended"
-            )
-        _prepare(folder, json.dumps(states, indent=2, sort_keys=True))
-        yield FrameStore(folder)
-    finally:
+                f"The frames cannot be written ({error.strerror})",
+                file=folder,
+                advice="Choose another folder with --out",
+            ) from error
+        if not try_lock(lock):
+            os.close(lock)
+            break
+        if holds(lock, folder / LOCK):
+            return lock
         os.close(lock)
+    raise InputError("Another run of Rockfall is drawing these frames", file=folder, advice="Wait until it has ended")
 
 
 def _prepare(folder: Path, states: str) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...exchange.job_inputs import digest_of, input_files, input_hashes
 from ...opencv import opencv
-from ...output import output_file, write_bytes
+from ...output import made_folder, output_file
 from ...progress import Progress, silent
 from ...versions import versions
 from ..check import check_film, check_index, check_picture
@@ -79,16 +79,16 @@ def make_film(
     size = film.width, film.height
     if kind.is_picture or still:
         frame = 0 if kind.is_picture else first if frames else film.frames // 2
-        progress("Drawing", 0, 0)
         file = out / f"{name or kind.name}.png"
-        out.mkdir(parents=True, exist_ok=True)
-        write_bytes(file, opencv().imencode(".png", film.canvas(frame).picture)[1].tobytes())
-        check_picture(file, size)
+        with made_folder(out), output_file(file) as draft:
+            progress("Drawing", 0, 0)
+            draft.write_bytes(opencv().imencode(".png", film.canvas(frame).picture)[1].tobytes())
+            check_picture(draft, size)
         return Made(file, 1, 0, size, tuple(material.remarks))
     wanted = range(first, last + 1)
     name = name or kind.name
     folder = out / (name if images else f"{name}.frames")
-    with frame_store(folder, _states(request)) as store:
+    with made_folder(out), frame_store(folder, _states(request)) as store:
         kept = store.fill(wanted, lambda frame: film.canvas(frame).picture, progress)
         if images:
             return Made(folder, len(wanted), kept, size, tuple(material.remarks))

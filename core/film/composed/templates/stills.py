@@ -30,7 +30,7 @@ ROUND = 1.7
 """How much of the frame about the block is taken, in its radii."""
 SKY_M = 1e5
 COARSE, FAR_PX = 4, -1e4
-MOST_CELLS = 12
+MOST_CELLS, LEAST_CELL_PX = 12, 16
 CELL_PX_OF_BLOCK = 7.0
 """Width of a picture of the contact sheet, in diameters of the block, at least."""
 
@@ -126,13 +126,18 @@ def contact_sheet(material: Material) -> Canvas:
     sheet.text(material.title, look.margin, look.margin + look.heading, look.heading, PAPER, weight=STRONG)
     sheet.text(f"{words.say('contact_sheet')}: {words.say('measured')}. {material.block_words()}", look.margin,
                look.margin + look.heading + 1.5 * look.body, look.body, QUIET)  # fmt: skip
-    columns, lines = _grid(len(rows), width / (height - top))
+    columns, lines = _grid(len(rows), width / max(height - top, 1))
     gap = 2 * look.gap
     caption = round(2 * 1.4 * look.small + look.gap)
     cell = (
         (width - 2 * look.margin - (columns - 1) * gap) // columns,
         (height - top - look.margin - (lines - 1) * gap) // lines,
     )
+    if min(cell[0], cell[1] - caption) < LEAST_CELL_PX:
+        raise InputError(
+            f"A picture of {width} × {height} pixels is too small for {len(rows)} impacts",
+            advice="Give --preset a larger one",
+        )
     for i, (fall, row) in enumerate(rows):
         left, upper = look.margin + (i % columns) * (cell[0] + gap), top + (i // columns) * (cell[1] + gap)
         _cell(material, sheet, fall, row, Box(left, upper, left + cell[0], upper + cell[1]), caption)

@@ -3,7 +3,6 @@
 
 import itertools
 import math
-import textwrap
 from collections.abc import Sequence
 
 import blf
@@ -17,6 +16,7 @@ from mathutils import Vector
 from ...scene import alignment, camera_paths, clocks, pairs, problems, store, video_files, videos
 from ...scene.next_step import ALIGN_TOOL
 from ...view import image_view
+from ...view.wrapping import wrapped
 from . import marking
 
 RING, CROSS, TEXT, HINT, GAP = 8.0, 6.0, 14.0, 14.0, 12.0  # in pixels at interface scale 1
@@ -169,10 +169,7 @@ def _draw_hint(context: bpy.types.Context, camera: bpy.types.Object, through: bo
 def _paragraph(context: bpy.types.Context, said: str, colour: Colour, size: float, scale: float) -> None:
     """Text in a box at the top, between what lies over the view."""
     left, right = _free_span(context.area, context.region)
-    blf.size(0, size)
-    room = max(right - left - 40 * scale, 80 * scale)
-    characters = max(12, int(len(said) * room / max(blf.dimensions(0, said)[0], 1.0)))
-    lines = textwrap.wrap(said, characters)
+    lines = wrapped(said, max(right - left - 40 * scale, 80 * scale), size)
     widths = [blf.dimensions(0, line)[0] for line in lines]
     step, middle = 1.45 * size, (left + right) / 2
     top = context.region.height - _covered_top(context.area) - 10 * scale

@@ -30,7 +30,7 @@ MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler th
     "release": (0.00, 0.62, 0.45),
     "pass": (0.62, 0.70, 0.78),
     "contact": (0.00, 0.45, 0.70),
-    "stop": (0.84, 0.37, 0.00),
+    "stop": (0.94, 0.89, 0.26),
     "takeoff": (0.84, 0.74, 0.90),
 }
 MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the rough surface

@@ -23,8 +23,7 @@ RING, CROSS, TEXT, HINT, GAP = 8.0, 6.0, 14.0, 14.0, 12.0  # in pixels at interf
 SEGMENTS, OUTLINE = 32, 6
 SHADE = (0.0, 0.0, 0.0, 0.65)
 BOX = (0.05, 0.06, 0.08, 0.85)
-WRONG = (1.0, 0.25, 0.2)
-PALETTE_ROOM = 7
+WRONG = (1.0, 0.55, 0.0)
 
 type Colour = tuple[float, float, float, float]
 type Line = Sequence[tuple[float, float]]
@@ -140,7 +139,7 @@ def _colour(pair: pairs.Pair, solution: alignment.Solution) -> Colour:
 def palette(number: int) -> tuple[float, float, float]:
     """The colour of a pair, as the theme's collections have them, which the panel shows as icons."""
     colours = bpy.context.preferences.themes[0].collection_color
-    red, green, blue = colours[number % min(PALETTE_ROOM, len(colours))].color
+    red, green, blue = colours[pairs.FIRST_COLOUR + number % pairs.COLOURS].color
     return tuple(0.7 * value + 0.3 for value in (red, green, blue))  # lighter, to be read on any picture
 
 

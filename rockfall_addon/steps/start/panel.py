@@ -52,7 +52,7 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
         for action in step.actions:
             text, icon = LOOKS[action]
             if step.tile and action == "rockfall.import_terrain":
-                text = "Read Again with Ground Filter"
+                text = "Read Again with Another Unit" if step.unit_m else "Read Again with Ground Filter"
             operator = "wm.tool_set_by_id" if action == PICK_TOOL else action
             button = column.operator(operator, icon=icon, **({"text": text} if text else {}))
             if action == PICK_TOOL:
@@ -60,7 +60,11 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
             elif action == "rockfall.look_through":
                 button.identifier = step.video
             elif step.tile and action == "rockfall.import_terrain":
-                button.replaces, button.ground = step.tile, "FILTER"
+                button.replaces = step.tile
+                if step.unit_m:
+                    button.unit_m = step.unit_m
+                else:
+                    button.ground = "FILTER"
 
 
 CLASSES = (ROCKFALL_PT_start,)

@@ -10,6 +10,7 @@ import uuid
 from collections import Counter
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -253,7 +254,7 @@ def read(
         angular_velocity=_doubles(objects, store.SPIN, 3),
         row=[obj.get(store.ROW, 0) for obj in objects],
         extra={name: np.array([str(extra.get(name, "")) for extra in extras], dtype=np.str_) for name in names},
-        source=str(scene.get(store.PICKS_SOURCE, "")),
+        source=Path(str(scene.get(store.PICKS_SOURCE, ""))).name,  # its folder would fill the panel
         shift=georeference.read_shift(scene),
         sort=True,
     )

@@ -221,7 +221,7 @@ def warnings(scene: bpy.types.Scene) -> list[str]:
             said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
         said += [remark.text for remark in (*_oversized(tile), *_vegetated(tile))]
         reach = float(tile.get(store.REACH, 0.0))
-        if reach > LARGE_COORDINATE_M:
+        if reach > LARGE_COORDINATE_M and not _oversized(tile):
             step = float(np.spacing(np.float32(reach))) * 1000
             said.append(
                 f"{tile.name} reaches {reach / 1000:.0f} km from the project's origin. Blender is single precision and "

@@ -2,6 +2,7 @@
 """Step 1: the terrain."""
 
 import textwrap
+from dataclasses import replace
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
@@ -129,7 +130,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
                 raise
             found = inspect_terrain(self.filepath, unit_m=MILLIMETRE_M)
         self.unit_m = MILLIMETRE_M
-        return found
+        said = "In metres it would be beyond every survey: millimetres are proposed."
+        return replace(found, summary=(said, *found.summary))
 
     def draw(self, context: bpy.types.Context) -> None:
         if not self.asked:

@@ -36,6 +36,8 @@ BEYOND_S = 1.0
 FAR_M = 1e6
 WIDEST_M = 100.0
 """No scan of a slope has its points this far apart."""
+FEWEST_OF_A_SCAN = 1000
+"""With fewer triangles a terrain may be a plane that was drawn."""
 STANDS_OUT_M = 1.0
 """No single point of the ground stands this far above or below all that surround it, but leaves and branches do."""
 MOST_STANDING_OUT = 0.02
@@ -69,7 +71,7 @@ def impossible_scan(extent: Array, triangles: int, name: str) -> tuple[Remark, .
     apart = float(np.sqrt(2 * extent[0] * extent[1] / max(triangles, 1)))
     if extent[2] > HIGHEST_RELIEF_M:
         why = f"is {extent[2]:,.0f} m high, more than any slope"
-    elif apart > WIDEST_M:
+    elif triangles >= FEWEST_OF_A_SCAN and apart > WIDEST_M:
         why = f"has its points {apart:,.0f} m apart, which is no scan of a slope"
     else:
         return ()

@@ -88,6 +88,10 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         hint = alignment.hint(scene, camera) or alignment.solution_of(camera).problem
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
         return NextStep(sentence, ("rockfall.align_views",))
+    for one in filter(alignment.is_to_be_followed, videos.cameras(scene)):
+        sentence = f"{one.name} moves, but has the pose of one frame so far: follow its background through the video."
+        action = "rockfall.follow_background" if one == camera else "rockfall.look_through"
+        return NextStep(sentence, (action,), str(one[store.ID]))
     waiting = next((one for one in videos.cameras(scene) if not camera_paths.is_solved(one)), None)
     if waiting is not None and not picks:
         sentence = (

@@ -131,6 +131,7 @@ def test_feet_taken_for_metres_put_most_flights_into_the_ground(feet, told):
     [
         ((100.0, 200.0, 90.0), 300_000, ""),
         ((30_000.0, 40_000.0, 2500.0), 2 * 300 * 400, ""),  # a coarse model of a whole valley
+        ((2000.0, 1000.0, 400.0), 2, ""),  # a plane that was drawn
         ((100e3, 200e3, 90e3), 300_000, "90,000 m high"),
         ((30e3, 30e3, 8000.0), 2 * 60 * 60, "points 500 m apart"),  # 30 m of a scan every 0.5 m, in millimetres
     ],

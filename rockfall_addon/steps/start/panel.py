@@ -22,6 +22,7 @@ LOOKS = {
     "rockfall.synchronise_videos": ("", "UV_SYNC_SELECT"),
     "rockfall.align_views": ("", "SPLIT_VERTICAL"),
     "rockfall.look_through": ("Look Through the Other Video", "VIEW_CAMERA"),
+    "rockfall.follow_background": ("", "TRACKING_FORWARDS"),
     "rockfall.propose_impacts": ("", "OUTLINER_OB_LIGHTPROBE"),
     "rockfall.apply_refinement": ("Apply", "CHECKMARK"),
     "rockfall.discard_refinement": ("Discard", "X"),

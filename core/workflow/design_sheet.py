@@ -170,7 +170,7 @@ def design_sheet(
         if not values:
             names = ", ".join(screen.name for screen in screens)
             raise InputError(
-                f"None of {counted.blocks} blocks with {one.model} comes to {names}",
+                f"None of {counted.blocks} blocks with {find_model(one.model).title} comes to {names}",
                 advice="Draw a screen where blocks pass, or release more",
             )
         maps = None if cells is None else cells.maps()

@@ -191,3 +191,15 @@ def test_text_fills_the_width_of_a_panel_and_is_nowhere_cut_off(part, words, sca
     for line, later in itertools.pairwise(lines):
         assert blf.dimensions(0, line)[0] < width - 82 * scale, "what stays free beside an icon, in a real window"
         assert blf.dimensions(0, f"{line} {later.split()[0]}")[0] > width - 100 * scale, "the next word had room"
+
+
+def test_two_videos_that_are_aligned_are_to_be_synchronised_now(part) -> None:
+    assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+    scene, wording = bpy.context.scene, part("rockfall_addon.steps.videos.wording")
+    first = part("rockfall_addon.scene.videos").cameras(scene)[0]
+    assert bpy.ops.rockfall.add_video(filepath=str(FOOTAGE)) == {"FINISHED"}
+    second = part("rockfall_addon.scene.videos").active_camera(scene)
+    assert "Once both are aligned, do so." in wording.warnings(scene, second)[0].text
+    paths = part("rockfall_addon.scene.camera_paths")
+    paths.set_camera_path(scene, second, paths.camera_path(first))
+    assert "Mark one event in both, and synchronise them." in wording.warnings(scene, second)[0].text

@@ -10,7 +10,7 @@ import bpy
 from .. import __package__ as ADDON_ID  # noqa: N812
 from .. import __version__
 from ..core.constants import ROCK_DENSITY_KGPM3
-from .scene.settings import BLOCK_SHAPES
+from .scene.settings import BLOCK_SHAPES, COLOURINGS
 
 problem = ""
 """Why nothing but this module is registered; empty when all is well. Set by the add-on's `register`."""
@@ -76,6 +76,10 @@ class RockfallPreferences(bpy.types.AddonPreferences):
     block_shape: bpy.props.EnumProperty(
         name="Block shape", description="Of the blocks of new projects", items=BLOCK_SHAPES, update=_changed
     )
+    colour_by: bpy.props.EnumProperty(
+        name="Colour by", description="What the colours of the flights mean in new projects", items=COLOURINGS,
+        default="SPEED", update=_changed,
+    )  # fmt: skip
     sigma_px: bpy.props.FloatProperty(
         name="Click ± [px]", description="Standard deviation of a click in the footage, in new projects",
         default=1.0, min=0.05, soft_max=10.0, precision=2, update=_changed,
@@ -89,7 +93,7 @@ class RockfallPreferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         layout.prop(self, "folder")
         layout.label(text="New projects begin with")
-        for name in ("block_diameter_m", "density_kgpm3", "block_shape", "sigma_px"):
+        for name in ("block_diameter_m", "density_kgpm3", "block_shape", "sigma_px", "colour_by"):
             layout.prop(self, name)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..impact_models.registry import find_model
 from ..remarks import Remark
 from ..simulation.ground import Ground
 from ..vectors import Array, Indices, Names
@@ -117,9 +118,10 @@ def whole_run_remarks(comparison: WholeRuns) -> tuple[Remark, ...]:
         )
         remarks.append(Remark(text, "note", "stops"))
     for model in comparison.simulated:
+        title = find_model(model).title
         known = [one for one in comparison.of(model) if np.isfinite(one.p_holm)]
         if not known:
-            text = f"{model}: too few runs were observed to tell anything ({FEWEST} are needed)."
+            text = f"{title}: too few runs were observed to tell anything ({FEWEST} are needed)."
             remarks.append(Remark(text, "warning", model))
             continue
         clearest = min(known, key=lambda one: one.p)
@@ -128,9 +130,9 @@ def whole_run_remarks(comparison: WholeRuns) -> tuple[Remark, ...]:
         what = f"{clearest.quantity.title}{where} (p = {clearest.p:.2g}, corrected {clearest.p_holm:.2g}"
         what += f"{_medians(clearest)})"
         if differ:
-            text = f"{model} differs from what was observed in {differ} of {len(known)} tests, most in {what}."
+            text = f"{title} differs from what was observed in {differ} of {len(known)} tests, most in {what}."
         else:
-            text = f"{model}: no difference seen in {len(known)} tests; the least probable is {what}."
+            text = f"{title}: no difference seen in {len(known)} tests; the least probable is {what}."
         remarks.append(Remark(text, "note", model))
     return tuple(remarks)
 

@@ -42,6 +42,14 @@ def turn_advice(rate_hz: float, turns_hz: float, spinning: str = "A block") -> s
     return f"{spinning} turns {turns_hz:.1f} times a second: {least}, this video has {rate_hz:.4g}{enough}."
 
 
+def uncountable(rate_hz: float, speed_mps: float, radius_m: float) -> str:
+    """That a block at this speed turns too fast to be counted when it rolls, a sentence; empty where it does not."""
+    turns = rolling_turns_hz(speed_mps, radius_m)
+    if not rate_hz < FRAMES_PER_TURN * turns * TELEVISION:
+        return ""
+    return turn_advice(rate_hz, turns, f"At {speed_mps:.3g} m/s a rolling block of {2 * radius_m:.3g} m diameter")
+
+
 def rate_advice(
     video: Video,
     *,

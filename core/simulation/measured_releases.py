@@ -166,13 +166,23 @@ def from_reconstruction(
     releases = _released(ground, start, sizes, blocks, number, seed, spin)
     remarks = []
     if begun_later:
-        text = f"{begun_later} of {len(names)} trajectories have no release; they start just after their first impact."
+        text = _first_impacts(begun_later, len(names))
         remarks.append(Remark(text, "note", "releases"))
     left = len(picks.group_starts) - len(names)
     if left:
-        text = f"{left} trajectories are left out: no velocity is known of a release or an impact."
+        which = "One trajectory is" if left == 1 else f"{left} trajectories are"
+        text = f"{which} left out: no velocity is known of a release or an impact."
         remarks.append(Remark(text, "advice", "releases"))
     return releases.with_remarks(*remarks)
+
+
+def _first_impacts(begun_later: int, count: int) -> str:
+    """Where blocks start whose trajectory was first seen at an impact."""
+    if begun_later == count:
+        who = "The trajectory begins" if count == 1 else "All trajectories begin"
+    else:
+        who = f"{begun_later} of {count} trajectories begin{'s' * (begun_later == 1)}"
+    return f"{who} with an impact instead of a release: the simulated blocks start just after it."
 
 
 def start_times(reconstruction: Reconstruction) -> dict[str, float]:

@@ -38,6 +38,7 @@ from ..analysis.run_statistics import (
 )
 from ..analysis.sections import Axis, Section, axis_of, crossings, default_sections
 from ..errors import InputError
+from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..remarks import Remark, gravest_first
 from ..simulation.engine import Recorded, Settings, check_settings, simulate
@@ -144,7 +145,9 @@ def back_analyse(
     estimates = estimates_of(priors, found, places)
     checks = predictive_checks(values, predicted, scales)
     folds = hold_out(values, table, simulated, sets, plain, settings.seed)
-    remarks = posterior_remarks(settings.model, len(values), estimates, checks, folds, found.effective)
+    remarks = posterior_remarks(
+        find_model(settings.model).title, len(values), estimates, checks, folds, found.effective
+    )
     draws = ParameterDraws(
         tuple(prior.name for prior in priors), _values_at(priors, found.place), found.weight,
         before=tuple(f"{one.prior}: {one.left}" for one in estimates),

@@ -170,7 +170,7 @@ def design_sheet(
         if not values:
             names = ", ".join(screen.name for screen in screens)
             raise InputError(
-                f"None of {counted.blocks} blocks with {one.model} comes to {names}",
+                f"None of {counted.blocks} blocks with {find_model(one.model).title} comes to {names}",
                 advice="Draw a screen where blocks pass, or release more",
             )
         maps = None if cells is None else cells.maps()
@@ -205,7 +205,7 @@ def _model_design(
     holdout: bool,
     progress: Progress,
 ) -> ModelDesign:
-    progress(f"Runs of {settings.model} to draw", 0, 0)
+    progress(f"Runs of {find_model(settings.model).title} to draw", 0, 0)
     some = np.unique(np.linspace(0, len(releases) - 1, min(DRAWN, len(releases))).astype(np.intp))
     drawn = simulate(ground, releases.take(some), settings)
     lines = np.degrees(run_figures(drawn).energy_line)[drawn.at_rest]
@@ -220,7 +220,7 @@ def evidence_of(
     model = find_model(settings.model)
     if model.draws_from_impacts:
         return None  # it is made of them
-    progress(f"{model.name} against the measured impacts", 0, 0)
+    progress(f"{model.title} against the measured impacts", 0, 0)
     try:
         predictions = compare(
             impacts, [model.name], {model.name: _parameters(settings)}, replicates=REPLICATES, seed=settings.seed
@@ -255,42 +255,42 @@ def _remarks(sheet: DesignSheet) -> list[Remark]:
     """What is not enough, and what is not known; the good news last."""
     found = []
     for one in sheet.models:
-        model = one.settings.model
+        model, title = one.settings.model, find_model(one.settings.model).title
         for screen in sheet.screens:
             values = one.values.get(screen.name)
             if values is None:
-                text = f"No block with {model} comes to {screen.name}: nothing is designed there."
+                text = f"No block with {title} comes to {screen.name}: nothing is designed there."
                 found.append(Remark(text, "warning", screen.name))
                 continue
             if values.faults:
-                text = f"{screen.name} is not enough for {model}: {'; '.join(values.faults)}."
+                text = f"{screen.name} is not enough for {title}: {'; '.join(values.faults)}."
                 found.append(Remark(text, "problem", screen.name))
             elif screen.holds:
-                found.append(Remark(f"{screen.name} is enough for what {model} says.", "note", screen.name))
+                found.append(Remark(f"{screen.name} is enough for what {title} says.", "note", screen.name))
             if not values.is_sample:
                 text = (
-                    f"Only {values.different} of {values.hits} hits at {screen.name} differ with {model}: it gives the "
+                    f"Only {values.different} of {values.hits} hits at {screen.name} differ with {title}: it gives the "
                     "same run to the same release. Release from an area, or blocks of several sizes; intervals are not "
                     "told."
                 )
                 found.append(Remark(text, "warning", screen.name))
             elif not values.is_known:
                 text = (
-                    f"{values.hits} hits at {screen.name} with {model} are too few for a {100 * sheet.share:g} % "
+                    f"{values.hits} hits at {screen.name} with {title} are too few for a {100 * sheet.share:g} % "
                     "value: release more blocks."
                 )
                 found.append(Remark(text, "warning", screen.name))
             elif max(values.energy_j.known_to, values.height_m.known_to) > KNOWN_TO:
                 text = (
                     f"At {screen.name} the energy is known to {100 * values.energy_j.known_to:.0f} % and the height to "
-                    f"{100 * values.height_m.known_to:.0f} % with {model}; {100 * KNOWN_TO:.0f} % is usual."
+                    f"{100 * values.height_m.known_to:.0f} % with {title}; {100 * KNOWN_TO:.0f} % is usual."
                 )
                 found.append(Remark(text, "advice", screen.name))
         if one.evidence is None:
             text = (
-                f"Nothing measured on this site supports {model} here: its parameters are taken on trust."
+                f"Nothing measured on this site supports {title} here: its parameters are taken on trust."
                 if sheet.measured is None
-                else f"Too few impacts were measured here to tell how well {model} fits them."
+                else f"Too few impacts were measured here to tell how well {title} fits them."
             )
             found.append(Remark(text, "warning", model))
     trees = sheet.models[0].settings.trees

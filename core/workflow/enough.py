@@ -9,6 +9,7 @@ import numpy as np
 from ..hazard.design import LEAST_DIFFERENT
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import ScreenHits
+from ..impact_models.registry import find_model
 from ..remarks import Remark
 from ..simulation.convergence import Quantile, quantile
 from ..simulation.release import Releases
@@ -37,16 +38,17 @@ def is_known(tally: ScreenTally, share: float) -> bool:
 
 def enough_remarks(model: str, tally: ScreenTally, share: float) -> list[Remark]:
     """How many blocks it took, or that they were not enough, and where."""
+    title = find_model(model).title
     percent = f"{100 * share:g} % values of energy and height"
     if is_known(tally, share):
-        text = f"{tally.blocks} blocks with {model} are enough: {percent} are known to {100 * KNOWN_TO:g} %."
+        text = f"{tally.blocks} blocks with {title} are enough: {percent} are known to {100 * KNOWN_TO:g} %."
         return [Remark(text, "note", model)]
     found = _reached(tally, share)
     if not found:
-        text = f"No block of {tally.blocks} with {model} reaches a screen: how many are enough is not known."
+        text = f"No block of {tally.blocks} with {title} reaches a screen: how many are enough is not known."
         return [Remark(text, "warning", model)]
     return [
-        Remark(f"{tally.blocks} blocks with {model} are not enough at {name}: {why}.", "warning", name)
+        Remark(f"{tally.blocks} blocks with {title} are not enough at {name}: {why}.", "warning", name)
         for name, values in found.items()
         if (why := _why_not(values))
     ]

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..hazard.tally import Arrays, Tally
+from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..simulation.engine import AT_ONCE, Recorded, RecordSpace, Settings, Simulation, joined, simulate
 from ..simulation.ground import Ground
@@ -143,7 +144,7 @@ def run_ensemble(
     numbers = range(-(-n // size))
     tallies, done = _kept(work.tallies, store)
     counted = sum(min(size, n - size * number) for number in done)
-    text = f"Simulating {work.settings.model}"
+    text = f"Simulating {find_model(work.settings.model).title}"
     progress(text, counted, n)
     left = ((i, first_run + i * size, releases.take(slice(i * size, (i + 1) * size))) for i in numbers if i not in done)
     alone = 0

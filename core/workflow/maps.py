@@ -11,6 +11,7 @@ from ..hazard.face_tally import FaceTally
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import Screen, check_screens
 from ..hazard.tally import Tally
+from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Settings, Simulation, check_settings, joined
@@ -88,7 +89,7 @@ def map_models(
         tallies += [hits] if screens else []
 
         def told(text: str, done: int = 0, _: int = 0, place: int = place, model: str = one.model) -> None:
-            progress(f"{text} {model}", place * n + done, len(settings) * n)
+            progress(f"{text} {find_model(model).title}", place * n + done, len(settings) * n)
 
         def enough(_: int, hits: ScreenTally = hits) -> bool:
             return until_known is not None and is_known(hits, until_known)
@@ -138,8 +139,9 @@ def map_remarks(tallies: Mapping[str, CellTally]) -> tuple[Remark, ...]:
     for model, tally in tallies.items():
         few, reached = tally.reached_by_few(FEW)
         cells = tally.cells
+        title = find_model(model).title
         text = (
-            f"Maps of {tally.blocks} blocks with {model}, in cells of {cells.size_m:g} m: {reached} cells are reached"
+            f"Maps of {tally.blocks} blocks with {title}, in cells of {cells.size_m:g} m: {reached} cells are reached"
         )
         if few:
             text += f", {few} of them by fewer than {FEW} blocks, whose 95 % values have no standard error"

@@ -12,6 +12,7 @@ from ..footage.background import BackgroundMotion, stabilise
 from ..reconstruction.block import per_pick
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
+from ..terrain.advice import HIGHEST_RELIEF_M
 from ..terrain.surface import Surface
 from ..vectors import Array, norm
 
@@ -33,6 +34,10 @@ TREMBLE_PX = 2.0
 BEYOND_S = 1.0
 """A block that is followed for longer than this after its last pick may well have hit the ground again."""
 FAR_M = 1e6
+WIDEST_M = 100.0
+"""No scan of a slope has its points this far apart."""
+FEWEST_OF_A_SCAN = 1000
+"""With fewer triangles a terrain may be a plane that was drawn."""
 STANDS_OUT_M = 1.0
 """No single point of the ground stands this far above or below all that surround it, but leaves and branches do."""
 MOST_STANDING_OUT = 0.02
@@ -59,6 +64,19 @@ def vegetated(share: float, name: str) -> tuple[Remark, ...]:
         f"{STANDS_OUT_M:g} m. Read it again with the ground filter."
     )
     return (Remark(text, "warning", "vegetation"),)
+
+
+def impossible_scan(extent: Array, triangles: int, name: str) -> tuple[Remark, ...]:
+    """A warning on a terrain of some extent (3,) [m] that cannot be a slope in metres: too high, or far too coarse."""
+    apart = float(np.sqrt(2 * extent[0] * extent[1] / max(triangles, 1)))
+    if extent[2] > HIGHEST_RELIEF_M:
+        why = f"is {extent[2]:,.0f} m high, more than any slope"
+    elif triangles >= FEWEST_OF_A_SCAN and apart > WIDEST_M:
+        why = f"has its points {apart:,.0f} m apart, which is no scan of a slope"
+    else:
+        return ()
+    text = f"{name} {why}: is its file in another unit? Read it again with the right one, 0.001 m for millimetres."
+    return (Remark(text, "warning", "scale"),)
 
 
 def tracks_off_the_motion(courses: Iterable[MotionCourse]) -> tuple[Remark, ...]:
@@ -119,7 +137,8 @@ def impossible_sizes(reconstruction: Reconstruction) -> tuple[Remark, ...]:
     Notes
     -----
     A fall of the height h gives 2 g h to the square of a speed, and no more. The block is held against the distances
-    between impacts.
+    between impacts. Where lengths and times do not belong together, parabolas do not follow the slope: most of them are
+    in the ground.
     """
     flights, picks = reconstruction.flights, reconstruction.picks
     diameter = per_pick(picks, reconstruction.block, lambda one: one.diameter_m)
@@ -146,6 +165,15 @@ def impossible_sizes(reconstruction: Reconstruction) -> tuple[Remark, ...]:
             text = (
                 f"Trajectory {name}: its speeds (typically {speed:.3g} m/s) are those of {why}. "
                 "Check the unit of the terrain, and the capture rate of the video."
+            )
+            remarks.append(Remark(text, "warning", name))
+            continue
+        under = reconstruction.clearance.below_terrain_m[own]
+        deep = int(np.count_nonzero(under > size / 2))
+        if 2 * deep > own.size:
+            text = (
+                f"Trajectory {name}: {deep} of its {own.size} flights pass under the terrain, up to "
+                f"{np.nanmax(under):.2g} m deep. Check the times of its picks, and the unit of the terrain."
             )
             remarks.append(Remark(text, "warning", name))
     return tuple(remarks)

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import HELD, OUTCOMES, OVER, THROUGH, Screen
+from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Simulation
@@ -44,27 +45,27 @@ def screen_remarks(tallies: Mapping[str, ScreenTally]) -> tuple[Remark, ...]:
 
 
 def _remarks_of_one(model: str, figures: ScreenFigures, behind: ScreenFigures) -> list[Remark]:
-    name, n = figures.screen.name, figures.reach
+    name, n, title = figures.screen.name, figures.reach, find_model(model).title
     if not n:
-        return [Remark(f"No block with {model} comes to {name}.", "warning", name)]
-    text = f"{n} of {figures.blocks} blocks with {model} come to {name} ({100 * figures.share:.3g} %)"
+        return [Remark(f"No block with {title} comes to {name}.", "warning", name)]
+    text = f"{n} of {figures.blocks} blocks with {title} come to {name} ({100 * figures.share:.3g} %)"
     if figures.speed_mps and figures.energy_j:
         text += f"; 95 % values: speed {_value(figures.speed_mps)} m/s, energy {_value(figures.energy_j, 1e-3)} kJ"
     if figures.height_m:
         text += f", height of the centre {_value(figures.height_m)} m"
     remarks = [Remark(f"{text}.", "note", name)]
     if n < FEW:
-        text = f"Only {n} block{'s' if n > 1 else ''} with {model} at {name}: too few for its 95 % values."
+        text = f"Only {n} block{'s' if n > 1 else ''} with {title} at {name}: too few for its 95 % values."
         remarks.append(Remark(text, "warning", name))
     if figures.screen.holds:
         counts = [behind.outcomes[OUTCOMES[place]] for place in (HELD, OVER, THROUGH)]
         text = (
-            f"{name} holds {counts[0]} of the {behind.hits} hits with {model}; {counts[1]} go over it, {counts[2]} "
+            f"{name} holds {counts[0]} of the {behind.hits} hits with {title}; {counts[1]} go over it, {counts[2]} "
             "through."
         )
         remarks.append(Remark(text, "note", name))
     elif behind.reach < n:
-        text = f"With the barriers {behind.reach} blocks with {model} come to {name}, without them {n}."
+        text = f"With the barriers {behind.reach} blocks with {title} come to {name}, without them {n}."
         remarks.append(Remark(text, "note", name))
     return remarks
 

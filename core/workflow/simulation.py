@@ -53,6 +53,8 @@ END_WORDS = {
 }
 MOST_LOOKED_AT = 50_000
 """Impacts from which the share of those beyond the measured conditions is found."""
+LONG_S = 1.0
+"""Less need not be said."""
 MUCH_BEYOND = 0.25
 """From this share on a result of the model observed is mostly one of conditions that nobody has measured."""
 
@@ -234,7 +236,7 @@ def _among(progress: Progress, model: str, before: int, total: int) -> Progress:
     """The progress of one model among all."""
 
     def counted(text: str, done: int = 0, _: int = 0) -> None:
-        progress(f"{text} {model}", before + done, total)
+        progress(f"{text} {find_model(model).title}", before + done, total)
 
     return counted
 
@@ -251,8 +253,11 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
     idle = [model for model in models if model not in begun]
     short = [simulation for simulation in simulations if len(simulation) < simulation.wanted]
     if short or idle:
-        parts = [f"{len(one)} of {one.wanted} blocks with {one.settings.model} are finished and kept" for one in short]
-        parts += [f"not begun: {', '.join(idle)}"] if idle else []
+        parts = [
+            f"{len(one)} of {one.wanted} blocks with {find_model(one.settings.model).title} are finished and kept"
+            for one in short
+        ]
+        parts += [f"not begun: {', '.join(find_model(model).title for model in idle)}"] if idle else []
         remarks.append(Remark(f"Stopped by you: {'; '.join(parts)}.", "warning", "cancelled"))
     for simulation in simulations:
         remarks += _remarks_of_one(simulation)
@@ -323,19 +328,20 @@ def _remarks_of_points(simulation: Simulation) -> list[Remark]:
 def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     """How the runs with one model ended."""
     remarks, model = [], simulation.settings.model
+    title = find_model(model).title
     n, counts = len(simulation), np.bincount(simulation.end, minlength=len(simulation.ends))
     limited = counts[ENDS.index(LIMIT)]
     if limited:
-        text = f"{limited} of {n} blocks with {model} {END_WORDS[LIMIT]}: they are not at rest."
+        text = f"{limited} of {n} blocks with {title} {END_WORDS[LIMIT]}: they are not at rest."
         remarks.append(Remark(text, "warning", model))
     through = int(fell_through(simulation).sum())
     if through:
-        text = f"{through} of {n} blocks with {model} fell through the terrain: it has holes larger than they are."
+        text = f"{through} of {n} blocks with {title} fell through the terrain: it has holes larger than they are."
         remarks.append(Remark(text, "warning", model))
     stayed = int((simulation.at_rest & (simulation.length_m < 2 * simulation.releases.radius_m)).sum())
     if stayed:
         text = (
-            f"{stayed} of {n} blocks with {model} stopped within their own diameter: the ground holds them where they "
+            f"{stayed} of {n} blocks with {title} stopped within their own diameter: the ground holds them where they "
             "are released. Release them from steeper ground, above it, or with a velocity."
         )
         remarks.append(Remark(text, "warning" if 2 * stayed > n else "note", model))
@@ -343,11 +349,11 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     words = END_WORDS | held
     ends = zip(simulation.ends, counts.tolist(), strict=True)
     ended = ", ".join(f"{count} {words[name]}" for name, count in ends if count)
-    text = f"{n} blocks with {model}, {simulation.impacts.sum()} impacts: {ended}."
+    text = f"{n} blocks with {title}, {simulation.impacts.sum()} impacts: {ended}."
     remarks.append(Remark(text, "note", model))
     if simulation.settings.trees is not None:
         text = (
-            f"{np.count_nonzero(simulation.tree_hits)} of {n} blocks with {model} hit trees, "
+            f"{np.count_nonzero(simulation.tree_hits)} of {n} blocks with {title} hit trees, "
             f"{simulation.tree_hits.sum()} times."
         )
         remarks.append(Remark(text, "note", model))
@@ -355,8 +361,10 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     flat = np.hypot(*(simulation.position - simulation.releases.position)[:, :2].T)
     text = (
         f"Run-out in plan {np.median(flat):.1f} m (median), {flat.max():.1f} m at most; speeds up to "
-        f"{simulation.v_max_mps.max():.1f} m/s. It took {simulation.seconds:.1f} s."
+        f"{simulation.v_max_mps.max():.1f} m/s."
     )
+    if simulation.seconds >= LONG_S:
+        text += f" It took {simulation.seconds:.0f} s."
     remarks.append(Remark(text, "note", model))
     if simulation.settings.draws is not None:
         remarks.append(Remark(_drawn_sentence(simulation.settings.draws), "note", model))
@@ -385,15 +393,13 @@ def _hit_structures(simulation: Simulation) -> list[Remark]:
     structures = simulation.ground.structures
     if not structures or np.count_nonzero(simulation.records.what == IMPACT) < simulation.impacts.sum():
         return []
-    hits, remarks = hits_of(simulation), []
+    hits, remarks, title = hits_of(simulation), [], find_model(simulation.settings.model).title
     run = simulation.records.run[hits.record]
     for place, name in enumerate(structures):
         own = hits.structure == place
         if own.any():
             blocks, beyond = np.unique(run[own]).size, np.unique(run[own & hits.passes]).size
-            text = (
-                f"{blocks} of {len(simulation)} blocks with {simulation.settings.model} hit {name}, {own.sum()} times"
-            )
+            text = f"{blocks} of {len(simulation)} blocks with {title} hit {name}, {own.sum()} times"
             remarks.append(Remark(f"{text}; {beyond} of them went on beyond it.", "note", name))
     return remarks
 

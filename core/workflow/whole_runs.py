@@ -130,7 +130,7 @@ def _from_others(
     parts, ends = [], np.flatnonzero(np.r_[releases.name[1:] != releases.name[:-1], True]) + 1
     for first, last in zip(np.r_[0, ends[:-1]].tolist(), ends.tolist(), strict=True):
         name = str(releases.name[first])
-        progress(f"Simulating {settings.model}", first, len(releases))
+        progress(f"Simulating {find_model(settings.model).title}", first, len(releases))
         others = replace(settings, measured=measured.without(measured.trajectory == name))
         part = releases.take(slice(first, last))
         simulation = simulate(ground, part, others, first_run=first, threads=threads)

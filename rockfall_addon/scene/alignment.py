@@ -78,6 +78,12 @@ def moves(camera: bpy.types.Object) -> bool:
     return camera.rockfall_alignment.motion != "FIXED"
 
 
+def is_to_be_followed(camera: bpy.types.Object) -> bool:
+    """Whether it is solved and moves, and has one frame's pose for all while nobody has followed its background."""
+    fixed = camera_paths.is_solved(camera) and camera_paths.camera_path(camera).is_fixed
+    return fixed and moves(camera) and store.FOLLOWED not in camera
+
+
 def keep_background(camera: bpy.types.Object, motion: BackgroundMotion) -> None:
     """Remember whether the background of a video says that its camera is no tripod."""
     camera[store.BACKGROUND] = to_text(no_tripod(motion, camera_paths.camera_path(camera).reference, camera.name))

@@ -6,7 +6,7 @@ import bpy
 from ... import __package__ as ADDON_ID  # noqa: N812
 from . import migration
 
-BLOCK, CLICK = ("block_diameter_m", "density_kgpm3", "block_shape"), ("sigma_px",)
+SHOWN, CLICK = ("block_diameter_m", "density_kgpm3", "block_shape", "colour_by"), ("sigma_px",)
 """Settings of reconstruction and of picking that the preferences have under the same names."""
 
 
@@ -15,7 +15,7 @@ def begin(scene: bpy.types.Scene) -> None:
     ours = bpy.context.preferences.addons.get(ADDON_ID)
     if ours is None or ours.preferences is None or migration.version(scene) is not None:
         return
-    for settings, names in ((scene.rockfall, BLOCK), (scene.rockfall_picking, CLICK)):
+    for settings, names in ((scene.rockfall, SHOWN), (scene.rockfall_picking, CLICK)):
         for name in names:
             wanted = getattr(ours.preferences, name)
             if getattr(settings, name) != wanted:

@@ -22,6 +22,12 @@ def read_shift(scene: bpy.types.Scene) -> GlobalShift:
     return GlobalShift()
 
 
+def forget_shift(scene: bpy.types.Scene) -> None:
+    """The project has no shift any more."""
+    for key in (store.SHIFT, store.CRS, store.VERTICAL, "crs x", "crs y", "SRID"):
+        scene.pop(key, None)
+
+
 def write_shift(scene: bpy.types.Scene, shift: GlobalShift) -> None:
     """Store the global shift, also where BlenderGIS looks for it."""
     scene[store.SHIFT] = [shift.x, shift.y, shift.z]

@@ -28,6 +28,7 @@ from . import (
 )
 
 ALIGN_TOOL, PICK_TOOL = "rockfall.align_tool", "rockfall.pick_tool"
+MILLIMETRE_M = 0.001
 
 
 @dataclass(frozen=True)
@@ -37,13 +38,15 @@ class NextStep:
     Attributes
     ----------
     video : id of the camera that is to be looked through, where that is an action.
-    tile : id of the terrain that is to be read again with the ground filter, where importing is an action.
+    tile : id of the terrain that is to be read again, where importing is an action.
+    unit_m : the unit that its file may have [m]; 0 where it is to be read with the ground filter.
     """
 
     sentence: str
     actions: tuple[str, ...] = ()
     video: str = ""
     tile: str = ""
+    unit_m: float = 0.0
 
 
 def next_step(scene: bpy.types.Scene) -> NextStep:
@@ -66,11 +69,13 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
     if apart:
         actions = ("rockfall.recover_picks", "rockfall.select_set_aside", "rockfall.remove_set_aside")
         return NextStep(apart[0].text, actions)
-    wooded = terrain.with_trees(scene)
-    if wooded and not picks and (camera is None or not camera_paths.is_solved(camera)):
-        sentence = " ".join(said for said in terrain.warnings(scene) if said.startswith(f"{wooded[0].name} "))
+    oversized, wooded = terrain.of_impossible_size(scene), terrain.with_trees(scene)
+    if (oversized or wooded) and not picks and (camera is None or not camera_paths.is_solved(camera)):
+        tile = (oversized or wooded)[0]
+        sentence = " ".join(said for said in terrain.warnings(scene) if said.startswith(f"{tile.name} "))
         rest = "rockfall.add_video" if camera is None else "rockfall.align_views"
-        return NextStep(sentence, ("rockfall.import_terrain", rest), tile=str(wooded[0].get(store.ID, "")))
+        unit_m = MILLIMETRE_M if oversized else 0.0
+        return NextStep(sentence, ("rockfall.import_terrain", rest), tile=str(tile.get(store.ID, "")), unit_m=unit_m)
     if camera is None and not picks:
         if store.has_role(scene, store.SIMULATED_BLOCKS_ROLE):
             sentence = "Play the simulated fall; step 7 has the numbers of each run."
@@ -83,6 +88,10 @@ def next_step(scene: bpy.types.Scene) -> NextStep:
         hint = alignment.hint(scene, camera) or alignment.solution_of(camera).problem
         sentence = hint or "Align the camera: mark the same places in the footage and on the terrain."
         return NextStep(sentence, ("rockfall.align_views",))
+    for one in filter(alignment.is_to_be_followed, videos.cameras(scene)):
+        sentence = f"{one.name} moves, but has the pose of one frame so far: follow its background through the video."
+        action = "rockfall.follow_background" if one == camera else "rockfall.look_through"
+        return NextStep(sentence, (action,), str(one[store.ID]))
     waiting = next((one for one in videos.cameras(scene) if not camera_paths.is_solved(one)), None)
     if waiting is not None and not picks:
         sentence = (

@@ -17,7 +17,8 @@ from ...core.georeference import GlobalShift
 from ...core.vectors import Array
 from . import store, videos
 
-COLOURS = 7
+COLOURS, FIRST_COLOUR = 7, 1
+"""Of the theme's collections, all but the first: red is what passes below the terrain."""
 PIXEL, POINT = "pixel", "point"
 
 

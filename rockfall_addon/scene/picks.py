@@ -10,6 +10,7 @@ import uuid
 from collections import Counter
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -30,7 +31,7 @@ MARKER_COLOURS = {  # sRGB, after Okabe & Ito 2008; those in flight are paler th
     "release": (0.00, 0.62, 0.45),
     "pass": (0.62, 0.70, 0.78),
     "contact": (0.00, 0.45, 0.70),
-    "stop": (0.84, 0.37, 0.00),
+    "stop": (0.94, 0.89, 0.26),
     "takeoff": (0.84, 0.74, 0.90),
 }
 MARKER_LIFT = 0.15  # of the radius, so that the disc is not swallowed by the rough surface
@@ -253,7 +254,7 @@ def read(
         angular_velocity=_doubles(objects, store.SPIN, 3),
         row=[obj.get(store.ROW, 0) for obj in objects],
         extra={name: np.array([str(extra.get(name, "")) for extra in extras], dtype=np.str_) for name in names},
-        source=str(scene.get(store.PICKS_SOURCE, "")),
+        source=Path(str(scene.get(store.PICKS_SOURCE, ""))).name,  # its folder would fill the panel
         shift=georeference.read_shift(scene),
         sort=True,
     )

@@ -11,6 +11,12 @@ BLOCK_SHAPES = (
     ("box", "Box", "Volume d₁·d₂·d₃: a slab or a cube"),
 )
 
+COLOURINGS = (
+    ("SPEED", "Speed", "Speed of the block"),
+    ("ENERGY", "Energy", "Kinetic energy of the block's translation"),
+    ("DOUBT", "Doubt", "Relative standard deviation of the speed; flagged flights at the top of the scale"),
+)
+
 
 def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
     from . import sync
@@ -121,12 +127,7 @@ class SceneSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     colour_by: EnumProperty(
         name="Colour by", description="What the colours of the flights mean; below the terrain they are always red",
-        items=[
-            ("SPEED", "Speed", "Speed of the block"),
-            ("ENERGY", "Energy", "Kinetic energy of the block's translation"),
-            ("DOUBT", "Doubt", "Relative standard deviation of the speed; flagged flights at the top of the scale"),
-        ],
-        default="SPEED", update=_colours_changed,
+        items=COLOURINGS, default="SPEED", update=_colours_changed,
     )  # fmt: skip
     speed_top_mps: FloatProperty(
         name="Top of the scale [m/s]", description="Speed at the upper end of the colour scale",

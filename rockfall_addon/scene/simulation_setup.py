@@ -17,7 +17,7 @@ from ...core.exchange.simulation_output import default_records, write_simulation
 from ...core.exchange.trees import open_trees
 from ...core.hazard.barriers import with_barriers
 from ...core.hazard.screens import Screen, check_screens
-from ...core.impact_models.registry import MODELS
+from ...core.impact_models.registry import MODELS, find_model
 from ...core.output import output_folder
 from ...core.progress import Progress
 from ...core.reconstruction.drag import Drag
@@ -207,8 +207,9 @@ def _stays(simulations: Sequence[Simulation]) -> list[Remark]:
     for one in simulations:
         away = np.hypot(*(one.position - one.releases.position)[:, :2].T)
         if np.median(away / one.releases.diameter_m) < FAR_DIAMETERS:
+            title = find_model(one.settings.model).title
             text = (
-                f"Most blocks with {one.settings.model} stop where they start, within {np.median(away):.1f} m: "
+                f"Most blocks with {title} stop where they start, within {np.median(away):.1f} m: "
                 "release them where the terrain is steeper, or look at the friction."
             )
             return [Remark(text, "advice", "releases")]

@@ -15,13 +15,14 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.footage.advice import uncountable as uncountable_at
 from ...core.reconstruction.refinement.views import View
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.vectors import Array
 from ...core.workflow.sightings import joined
 from ...core.workflow.spin_marks import AXES, Axis, MarkedVideo, SpinMarks
 from ...core.workflow.spins import FlightSpin, MeasuredSpins, measure_spins
-from . import camera_paths, clocks, named_rows, picks, pictures, reconstruction, store, videos
+from . import camera_paths, clocks, named_rows, picks, pictures, places, reconstruction, store, videos
 
 COLUMNS = 7  # frame, video time, u, v, sigma, number of the axis, turns per second that were counted
 AXIS, COUNTED = 5, 6
@@ -54,6 +55,14 @@ class Measured:
     def is_known(self) -> bool:
         """Whether there is a spin."""
         return math.isfinite(self.rate)
+
+
+def uncountable(scene: bpy.types.Scene, camera: bpy.types.Object, name: str) -> str:
+    """That the rate of a video does not tell how fast the block of a trajectory turns; empty where it does."""
+    flights = [obj for obj in store.with_role(scene, store.FLIGHTS_ROLE) if obj.get(store.TRAJECTORY) == name]
+    speed = max((float(obj.get(store.TOP_SPEED, 0.0)) for obj in flights), default=0.0)
+    rate = videos.capture_rate_of(camera) or float(videos.facts_of(camera).get("rate_hz", math.inf))
+    return uncountable_at(rate, speed, places.block_of(scene, name).radius_m)
 
 
 def names(scene: bpy.types.Scene) -> list[str]:

@@ -14,7 +14,7 @@ from ...core.remarks import Remark
 from ...core.terrain.joining import join, moved
 from ...core.terrain.shading import Shading, thin_share
 from ...core.terrain.surface import Surface
-from ...core.workflow.noticed import standing_out, vegetated
+from ...core.workflow.noticed import impossible_scan, standing_out, vegetated
 from . import georeference, materials, store, terrain_colours, terrain_look, terrain_mesh, terrain_view
 
 LEAST_THIN = 0.005
@@ -198,6 +198,17 @@ def _vegetated(tile: bpy.types.Object) -> tuple[Remark, ...]:
     return vegetated(float(tile.get(store.STANDING_OUT, 0.0)), tile.name)
 
 
+def of_impossible_size(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Tiles that are too high or too coarse for a slope in metres."""
+    return [tile for tile in tiles(scene) if _oversized(tile)]
+
+
+def _oversized(tile: bpy.types.Object) -> tuple[Remark, ...]:
+    if not has_faces(tile):
+        return ()
+    return impossible_scan(np.ptp(np.array(tile.bound_box), axis=0), len(tile.data.polygons), tile.name)
+
+
 def warnings(scene: bpy.types.Scene) -> list[str]:
     """What needs a person's attention, in sentences."""
     said = [
@@ -208,9 +219,9 @@ def warnings(scene: bpy.types.Scene) -> list[str]:
     for tile in store.with_role(scene, store.TERRAIN_ROLE):
         if not has_faces(tile):
             said.append(f"{tile.name} has no faces: it is left out. Undo what emptied it, or delete it.")
-        said += [remark.text for remark in _vegetated(tile)]
+        said += [remark.text for remark in (*_oversized(tile), *_vegetated(tile))]
         reach = float(tile.get(store.REACH, 0.0))
-        if reach > LARGE_COORDINATE_M:
+        if reach > LARGE_COORDINATE_M and not _oversized(tile):
             step = float(np.spacing(np.float32(reach))) * 1000
             said.append(
                 f"{tile.name} reaches {reach / 1000:.0f} km from the project's origin. Blender is single precision and "

@@ -305,7 +305,7 @@ def _add_active(
     for click in clicked.values():
         axes = click.ellipse
         points = place + np.cos(CIRCLE)[:, None] * axes[0] + np.sin(CIRCLE)[:, None] * axes[1]
-        found.lines.append(_closed(project(lens, points), (1.0, 0.3, 0.2), 1.5))
+        found.lines.append(_closed(project(lens, points), EPIPOLAR, 1.5))
     curve = clicks.epipolar(scene, obj, camera)
     if curve is not None and len(curve) > 1:
         found.lines.append(_closed(curve, EPIPOLAR, 1.5))

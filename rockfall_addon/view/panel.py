@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What all panels share."""
 
-import textwrap
 from collections.abc import Iterable
 from typing import Literal
 
@@ -9,6 +8,7 @@ import bpy
 
 from ...core.remarks import Remark
 from ..scene import store
+from .wrapping import wrapped
 
 type State = Literal["TO_DO", "READY", "ATTENTION", "ANY_TIME"]
 """How a step stands; what has no end can be done at any time."""
@@ -16,6 +16,9 @@ type State = Literal["TO_DO", "READY", "ATTENTION", "ANY_TIME"]
 MARKS: dict[State, str] = {"TO_DO": "RADIOBUT_OFF", "READY": "CHECKMARK", "ATTENTION": "ERROR", "ANY_TIME": "DOT"}
 
 
+MARGIN, ICON, LEAST = 70.0, 20.0, 100.0
+"""What of a sidebar is beside its text, beside an icon, too, and the width that text has at least, at interface scale 1
+[px]."""
 SHORT = 36
 """Characters that have room beside one another in a sidebar as wide as ours is at first."""
 
@@ -76,10 +79,11 @@ def advise(context: bpy.types.Context, layout: bpy.types.UILayout, ready: bool, 
 
 def paragraph(context: bpy.types.Context, layout: bpy.types.UILayout, sentence: str, icon: str = "NONE") -> None:
     """Text broken to the width of the region."""
-    characters = max(16, int(context.region.width / context.preferences.system.ui_scale / 7.2) - 7)
+    scale, style = context.preferences.system.ui_scale, context.preferences.ui_styles[0]
+    room = context.region.width - (MARGIN if icon == "NONE" else MARGIN + ICON) * scale
     column = layout.column(align=True)
     below = "NONE" if icon == "NONE" else "BLANK1"
-    for number, line in enumerate(textwrap.wrap(sentence, characters)):
+    for number, line in enumerate(wrapped(sentence, max(room, LEAST * scale), style.widget.points * scale)):
         column.label(text=line, icon=icon if number == 0 else below)
 
 

@@ -61,6 +61,7 @@ def test_what_fits_is_kept_with_its_intervals_and_how_good_it_is(part, scene) ->
     assert "normal, 0.5 ± 0.1" in kept["rows"][2][5]
     assert "15 observed runs" in kept["said"]
     assert "held out" in json.dumps(kept["remarks"])
+    assert "with CRSP (Pfeiffer & Bowen 1989) as it was set" in json.dumps(kept["remarks"])
     assert draw_panel(part) == kept["names"]
     again = analysed(scene)
     assert again["values"] == kept["values"], "the same seed"

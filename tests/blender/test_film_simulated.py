@@ -231,13 +231,15 @@ def test_a_still_of_the_end_and_a_picture_of_the_slope(rockfall, part, job) -> N
     from dataclasses import replace
 
     render, said = part("rockfall_addon.steps.film.render"), []
+    known = part("core.impact_models.registry").MODELS
+    titles = [known[model].title for model in MODELS]
     for kind in ("still", "slope"):
         made = replace(job, kind=kind, out=job.out.with_name(f"{kind}.png"))
         remarks = render.make(made, lambda *words: said.append(words[0]))
-        assert all(any(f"6 blocks with {model}" in remark for remark in remarks) for model in MODELS)
+        assert all(any(f"6 blocks with {title}" in remark for remark in remarks) for title in titles)
         picture = bpy.data.images.load(str(made.out))
         assert tuple(picture.size) == (64, 36)
-    assert {f"Simulating {model}" for model in MODELS} <= set(said)
+    assert {f"Simulating {title}" for title in titles} <= set(said)
 
 
 def test_what_the_step_hides_is_not_in_the_film(scene: bpy.types.Scene, part) -> None:

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is drawn of flights and picks: colours, ticks, beads, doubt; the models' blocks follow."""
 
+import colorsys
 import itertools
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -118,3 +120,30 @@ def test_twins_follow_an_edit(slope: bpy.types.Scene, part) -> None:
     update()
     assert landing() != before
     check_shown(slope, part)
+
+
+def is_red(colour) -> bool:
+    """Whether a person calls a colour red."""
+    hue, lightness, saturation = colorsys.rgb_to_hls(*colour[:3])
+    return saturation > 0.5 and 0.2 < lightness < 0.9 and min(hue, 1 - hue) < 27 / 360
+
+
+def test_nothing_but_what_passes_below_the_terrain_is_red(part, monkeypatch) -> None:
+    assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+    assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
+    scene, view = bpy.context.scene, part("rockfall_addon.view.footage_view")
+    picks, camera = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.videos").cameras(scene)[0]
+    click = SimpleNamespace(ellipse=np.eye(3)[:2])
+    monkeypatch.setattr(part("rockfall_addon.scene.clicks"), "of", lambda _: {"video": click})
+    monkeypatch.setattr(part("rockfall_addon.scene.clicks"), "epipolar", lambda *_: None)
+    chosen, found = picks.objects_of(scene)[0], part("rockfall_addon.view.drawn").Drawing()
+    view._add_active(found, scene, camera, part("rockfall_addon.scene.pictures").posed(camera, 2.0), chosen)
+    colours = [tuple(line.colour.reshape(-1, 4)[0]) for line in found.lines]
+    solid = part("rockfall_addon.steps.picking.overlay")._solid(scene, chosen)
+    assert (len(colours), len(solid)) >= (2, 1), "the ellipse of the click is drawn in both views"
+    marking, pairs = part("rockfall_addon.steps.alignment.overlay"), part("rockfall_addon.scene.pairs")
+    colours += [colour for _, colour in solid]
+    colours += [marking.WRONG, *map(marking.palette, range(pairs.COLOURS)), *picks.MARKER_COLOURS.values()]
+    colours += [model.colour for model in part("core.impact_models.registry").MODELS.values()]
+    assert [colour for colour in colours if is_red(colour)] == []
+    assert is_red(view.BELOW)

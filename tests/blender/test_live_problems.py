@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What cannot be computed is told, and the rest follows all the same; terrain that changes is seen."""
 
+from pathlib import Path
+
 import bmesh
 import bpy
 import numpy as np
@@ -13,6 +15,8 @@ def test_two_picks_at_one_time_are_told_and_the_last_good_flights_stay(scene: bp
     shown = places(trail(scene, "A").data)
     second.rockfall_pick.time_s = first.rockfall_pick.time_s
     problem = scene["rockfall_problem"]
+    (remark,) = part("rockfall_addon.scene.problems").remarks(scene)
+    assert remark.text.startswith(f"{Path(scene['rockfall_picks_source']).name}, row "), "a folder would fill the panel"
     assert "trajectory A" in problem
     assert "10.7312" in problem
     np.testing.assert_array_equal(places(trail(scene, "A").data), shown)

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What panels say of a selected impact, and that ⚠ never stands without its reason."""
 
+import itertools
 from pathlib import Path
 from types import SimpleNamespace
 
+import blf
 import bpy
 import pytest
 from two_runs import picks_of
@@ -30,11 +32,15 @@ class Layout:
         return lambda *_, **__: self
 
 
+def preferences(scale: float) -> SimpleNamespace:
+    return SimpleNamespace(system=SimpleNamespace(ui_scale=scale), ui_styles=bpy.context.preferences.ui_styles)
+
+
 def in_sidebar() -> SimpleNamespace:
     """A context as a panel gets it; without a window Blender has no region and no interface scale."""
     return SimpleNamespace(
         scene=bpy.context.scene, object=bpy.context.object, view_layer=bpy.context.view_layer,
-        region=SimpleNamespace(width=2000), preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=SimpleNamespace(width=2000), preferences=preferences(1.0),
     )  # fmt: skip
 
 
@@ -171,3 +177,29 @@ def test_a_camera_from_a_file_is_not_asked_for_pairs_and_not_called_a_tripod(par
     moving = " ".join(text for _, text in draw("ROCKFALL_PT_alignment_motion"))
     assert "a pose for each frame" in moving
     assert "One pose" not in moving
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+@pytest.mark.parametrize("words", ["ill till it fills", "WWWWW MMMMMM WWWW"], ids=["narrow", "wide"])
+def test_text_fills_the_width_of_a_panel_and_is_nowhere_cut_off(part, words, scale) -> None:
+    panel, written, width = part("rockfall_addon.view.panel"), [], 300 * scale
+    context = SimpleNamespace(region=SimpleNamespace(width=width), preferences=preferences(scale))
+    panel.paragraph(context, Layout(written), " ".join([words] * 12), "INFO")
+    lines = [text for _, text in written]
+    assert " ".join(lines) == " ".join([words] * 12)
+    blf.size(0, bpy.context.preferences.ui_styles[0].widget.points * scale)
+    for line, later in itertools.pairwise(lines):
+        assert blf.dimensions(0, line)[0] < width - 82 * scale, "what stays free beside an icon, in a real window"
+        assert blf.dimensions(0, f"{line} {later.split()[0]}")[0] > width - 100 * scale, "the next word had room"
+
+
+def test_two_videos_that_are_aligned_are_to_be_synchronised_now(part) -> None:
+    assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
+    scene, wording = bpy.context.scene, part("rockfall_addon.steps.videos.wording")
+    first = part("rockfall_addon.scene.videos").cameras(scene)[0]
+    assert bpy.ops.rockfall.add_video(filepath=str(FOOTAGE)) == {"FINISHED"}
+    second = part("rockfall_addon.scene.videos").active_camera(scene)
+    assert "Once both are aligned, do so." in wording.warnings(scene, second)[0].text
+    paths = part("rockfall_addon.scene.camera_paths")
+    paths.set_camera_path(scene, second, paths.camera_path(first))
+    assert "Mark one event in both, and synchronise them." in wording.warnings(scene, second)[0].text

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-NAMES = ("block_diameter_m", "density_kgpm3", "block_shape", "sigma_px")
+NAMES = ("block_diameter_m", "density_kgpm3", "block_shape", "sigma_px", "colour_by")
 
 
 @pytest.fixture
@@ -30,6 +30,7 @@ def new_file() -> None:
 def test_without_a_word_they_are_those_of_the_settings(part, preferences) -> None:
     scene = bpy.context.scene
     of = {name: scene.rockfall.bl_rna.properties[name].default for name in NAMES[:3]}
+    of["colour_by"] = scene.rockfall.bl_rna.properties["colour_by"].default
     of["sigma_px"] = scene.rockfall_picking.bl_rna.properties["sigma_px"].default
     assert {name: getattr(preferences, name) for name in NAMES} == of
 
@@ -52,3 +53,12 @@ def test_new_projects_begin_with_them(part, preferences, table: Path, tmp_path: 
     assert settings() == [1.5, 2500.0, "box", 0.5]
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"), load_ui=False)
     assert settings() == wanted
+
+
+def test_new_projects_have_the_colours_that_were_preferred(part, preferences, table: Path) -> None:
+    preferences.colour_by = "DOUBT"
+    new_file()
+    bpy.ops.rockfall.import_picks(filepath=str(table))
+    assert bpy.context.scene.rockfall.colour_by == "DOUBT"
+    preferences.colour_by = "ENERGY"
+    assert bpy.context.scene.rockfall.colour_by == "DOUBT", "a project that has begun keeps what it has"

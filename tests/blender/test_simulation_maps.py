@@ -51,7 +51,7 @@ def test_the_maps_are_those_of_the_core(mapped: bpy.types.Scene, part) -> None:
     assert (maps.layers["Nr_blocks"][row, column] > 0).all()
     fastest = np.nanmax(maps.layers["V_max"])
     assert fastest == pytest.approx(simulation.v_max_mps.max(), rel=1e-6)
-    assert "Maps of 150 blocks with noel_2017" in said(part, mapped)
+    assert "Maps of 150 blocks with Noël et al. 2017" in said(part, mapped)
 
 
 def test_maps_are_saved_and_undone(mapped: bpy.types.Scene, tmp_path: Path, part) -> None:

@@ -66,7 +66,7 @@ def test_a_structure_across_the_slope_holds_blocks(slope: bpy.types.Scene, wall:
     impact = (records.what == part("core.simulation.engine").IMPACT) & (owner == 1)
     blocks, times = len(set(records.run[impact].tolist())), int(impact.sum())
     assert blocks > 0
-    assert f"{blocks} of 8 blocks with noel_2017 hit wall, {times} times; 0 of them went on" in said(part, slope)
+    assert f"{blocks} of 8 blocks with Noël et al. 2017 hit wall, {times} times; 0 of them went on" in said(part, slope)
     wall.location.x += 200.0
     bpy.context.view_layer.update()
     assert part("rockfall_addon.scene.simulation_setup").is_stale(slope)

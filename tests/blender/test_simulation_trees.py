@@ -43,7 +43,7 @@ def test_a_forest_is_met_and_seen(slope: bpy.types.Scene, part) -> None:
     np.testing.assert_allclose(np.ptp(corners[:, :, 0], axis=1), 0.4, atol=1e-3)
     assert not obj.data.validate()
     assert f"Blocks meet {len(trees)} trees" in said(part, slope)
-    assert "blocks with noel_2017 hit trees" in said(part, slope)
+    assert "blocks with Noël et al. 2017 hit trees" in said(part, slope)
     settings.show_trees = False
     assert obj.hide_viewport
     settings.trees = "NONE"

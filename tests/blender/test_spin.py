@@ -232,3 +232,31 @@ def test_what_is_drawn(site, part, impacts) -> None:
     rings = [one.pixel for one in drawn.marks if one.shape == "ring" and one.colour[1] == hand.colour[1]]
     assert len(rings) == 1
     assert np.linalg.norm(rings[0] - pixel) < 4.0, "a fifth of the block"
+
+
+def test_a_frame_rate_that_cannot_tell_the_turns_is_said_before_anything_is_marked(site, part, monkeypatch) -> None:
+    spins, store = (part(f"rockfall_addon.scene.{name}") for name in ("spins", "store"))
+    camera = camera_of(site, part)
+    (flights,) = store.with_role(site, store.FLIGHTS_ROLE)
+    flights[store.TOP_SPEED] = 9.0
+    said = spins.uncountable(site, camera, NAME)
+    assert said.startswith("At 9 m/s a rolling block of 0.39 m diameter turns 7.3 times a second")
+    assert said.endswith("this video has 30.")
+    camera[store.CAPTURE_RATE] = 120.0
+    assert spins.uncountable(site, camera, NAME) == "", "slow motion"
+    assert spins.uncountable(site, camera, "nobody") == ""
+    panel, written = bpy.types.ROCKFALL_PT_spin, []
+    del camera[store.CAPTURE_RATE]
+    of = part("rockfall_addon.steps.spin.panel")
+    for name in ("paragraph", "advise"):
+        monkeypatch.setattr(of, name, lambda _, __, *said: written.extend(said))
+    plain = type("Plain", (), {"draw": panel.draw, "layout": Anything()})()
+    plain.draw(bpy.context)
+    assert said in written
+
+
+class Anything:
+    """Stands in for a Blender layout, which exists only while a window is drawn."""
+
+    def __getattr__(self, name: str) -> object:
+        return lambda *_, **__: self

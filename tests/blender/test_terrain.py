@@ -80,3 +80,25 @@ def test_material_is_made_once(part, tmp_path: Path) -> None:
     for _ in range(2):
         bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
     assert [m.name for m in bpy.data.materials if m.name.startswith("Rockfall terrain")] == ["Rockfall terrain"]
+
+
+def test_a_scan_in_millimetres_is_noticed_and_read_again(part, tmp_path: Path) -> None:
+    """Survey coordinates, too: the shift that was proposed for the wrong unit is not kept."""
+    points = wave(tmp_path / "wave.asc").reshape(20, 30, 3) - (2574000.0, 1188000.0, 0.0)
+    file, corner = tmp_path / "mm.obj", np.arange(600).reshape(20, 30) + 1
+    rows = [f"v {1000 * x:.3f} {1000 * y:.3f} {1000 * (z + 20 * (x - 26000)):.3f}" for x, y, z in points.reshape(-1, 3)]
+    a, b, c, d = (each.ravel() for each in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
+    rows += [f"f {i} {j} {k} {m}" for i, j, k, m in zip(a, b, c, d, strict=True)]
+    file.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    assert bpy.ops.rockfall.import_terrain(filepath=str(file)) == {"FINISHED"}
+    scene, following = bpy.context.scene, part("rockfall_addon.scene.next_step")
+    step = following.next_step(scene)
+    assert "is its file in another unit?" in step.sentence
+    assert (step.actions[0], step.unit_m) == ("rockfall.import_terrain", 0.001)
+    again = {"replaces": step.tile, "unit_m": step.unit_m}
+    assert bpy.ops.rockfall.import_terrain(filepath=str(file), **again) == {"FINISHED"}
+    (tile,) = part("rockfall_addon.scene.terrain").tiles(scene)
+    middle = np.array(tile.bound_box).mean(axis=0) + part("rockfall_addon.scene.georeference").read_shift(scene).vector
+    np.testing.assert_allclose(middle[:2], points.reshape(-1, 3).mean(axis=0)[:2], atol=0.01)
+    assert np.abs(tile.bound_box).max() < 10_000, "near the origin of the scene"
+    assert not following.next_step(scene).tile

@@ -228,3 +228,20 @@ def test_a_tripod_is_not_asked_about(scan, part: Part, tmp_path: Path) -> None:
     alignment = part("rockfall_addon.scene.alignment")
     assert not alignment.background_remarks(camera)
     assert not alignment.is_taken_for_a_tripod(camera), "somebody has looked, and it stood still"
+
+
+def test_a_camera_that_moves_is_to_be_followed_before_anything_is_picked(part: Part) -> None:
+    """What comes after the advice to choose Hand-held: with the pose of one frame, picks would be beside the block."""
+    demo = Path(__file__).resolve().parents[2] / "assets" / "demo"
+    assert bpy.ops.rockfall.import_terrain(filepath=str(demo / "terrain.ply")) == {"FINISHED"}
+    assert bpy.ops.rockfall.add_video(filepath=str(demo / "footage" / "footage.mp4")) == {"FINISHED"}
+    following, videos = part("rockfall_addon.scene.next_step"), part("rockfall_addon.scene.videos")
+    camera = videos.active_camera(scene())
+    camera.rockfall_alignment.motion = "ROTATION"
+    assert "follow" not in following.next_step(scene()).sentence, "first it is solved"
+    assert bpy.ops.rockfall.import_pairs(filepath=str(demo / "footage" / "pairs.csv")) == {"FINISHED"}
+    step = following.next_step(scene())
+    assert "follow its background" in step.sentence
+    assert step.actions == ("rockfall.follow_background",)
+    camera[part("rockfall_addon.scene.store").FOLLOWED] = "{}"
+    assert "follow" not in following.next_step(scene()).sentence, "also where it was found to stand still"

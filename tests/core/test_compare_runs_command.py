@@ -78,7 +78,7 @@ def test_tables_agree_with_each_other(site: Path, tmp_path: Path, capsys) -> Non
     models = ["--model", "noel_2017", "wyllie_2014"]
     assert main(asked(site, out, *more, *models)) == 0
     said = capsys.readouterr().out
-    assert re.search(r"wyllie_2014 differs from what was observed in \d+ of \d+ tests", said)
+    assert re.search(r"Wyllie 2014 differs from what was observed in \d+ of \d+ tests", said)
     assert sorted(path.name for path in (out / "figures").iterdir()) == [
         f"{name}.png" for name in ("profiles", "sections", "whole_runs")
     ]

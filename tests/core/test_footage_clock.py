@@ -16,6 +16,7 @@ from rockfall.core.footage.advice import (
     rolling_turns_hz,
     time_sigma_s,
     turn_advice,
+    uncountable,
 )
 from rockfall.core.footage.clock import Clock, clock_for, synchronise
 from rockfall.core.footage.video import open_video
@@ -154,6 +155,10 @@ def test_five_frames_a_turn():
         sentence == "A block turns 8.2 times a second: 41 frames a second are needed to count turns, this video has 30."
     )
     assert turn_advice(60, 8.2).endswith("this video has 60, which is enough.")
+    said = uncountable(25, 9.0, 0.195)
+    assert "At 9 m/s a rolling block of 0.39 m diameter turns 7.3 times a second" in said
+    assert said.endswith("37 frames a second are needed to count turns, this video has 25.")
+    assert uncountable(37, 9.0, 0.195) == "" == uncountable(25, 1.0, 0.195)
     assert "30 frames a second are the least" in turn_advice(25, 2.0)
     assert "enough" not in turn_advice(25, 2.0)
     assert "enough" in turn_advice(30_000 / 1001, 2.0)

@@ -14,6 +14,7 @@ from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.noticed import (
+    impossible_scan,
     impossible_sizes,
     moved_on,
     moves_at_a_glance,
@@ -108,6 +109,37 @@ def slope(lifted):
     a, b, c, d = (each.ravel() for each in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
     faces = np.r_[np.c_[a, b, c], np.c_[a, c, d]].astype(np.int32)
     return Surface(np.c_[x, y, x + lifted], faces, GlobalShift(), "slope")
+
+
+@pytest.mark.parametrize(("feet", "told"), [(1.0, False), (1 / 0.3048, True)])
+def test_feet_taken_for_metres_put_most_flights_into_the_ground(feet, told):
+    """Parabolas of 0.9 s rise 0.99 m over their chords, whatever the unit; humps of 0.6 m are then 2 m high."""
+    x = np.tile(np.arange(31.0), 31)
+    ground = slope(0.3 * (1 - np.cos(2 * np.pi * (x - 4) / 8)))
+    ground = Surface(feet * ground.vertices, ground.faces, GlobalShift(), "slope")
+    at = np.array([28.0, 20.0, 12.0, 4.0])
+    picks = make_picks(["a"] * 4, 0.9 * np.arange(4), feet * np.c_[at, np.full(4, 15.0), at])
+    said = impossible_sizes(reconstruct(picks, surface=ground, block=Block(0.5, 0.5, 0.5)))
+    assert [remark.text.startswith("Trajectory a: 3 of its 3 flights pass under the terrain") for remark in said] == (
+        [True] * told
+    )
+    assert all("the unit of the terrain" in remark.text for remark in said)
+
+
+@pytest.mark.parametrize(
+    ("extent", "triangles", "told"),
+    [
+        ((100.0, 200.0, 90.0), 300_000, ""),
+        ((30_000.0, 40_000.0, 2500.0), 2 * 300 * 400, ""),  # a coarse model of a whole valley
+        ((2000.0, 1000.0, 400.0), 2, ""),  # a plane that was drawn
+        ((100e3, 200e3, 90e3), 300_000, "90,000 m high"),
+        ((30e3, 30e3, 8000.0), 2 * 60 * 60, "points 500 m apart"),  # 30 m of a scan every 0.5 m, in millimetres
+    ],
+)
+def test_a_scan_in_millimetres_is_no_slope_in_metres(extent, triangles, told):
+    said = impossible_scan(np.array(extent), triangles, "scan.ply")
+    assert len(said) == bool(told)
+    assert all(told in remark.text and "0.001 m for millimetres" in remark.text for remark in said)
 
 
 def test_leaves_are_told_from_boulders_and_steps():

@@ -80,7 +80,7 @@ def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: P
     assert summary["models"]["noel_2017"]["ends"] == {"stopped": 5, "left_terrain": 0, "limit": 0}
     assert summary["seed"] == 3
     assert len(summary["inputs"]["terrain"]["sha256"]) == 64
-    assert "5 blocks with noel_2017" in capsys.readouterr().out
+    assert "5 blocks with Noël et al. 2017" in capsys.readouterr().out
     again = tmp_path / "again"
     assert main([*argv, "--threads", "1", "--out", str(again)]) == 0
     for name in ("runs.csv", "impacts.csv", "trajectories.csv"):
@@ -263,7 +263,7 @@ def test_an_interrupted_simulation_keeps_and_says_what_is_finished(
     runs, whole = (rows_of(tmp_path / name / "runs.csv") for name in ("cut", "whole"))
     assert 0 < len(runs) < 300
     assert runs == whole[: len(runs)]
-    said = f"Stopped by you: {len(runs)} of 300 blocks with noel_2017 are finished and kept."
+    said = f"Stopped by you: {len(runs)} of 300 blocks with Noël et al. 2017 are finished and kept."
     assert said in capsys.readouterr().out
     summary = json.loads((tmp_path / "cut" / "summary.json").read_text(encoding="utf-8"))
     assert (summary["blocks_wanted"], sum(summary["models"]["noel_2017"]["ends"].values())) == (300, len(runs))

@@ -62,7 +62,7 @@ def test_maps_beside_the_same_tables_whatever_is_recorded(argv: list[str], tmp_p
         stopped = sum(row["end"] == "stopped" for row in csv.DictReader(file))
     assert np.nansum(values(tmp_path / "maps" / "maps", "Nr_deposited")) == stopped > 0
     assert np.nanmax(values(tmp_path / "maps" / "maps", "Reach_probability")) == 100
-    assert "Maps of 60 blocks with noel_2017" in capsys.readouterr().out
+    assert "Maps of 60 blocks with Noël et al. 2017" in capsys.readouterr().out
 
 
 def test_several_models_have_a_folder_each(argv: list[str], tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_a_design_sheet_of_the_demo(tmp_path: Path, barriers: Path, capsys: pyte
     assert cli.main([*arguments, "--screen", str(barriers), "--out", str(out)]) == 0
     assert {path.name for path in out.iterdir()} == {"design.html", "design.pdf", "design.json", "screens.csv"}
     said = capsys.readouterr().out
-    assert "barrier is not enough for noel_2017" in said
+    assert "barrier is not enough for Noël et al. 2017" in said
     html = (out / "design.html").read_text(encoding="utf-8")
     assert "Evidence: the impacts that were measured on this site" in html
     assert "EPSG:2154" in html
@@ -140,7 +140,7 @@ def test_it_ends_when_the_values_are_known_and_says_how_many_it_took(
     said = capsys.readouterr().out
     found = len(rows(out / "runs.csv"))
     assert 200 <= found < 900
-    assert f"{found} blocks with noel_2017 are enough" in said
+    assert f"{found} blocks with Noël et al. 2017 are enough" in said
     assert len({row["release"] for row in rows(out / "runs.csv")}) == 15, "of all releases"
     assert cli.main([*arguments, "--until-known", "0.95", "--out", str(out)]) == 1
     assert "known nowhere" in capsys.readouterr().err

@@ -217,7 +217,9 @@ def test_measured_releases_and_impacts_start_as_they_were_measured(cliff: Ground
     np.testing.assert_allclose(made.angular_velocity[2], [0.0, 2 / 0.6 / 0.25, 0.0], atol=1e-9)
     np.testing.assert_allclose(made.mass_kg, 2700 * 0.6 * 0.5 * 0.4)
     assert (made.shape == "box").all()
-    assert "start just after their first impact" in str(made.remarks[0])
+    assert made.remarks[0].text == (
+        "1 of 2 trajectories begins with an impact instead of a release: the simulated blocks start just after it."
+    )
     assert start_times(measured) == {"a": 0.0, "b": 10.0}
 
     leaving = from_impacts(cliff, measured.impacts)

@@ -83,14 +83,14 @@ def test_a_cancel_keeps_finished_models_and_finished_runs_and_says_so(scenario: 
     np.testing.assert_array_equal(cut[1].position, whole[1].position[:n])
     remark = remarks_of(cut, list(MODELS))[0]
     assert (remark.severity, remark.about) == ("warning", "cancelled")
-    assert remark.text == f"Stopped by you: {n} of 200 blocks with azimi_desvarreux_1977 are finished and kept."
+    assert remark.text == f"Stopped by you: {n} of 200 blocks with Azimi & Desvarreux 1977 are finished and kept."
     first = run_models(ground, releases, scenario.settings, threads=1, progress=partial(stop, after=64))
     assert remarks_of(first, list(MODELS))[0].text == (
-        f"Stopped by you: {len(first[0])} of 200 blocks with noel_2017 are finished and kept; "
-        "not begun: azimi_desvarreux_1977."
+        f"Stopped by you: {len(first[0])} of 200 blocks with Noël et al. 2017 are finished and kept; "
+        "not begun: Azimi & Desvarreux 1977."
     )
     between = run_models(ground, releases, scenario.settings, threads=1, progress=partial(stop, after=200))
-    assert remarks_of(between, list(MODELS))[0].text == "Stopped by you: not begun: azimi_desvarreux_1977."
+    assert remarks_of(between, list(MODELS))[0].text == "Stopped by you: not begun: Azimi & Desvarreux 1977."
     assert not any(remark.about == "cancelled" for remark in remarks_of(whole, list(MODELS)))
     with pytest.raises(CancelledError):
         run_models(ground, releases, scenario.settings, progress=partial(stop, after=0))
@@ -101,8 +101,8 @@ def test_blocks_that_were_cut_off_are_said_first(scenario: Scenario) -> None:
     simulation = run_models(ground, drops(ground), [Settings("noel_2017", most_impacts=1)])
     first, second, *_ = remarks_of(simulation)
     assert first.severity == "warning"
-    assert "200 of 200 blocks with noel_2017 were cut off at the limit" in first.text
-    assert "200 blocks with noel_2017, 200 impacts: 200 were cut off" in second.text
+    assert "200 of 200 blocks with Noël et al. 2017 were cut off at the limit" in first.text
+    assert "200 blocks with Noël et al. 2017, 200 impacts: 200 were cut off" in second.text
 
 
 def test_blocks_that_stay_where_they_are_released_are_said() -> None:
@@ -113,7 +113,7 @@ def test_blocks_that_stay_where_they_are_released_are_said() -> None:
     still = make_releases(place, diameter_m=0.5)
     first, *_ = remarks_of(run_models(ground, still, settings))
     assert first.severity == "warning"
-    assert first.text.startswith("3 of 3 blocks with noel_2017 stopped within their own diameter")
+    assert first.text.startswith("3 of 3 blocks with Noël et al. 2017 stopped within their own diameter")
     one = make_releases(place, velocity=np.array([[0.0, 0.0, 0.0], [8.0, 0.0, 0.0], [0.0, 8.0, 0.0]]), diameter_m=0.5)
     said = [remark for remark in remarks_of(run_models(ground, one, settings)) if "own diameter" in remark.text]
     assert [remark.text[:6] for remark in said] == ["1 of 3"]

@@ -192,3 +192,49 @@ def colour_sum():
 def drawn():
     (ground,) = [o for o in bpy.context.scene.objects if o.get("rockfall_role") == "terrain"]
     return len(ground.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)
+
+
+def case_a_scan_in_millimetres_is_noticed(window):
+    """Before it is imported, where it cannot be metres at all; else after it, with the way to read it again."""
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0, 41, 2.0), np.arange(0, 41, 2.0)))
+    corners = np.arange(441).reshape(21, 21)
+    corners = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=-1).reshape(-1, 4)
+    folder, scene = Path(tempfile.mkdtemp()), bpy.context.scene
+    for name, east, north in (("survey", 2.6e6, 1.2e6), ("local", 0.0, 0.0)):
+        rows = [
+            f"v {1e3 * (a + east):.1f} {1e3 * (b + north):.1f} {1e3 * (30 - 0.5 * a):.1f}"
+            for a, b in zip(x, y, strict=True)
+        ]
+        rows += [f"f {a} {b} {c} {d}" for a, b, c, d in corners + 1]
+        (folder / f"{name}.obj").write_text("\n".join(rows) + "\n")
+
+    def grounds():
+        return [obj for obj in scene.objects if obj.get("rockfall_role") == "terrain"]
+
+    with window.override():
+        bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=str(folder / "survey.obj"))
+    yield 1.5
+    window.screenshot("1-beyond-every-survey")
+    yield from window.press("RET", *window.centre())
+    yield from window.wait_for(grounds, what="imported")
+    yield 1.0
+    (ground,) = grounds()
+    assert abs(ground.dimensions.x - 40) < 0.01, "read in millimetres"
+    with window.override():
+        bpy.ops.rockfall.remove_terrain()
+        window.part("rockfall_addon.scene.georeference").forget_shift(scene)
+        assert bpy.ops.rockfall.import_terrain(filepath=str(folder / "local.obj"), unit_m=1.0) == {"FINISHED"}
+    yield from window.show_sidebar()
+    yield 1.0
+    window.screenshot("2-two-kilometres-apart")
+    step = window.part("rockfall_addon.scene.next_step").next_step(scene)
+    assert "is its file in another unit?" in step.sentence
+    with window.override():
+        again = {"replaces": step.tile, "unit_m": step.unit_m}
+        bpy.ops.rockfall.import_terrain("INVOKE_DEFAULT", filepath=str(folder / "local.obj"), **again)
+    yield 1.5
+    window.screenshot("3-again")
+    yield from window.press("RET", *window.centre())
+    yield from window.wait_for(lambda: abs(grounds()[0].dimensions.x - 40) < 0.01, what="read again")
+    yield 1.0
+    window.screenshot("4-read-again")

@@ -3,7 +3,6 @@
 
 import itertools
 import math
-import textwrap
 from collections.abc import Sequence
 
 import blf
@@ -17,14 +16,14 @@ from mathutils import Vector
 from ...scene import alignment, camera_paths, clocks, pairs, problems, store, video_files, videos
 from ...scene.next_step import ALIGN_TOOL
 from ...view import image_view
+from ...view.wrapping import wrapped
 from . import marking
 
 RING, CROSS, TEXT, HINT, GAP = 8.0, 6.0, 14.0, 14.0, 12.0  # in pixels at interface scale 1
 SEGMENTS, OUTLINE = 32, 6
 SHADE = (0.0, 0.0, 0.0, 0.65)
 BOX = (0.05, 0.06, 0.08, 0.85)
-WRONG = (1.0, 0.25, 0.2)
-PALETTE_ROOM = 7
+WRONG = (1.0, 0.55, 0.0)
 
 type Colour = tuple[float, float, float, float]
 type Line = Sequence[tuple[float, float]]
@@ -140,7 +139,7 @@ def _colour(pair: pairs.Pair, solution: alignment.Solution) -> Colour:
 def palette(number: int) -> tuple[float, float, float]:
     """The colour of a pair, as the theme's collections have them, which the panel shows as icons."""
     colours = bpy.context.preferences.themes[0].collection_color
-    red, green, blue = colours[number % min(PALETTE_ROOM, len(colours))].color
+    red, green, blue = colours[pairs.FIRST_COLOUR + number % pairs.COLOURS].color
     return tuple(0.7 * value + 0.3 for value in (red, green, blue))  # lighter, to be read on any picture
 
 
@@ -169,10 +168,7 @@ def _draw_hint(context: bpy.types.Context, camera: bpy.types.Object, through: bo
 def _paragraph(context: bpy.types.Context, said: str, colour: Colour, size: float, scale: float) -> None:
     """Text in a box at the top, between what lies over the view."""
     left, right = _free_span(context.area, context.region)
-    blf.size(0, size)
-    room = max(right - left - 40 * scale, 80 * scale)
-    characters = max(12, int(len(said) * room / max(blf.dimensions(0, said)[0], 1.0)))
-    lines = textwrap.wrap(said, characters)
+    lines = wrapped(said, max(right - left - 40 * scale, 80 * scale), size)
     widths = [blf.dimensions(0, line)[0] for line in lines]
     step, middle = 1.45 * size, (left + right) / 2
     top = context.region.height - _covered_top(context.area) - 10 * scale

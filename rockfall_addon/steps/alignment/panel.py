@@ -10,7 +10,9 @@ from ...view import job
 from ...view.panel import RockfallPanel, Rows, State, advise, facts, paragraph, show_remarks
 from . import following
 
-COLOURS = tuple(f"COLLECTION_COLOR_{number:02d}" for number in range(1, pairs.COLOURS + 1))
+COLOURS = tuple(
+    f"COLLECTION_COLOR_{number:02d}" for number in range(1 + pairs.FIRST_COLOUR, 1 + pairs.FIRST_COLOUR + pairs.COLOURS)
+)
 
 
 TRIPOD = "One pose for all frames. If the picture moves, choose Hand-held."

@@ -91,7 +91,7 @@ def _solid(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[tuple[np.ndarr
     for seen in clicks.of(obj).values():
         circle = footage_view.CIRCLE[:, None]
         ellipse = place + 0.02 * normal + np.cos(circle) * seen.ellipse[0] + np.sin(circle) * seen.ellipse[1]
-        found.append((ellipse, (1.0, 0.3, 0.2)))
+        found.append((ellipse, footage_view.EPIPOLAR))
     return found
 
 

@@ -28,6 +28,10 @@ class ROCKFALL_PT_spin(RockfallPanel, bpy.types.Panel):
         name = places.trajectory(scene)
         layout.operator("wm.tool_set_by_id", text="Mark Spin", icon="FILE_REFRESH").name = SpinTool.bl_idname
         field(layout, "Trajectory").prop(scene.rockfall_picking, "trajectory", text="")
+        said = {camera.name: spins.uncountable(scene, camera, name) for camera in videos.cameras(scene)}
+        for video, text in said.items():
+            if text:
+                paragraph(context, layout, text if len(said) == 1 else f"{video}: {text}", "ERROR")
         marked = [camera for camera in videos.cameras(scene) if name in spins.names_in(camera)]
         if not marked:
             text = f"Click the same point of {name} in two pictures or more of one flight: an edge, a stain."

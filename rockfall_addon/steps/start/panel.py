@@ -22,6 +22,7 @@ LOOKS = {
     "rockfall.synchronise_videos": ("", "UV_SYNC_SELECT"),
     "rockfall.align_views": ("", "SPLIT_VERTICAL"),
     "rockfall.look_through": ("Look Through the Other Video", "VIEW_CAMERA"),
+    "rockfall.follow_background": ("", "TRACKING_FORWARDS"),
     "rockfall.propose_impacts": ("", "OUTLINER_OB_LIGHTPROBE"),
     "rockfall.apply_refinement": ("Apply", "CHECKMARK"),
     "rockfall.discard_refinement": ("Discard", "X"),
@@ -52,7 +53,7 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
         for action in step.actions:
             text, icon = LOOKS[action]
             if step.tile and action == "rockfall.import_terrain":
-                text = "Read Again with Ground Filter"
+                text = "Read Again with Another Unit" if step.unit_m else "Read Again with Ground Filter"
             operator = "wm.tool_set_by_id" if action == PICK_TOOL else action
             button = column.operator(operator, icon=icon, **({"text": text} if text else {}))
             if action == PICK_TOOL:
@@ -60,7 +61,11 @@ class ROCKFALL_PT_start(RockfallPanel, bpy.types.Panel):
             elif action == "rockfall.look_through":
                 button.identifier = step.video
             elif step.tile and action == "rockfall.import_terrain":
-                button.replaces, button.ground = step.tile, "FILTER"
+                button.replaces = step.tile
+                if step.unit_m:
+                    button.unit_m = step.unit_m
+                else:
+                    button.ground = "FILTER"
 
 
 CLASSES = (ROCKFALL_PT_start,)

@@ -2,19 +2,32 @@
 """Step 1: the terrain."""
 
 import textwrap
+from dataclasses import replace
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ....core.errors import RockfallError
+from ....core.errors import InputError, RockfallError
 from ....core.georeference import GlobalShift
 from ....core.progress import Progress, silent
 from ....core.terrain.advice import sentences
 from ....core.terrain.opening import EXTENSIONS
-from ....core.terrain.readers import inspect_terrain, read_terrain
+from ....core.terrain.readers import TerrainInfo, inspect_terrain, read_terrain
 from ....core.terrain.shading import Shading, shade
 from ....core.terrain.surface import Surface
-from ...scene import georeference, materials, start_up, store, sync, terrain, terrain_look
+from ...scene import (
+    camera_paths,
+    georeference,
+    materials,
+    pairs,
+    start_up,
+    store,
+    sync,
+    terrain,
+    terrain_look,
+    videos,
+)
+from ...scene.next_step import MILLIMETRE_M
 from ...view import job, look
 from ...view.first_import import FirstImport, begin_file
 from ...view.reporting import possible, reported
@@ -77,6 +90,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     y_up: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     proposed: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
+    asked_unit_m: FloatProperty(default=1.0, options={"HIDDEN", "SKIP_SAVE"})
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     is_cloud: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
@@ -95,17 +109,29 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
 
     @reported
     def _ask(self, context: bpy.types.Context) -> set[str]:
-        found = inspect_terrain(self.filepath)
-        shift = georeference.read_shift(context.scene) if georeference.has_shift(context.scene) else found.shift
+        found = self._inspected()
+        shift = georeference.read_shift(context.scene) if self._is_bound(context.scene) else found.shift
         self.shift_x, self.shift_y, self.shift_z = repr(shift.x), repr(shift.y), repr(shift.z)
         self.proposed = " ".join((self.shift_x, self.shift_y, self.shift_z))
-        self.asked, self.y_up = True, found.y_up
+        self.asked, self.y_up, self.asked_unit_m = True, found.y_up, self.unit_m
         self.is_cloud = found.kind == "cloud"
         self.facts = [found.name, *found.summary]
         self.facts += [said for said in sentences(found.minimum, found.maximum, shift) if said not in self.facts]
         return context.window_manager.invoke_props_dialog(
             self, width=420, title="Import Terrain", confirm_text="Import"
         )
+
+    def _inspected(self) -> TerrainInfo:
+        """What the file holds; where that cannot be metres, millimetres are proposed, and can be changed."""
+        try:
+            return inspect_terrain(self.filepath, unit_m=float(f"{self.unit_m:.7g}"))
+        except InputError:
+            if self.unit_m != 1.0:
+                raise
+            found = inspect_terrain(self.filepath, unit_m=MILLIMETRE_M)
+        self.unit_m = MILLIMETRE_M
+        said = "In metres it would be beyond every survey: millimetres are proposed."
+        return replace(found, summary=(said, *found.summary))
 
     def draw(self, context: bpy.types.Context) -> None:
         if not self.asked:
@@ -117,12 +143,13 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         layout.separator()
         layout.use_property_split = True
         column = layout.column(align=True)
-        known = georeference.has_shift(context.scene)
+        known = self._is_bound(context.scene)
         column.enabled = not known
         for name in ("shift_x", "shift_y", "shift_z"):
             column.prop(self, name)
         said = "The project's shift, shared by all its files." if known else "Proposed: kept for the project."
-        column.label(text="Proposed anew for Y up." if self._turned_since(context.scene) else said)
+        anew = "Proposed anew for Y up." if self.up == "y" else "Proposed anew for this unit."
+        column.label(text=anew if self._changed_since(context.scene) else said)
         if self.y_up:
             column = layout.column(align=True)
             column.label(text="The surface stands upright: does Y point up in this file?", icon="QUESTION")
@@ -161,9 +188,10 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     def _work(self, context: bpy.types.Context) -> job.Work:
         """What there is to read, and how it is shown. Blender may have forgotten the operator by then."""
         path, replaces, opens_workspace = self.chosen(context), self.replaces, self.opens_workspace
+        is_bound = self._is_bound(context.scene)
         accuracy_m = ACCURACY_M.get(self.source)
         told = {
-            "shift": None if self._turned_since(context.scene) else self._shift(context.scene),
+            "shift": None if self._changed_since(context.scene) else self._shift(context.scene),
             "up": self.up,
             "unit_m": float(f"{self.unit_m:.7g}"),
             "max_edge_m": self.max_edge_m or None,
@@ -182,6 +210,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             old = tiles_of(scene, replaces) if replaces else []
             replaced = [f"Replaced {', '.join(tile.name for tile in old)}.", what_stays(scene, old)] if old else []
             terrain.remove(scene, old)
+            if not is_bound:
+                georeference.forget_shift(scene)
             terrain.add_terrain(scene, surface, shading)
             if accuracy_m is not None:
                 scene.rockfall_terrain.accuracy_m = accuracy_m
@@ -204,10 +234,22 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         except RuntimeError as error:
             raise RockfallError(str(error).removeprefix("Error: ").strip()) from None
 
-    def _turned_since(self, scene: bpy.types.Scene) -> bool:
-        """Whether the shift was proposed for a file with z up, and it is read with y up: then it is of no use."""
+    def _is_bound(self, scene: bpy.types.Scene) -> bool:
+        """Whether the project keeps its shift: it is not that of the replaced tile alone."""
+        if store.SHIFT not in scene or not self.replaces:
+            return georeference.has_shift(scene)
+        others = [tile for tile in store.with_role(scene, store.TERRAIN_ROLE) if tile.get(store.ID) != self.replaces]
+        cameras = videos.cameras(scene)
+        placed = [camera for camera in cameras if camera_paths.is_solved(camera) or pairs.pairs_of(camera)]
+        own = (store.TERRAIN_ROLE, store.LEFT_OUT_ROLE)
+        made = [obj for obj in scene.objects if store.ROLE in obj and obj[store.ROLE] not in own and obj not in cameras]
+        return bool(others or placed or made)
+
+    def _changed_since(self, scene: bpy.types.Scene) -> bool:
+        """Whether the shift was proposed for z up and another unit than the file is read with: then it is of no use."""
         texts = " ".join((self.shift_x, self.shift_y, self.shift_z))
-        return self.asked and self.up == "y" and texts == self.proposed and not georeference.has_shift(scene)
+        otherwise = self.up == "y" or self.unit_m != self.asked_unit_m
+        return self.asked and otherwise and texts == self.proposed and not self._is_bound(scene)
 
     def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:
         """The project's shift, else the one that was given, else None: one is proposed.
@@ -223,7 +265,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             raise RockfallError(
                 f"The shift {', '.join(texts)} is not three numbers. Write metres, like 2600000.0."
             ) from None
-        if not georeference.has_shift(scene):
+        if not self._is_bound(scene):
             return given
         shift = georeference.read_shift(scene)
         if given is not None and (given.x, given.y, given.z) != (shift.x, shift.y, shift.z):

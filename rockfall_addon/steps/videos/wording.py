@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.remarks import Remark, from_plain, from_text
-from ...scene import clocks, footage, proposal, store, timing, video_files, video_times, videos
+from ...scene import camera_paths, clocks, footage, proposal, store, timing, video_files, video_times, videos
 from ...view import image_view
 
 OTHER_RATE = 1e-4
@@ -58,9 +58,9 @@ def warnings(scene: bpy.types.Scene, camera: bpy.types.Object) -> list[Remark]:
     said = []
     unset = None if proposal.is_applied(scene) else video_times.never_synchronised(scene)
     if unset is not None:
-        text = (
-            f"{unset.name} is not synchronised: both videos begin together until it is. Once both are aligned, do so."
-        )
+        ready = all(map(camera_paths.is_solved, videos.cameras(scene)))
+        then = "Mark one event in both, and synchronise them." if ready else "Once both are aligned, do so."
+        text = f"{unset.name} is not synchronised: both videos begin together until it is. {then}"
         said.append(Remark(text, "warning", "clock"))
     if scene.camera == camera and not image_view.shape_agrees(scene, camera):
         text = "The scene's render size has another shape than the video: footage and terrain do not fit."

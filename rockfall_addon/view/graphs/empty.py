@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the editor says when there is nothing to draw, and what to do next."""
 
-import textwrap
 from dataclasses import dataclass
 
 import bpy
@@ -12,6 +11,7 @@ from ....core.analysis.variables import VARIABLES
 from ....core.vectors import Mask
 from ...scene import next_step, store
 from ...scene.comparison import SceneComparison
+from ..wrapping import broken
 from . import drawing
 from .editor import Canvas, button
 from .impact_graphs import ImpactGraph
@@ -80,7 +80,7 @@ def in_graph(graph: ImpactGraph, compared: SceneComparison) -> str:
 def draw(canvas: Canvas, said: Said) -> None:
     """In the middle of the editor."""
     look, room = canvas.look, canvas.room
-    lines = wrapped(said.sentence, look, min(0.86 * room.width, 42 * look.text))
+    lines = broken(said.sentence, min(0.86 * room.width, 42 * look.text), look.measure)
     rows = -(-len(said.operators) // 2) if said.operators else 0
     height = (1.8 + LINE * len(lines) + 2.8 * rows + 0.6) * look.text
     y = room.bottom + (room.height + height) / 2 - look.text
@@ -102,7 +102,7 @@ def draw(canvas: Canvas, said: Said) -> None:
 
 def draw_in_plot(plot: Rectangle, look: Look, sentence: str) -> None:
     """In the middle of a graph."""
-    lines = wrapped(sentence, look, 0.9 * plot.width)
+    lines = broken(sentence, 0.9 * plot.width, look.measure)
     y = plot.bottom + (plot.height + LINE * look.text * (len(lines) - 1)) / 2
     for line in lines:
         wide = look.measure(line) + look.text
@@ -110,12 +110,6 @@ def draw_in_plot(plot: Rectangle, look: Look, sentence: str) -> None:
         drawing.fill(back, alpha(look.plot, 0.85))
         drawing.text(plot.left + plot.width / 2, y, line, look.text, look.faint, (0.5, 0.5))
         y -= LINE * look.text
-
-
-def wrapped(sentence: str, look: Look, width: float) -> list[str]:
-    """A sentence in lines that are no wider [px]."""
-    characters = max(10, int(width / (look.measure("The impacts shown have") / 22)))
-    return textwrap.wrap(sentence, characters)
 
 
 def _any(graph: ImpactGraph, name: str) -> bool:

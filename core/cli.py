@@ -24,8 +24,8 @@ DONE, BAD_INPUT, USAGE, SIGNALLED = 0, 1, 2, 128
 TRACEBACK = "ROCKFALL_TRACEBACK"
 """Variable of the environment with which an error that nobody has foreseen is shown as Python shows it."""
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "1")
-"""Of linear algebra, unless somebody asks for more, before NumPy is loaded: the matrices are small, and threads that wait
-for each other take longer than the work. Rows are spread over the cores by Rockfall itself."""
+"""Of linear algebra, unless somebody asks for more, before NumPy is loaded: the matrices are small, and threads that
+wait for each other take longer than the work. Rows are spread over the cores by Rockfall itself."""
 CLOSED_PIPE = 141
 """What a shell says of a tool that a closed pipe has ended, as in ``rockfall models | head -1``."""
 

@@ -17,8 +17,8 @@ from ...core.georeference import GlobalShift
 from ...core.vectors import Array
 from . import store, videos
 
-COLOURS, FIRST_COLOUR = 7, 1
-"""Of the theme's collections, all but the first: red is what passes below the terrain."""
+COLOURS, FIRST_COLOUR = 6, 1
+"""Of the theme's collections, without the first and the last: red is what passes below the terrain, brown is rock."""
 PIXEL, POINT = "pixel", "point"
 
 

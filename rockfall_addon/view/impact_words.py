@@ -41,7 +41,7 @@ def numbers(pick: bpy.types.Object) -> list[str]:
     energies = _pair(result, "kinetic1_j", "kinetic2_j", "sigma_kinetic1_j", "sigma_kinetic2_j", 1e-3, 2)
     coefficients = [(name, between(result, key, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))]
     coefficient = "   ".join(f"{name} {value}" for name, value in coefficients if value)
-    lines = [f"v {speeds} m/s", coefficient, f"E {energies} kJ", _spin(pick)]
+    lines = [speeds and f"v {speeds} m/s", coefficient, energies and f"E {energies} kJ", _spin(pick)]
     return [line for line in lines if line]
 
 
@@ -99,6 +99,6 @@ def _number(result: dict[str, object], key: str, sigma_key: str, factor: float, 
 def _pair(
     result: dict[str, object], before: str, after: str, sigma1: str, sigma2: str, factor: float, digits: int
 ) -> str:
-    """A value before and after the impact."""
-    both = (_number(result, key, sigma, factor, digits) for key, sigma in ((before, sigma1), (after, sigma2)))
-    return " → ".join(value or "?" for value in both)
+    """A value before and after the impact; empty where neither is defined."""
+    both = [_number(result, key, sigma, factor, digits) for key, sigma in ((before, sigma1), (after, sigma2))]
+    return " → ".join(value or "?" for value in both) if any(both) else ""

@@ -203,3 +203,14 @@ def test_two_videos_that_are_aligned_are_to_be_synchronised_now(part) -> None:
     paths = part("rockfall_addon.scene.camera_paths")
     paths.set_camera_path(scene, second, paths.camera_path(first))
     assert "Mark one event in both, and synchronise them." in wording.warnings(scene, second)[0].text
+
+
+def test_the_card_of_a_lone_impact_has_no_question_marks(scene, part) -> None:
+    words, nothing = part("rockfall_addon.view.impact_words"), [float("nan")] * 3
+    pick = picks_of(scene, "A")[1]
+    assert {line[0] for line in words.numbers(pick)} >= {"v", "E"}
+    for key in ("incident_mps", "restituted_mps"):
+        pick["rockfall_result"][key] = nothing
+    for key in ("kinetic1_j", "kinetic2_j", "rn", "rt"):
+        pick["rockfall_result"][key] = nothing[:1]
+    assert words.numbers(pick) == []

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture without what moves: a median of frames that are laid on each other, and how much it varies."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -211,10 +212,21 @@ def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarr
 
 
 def _sorted(layers: list[np.ndarray]) -> list[np.ndarray]:
-    """Sorted pixel by pixel, by a network of exchanges of whole pictures (odd-even transposition sort)."""
+    """Sorted pixel by pixel, by a network of exchanges of whole pictures."""
     cv2, ordered = opencv(), list(layers)
-    for turn in range(len(ordered)):
-        for i in range(turn % 2, len(ordered) - 1, 2):
-            a, b = ordered[i], ordered[i + 1]
-            ordered[i], ordered[i + 1] = cv2.min(a, b), cv2.max(a, b)
+    for i, j in _exchanges(len(ordered)):
+        a, b = ordered[i], ordered[j]
+        ordered[i], ordered[j] = cv2.min(a, b), cv2.max(a, b)
     return ordered
+
+
+def _exchanges(count: int) -> Iterator[tuple[int, int]]:
+    """Places that are put in order one after the other to sort so many (Batcher's merge exchange, Knuth 5.2.2 M)."""
+    top = 1 << max(count - 1, 1).bit_length() - 1
+    size = top
+    while size:
+        step, other, rest = size, top, 0
+        while step:
+            yield from ((i, i + step) for i in range(count - step) if i & size == rest)
+            step, other, rest = other - size, other >> 1, size
+        size >>= 1

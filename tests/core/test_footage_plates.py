@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 from rockfall.core.footage.background import BackgroundMotion, no_motion
-from rockfall.core.footage.plates import NOISE_FLOOR, Plates
+from rockfall.core.footage.plates import NOISE_FLOOR, Plates, _sorted
 from rockfall.core.footage.sources import Pictures
 
 WIDTH, HEIGHT = 120, 80
@@ -20,6 +20,14 @@ def panning(count: int, step: int, first: int = 0) -> BackgroundMotion:
     homography = np.tile(np.eye(3), (count, 1, 1))
     homography[:, 0, 2] = step * np.arange(count)
     return BackgroundMotion(np.arange(first, first + count), homography, np.full(count, 50), np.zeros(count), False)
+
+
+@pytest.mark.parametrize("count", [*range(1, 9), 15])
+def test_samples_in_any_order_are_sorted(count: int) -> None:
+    """What sorts all rows of zeros and ones sorts everything (Knuth 5.3.4 Z)."""
+    layers = [np.arange(2**count, dtype=np.uint32)[None] >> i & 1 for i in range(count)]
+    ordered = _sorted([layer.astype(np.uint8) for layer in layers])
+    np.testing.assert_array_equal(ordered, np.sort(layers, axis=0))
 
 
 @pytest.mark.parametrize("count", [1, 4, 15])

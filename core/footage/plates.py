@@ -191,23 +191,23 @@ def _centred(homography: Array) -> Array:
 
 def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Picture, sigma and where it is known, by median and quartiles; what is not known is sorted to the end."""
-    if all(there.all() for there in known):
-        known = []
-    for layer, there in zip(layers, known, strict=False):
-        layer[~there] = 255
+    cv2 = opencv()
+    partial = [not there.all() for there in known]
+    for i in np.flatnonzero(partial):
+        layers[i] = cv2.copyTo(np.full_like(layers[i], 255), (~known[i]).view(np.uint8), layers[i])
     ordered = _sorted(layers)
     count = len(ordered)
     middle, low, high = (ordered[int(q * (count - 1))].copy() for q in QUARTILES)
     seen = np.full(middle.shape[:2], 255, np.uint8)
-    if known:
-        number = np.stack(known).sum(axis=0, dtype=np.int16)
+    if any(partial):
+        number = np.sum(known, axis=0, dtype=np.uint8)
         seen[number < FEWEST] = 0
-        part = number < count
-        rest, fewer = np.stack([layer[part] for layer in ordered]), np.maximum(number[part] - 1, 0)
-        for picture, q in zip((middle, low, high), QUARTILES, strict=True):
-            picture[part] = rest[(q * fewer).astype(np.intp), np.arange(fewer.size)]
+        for fewer in np.flatnonzero(np.bincount(number.ravel(), minlength=count)[:count]).tolist():
+            there = (number == fewer).view(np.uint8)
+            for picture, q in zip((middle, low, high), QUARTILES, strict=True):
+                cv2.copyTo(ordered[int(q * max(fewer - 1, 0))], there, picture)
     spread = (high.astype(np.float32) - low) / IQR_PER_SD
-    variance = opencv().blur(np.einsum("ijk,ijk->ij", spread, spread) / np.float32(3), (5, 5))
+    variance = cv2.blur(np.einsum("ijk,ijk->ij", spread, spread) / np.float32(3), (5, 5))
     return middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen
 
 

@@ -195,3 +195,12 @@ def test_a_page_of_runs_of_which_nothing_is_known(site: Path, capsys: pytest.Cap
     said = f"{site / 'project.toml'}: No measured block can be shown: no flight is known. Pick two impacts or more"
     assert said in capsys.readouterr().err
     assert not (site / "out").exists()
+
+
+def test_a_page_of_simulated_blocks_without_a_terrain(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (site / "project.toml").write_text(PROJECT.replace('[terrain]\nfile = "slope.obj"\n', ""))
+    words = ["web", str(site / "project.toml"), "--simulate", "noel_2017", "--out", str(site / "out")]
+    assert main(words) == 1
+    said = f"{site / 'project.toml'}: Simulated blocks fall on a terrain, and the project names none. Add [terrain]"
+    assert said in capsys.readouterr().err
+    assert not (site / "out").exists()

@@ -144,6 +144,16 @@ def test_a_contact_sheet_of_a_video_without_impacts(site: Path, capsys: pytest.C
     )
 
 
+def test_a_stroboscope_of_a_block_that_is_behind_the_camera(site: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """It has no pixels: the picture is made, and no library warns."""
+    behind = look_at(64, 48, [2.0, -25.0, 12.0], [2.0, -90.0, 2.0], focal_px=60.0)
+    write_camera(site / "side.toml", fixed(behind))
+    words = ["--preset", "small", "--film", "stroboscopic", "--out", str(site / "out")]
+    assert main(["render", str(site / "project.toml"), *words]) == 0
+    assert not [str(one.message) for one in recwarn]
+    assert (site / "out" / "stroboscopic.png").is_file()
+
+
 def test_a_folder_of_somebody_elses_pictures_is_left_alone(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = site.parent / "film"
     (out / "turntable").mkdir(parents=True)

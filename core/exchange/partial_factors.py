@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import cast
 
 from ..errors import InputError
-from ..hazard.design import ON, Factor, On, PartialFactors, check_factors
+from ..hazard.design import ON, Factor, On, PartialFactors
 from ..reading import reader
 from .toml_text import TomlTable, read_toml
 
@@ -75,7 +75,6 @@ def read_factors(path: str | Path) -> PartialFactors:
     unknown = sorted(table.rest())
     if unknown:
         raise table.wrong(unknown[0], "is not known here", "title, note, share, clearance_m and [[factor]] are")
-    check_factors(factors)
     return found
 
 

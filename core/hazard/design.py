@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From what comes to a screen to what a barrier there must hold: characteristic values times partial factors."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import isfinite, nan, prod
 from typing import Literal, get_args
@@ -161,11 +160,9 @@ def design_values(
 
     Raises
     ------
-    InputError : no block comes to the screen, a share that is none, a factor without a value.
+    InputError : no block comes to the screen, a factor without a value.
     """
     share = factors.share if share is None else share
-    if not 0 < share < 1:
-        raise InputError(f"The share {share:g} is none between 0 and 1", advice="0.95 and 0.99 are usual")
     if not len(hits):
         raise InputError(
             f"None of {blocks} blocks comes to {screen.name!r}: there is nothing to design for",
@@ -202,12 +199,3 @@ def design_values(
         design_energy * factors.product("capacity"),
         design_height + clearance,
     )
-
-
-def check_factors(factors: Iterable[Factor]) -> None:
-    """Raises `InputError` for a factor on nothing, or below zero."""
-    for factor in factors:
-        if factor.on not in ON:
-            raise InputError(f"{factor.symbol} is on {factor.on!r}", advice=f"Give one of {', '.join(ON)}")
-        if factor.value <= 0:
-            raise InputError(f"{factor.symbol} is {factor.value:g}", advice="Give a number above zero")

@@ -119,15 +119,10 @@ def placed_trees(
 
     Raises
     ------
-    InputError : sizes that cannot be; no tree that stands on the terrain.
+    InputError : one that is too thick; no tree that stands on the terrain.
     """
     position = np.asarray(position, dtype=np.float64).reshape(-1, 2)
     names: Names = np.full(len(position), "", np.str_) if name is None else name
-    for what, values in (("diameter", dbh_m), ("height", height_m), ("loss of energy", energy_j)):
-        wrong = np.flatnonzero(~(np.isfinite(values) & (values > 0)))
-        if wrong.size:
-            i = int(wrong[0])
-            raise InputError(f"The {what} of tree {names[i] or i + 1} is {values[i]:g}", advice="Give more than zero")
     if len(dbh_m) and float(dbh_m.max()) > THICKEST_M:
         raise InputError(
             f"A tree has a diameter of {dbh_m.max():g} m",
@@ -172,13 +167,8 @@ def random_trees(
 
     Raises
     ------
-    InputError : a density or diameter that cannot be; no tree on the terrain.
+    InputError : more trees than fit, or thicker ones than there are; no tree on the terrain.
     """
-    for what, value in (("density of stems", per_hectare), ("mean diameter", mean_dbh_m), ("height", height_m)):
-        if not (np.isfinite(value) and value > 0):
-            raise InputError(f"The {what} is {value:g}", advice="Give a number above zero")
-    if not (np.isfinite(sd_dbh_m) and sd_dbh_m >= 0):
-        raise InputError(f"The standard deviation of the diameters is {sd_dbh_m:g}", advice="Give zero or more")
     if mean_dbh_m > THICKEST_M:
         raise InputError(
             f"The mean diameter is {mean_dbh_m:g} m", advice=f"Diameters are in cm, and below {100 * THICKEST_M:g}"

@@ -203,7 +203,8 @@ def sync(
         done = _sync_with_keepers(scene, names, again, undone)
     finally:
         _busy.pop()
-    done.step_changed = folders.remember() or done.step_changed
+    if names is None:  # where collections were moved, all is looked at
+        done.step_changed = folders.remember() or done.step_changed
     return done
 
 

@@ -144,6 +144,16 @@ def test_a_contact_sheet_of_a_video_without_impacts(site: Path, capsys: pytest.C
     )
 
 
+def test_a_stroboscope_of_a_block_that_is_behind_the_camera(site: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """It has no pixels: the picture is made, and no library warns."""
+    behind = look_at(64, 48, [2.0, -25.0, 12.0], [2.0, -90.0, 2.0], focal_px=60.0)
+    write_camera(site / "side.toml", fixed(behind))
+    words = ["--preset", "small", "--film", "stroboscopic", "--out", str(site / "out")]
+    assert main(["render", str(site / "project.toml"), *words]) == 0
+    assert not [str(one.message) for one in recwarn]
+    assert (site / "out" / "stroboscopic.png").is_file()
+
+
 def test_a_folder_of_somebody_elses_pictures_is_left_alone(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = site.parent / "film"
     (out / "turntable").mkdir(parents=True)
@@ -193,5 +203,14 @@ def test_a_page_of_runs_of_which_nothing_is_known(site: Path, capsys: pytest.Cap
     (site / "picks.csv").write_text("trajectory,time_s,x_m,y_m,z_m,kind\nA,0,0,0,0,impact\n")
     assert main(["web", str(site / "project.toml"), "--out", str(site / "out")]) == 1
     said = f"{site / 'project.toml'}: No measured block can be shown: no flight is known. Pick two impacts or more"
+    assert said in capsys.readouterr().err
+    assert not (site / "out").exists()
+
+
+def test_a_page_of_simulated_blocks_without_a_terrain(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (site / "project.toml").write_text(PROJECT.replace('[terrain]\nfile = "slope.obj"\n', ""))
+    words = ["web", str(site / "project.toml"), "--simulate", "noel_2017", "--out", str(site / "out")]
+    assert main(words) == 1
+    said = f"{site / 'project.toml'}: Simulated blocks fall on a terrain, and the project names none. Add [terrain]"
     assert said in capsys.readouterr().err
     assert not (site / "out").exists()

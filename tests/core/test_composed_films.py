@@ -318,8 +318,13 @@ def test_a_killed_render_goes_on_and_gives_the_same_frames(tmp_path: Path) -> No
     with frame_store(tmp_path / "whole", {"film": "a"}) as store:
         assert store.fill(range(8), draw, quiet) == 0
     drawn.clear()
-    with pytest.raises(KeyboardInterrupt), frame_store(tmp_path / "cut", {"film": "a"}) as store:
+    with pytest.raises(KeyboardInterrupt) as ended, frame_store(tmp_path / "cut", {"film": "a"}) as store:
         store.fill(range(8), killed, quiet)
+    said = f"4 frames are finished and kept in {tmp_path / 'cut'}; the same command goes on with the others"
+    assert str(ended.value) == said
+    with pytest.raises(KeyboardInterrupt) as ended, frame_store(tmp_path / "none", {"film": "a"}):
+        raise KeyboardInterrupt
+    assert not ended.value.args  # nothing was written
     assert drawn == [0, 1, 2, 3]
     with frame_store(tmp_path / "cut", {"film": "a"}) as store:
         assert store.fill(range(8), draw, quiet) == 4

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What `rockfall simulate` refuses of measured impacts, attributes, posteriors and projects; nothing is written."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,7 @@ FILES = {
         f"A,{0.5 * k},{10 + 4 * k},30,{43 - 2.8 * k},impact\n" for k in range(4)
     ),
     "sizes.csv": "d1_m,d2_m,d3_m\n0.5,0.4,0.3\n",
+    "trees.csv": "x_m,y_m,dbh_cm\n20,30,30\n",
     "project.toml": 'schema = 1\n[terrain]\nfile = "slope.obj"\n[picks]\nfile = "picks.csv"\n[block]\nd1_m = 0.4\n'
     'd2_m = 0.4\nd3_m = 0.4\n[simulation]\nmodel = "noel_2017"\n',
 }  # fmt: skip
@@ -71,9 +73,10 @@ def folder(tmp_path: Path) -> Path:
 def refused(folder: Path, capsys: pytest.CaptureFixture[str], words: list[str]) -> str:
     """What is said in the end, without the folder's name."""
     capsys.readouterr()
+    there = sorted(path.name for path in folder.iterdir())
     words = [word.replace("@", f"{folder}/") for word in words]
     assert main(["simulate", *words, "--out", str(folder / "out")]) == 1
-    assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
+    assert sorted(path.name for path in folder.iterdir()) == there
     return capsys.readouterr().err.strip().split("\n")[-1].replace(f"{folder}/", "@")
 
 
@@ -155,3 +158,60 @@ def test_what_a_project_says_itself(
     folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
 ) -> None:
     assert said in refused(folder, capsys, ["@project.toml", *words])
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ('[[blocks]]\nname = "A"\nd1_m = 1\n[[blocks]]\nname = "A"\nd1_m = 2\n', "blocks names 'A' twice. Give"),
+        ('[[render]]\nname = "hd"\n[[render]]\nname = "hd"\n', "render names 'hd' twice. Give each entry"),
+        ("[simulation.trees]\nheight_m = 20\n", "simulation.trees.stems_per_hectare is missing. Give a file of trees"),
+        ("[simulation.trees]\nstems_per_hectare = 9\n", "simulation.trees.dbh_cm is missing. Give a file of trees"),
+        (
+            '[simulation.trees]\nfile = "trees.csv"\ndbh_cm = 30\n',
+            "simulation.trees.dbh_cm is given beside file. The table has each stem: leave out one of them",
+        ),
+    ],
+)  # fmt: skip
+def test_projects_that_contradict_themselves(
+    folder: Path, capsys: pytest.CaptureFixture[str], more: str, said: str
+) -> None:
+    (folder / "project.toml").write_text(FILES["project.toml"] + more, encoding="utf-8")
+    assert f"@project.toml: {said}" in refused(folder, capsys, ["@project.toml"])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--set", "stevens_1998.rn=0.3"], "--set gives parameters of stevens_1998, which is not used. Add"),
+        (["--observed", "@above.csv"], "--observed gives measured impacts, which no model draws from. Add"),
+        (["--model", "observed"], "The model observed draws from measured impacts, and there are none. Give"),
+    ],
+)  # fmt: skip
+def test_options_of_models_that_are_not_asked_for(
+    folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    assert said in refused(folder, capsys, ["@r.csv", *ON, *words])
+
+
+@pytest.mark.parametrize(
+    ("geometry", "said"),
+    [
+        ('{"coordinates": [1, 2]}', "This is no GeoJSON: an object has no type. Export"),
+        (
+            '{"type": "Polygon", "coordinates": [[[0, 0], [1e10, 0], [5, 5], [0, 0]]]}',
+            "has a coordinate beyond every survey (1e9 m). Correct it",
+        ),
+        (
+            '{"type": "Polygon", "coordinates": [[[0, 0], [NaN, 0], [5, 5], [0, 0]]]}',
+            "has a coordinate that is not finite. Correct it",
+        ),
+    ],
+)
+def test_maps_that_cannot_be_drawn(folder: Path, capsys: pytest.CaptureFixture[str], geometry: str, said: str) -> None:
+    text = (
+        '{"type": "FeatureCollection", "features": [{"type": "Feature", "properties": {"name": "a"}, "geometry": %s}]}'
+    )
+    (folder / "zone.geojson").write_text(text % geometry, encoding="utf-8")
+    from_there = ["--from-polygon", "@zone.geojson", "--diameter", "1", "--number", "2"]
+    assert re.search(rf"^rockfall: @zone.geojson: .*{re.escape(said)}", refused(folder, capsys, [*ON, *from_there]))

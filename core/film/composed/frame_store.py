@@ -10,9 +10,11 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from signal import SIGINT
 
 from ...errors import InputError
 from ...file_locks import holds, try_lock
+from ...interrupts import Interrupt
 from ...opencv import opencv
 from ...output import TRIES, made_folder, write_bytes, write_text
 from ...progress import Progress
@@ -97,12 +99,19 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
     Raises
     ------
     InputError : the folder cannot be made or holds other things, or another process is drawing into it.
+    KeyboardInterrupt : with a message that says so where frames are finished.
     """
     with made_folder(folder):
         lock = _claim(folder)
         try:
             _prepare(folder, json.dumps(states, indent=2, sort_keys=True))
             yield FrameStore(folder)
+        except KeyboardInterrupt as error:
+            kept = sum(_is_whole(file) for file in folder.iterdir() if _is_frame(file))
+            if error.args or not kept:
+                raise
+            said = f"{kept} frames are finished and kept in {folder}; the same command goes on with the others"
+            raise Interrupt(error.number if isinstance(error, Interrupt) else SIGINT, said) from error
         finally:
             with suppress(OSError):
                 if not (folder / STATED).exists():  # it is no folder of frames, and nothing could be written

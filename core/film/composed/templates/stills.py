@@ -231,8 +231,9 @@ def _step(material: Material, mosaic: Mosaic, fall: Fall, begin: float, end: flo
         if len(places) < 2:
             continue
         centres, radii = np.array([c for c, _ in places]), np.array([r for _, r in places])
-        apart = np.hypot(*np.diff(centres, axis=0).T)
-        if np.nanmedian(apart / (2 * radii[1:])) > APART:
+        apart = np.hypot(*np.diff(centres, axis=0).T) / (2 * radii[1:])
+        seen = apart[np.isfinite(apart)]
+        if seen.size and np.median(seen) > APART:
             return step
     return STEPS_S[-1]
 

@@ -24,6 +24,7 @@ BETWEEN: Mapping[str, tuple[float, float]] = {
     "unit_m": (1e-7, 1e7),
     **dict.fromkeys(("fx", "fy"), (1e-3, 1e7)),
     **dict.fromkeys(("cx", "cy"), (0.0, 1e7)),
+    **dict.fromkeys(("k1", "k2", "k3", "p1", "p2"), (0.0, 1e6)),
     **dict.fromkeys(("width", "height"), (1, 1e5)),
     **dict.fromkeys(("nx", "ny", "nz"), (0.0, 1e3)),
     **dict.fromkeys(("rn", "rt", "r"), (0.0, 1e9)),

@@ -128,6 +128,15 @@ def test_a_camera_of_another_picture(site: Path, camera: Camera, capsys: pytest.
     assert f"{site / 'side.toml'}: The camera is of a picture of 640 × 480 pixels, the video has 64 × 48. " in said
 
 
+@pytest.mark.parametrize("name", ["k1", "k2", "k3", "p1", "p2"])
+def test_a_lens_that_cannot_be(site: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    text = (site / "side.toml").read_text()
+    assert f"{name} = 0.0\n" in text
+    (site / "side.toml").write_text(text.replace(f"{name} = 0.0\n", f"{name} = 1e308\n"))
+    said = refused(site, capsys, "--film", "overlay", "--still")
+    assert f"{site / 'side.toml'}: {name} is 1e+308, beyond what can be (±1e+06). Correct it" in said
+
+
 def test_runs_of_which_nothing_is_known(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (site / "picks.csv").write_text("trajectory,time_s,x_m,y_m,z_m,kind\nA,0,0,0,0,impact\n")
     said = refused(site, capsys, "--film", "turntable", "--still")

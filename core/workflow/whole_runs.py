@@ -38,6 +38,8 @@ class ObservedRuns(NamedTuple):
 def join_runs(parts: Sequence[ObservedRuns]) -> ObservedRuns:
     """The runs of several sources, as of trajectories that were filmed and of blocks of which the stop is known.
 
+    Remarks on the releases of one source name its first run.
+
     Raises
     ------
     InputError : runs of two sources have one name.
@@ -45,7 +47,14 @@ def join_runs(parts: Sequence[ObservedRuns]) -> ObservedRuns:
     if len(parts) == 1:
         return parts[0]
     observed, releases = zip(*parts, strict=True)
-    return ObservedRuns(join_observed(observed), join_releases(releases))
+    return ObservedRuns(join_observed(observed), join_releases([_told_apart(one) for one in releases]))
+
+
+def _told_apart(releases: Releases) -> Releases:
+    """Its remarks say of which runs they are."""
+    first, *others = dict.fromkeys(releases.name.tolist())
+    which = f"{first} and {len(others)} other{'s' * (len(others) > 1)}" if others else first
+    return replace(releases, remarks=tuple(replace(one, text=f"Of {which}: {one.text}") for one in releases.remarks))
 
 
 NUMBER = 100

@@ -25,11 +25,12 @@ from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
+from rockfall.core.remarks import Remark
 from rockfall.core.simulation.engine import Settings, joined, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
 from rockfall.core.terrain.surface import Surface
-from rockfall.core.workflow.whole_runs import compare_whole_runs, released_as_observed
+from rockfall.core.workflow.whole_runs import ObservedRuns, compare_whole_runs, join_runs, released_as_observed
 from scipy.integrate import solve_ivp
 from scipy.stats import binom, kstest, rankdata
 
@@ -510,3 +511,20 @@ def test_stops_without_motion(ground: Ground) -> None:
     assert runout.observed == pytest.approx(np.hypot(*(shorter - runs.start[first[one]])[:, :2].T))
     assert runout.differs
     assert runout.test.place.max() < 0.05
+
+
+def test_remarks_on_the_runs_of_several_sources_say_of_which_they_are() -> None:
+    def of(*names: str) -> ObservedRuns:
+        place = np.arange(3.0 * len(names)).reshape(-1, 3)
+        released = make_releases(place, name=np.array(names), number=2)
+        said = Remark(f"{len(names)} of {len(names)} trajectories begin with an impact.")
+        return ObservedRuns(
+            observe_stops(np.array(names), place, place, np.ones(len(names))), released.with_remarks(said)
+        )
+
+    parts = of("A1", "A2", "A3"), of("B1")
+    assert parts[0] is join_runs(parts[:1])
+    assert [str(one) for one in join_runs(parts).releases.remarks] == [
+        "Of A1 and 2 others: 3 of 3 trajectories begin with an impact.",
+        "Of B1: 1 of 1 trajectories begin with an impact.",
+    ]

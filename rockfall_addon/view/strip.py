@@ -160,13 +160,15 @@ def _draw() -> None:
     bounds = (strip.first, -1.0, strip.first + frames, strip.rows + 1.0)
     matrix = Matrix.Translation((-strip.first * strip.per_frame, strip.area.top - 0.5 * strip.row_height, 0.0))
     matrix @= Matrix.Diagonal((strip.per_frame, -strip.row_height, 1.0, 1.0))
+    with drawing.clipped(strip.area):
+        _draw_active(context, strip, seen, diameter)
     with drawing.clipped(strip.area), gpu.matrix.push_pop():
         gpu.matrix.multiply_matrix(matrix)
         kept["spans"].draw(alpha(seen.faint, 0.6), seen.line, thin=True)
         kept["alarming"].draw(1.7 * diameter, bounds)
         for kind in SHAPES:
             kept[kind].draw(diameter, bounds, edge=(0.0, 0.0, 0.0), rim=seen.line)
-    _draw_chosen(context, strip, seen, diameter)
+    _draw_pointed(context, strip, seen, diameter)
     gpu.state.blend_set("NONE")
 
 
@@ -206,20 +208,25 @@ def _draw_rows(context: bpy.types.Context, strip: Strip, seen: Look) -> None:
         drawing.text(6 * seen.scale, low + strip.row_height / 2, words, size, colour, (0.0, 0.5))
 
 
-def _draw_chosen(context: bpy.types.Context, strip: Strip, seen: Look, diameter: float) -> None:
-    """A ring about the selected pick and the one under the mouse, and the card of the latter."""
-    places = None
-    active = context.object.get(store.ID, "") if context.object is not None else ""
-    pointed = _pointed.get(context.region.as_pointer(), "")
-    for identifier, colour in ((active, seen.chosen), (pointed, seen.ink)):
-        if not identifier or identifier not in strip.marks.identifier:
-            continue
-        places = strip.places() if places is None else places
-        place = places[[strip.marks.identifier.index(identifier)]]
-        region = (0.0, 0.0, strip.area.width, strip.area.top + diameter)
-        drawing.Points(place, colour, 1.0, "ring").draw(2.2 * diameter, region)
-        pick = picks.with_id(context.scene, identifier) if identifier == pointed else None
-        if pick is not None:
-            rows = [impact_words.title(pick), "   ".join(impact_words.numbers(pick)), *impact_words.reasons(pick)]
-            within = Rectangle(0.0, 0.0, strip.area.width, strip.area.top)
-            drawing.card(tuple(place[0]), [row for row in rows if row], seen, within)
+def _draw_active(context: bpy.types.Context, strip: Strip, seen: Look, diameter: float) -> None:
+    """A bar behind the selected pick: a ring would be taken for the ring of a flag."""
+    identifier = context.object.get(store.ID, "") if context.object is not None else ""
+    if identifier and identifier in strip.marks.identifier:
+        x, y = strip.places()[strip.marks.identifier.index(identifier)]
+        high = max(strip.row_height, 2.0 * diameter)
+        drawing.fill(Rectangle(x - 1.2 * diameter, y - high / 2, 2.4 * diameter, high), alpha(seen.chosen, 0.55))
+
+
+def _draw_pointed(context: bpy.types.Context, strip: Strip, seen: Look, diameter: float) -> None:
+    """A ring about the pick under the mouse, and its card."""
+    identifier = _pointed.get(context.region.as_pointer(), "")
+    if not identifier or identifier not in strip.marks.identifier:
+        return
+    place = strip.places()[[strip.marks.identifier.index(identifier)]]
+    region = (0.0, 0.0, strip.area.width, strip.area.top + diameter)
+    drawing.Points(place, seen.ink, 1.0, "ring").draw(2.2 * diameter, region)
+    pick = picks.with_id(context.scene, identifier)
+    if pick is not None:
+        rows = [impact_words.title(pick), "   ".join(impact_words.numbers(pick)), *impact_words.reasons(pick)]
+        within = Rectangle(0.0, 0.0, strip.area.width, strip.area.top)
+        drawing.card(tuple(place[0]), [row for row in rows if row], seen, within)

@@ -115,7 +115,7 @@ def test_a_model_that_cannot_give_what_was_observed_is_named(ground: Ground, rel
     found = back_analyse(ground, observed, releases, Settings(MODEL, {"rt": 0.3}), priors, sets=300, rounds=1)
     assert not all(check.fits for check in found.checks)
     assert found.remarks[0].severity == "warning"
-    assert "make pfeiffer_bowen_1989 give" in str(found.remarks[0])
+    assert "make CRSP (Pfeiffer & Bowen 1989) give" in str(found.remarks[0])
 
 
 def test_the_same_seed_gives_the_same_posterior(ground: Ground, releases: Releases) -> None:

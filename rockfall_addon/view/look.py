@@ -83,6 +83,8 @@ def _look_at(area: bpy.types.Area, points: Sequence[Vector], rotation: Quaternio
     aside = Vector((left + right - region.width, bottom + top - region.height, 0.0)) * (per_px * distance / 2)
     view.view_perspective, view.view_rotation = "PERSP", rotation
     view.view_location, view.view_distance = rotation @ (middle - aside), distance
+    space = area.spaces.active
+    space.clip_end = max(space.clip_end, 2 * (distance + high.z - low.z))
 
 
 def _views(context: bpy.types.Context) -> Iterator[bpy.types.Area]:

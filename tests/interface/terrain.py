@@ -224,6 +224,10 @@ def case_a_scan_in_millimetres_is_noticed(window):
         bpy.ops.rockfall.remove_terrain()
         window.part("rockfall_addon.scene.georeference").forget_shift(scene)
         assert bpy.ops.rockfall.import_terrain(filepath=str(folder / "local.obj"), unit_m=1.0) == {"FINISHED"}
+    with window.override("VIEW_3D"):
+        window.part("rockfall_addon.view.look").show_relief(bpy.context, frame_all=True)
+        space = bpy.context.space_data
+        assert space.clip_end > space.region_3d.view_distance > 2e4, "it is seen, large as it is"
     yield from window.show_sidebar()
     yield 1.0
     window.screenshot("2-two-kilometres-apart")

@@ -13,7 +13,7 @@ A,0.75,4.1,0.3,36.2,impact,ok
 A,1.9,11.3,-0.5,27.9,impact,ok
 A,2.4,13.9,0.1,26,stop,ok
 """
-SET_UP, PREVIEW, RENDER, REMOVE = 161, 213, 290, 344
+SET_UP, PREVIEW, RENDER, REMOVE = 161, 213, 269, 323
 """How far below the panel's header its buttons are [px]."""
 
 

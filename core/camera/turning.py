@@ -14,7 +14,8 @@ from ..vectors import Array, Indices, Mask, across, cross, norm, perpendicular, 
 from .model import rotation_from_vector
 
 LEAST_FEATURES = 3
-WAHBA_ROUNDS = 15
+WAHBA_ROUNDS, SETTLED = 15, 1e-9
+"""Most rounds, and the change of all rotations that ends them [rad]: a thousandth of what a feature tells."""
 ROUNDS = 6
 RIDGE = 1e-9
 """What is added to the normal equations, for frames that too few features hold."""
@@ -107,7 +108,9 @@ def _wahba(bearing: Array, direction: Array, frame: Indices, sigma: Array, frame
     for _ in range(WAHBA_ROUNDS):
         left, _, right = np.linalg.svd(sums_by(frame, weight[:, None, None] * products, frames))
         left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-        rotation = left @ right
+        last, rotation = rotation, left @ right
+        if np.abs(rotation - last).max() < SETTLED:
+            break
         gap = norm(bearing - np.einsum("mij,mj->mi", rotation[frame], direction))
         weight = 1 / np.maximum(gap / sigma, 1) / sigma
     return rotation

@@ -320,12 +320,16 @@ def installed(place: Path) -> dict[str, str]:
     return there
 
 
+ONE_THREAD = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+"""Of linear algebra, as Rockfall's commands have it: threads that wait count as work. All else has all cores."""
+
+
 def compared(path: Path, size: int, what: str, whom: dict[str, str], repeats: int) -> list[Row]:
     """What was measured on one file."""
     results = {}
     for who, python in whom.items():
         command = [python, __file__, "--measure", who, str(path), "--repeats", str(repeats)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=ONE_THREAD)
         if done.returncode:
             print(f"{who} failed on {size:,} {what}: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
         else:

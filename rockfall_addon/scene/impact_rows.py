@@ -24,8 +24,9 @@ def fill(scene: bpy.types.Scene, trajectory: str | None = None) -> None:
         there.append(len(rows) - 1)
     for i in reversed(there[len(wanted) :]):
         rows.remove(i)
+    found = rows if trajectory is not None else list(rows)  # Blender counts up to each number
     for i, obj in zip(there, wanted, strict=False):
-        _write(rows[i], obj)
+        _write(found[i], obj)
 
 
 def _rows_of(rows: bpy.types.bpy_prop_collection, trajectory: str) -> list[int]:

@@ -84,7 +84,7 @@ def readers() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
 
 
 def _explore(at: Path) -> object:
-    """The live page is put together, a slider moved, and the parameters saved."""
+    """The live page is put together, with what it would save; nothing on it is moved."""
     from bokeh.document import Document
     from rockfall.core.analysis.courses import find_courses
     from rockfall.core.analysis.explorer import Exploration, open_page

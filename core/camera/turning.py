@@ -15,7 +15,7 @@ from .model import rotation_from_vector
 
 LEAST_FEATURES = 3
 WAHBA_ROUNDS, SETTLED = 15, 1e-9
-"""Most rounds, and the change of all rotations that ends them [rad]: a thousandth of what a feature tells."""
+"""Most rounds, and the change of all rotations that ends them, far below what features tell [rad]."""
 ROUNDS = 6
 RIDGE = 1e-9
 """What is added to the normal equations, for frames that too few features hold."""

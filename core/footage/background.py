@@ -261,8 +261,9 @@ def _quartered(grey: np.ndarray) -> np.ndarray:
 
 def _brightness(small: np.ndarray, pixel: Array) -> Array:
     """(n,) grey levels at corners, told from a picture a quarter as wide and high."""
-    column, row = (np.clip(pixel / 4, 0, (small.shape[1] - 1, small.shape[0] - 1)) + 0.5).astype(np.intp).T
-    return small[np.minimum(row, small.shape[0] - 1), np.minimum(column, small.shape[1] - 1)].astype(np.float64) + 1.0
+    height, width = small.shape
+    column, row = (np.clip(np.nan_to_num(pixel / 4), 0, (width - 1, height - 1)) + 0.5).astype(np.intp).T
+    return small[row, column].astype(np.float64) + 1.0
 
 
 def _as_bright(grey: np.ndarray, ratio: Array) -> np.ndarray:

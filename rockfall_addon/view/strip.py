@@ -162,12 +162,12 @@ def _draw() -> None:
     matrix @= Matrix.Diagonal((strip.per_frame, -strip.row_height, 1.0, 1.0))
     with drawing.clipped(strip.area):
         _draw_active(context, strip, seen, diameter)
-    with drawing.clipped(strip.area), gpu.matrix.push_pop():
-        gpu.matrix.multiply_matrix(matrix)
-        kept["spans"].draw(alpha(seen.faint, 0.6), seen.line, thin=True)
-        kept["alarming"].draw(1.7 * diameter, bounds)
-        for kind in SHAPES:
-            kept[kind].draw(diameter, bounds, edge=(0.0, 0.0, 0.0), rim=seen.line)
+        with gpu.matrix.push_pop():
+            gpu.matrix.multiply_matrix(matrix)
+            kept["spans"].draw(alpha(seen.faint, 0.6), seen.line, thin=True)
+            kept["alarming"].draw(1.7 * diameter, bounds)
+            for kind in SHAPES:
+                kept[kind].draw(diameter, bounds, edge=(0.0, 0.0, 0.0), rim=seen.line)
     _draw_pointed(context, strip, seen, diameter)
     gpu.state.blend_set("NONE")
 

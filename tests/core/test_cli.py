@@ -333,3 +333,18 @@ def test_models_are_named_alike_in_every_command(name, tmp_path) -> None:
 def test_a_file_after_the_models_is_not_taken_for_one(terrain, tmp_path, capsys) -> None:
     argv = ["simulate", "--terrain", str(terrain), "--model", "noel_2017", "starts.csv"]
     assert "starts.csv for a model. Write the file before --model" in refused(capsys, tmp_path / "out", *argv)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted as Linux tells them")
+@pytest.mark.parametrize(("asked", "threads"), [(None, "1"), ("2", "2")])
+def test_linear_algebra_has_one_thread_unless_more_are_asked_for(asked, threads) -> None:
+    code = (
+        "import os; from rockfall.core.cli import main; main(['models']); import numpy; "
+        "print(len(os.listdir('/proc/self/task')), os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    name = "OPENBLAS_NUM_THREADS"
+    environment = {key: value for key, value in os.environ.items() if key != name} | ({name: asked} if asked else {})
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    count, told = done.stdout.splitlines()[-1].split()
+    assert told == threads
+    assert asked or count == "1"

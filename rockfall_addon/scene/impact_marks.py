@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.vectors import Array
-from . import fingerprints, picks, store, timing
+from . import fingerprints, impact_numbers, picks, store, timing
 
 ALARMING = ("departing", "into_ground", "below_terrain", "doubtful", "shattered", "discarded")
 """Flags of an impact that a person should look at; the others only say where in its chain it is."""
@@ -81,10 +81,7 @@ def is_alarming(obj: bpy.types.Object) -> bool:
     """Whether a pick should be looked at."""
     if obj.get(store.STATUS, "ok") != "ok":
         return True
-    result = obj.get(store.RESULT)
-    if result is None:
-        return False
-    return result["r"][0] > 1.0 or any(flag in ALARMING for flag in result["flags"].split(";"))
+    return impact_numbers.one(obj, "r") > 1.0 or any(flag in ALARMING for flag in impact_numbers.flags(obj))
 
 
 def _make(scene: bpy.types.Scene) -> Marks:

@@ -7,7 +7,7 @@ import zlib
 import bpy
 import numpy as np
 
-from . import picks, store
+from . import impact_numbers, picks, store
 
 COLUMNS = ("speed1_mps", "speed2_mps", "rn", "rt", "r", "theta1_deg", "theta_dev_deg")
 
@@ -79,11 +79,11 @@ def selected(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def _write(row: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:
-    result = obj[store.RESULT]
+    result = impact_numbers.of(obj)
     row.pick, row.trajectory = obj[store.ID], obj[store.TRAJECTORY]
     row.trajectory_number = _number_of(obj[store.TRAJECTORY])
-    row.number, row.flags = result["number"], result["flags"]
+    row.number, row.flags = int(result["number"]), ";".join(impact_numbers.flags(obj))
     row.time_s = obj[store.TIME]
     row.speed1_mps, row.speed2_mps = math.hypot(*result["incident_mps"]), math.hypot(*result["restituted_mps"])
     for name in COLUMNS[2:]:
-        setattr(row, name, result[name][0])
+        setattr(row, name, result[name])

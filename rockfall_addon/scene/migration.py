@@ -7,9 +7,9 @@ import uuid
 import bpy
 
 from ...core.errors import RockfallError
-from . import georeference, keyframes, materials, picks, set_aside, store, timing, trajectories
+from . import georeference, impact_numbers, keyframes, materials, picks, set_aside, store, timing, trajectories
 
-SCHEMA = 1
+SCHEMA = 2
 
 
 def version(scene: bpy.types.Scene) -> int | None:
@@ -49,6 +49,7 @@ def _from_0(scene: bpy.types.Scene) -> None:
     blocks = scene.get(store.BLOCKS)
     if hasattr(blocks, "to_dict"):
         scene[store.BLOCKS] = json.dumps(blocks.to_dict(), default=str)
+    _from_1(scene)
     set_aside.look_at_scene(scene)
     objects = store.of_role(scene, store.PICK_ROLE)
     shift = georeference.read_shift(scene).vector.tolist()
@@ -79,5 +80,11 @@ def _from_0(scene: bpy.types.Scene) -> None:
         materials.trail_group()
 
 
-STEPS = (_from_0,)
+def _from_1(scene: bpy.types.Scene) -> None:
+    """The numbers of an impact were a group of lists."""
+    for obj in store.of_role(scene, store.PICK_ROLE):
+        impact_numbers.from_group(obj)
+
+
+STEPS = (_from_0, _from_1)
 """The step from each schema to the next."""

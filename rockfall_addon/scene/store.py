@@ -88,7 +88,7 @@ SIGMA_TIME, SIGMA_POSITION = "rockfall_sigma_time_s", "rockfall_sigma_position_m
 ROW, EXTRA = "rockfall_row", "rockfall_extra"  # where it stood in a table, and the table's other columns
 KEY_FRAME, PICK_SHIFT = "rockfall_key_frame", "rockfall_pick_shift_m"
 SEEN = "rockfall_seen"  # id of a video → frame and pixel in it
-RESULT = "rockfall_result"
+RESULT, FLAGS = "rockfall_result", "rockfall_flags"  # of its impact, see `impact_numbers`
 MEASURED_SPIN = "rockfall_measured_spin"  # of the flight that ends here, from marks in videos, as text
 
 # of picks, of what is shown of a run, and of the actions of both; 0.1.0 had none of these

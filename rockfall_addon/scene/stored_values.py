@@ -21,7 +21,7 @@ from ...core.reconstruction.block import Block
 from ...core.reconstruction.picks import KINDS, STATUSES
 from ...core.remarks import from_plain, from_text
 from ...core.simulation.parameter_draws import ParameterDraws, check_draws
-from . import store
+from . import impact_numbers, store
 
 type Check = Callable[[object], str]
 
@@ -79,6 +79,11 @@ def one_of(known: Collection[str]) -> Check:
 def name(value: object) -> str:
     """A text that is not empty."""
     return "" if isinstance(value, str) and value else NO_TEXT if value != "" else "is empty"
+
+
+def text(value: object) -> str:
+    """A text, which may be empty."""
+    return "" if isinstance(value, str) else NO_TEXT
 
 
 def group(value: object) -> str:
@@ -197,6 +202,13 @@ def _models(value: object) -> str:
     return "" if known else "names no models"
 
 
+def _impact(value: object) -> str:
+    """The numbers of an impact, which may be unknown but for its own."""
+    if getattr(value, "typecode", "") != "d" or len(value) != impact_numbers.WIDTH:
+        return f"is no list of {impact_numbers.WIDTH} numbers"
+    return "" if value[0].is_integer() and value[0] >= 0 else "is of no impact"
+
+
 _vector = numbers(3, -GREATEST_M, GREATEST_M)
 _finite_vector = numbers(3)
 _sigma = numbers(1, 0.0)
@@ -228,7 +240,8 @@ BESIDE_A_PICK: dict[str, Check] = {
     store.KEY_FRAME: _frame,
     store.PICK_SHIFT: _vector,
     store.SEEN: group,
-    store.RESULT: group,
+    store.RESULT: _impact,
+    store.FLAGS: text,
     store.MEASURED_SPIN: json_of(dict, _having(*OF_A_SPIN)),
     store.WRITTEN: count,
 }

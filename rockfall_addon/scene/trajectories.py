@@ -18,7 +18,7 @@ from ...core.reconstruction.trajectory import Reconstruction
 from ...core.terrain.raycast import heights_above
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array, Indices, Names, norm
-from . import block_keys, impact_marks, impact_rows, keyframes, materials, picks, store, timing, trails
+from . import block_keys, impact_marks, impact_numbers, impact_rows, keyframes, materials, picks, store, timing, trails
 
 BELOW_RADII = 0.2
 """A point of a flight that is deeper under the terrain than this part of the block's radius is shown as below it."""
@@ -252,7 +252,7 @@ def _doubt(result: Reconstruction, which: np.ndarray) -> Array:
         row = row_of[ends[which]]
         known = row >= 0
         if name in impacts.sigma:
-            relative = speed_sigma(velocity, impacts.sigma[name]) / norm(velocity)
+            relative = impact_numbers.speed_sigma(velocity, impacts.sigma[name]) / norm(velocity)
             doubt[known] = np.fmax(doubt[known], relative[row[known]] / trails.DOUBTFUL_SIGMA)
         flagged = impacts.flags["doubtful"].copy()
         if name == "v2":
@@ -262,12 +262,6 @@ def _doubt(result: Reconstruction, which: np.ndarray) -> Array:
         doubt[known] = np.where(flagged[row[known]], 1.0, doubt[known])
     radius = np.array([_block_of(result, str(flights.trajectory[i])).radius_m for i in which])
     return np.clip(np.where(result.clearance.below_terrain_m[which] > radius, 1.0, doubt), 0.0, 1.0)
-
-
-def speed_sigma(velocity: Array, sigma: Array) -> Array:
-    """(n,) standard deviation of the speed, the errors of the components (n, 3) taken as independent [m/s]."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return norm(velocity * sigma) / norm(velocity)
 
 
 def _show_block(
@@ -315,40 +309,16 @@ def store_results(
     objects : the object of each of the reconstruction's picks.
     but : objects that are left alone: another scene writes them.
     """
-    impacts, flags = result.impacts, result.impacts.flag_text()
-    columns = {
-        "incident_mps": impacts.v1,
-        "restituted_mps": impacts.v2,
-        "rn": impacts.rn,
-        "rt": impacts.rt,
-        "r": impacts.r,
-        "theta1_deg": np.degrees(impacts.theta1),
-        "theta_dev_deg": np.degrees(impacts.theta_dev),
-        "normal_spread_deg": np.degrees(impacts.normal_spread),
-        "kinetic1_j": impacts.kinetic1_j,
-        "kinetic2_j": impacts.kinetic2_j,
-        "bounce_height_m": impacts.bounce_height_m,
-        "chord_height_m": impacts.chord_height_m,
-    }
-    if impacts.sigma:
-        sigma = impacts.sigma
-        columns |= {f"sigma_{name}": sigma[name] for name in ("rn", "rt", "r")}
-        columns |= {f"sigma_{name}_deg": np.degrees(sigma[name]) for name in ("theta1", "theta_dev")}
-        columns["sigma_speed1"] = speed_sigma(impacts.v1, sigma["v1"])
-        columns["sigma_speed2"] = speed_sigma(impacts.v2, sigma["v2"])
-        columns["sigma_kinetic1_j"] = impacts.mass_kg * norm(impacts.v1) * columns["sigma_speed1"]
-        columns["sigma_kinetic2_j"] = impacts.mass_kg * norm(impacts.v2) * columns["sigma_speed2"]
-    columns |= {f"interval_{name}": ends for name, ends in impacts.intervals.items()}
-    rows = {name: (values if values.ndim > 1 else values[:, None]).tolist() for name, values in columns.items()}
+    rows, flags = impact_numbers.table(result.impacts), result.impacts.flag_text()
     impact_marks.results_written(set(result.picks.trajectory.tolist()))
     i = 0
     for obj, kind in zip(objects, result.picks.kind.tolist(), strict=True):
         if obj not in but:
             if kind == "impact":
-                numbers = {name: values[i] for name, values in rows.items()}
-                obj[store.RESULT] = numbers | {"number": int(impacts.impact[i]), "flags": flags[i]}
+                obj[store.RESULT], obj[store.FLAGS] = rows[i], flags[i]
             else:
                 obj.pop(store.RESULT, None)
+                obj.pop(store.FLAGS, None)
         i += kind == "impact"
 
 

@@ -7,7 +7,7 @@ import bpy
 
 from ...core.reconstruction.intervals import in_words
 from ...core.reconstruction.summary import MEANINGS
-from ..scene import impact_marks, pick_names, spins, store
+from ..scene import impact_marks, impact_numbers, pick_names, spins, store
 
 FLAG_WORDS = {
     "first": "First of its chain: no incident velocity",
@@ -27,20 +27,24 @@ TOO_FAST = "R over 1: faster after the impact than before it"
 
 def title(pick: bpy.types.Object) -> str:
     """Which pick it is, and when."""
-    result = pick.get(store.RESULT)
-    name = f"impact {result['number']}" if result is not None else pick_names.word(pick)
-    return f"{pick[store.TRAJECTORY]}, {name}, {pick[store.TIME]:.3f} s"
+    return f"{pick[store.TRAJECTORY]}, {name(pick)}, {pick[store.TIME]:.3f} s"
+
+
+def name(pick: bpy.types.Object) -> str:
+    """What it is called within its trajectory."""
+    number = impact_numbers.one(pick, "number")
+    return pick_names.word(pick) if math.isnan(number) else f"impact {number:.0f}"
 
 
 def numbers(pick: bpy.types.Object) -> list[str]:
     """Speeds and energies with standard deviations, coefficients with intervals; nothing without a result."""
-    result = pick.get(store.RESULT)
+    result = impact_numbers.of(pick)
     if result is None:
         return []
     speeds = _pair(result, "incident_mps", "restituted_mps", "sigma_speed1", "sigma_speed2", 1.0, 1)
     energies = _pair(result, "kinetic1_j", "kinetic2_j", "sigma_kinetic1_j", "sigma_kinetic2_j", 1e-3, 2)
-    coefficients = [(name, between(result, key, 2)) for name, key in (("R_N", "rn"), ("R_T", "rt"))]
-    coefficient = "   ".join(f"{name} {value}" for name, value in coefficients if value)
+    coefficients = [(symbol, between(result, key, 2)) for symbol, key in (("R_N", "rn"), ("R_T", "rt"))]
+    coefficient = "   ".join(f"{symbol} {value}" for symbol, value in coefficients if value)
     lines = [speeds and f"v {speeds} m/s", coefficient, energies and f"E {energies} kJ", _spin(pick)]
     return [line for line in lines if line]
 
@@ -58,13 +62,12 @@ def reasons(pick: bpy.types.Object) -> list[str]:
     """Why it should be looked at, a sentence each; nothing when it need not."""
     if not impact_marks.is_alarming(pick):
         return []
-    result = pick.get(store.RESULT)
-    flags = [] if result is None else [flag for flag in result["flags"].split(";") if flag in impact_marks.ALARMING]
+    flags = [flag for flag in impact_numbers.flags(pick) if flag in impact_marks.ALARMING]
     status = pick.get(store.STATUS, "ok")
     if status != "ok" and status not in flags:
         flags.append(status)
     said = [meaning(flag) for flag in flags]
-    return [*said, TOO_FAST] if result is not None and result["r"][0] > 1.0 else said
+    return [*said, TOO_FAST] if impact_numbers.one(pick, "r") > 1.0 else said
 
 
 def meaning(flag: str) -> str:
@@ -81,24 +84,22 @@ def measured(value: float, sigma: float, digits: int) -> str:
     return f"{value:.{digits}f}" + ("" if math.isnan(sigma) else f" ± {sigma:.{digits}f}")
 
 
-def between(result: dict[str, object], name: str, digits: int) -> str:
+def between(result: impact_numbers.Numbers, of: str, digits: int) -> str:
     """A coefficient or an angle, or `…_contact`, with its 95 % interval; empty where it is not defined."""
-    key = name.removesuffix("_contact")
-    value = math.radians(result[f"{key}_deg"][0]) if key.startswith("theta") else result[key][0]
-    low, high = result.get(f"interval_{name}", (math.nan, math.nan))
-    return in_words(name, value, low, high, digits)
+    key = of.removesuffix("_contact")
+    value = math.radians(result[f"{key}_deg"]) if key.startswith("theta") else result[key]
+    return in_words(of, value, *result[f"interval_{of}"], digits)
 
 
-def _number(result: dict[str, object], key: str, sigma_key: str, factor: float, digits: int) -> str:
-    """A value with its standard deviation; empty where it is not defined."""
-    value = factor * (math.hypot(*result[key]) if len(result[key]) == 3 else result[key][0])
-    sigma = factor * result[sigma_key][0] if sigma_key in result else math.nan
-    return measured(value, sigma, digits)
+def with_sigma(result: impact_numbers.Numbers, key: str, sigma_key: str, factor: float, digits: int) -> str:
+    """A value, or the length of a vector, with its standard deviation; empty where it is not defined."""
+    value, sigma = result[key], result[sigma_key] if sigma_key else math.nan
+    return measured(factor * (math.hypot(*value) if isinstance(value, tuple) else value), factor * sigma, digits)
 
 
 def _pair(
-    result: dict[str, object], before: str, after: str, sigma1: str, sigma2: str, factor: float, digits: int
+    result: impact_numbers.Numbers, before: str, after: str, sigma1: str, sigma2: str, factor: float, digits: int
 ) -> str:
     """A value before and after the impact; empty where neither is defined."""
-    both = [_number(result, key, sigma, factor, digits) for key, sigma in ((before, sigma1), (after, sigma2))]
+    both = [with_sigma(result, key, sigma, factor, digits) for key, sigma in ((before, sigma1), (after, sigma2))]
     return " → ".join(value or "?" for value in both) if any(both) else ""

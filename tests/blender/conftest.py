@@ -195,6 +195,12 @@ def part(rockfall: ModuleType, installation: Installation) -> Callable[[str], Mo
 
 
 @pytest.fixture
+def numbers(part) -> Callable[[bpy.types.Object], dict | None]:
+    """``numbers(pick)["rn"]`` is what the pick's object keeps of its impact."""
+    return part("rockfall_addon.scene.impact_numbers").of
+
+
+@pytest.fixture
 def scan(part) -> bpy.types.Scene:
     """A rough slope that runs out, without any footage."""
     line = np.linspace(0.0, 118.0, 60)

@@ -38,28 +38,28 @@ def test_a_bad_trajectory_does_not_stop_the_others_from_following_a_setting(scen
     assert "trajectory A" in scene["rockfall_problem"]
 
 
-def test_deleted_terrain_is_told(slope: bpy.types.Scene, part) -> None:
+def test_deleted_terrain_is_told(slope: bpy.types.Scene, part, numbers) -> None:
     (terrain,) = [o for o in slope.objects if o.get("rockfall_role") == "terrain"]
-    rn = picks_of(slope, "A")[1]["rockfall_result"]["rn"][0]
+    rn = numbers(picks_of(slope, "A")[1])["rn"]
     bpy.data.objects.remove(terrain)
     update()
     assert "terrain is gone" in slope["rockfall_problem"]
-    assert picks_of(slope, "A")[1]["rockfall_result"]["rn"][0] == rn, "what was computed stays"
+    assert numbers(picks_of(slope, "A")[1])["rn"] == rn, "what was computed stays"
     picks_of(slope, "A")[2].location.y += 0.3
     update()
-    assert np.isnan(picks_of(slope, "A")[1]["rockfall_result"]["rn"][0])
-    assert np.isfinite(picks_of(slope, "A")[1]["rockfall_result"]["r"][0])
-    assert picks_of(slope, "B")[1]["rockfall_result"]["rn"][0] == pytest.approx(rn, abs=1e-12)
+    assert np.isnan(numbers(picks_of(slope, "A")[1])["rn"])
+    assert np.isfinite(numbers(picks_of(slope, "A")[1])["r"])
+    assert numbers(picks_of(slope, "B")[1])["rn"] == pytest.approx(rn, abs=1e-12)
     assert "terrain is gone" in slope["rockfall_problem"]
 
 
-def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part) -> None:
+def test_another_terrain_recomputes_all(slope: bpy.types.Scene, part, numbers) -> None:
     (terrain,) = [o for o in slope.objects if o.get("rockfall_role") == "terrain"]
     terrain.location.z -= 0.4
     update()
     update()
     check_shown(slope, part)
-    assert picks_of(slope, "B")[1]["rockfall_result"]["bounce_height_m"][0] > 0.3
+    assert numbers(picks_of(slope, "B")[1])["bounce_height_m"] > 0.3
 
 
 def raised(x: np.ndarray) -> np.ndarray:
@@ -84,7 +84,7 @@ def edit_in_edit_mode(tile: bpy.types.Object) -> None:
 
 
 @pytest.mark.parametrize("edit", [edit_by_script, edit_in_edit_mode])
-def test_an_edited_terrain_is_seen(slope: bpy.types.Scene, part, edit) -> None:
+def test_an_edited_terrain_is_seen(slope: bpy.types.Scene, part, edit, numbers) -> None:
     """Vertices that move, as many as before: rays, normals, results and fingerprints are of the new surface."""
     terrain, reconstruction = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.reconstruction")
     (tile,) = terrain.tiles(slope)
@@ -101,7 +101,7 @@ def test_an_edited_terrain_is_seen(slope: bpy.types.Scene, part, edit) -> None:
     fresh = reconstruction.reconstruct_scene(slope).impacts
     (row,) = np.flatnonzero((fresh.trajectory == "A") & (fresh.time_s == impact["rockfall_time_s"]))
     np.testing.assert_allclose(fresh.normal[row], normal, atol=1e-6)
-    assert impact["rockfall_result"]["rn"][0] == pytest.approx(fresh.rn[row], rel=1e-12)
+    assert numbers(impact)["rn"] == pytest.approx(fresh.rn[row], rel=1e-12)
     assert all(each.value for each in trail(slope, "A").data.attributes["below_terrain"].data)
     # the same terrain again changes nothing, and neither does a file that is opened again
     shown = slope["rockfall_shown"]

@@ -3,6 +3,7 @@
 
 import csv
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -17,17 +18,22 @@ def block(scene, part) -> bpy.types.PropertyGroup:
     return scene.rockfall_block
 
 
-def mass_of(scene: bpy.types.Scene, name: str) -> float:
-    """As its energy tells: 2E/v²."""
-    result = picks_of(scene, name)[1]["rockfall_result"]
-    return 2 * result["kinetic1_j"][0] / math.hypot(*result["incident_mps"]) ** 2
+@pytest.fixture
+def mass_of(numbers) -> Callable[[bpy.types.Scene, str], float]:
+    """Of the block of a trajectory, as its energy tells: 2E/v²."""
+
+    def mass(scene: bpy.types.Scene, name: str) -> float:
+        result = numbers(picks_of(scene, name)[1])
+        return 2 * result["kinetic1_j"] / math.hypot(*result["incident_mps"]) ** 2
+
+    return mass
 
 
 def block_in_scene(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     return scene.objects[f"{name} block"]
 
 
-def test_a_block_of_its_own_is_used_for_its_trajectory_alone(scene, block) -> None:
+def test_a_block_of_its_own_is_used_for_its_trajectory_alone(scene, block, mass_of) -> None:
     before = mass_of(scene, "A")
     assert before == pytest.approx(scene.rockfall.density_kgpm3 * math.pi / 6 * 0.35**3, rel=1e-6)
     block.own = True
@@ -47,7 +53,7 @@ def test_a_block_of_its_own_is_used_for_its_trajectory_alone(scene, block) -> No
     assert mass_of(scene, "B") == pytest.approx(mass_of(scene, "A"))
 
 
-def test_numbers_that_no_block_has_end_at_the_range_of_their_field(scene, block) -> None:
+def test_numbers_that_no_block_has_end_at_the_range_of_their_field(scene, block, mass_of) -> None:
     block.d1 = block.d2 = block.d3 = 0.5
     for given, kept in ((1e6, 5000.0), (0.0, 500.0), (2800.0, 2800.0)):
         block.density = given
@@ -57,7 +63,7 @@ def test_numbers_that_no_block_has_end_at_the_range_of_their_field(scene, block)
         assert mass_of(scene, "B") == pytest.approx(math.pi / 6 * kept**3 * 2800, rel=1e-6)
 
 
-def test_tables_projects_and_files_have_it(slope, part, tmp_path: Path) -> None:
+def test_tables_projects_and_files_have_it(slope, part, tmp_path: Path, mass_of) -> None:
     bpy.context.view_layer.objects.active = picks_of(slope, "B")[3]
     block = slope.rockfall_block
     block.d1, block.shape = 0.7, "box"
@@ -82,7 +88,7 @@ def test_tables_projects_and_files_have_it(slope, part, tmp_path: Path) -> None:
     assert mass_of(bpy.context.scene, "B") == pytest.approx(mass)
 
 
-def test_the_default_of_a_project_can_be_edited(slope, part, tmp_path: Path) -> None:
+def test_the_default_of_a_project_can_be_edited(slope, part, tmp_path: Path, mass_of) -> None:
     bpy.ops.rockfall.export_project(directory=str(tmp_path))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.rockfall.open_project(filepath=str(tmp_path / "project.toml"))
@@ -91,7 +97,7 @@ def test_the_default_of_a_project_can_be_edited(slope, part, tmp_path: Path) -> 
     assert mass_of(bpy.context.scene, "A") == pytest.approx(8 * before, rel=1e-6)
 
 
-def test_undo_brings_the_block_back(scene, block) -> None:
+def test_undo_brings_the_block_back(scene, block, mass_of) -> None:
     bpy.ops.ed.undo_push(message="before")
     before = mass_of(scene, "B")
     block.d1 = 0.9

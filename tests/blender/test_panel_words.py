@@ -92,12 +92,11 @@ def test_a_standard_deviation_has_a_digit_that_is_not_zero_where_two_more_suffic
     assert measured(nan, 0.1, 2) == ""
 
 
-def test_coefficients_have_intervals_in_words(part, scene, draw) -> None:
+def test_coefficients_have_intervals_in_words(part, scene, draw, numbers) -> None:
     pick = scene.objects["B impact 2"]
-    result = pick["rockfall_result"]
-    result["rn"], result["interval_rn"] = [0.87], [0.803, 0.964]
-    result["rt"], result["interval_rt"] = [0.7], [0.05, 3.0]
-    result["interval_rn_contact"] = [0.41, float("inf")]
+    new = {"rn": 0.87, "interval_rn": (0.803, 0.964), "rt": 0.7, "interval_rt": (0.05, 3.0)}
+    new["interval_rn_contact"] = (0.41, float("inf"))
+    part("rockfall_addon.scene.impact_numbers").keep(pick, numbers(pick) | new)
     assert "R_N 0.87 (0.80 to 0.96)   R_T undetermined" in part("rockfall_addon.view.impact_words").numbers(pick)
     select(pick)
     written = [text for _, text in draw("ROCKFALL_PT_impact")]
@@ -205,12 +204,11 @@ def test_two_videos_that_are_aligned_are_to_be_synchronised_now(part) -> None:
     assert "Mark one event in both, and synchronise them." in wording.warnings(scene, second)[0].text
 
 
-def test_the_card_of_a_lone_impact_has_no_question_marks(scene, part) -> None:
-    words, nothing = part("rockfall_addon.view.impact_words"), [float("nan")] * 3
+def test_the_card_of_a_lone_impact_has_no_question_marks(scene, part, numbers) -> None:
+    words = part("rockfall_addon.view.impact_words")
     pick = picks_of(scene, "A")[1]
     assert {line[0] for line in words.numbers(pick)} >= {"v", "E"}
-    for key in ("incident_mps", "restituted_mps"):
-        pick["rockfall_result"][key] = nothing
-    for key in ("kinetic1_j", "kinetic2_j", "rn", "rt"):
-        pick["rockfall_result"][key] = nothing[:1]
+    unknown = ("incident_mps", "restituted_mps", "kinetic1_j", "kinetic2_j", "rn", "rt")
+    rest = {name: value for name, value in numbers(pick).items() if name not in unknown}
+    part("rockfall_addon.scene.impact_numbers").keep(pick, rest)
     assert words.numbers(pick) == []

@@ -99,10 +99,9 @@ def test_two_scenes_do_not_take_names_from_one_another(scene, part) -> None:
     assert names(scene) == RUN
 
 
-def test_files_of_0_1_0_are_named_when_they_are_opened(part) -> None:
+def test_files_of_0_1_0_are_named_when_they_are_opened(part, numbers) -> None:
     file = Path(__file__).resolve().parents[1] / "data" / "saved_by_0.1.0.blend"
     bpy.ops.wm.open_mainfile(filepath=str(file))
     for pick in (o for o in bpy.context.scene.objects if o.get("rockfall_role") == "pick"):
-        number = pick["rockfall_result"]["number"] if "rockfall_result" in pick else None
-        if number is not None:
-            assert pick.name == f"{pick['rockfall_trajectory']} impact {number}"
+        if (kept := numbers(pick)) is not None:
+            assert pick.name == f"{pick['rockfall_trajectory']} impact {kept['number']:.0f}"

@@ -264,7 +264,7 @@ def test_two_views_make_one_point(site, part) -> None:
     assert len(clicks.of(obj)) == 2
 
 
-def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part) -> None:
+def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part, numbers) -> None:
     """A normal that came with the pick is of its old place."""
     new_videos = part("rockfall_addon.scene.new_videos")
     clocks = part("rockfall_addon.scene.clocks")
@@ -297,7 +297,7 @@ def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part) 
     assert np.linalg.norm(here - old) > 0.2
     normals = part("core.reconstruction.placement").terrain_normals(surface, here[None], np.array([0.39]), None)
     (impact,) = [i for i in site.rockfall_impacts if abs(i.time_s - obj["rockfall_time_s"]) < 1e-4]
-    v1, v2 = (np.array(list(obj["rockfall_result"][name])) for name in ("incident_mps", "restituted_mps"))
+    v1, v2 = (np.array(list(numbers(obj)[name])) for name in ("incident_mps", "restituted_mps"))
     assert impact.rn == pytest.approx(abs(v2 @ normals.normal[0]) / abs(v1 @ normals.normal[0]), rel=1e-4)
 
 

@@ -198,11 +198,11 @@ def picked(part):
     return found.position.tolist(), found.time_s.tolist()
 
 
-def test_a_terrain_is_removed_and_its_picks_stay(part, table, planes, capfd) -> None:
+def test_a_terrain_is_removed_and_its_picks_stay(part, numbers, table, planes, capfd) -> None:
     assert bpy.ops.rockfall.import_terrain(filepath=planes[0]) == {"FINISHED"}
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     before, scene = picked(part), bpy.context.scene
-    numbers = scene.objects["A impact 2"]["rockfall_result"].to_dict()
+    before_it = numbers(scene.objects["A impact 2"])
     bpy.ops.ed.undo_push(message="before")
     (tile,) = grounds(part)
     assert bpy.ops.rockfall.remove_terrain(identifier=tile["rockfall_id"]) == {"FINISHED"}
@@ -210,7 +210,7 @@ def test_a_terrain_is_removed_and_its_picks_stay(part, table, planes, capfd) -> 
     bpy.ops.ed.undo_push(message="removed")
     assert not grounds(part)
     assert picked(part) == before
-    assert scene.objects["A impact 2"]["rockfall_result"].to_dict() == numbers
+    assert numbers(scene.objects["A impact 2"]) == before_it
     assert "terrain is gone" in scene["rockfall_problem"]
     assert not bpy.ops.rockfall.remove_terrain.poll()
     bpy.ops.ed.undo()

@@ -103,6 +103,7 @@ def check_shown(scene: bpy.types.Scene, part) -> None:
     """What is shown is what a reconstruction of the picks from nothing gives."""
     result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
     rows = {(row.trajectory, row.number): row for row in scene.rockfall_impacts}
+    numbers = part("rockfall_addon.scene.impact_numbers").of
     assert len(rows) == len(result.impacts)
     for i in range(len(result.impacts)):
         row = rows[str(result.impacts.trajectory[i]), int(result.impacts.impact[i])]
@@ -110,7 +111,7 @@ def check_shown(scene: bpy.types.Scene, part) -> None:
         pick = next(o for o in scene.objects if o.get("rockfall_id") == row.pick)
         assert pick["rockfall_time_s"] == result.impacts.time_s[i]
         np.testing.assert_array_equal(pick["rockfall_position_m"], result.impacts.position[i])
-        np.testing.assert_array_equal(pick["rockfall_result"]["incident_mps"], result.impacts.v1[i])
+        np.testing.assert_array_equal(numbers(pick)["incident_mps"], result.impacts.v1[i])
     for name in set(result.picks.trajectory.tolist()):
         which = np.flatnonzero(result.flights.trajectory == name)
         shown = places(trail(scene, name).data)

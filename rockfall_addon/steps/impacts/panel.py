@@ -5,7 +5,7 @@ import math
 
 import bpy
 
-from ...scene import pick_names, picks, spins, store
+from ...scene import impact_numbers, picks, spins, store
 from ...view import impact_words, pointing
 from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 
@@ -40,25 +40,24 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, pick = self.layout, pointing.active_pick(context)
-        result = pick.get(store.RESULT)
-        name = f"impact {result['number']}" if result is not None else pick_names.word(pick)
+        result = impact_numbers.of(pick)
         row = layout.row(align=True)
-        row.label(text=f"{pick[store.TRAJECTORY]}, {name}")
+        row.label(text=f"{pick[store.TRAJECTORY]}, {impact_words.name(pick)}")
         row.operator("rockfall.show_impact", text="", icon="TIME")
         _draw_editable(layout, pick.rockfall_pick)
         if result is None:
             return
         judged = [(label, impact_words.between(result, *how) or "not defined") for label, *how in JUDGED]
-        numbers = (_fact(result, *how) for how in NUMBERS if how[1] in result)
+        numbers = (_fact(result, *how) for how in NUMBERS)
         facts(layout, [*judged, *numbers, *_slide(context.scene, pick), *spins.words(pick)])
         _draw_contact(context, layout, result)
         reasons = impact_words.reasons(pick)
         for reason in reasons:
             paragraph(context, layout, reason, "ERROR")
-        for said in map(impact_words.meaning, filter(None, result["flags"].split(";"))):
+        for said in map(impact_words.meaning, impact_numbers.flags(pick)):
             if said not in reasons:
                 paragraph(context, layout, said, "INFO")
-        if "sigma_r" not in result:
+        if _lacks_errors(result):
             paragraph(context, layout, "Give a confidence, and the numbers get their errors.")
 
 
@@ -72,9 +71,9 @@ def _slide(scene: bpy.types.Scene, pick: bpy.types.Object) -> list[tuple[str, st
     return [("Until the take-off", f"{far:.2f} m, {1e3 * (later[0][store.TIME] - pick[store.TIME]):.0f} ms")]
 
 
-def _draw_contact(context: bpy.types.Context, layout: bpy.types.UILayout, result: dict[str, object]) -> None:
+def _draw_contact(context: bpy.types.Context, layout: bpy.types.UILayout, result: impact_numbers.Numbers) -> None:
     """The intervals with the ground's roughness, where that is known."""
-    if not math.isfinite(result.get("interval_rn_contact", (math.nan,))[0]):
+    if not math.isfinite(result["interval_rn_contact"][0]):
         return
     paragraph(context, layout, "In brackets 95 %, for the normal at the block's scale; with its roughness:", "INFO")
     facts(layout, [(label, impact_words.between(result, *how)) for label, *how in OF_CONTACT])
@@ -89,13 +88,17 @@ def _draw_editable(layout: bpy.types.UILayout, editable: bpy.types.PropertyGroup
         row.operator("rockfall.nudge_pick_time", text="", icon=icon).frames = frames
 
 
-def _fact(result: dict[str, object], label: str, key: str, sigma_key: str, unit: str, digits: int) -> tuple[str, str]:
-    value, sigma = math.hypot(*result[key]) if len(result[key]) == 3 else result[key][0], math.nan
-    if sigma_key in result:
-        sigma = result[sigma_key][0]
-    factor = 1e-3 if unit == " kJ" else 1.0
-    text = impact_words.measured(factor * value, factor * sigma, digits)
+def _fact(
+    result: impact_numbers.Numbers, label: str, key: str, sigma_key: str, unit: str, digits: int
+) -> tuple[str, str]:
+    text = impact_words.with_sigma(result, key, sigma_key, 1e-3 if unit == " kJ" else 1.0, digits)
     return label, f"{text}{unit}" if text else "not defined"
+
+
+def _lacks_errors(result: impact_numbers.Numbers) -> bool:
+    """Whether a speed is known and its error is not."""
+    sides = (("incident_mps", "sigma_speed1"), ("restituted_mps", "sigma_speed2"))
+    return any(math.isfinite(result[speed][0]) and math.isnan(result[sigma]) for speed, sigma in sides)
 
 
 CLASSES = (ROCKFALL_PT_impact,)

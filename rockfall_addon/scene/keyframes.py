@@ -22,6 +22,8 @@ SAME_TIME_S, SAME_PLACE_M, SAME_PLACE_SHARE = 1e-9, 1e-6, 1e-5
 """A segment that starts as near to the end of the one before goes on from it; the share is of the coordinates."""
 MANY_ACTIONS = 100
 """More new actions than this are copies of one, and named like it."""
+OF_MANY_PICKS, OF_MANY_BLOCKS = "Key of pick", "Keys of block"
+"""Their names. Blender seeks the place of each from the end of the alphabet, and blocks get theirs after the picks."""
 CONSTANT, BEZIER = 0, 2  # as the interpolation of keys is numbered
 
 
@@ -169,6 +171,13 @@ def key_location_once(obj: bpy.types.Object, frame: float, like: bpy.types.Actio
 def action_of(obj: bpy.types.Object) -> bpy.types.Action | None:
     """What holds the keys of an object."""
     return obj.animation_data.action if obj.animation_data is not None else None
+
+
+def to_be_copied(obj: bpy.types.Object, name: str) -> bpy.types.Action:
+    """The action of an object, named for all that will be copied from it."""
+    action = obj.animation_data.action
+    action.name = name
+    return action
 
 
 def location_curves(obj: bpy.types.Object) -> list[bpy.types.FCurve]:

@@ -107,8 +107,8 @@ def show_picks(
             obj[store.EXTRA] = extra
         obj[store.PICK_SHIFT] = picks.shift.vector.tolist()
         pose(obj, normals[i], (time - offsets[trajectory]) * rate, radius_m, version, like)
-        if len(folders) > keyframes.MANY_ACTIONS:
-            like = like or keyframes.action_of(obj)
+        if len(folders) > keyframes.MANY_ACTIONS and like is None:
+            like = keyframes.to_be_copied(obj, keyframes.OF_MANY_PICKS)
         shown.append(obj)
     store.remove_objects(list(there.values()))
     of: dict[str, list[bpy.types.Object]] = {}

@@ -92,9 +92,8 @@ def show_reconstruction(scene: bpy.types.Scene, result: Reconstruction, surface:
         show_trajectory(scene, name, result, objects, offsets[name], surface, parts, rows=rows)
         last = max(last, float(result.flights.end_time_s[rows.flights].max()) - offsets[name])
         if len(flown) > keyframes.MANY_ACTIONS and like is None:
-            like = next(
-                keyframes.action_of(obj) for obj in folders[name].objects if obj.get(store.ROLE) == store.BLOCK_ROLE
-            )
+            block = next(obj for obj in folders[name].objects if obj.get(store.ROLE) == store.BLOCK_ROLE)
+            like = keyframes.to_be_copied(block, keyframes.OF_MANY_BLOCKS)
     trails.set_tops(scene)
     trails.paint_observed(scene)
     impact_rows.fill(scene)

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from two_runs import key_frames
 
 GRAVITY = 9.81
 SHIFT = np.array([2600000.0, 1200000.0, 0.0])
@@ -178,6 +179,25 @@ def test_of_many_flights_only_renders_have_tubes(part, scene: bpy.types.Scene, t
     bare, tube = (scene.objects[name].evaluated_get(graph).data for name in shown)
     assert len(bare.vertices) == len(scene.objects["A flights"].data.vertices)
     assert len(tube.vertices) > 3 * len(scene.objects["B flights"].data.vertices)
+
+
+def test_among_many_each_has_keys_of_its_own_that_are_copies(part, scene: bpy.types.Scene, table, monkeypatch) -> None:
+    def keys() -> dict[str, list]:
+        moving = [obj for obj in scene.objects if obj.get("rockfall_role") in ("pick", "block")]
+        return {obj.name: key_frames(obj) for obj in moving}
+
+    one_by_one = keys()
+    for obj in list(scene.objects):
+        bpy.data.objects.remove(obj)
+    bpy.data.orphans_purge()
+    monkeypatch.setattr(part("rockfall_addon.scene.keyframes"), "MANY_ACTIONS", 1)
+    assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
+    assert keys() == one_by_one
+    actions = {obj.name: obj.animation_data.action for obj in scene.objects if obj.name in one_by_one}
+    assert len({action.name for action in actions.values()}) == len(one_by_one) == 12
+    assert (
+        sorted(action.name.split(".")[0] for action in actions.values()) == ["Key of pick"] * 10 + ["Keys of block"] * 2
+    )
 
 
 def test_what_is_looked_up_is_what_is_there(part, scene: bpy.types.Scene) -> None:

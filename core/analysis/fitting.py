@@ -131,11 +131,11 @@ def resample(sums: Sums, counts: Array, found: Fit, resamples: int, seed: int, p
 
 def interval(values: Array, clusters: int) -> tuple[float, float]:
     """95 % interval from resampled values: percentiles, expanded for few clusters (Hesterberg 2015, § 4.3)."""
-    from scipy.stats import norm, t
+    from scipy.special import ndtr, stdtrit
 
     if clusters < 2:
         return float(values.min()), float(values.max())
-    tail = norm.cdf(-np.sqrt(clusters / (clusters - 1)) * t.ppf((1 + CONFIDENCE) / 2, clusters - 1))
+    tail = ndtr(-np.sqrt(clusters / (clusters - 1)) * stdtrit(clusters - 1, (1 + CONFIDENCE) / 2))
     low, high = np.quantile(values, [tail, 1 - tail])
     return float(low), float(high)
 

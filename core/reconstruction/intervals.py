@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -19,6 +20,8 @@ INTERVALS = (*JUDGED, *OF_CONTACT)
 COVERAGE = 0.95
 DRAWS_LOG2 = 9
 """Draws of an interval: 2 to this power."""
+DRAWS_FILE = Path(__file__).resolve().parents[2] / "assets" / "intervals" / "draws.npy"
+"""Points of a Sobol sequence in units of 2^-32, by ``scripts/making/interval_draws.py``."""
 SIGMA_ROWS = 256
 """Impacts whose deviations are computed at a time: their points stay in the processor's cache."""
 ROWS = 64
@@ -171,9 +174,8 @@ def impact_intervals(
 def _draws() -> Array:
     """(m, 13) standard normal draws: of velocities and place, of the normal's tilt, of the roughness."""
     from scipy.special import ndtri
-    from scipy.stats import qmc
 
-    return np.asarray(ndtri(qmc.Sobol(ERRORS + 4, rng=np.random.default_rng(0)).random_base2(DRAWS_LOG2)))
+    return np.asarray(ndtri(np.load(DRAWS_FILE) / 2.0**32))
 
 
 def _drawn(v1: Array, v2: Array, normal: Array, roots: Array, errors: ImpactErrors, rows: Indices) -> Array:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Intervals of R_N, R_T, R and the angles, against draws of the whole reconstruction over ground that is known."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +12,19 @@ from rockfall.core.exchange.selection import joined, rows_of
 from rockfall.core.exchange.tables import read_impacts, write_impacts
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.impact import apparent
-from rockfall.core.reconstruction.intervals import INTERVALS, ImpactErrors, impact_intervals, undetermined
+from rockfall.core.reconstruction.intervals import (
+    DRAWS_FILE,
+    DRAWS_LOG2,
+    INTERVALS,
+    ImpactErrors,
+    impact_intervals,
+    undetermined,
+)
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.orientation import block_scale_normals, normals_beside
 from rockfall.core.terrain.surface import Surface
+from scipy.stats import qmc
 
 TIME = np.array([0.0, 0.9, 1.7])
 POSITION = np.array([(0, 0, 0), (6, 0.5, -6.5), (13.0, 2.2, -13)])
@@ -136,3 +146,24 @@ def test_tables_keep_them(tmp_path):
     assert np.isnan(both[1:]).all()
     assert field_of("theta1_deg_contact_low").unit == "°"
     assert "no limit" in field_of("rn_high").description
+
+
+def test_the_draws_are_points_of_scipys_sobol_sequence():
+    points = np.load(DRAWS_FILE)
+    sequence = qmc.Sobol(points.shape[1], rng=np.random.default_rng(0)).random_base2(DRAWS_LOG2)
+    assert points.shape == (512, 13)
+    np.testing.assert_array_equal(points / 2.0**32, sequence)
+
+
+def test_a_reconstruction_loads_no_statistics(tmp_path):
+    """They take longer to load than everything else."""
+    code = "import sys; from rockfall.core.cli import main; assert main(sys.argv[1:]) == 0; "
+    code += "assert 'scipy.special' in sys.modules and 'scipy.stats' not in sys.modules"
+    picks = tmp_path / "picks.csv"
+    picks.write_text(
+        "trajectory,time_s,x_m,y_m,z_m,nx,ny,nz,sigma_time_s,sigma_position_m\n"
+        "A,0,0,0,0,0,0,1,0.01,0.1\nA,1,5,0,-6,0,0,1,0.01,0.1\nA,2,9,0,-12,0,0,1,0.01,0.1\n"
+    )
+    arguments = ["reconstruct", str(picks), "--out", str(tmp_path / "out")]
+    subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True)
+    assert np.isfinite(read_impacts(tmp_path / "out" / "impacts.csv").intervals["rn"][1]).all()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make assets/intervals/draws.npy: the points that the intervals of impacts are drawn at.
 
-They are those of SciPy's scrambled Sobol sequence. Kept in a file they need no `scipy.stats`, whose loading was a third of
-the time of `rockfall reconstruct`, and stay the same when SciPy changes.
+They are those of SciPy's scrambled Sobol sequence. In a file they need no `scipy.stats`, which takes a third of the
+time of `rockfall reconstruct` to load, and they stay the same when SciPy changes.
 """
 
 from pathlib import Path

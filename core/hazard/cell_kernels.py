@@ -112,7 +112,7 @@ def walk(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """The passages of runs; returns how many runs have them all, and how many passages these are.
 
-    It makes no arrays: those that count references to arrays spill all registers at each turn of the loop.
+    It makes no arrays: what counts references to arrays would do so at each turn of the loop.
 
     Parameters
     ----------
@@ -122,8 +122,8 @@ def walk(  # type: ignore[no-untyped-def]
     what … omega1 : (k, …) the records.
     half_mass, half_inertia, drag : (n,) of the runs: energies are these times squares; ½ρC_D A/m [1/m].
     seen : (cells,) work space: of runs that were followed before, their numbers from 1 to `known`, or 0.
-    keys, values : to be filled from `count` on, up to the last run that has room: (p,) the cell, row · columns + column,
-        −1 − cell for the first passage of a run; (p, 4) see `COLUMNS`.
+    keys, values : to be filled from `count` on, up to the last run that has room: (p,) the cell, row · columns +
+        column, −1 − cell for the first passage of a run; (p, 4) see `COLUMNS`.
     stack, bounds, below : (`STACK_SIZE`,) work space.
     """
     for number in range(len(order)):

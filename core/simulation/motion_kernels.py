@@ -246,7 +246,8 @@ def run_block(  # type: ignore[no-untyped-def]
     inertia : c of c m r², for rolling. moments : three, of inertia, for flight. drag : ½ρC_D A/m [1/m].
     law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
     record : `ENDS_ONLY`, `IMPACTS` or `ALL`.
-    stems : see `tree_kernels`; empty for none. fallen : work space, those that gave way to this block. uniform : (3,) work space.
+    stems : see `tree_kernels`; empty for none. fallen : work space, those that gave way to this block.
+    uniform : (3,) work space.
     """
     zero = (0.0, 0.0, 0.0)
     bounds = box(tree)

@@ -302,7 +302,6 @@ def test_the_same_bits_for_any_threads_and_batches(monkeypatch: pytest.MonkeyPat
     assert not np.array_equal(simulate(ground, releases, Settings("stevens_1998", seed=5)).position, one.position)
 
 
-
 def test_records_for_which_the_room_is_too_small_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """The run that does not fit is simulated again with more room: nothing of it is kept, and nothing is lost."""
     ground, spheres = drops(rough(), 7)

@@ -13,12 +13,11 @@ from math import ceil, floor, inf, isnan, nan, sqrt
 
 import numpy as np
 
-from ..compiled import borrowing, kernel
+from ..compiled import borrowing
 from ..simulation.drag_kernels import DRAG_CHANGE, with_drag
 from ..simulation.height_kernels import flight_height
 from ..simulation.plan_kernels import triangle_below
 from ..simulation.record_kernels import ON_GROUND
-from ..terrain.kernels import STACK_SIZE
 
 STRAIGHT_M = 0.001
 """A step on the ground is nowhere farther than this from the straight line in plan that it is taken for."""
@@ -29,13 +28,6 @@ MOST_AT_ONCE = 64
 """Triangles around one place; after so many the path is lost, and found again in the next cell."""
 COLUMNS = 4
 """Of values: speed, kinetic energy, that of translation, height; NaN where there is no terrain below."""
-
-
-@kernel
-def _longer(keys, values):  # type: ignore[no-untyped-def]
-    more_keys, more_values = np.empty(2 * len(keys), np.int32), np.empty((2 * len(keys), COLUMNS), np.float32)
-    more_keys[: len(keys)], more_values[: len(keys)] = keys, values
-    return more_keys, more_values
 
 
 @borrowing
@@ -113,12 +105,14 @@ def _among_layers(tree, stack, bounds, below, p, v, a, start, stop, best):  # ty
     return flight_height(tree, stack, bounds, below, here, speed, fall, t, best)
 
 
-@kernel
+@borrowing
 def walk(  # type: ignore[no-untyped-def]
     west, south, size, columns, rows, plan, tree, order, begin, what, time, position, v2, omega2, v1, omega1,
-    half_mass, half_inertia, drag, gravity, seen, known, keys, values,
+    half_mass, half_inertia, drag, gravity, seen, known, keys, values, count, stack, bounds, below,
 ):  # fmt: skip
-    """All passages of runs; returns (keys, values, how many).
+    """The passages of runs; returns how many runs have them all, and how many passages these are.
+
+    It makes no arrays: what counts references to arrays would do so at each turn of the loop.
 
     Parameters
     ----------
@@ -128,13 +122,12 @@ def walk(  # type: ignore[no-untyped-def]
     what … omega1 : (k, …) the records.
     half_mass, half_inertia, drag : (n,) of the runs: energies are these times squares; ½ρC_D A/m [1/m].
     seen : (cells,) work space: of runs that were followed before, their numbers from 1 to `known`, or 0.
-    keys, values : to be filled, and made longer: (p,) the cell, row · columns + column, −1 − cell for the first
-        passage of a run; (p, 4) see `COLUMNS`.
+    keys, values : to be filled from `count` on, up to the last run that has room: (p,) the cell, row · columns +
+        column, −1 − cell for the first passage of a run; (p, 4) see `COLUMNS`.
+    stack, bounds, below : (`STACK_SIZE`,) work space.
     """
-    stack, bounds, below = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE), np.empty(STACK_SIZE, np.int64)
-    count = 0
     for number in range(len(order)):
-        run, stamp = order[number], np.int32(known + number + 1)
+        run, stamp, before = order[number], np.int32(known + number + 1), count
         first, last = begin[run], begin[run + 1] - 1
         if last < first:
             continue
@@ -241,7 +234,7 @@ def walk(  # type: ignore[no-untyped-def]
                         square, energy = max(square, s), max(energy, mass * s + now_spin)
                         if 0 <= column < columns and 0 <= row < rows:
                             if count == len(keys):
-                                keys, values = _longer(keys, values)
+                                return number, before
                             cell = row * columns + column
                             keys[count] = cell if seen[cell] == stamp else -1 - cell
                             seen[cell] = stamp
@@ -274,11 +267,11 @@ def walk(  # type: ignore[no-untyped-def]
                 v = then_v if flies else (v[0] + a[0] * duration, v[1] + a[1] * duration, v[2] + a[2] * duration)
         if 0 <= column < columns and 0 <= row < rows:
             if count == len(keys):
-                keys, values = _longer(keys, values)
+                return number, before
             cell = row * columns + column
             keys[count] = cell if seen[cell] == stamp else -1 - cell
             seen[cell] = stamp
             values[count, 0], values[count, 1] = sqrt(square), energy
             values[count, 2], values[count, 3] = mass * square, height if height > -inf else nan
             count += 1
-    return keys, values, count
+    return len(order), count

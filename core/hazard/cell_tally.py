@@ -164,17 +164,23 @@ def passages_of(
     records, releases, ground = simulation.records, simulation.releases, simulation.ground
     size = int(PER_METRE * simulation.length_m.sum() / cells.size_m) + PER_RUN * len(simulation)
     space = spaces.pop() if spaces else _Space(len(cells))
-    space.make_room(size, len(simulation))
     order = np.argsort(along_curve(releases.position[:, :2]), kind="stable")
     mass, radius = releases.mass_kg, releases.radius_m
-    space.keys, space.values, count = walk(
-        cells.x0_m, cells.y0_m, cells.size_m, cells.columns, cells.rows, ground.plan, ground.terrain_tree, order,
-        np.searchsorted(records.run, np.arange(len(simulation) + 1)), records.what, records.time_s, records.position,
-        records.v2, records.omega2, records.v1, records.omega1, 0.5 * mass,
-        0.5 * releases.inertia * mass * radius**2, releases.drag_per_m(simulation.settings.drag),
-        simulation.settings.gravity_mps2, space.seen, space.runs, space.keys, space.values,
-    )  # fmt: skip
-    space.runs += len(simulation)
+    begin = np.searchsorted(records.run, np.arange(len(simulation) + 1))
+    halves = 0.5 * mass, 0.5 * releases.inertia * mass * radius**2
+    drag, count = releases.drag_per_m(simulation.settings.drag), 0
+    while True:
+        space.make_room(size, order.size + 1, count)
+        done, count = walk(
+            cells.x0_m, cells.y0_m, cells.size_m, cells.columns, cells.rows, ground.plan, ground.terrain_tree, order,
+            begin, records.what, records.time_s, records.position, records.v2, records.omega2, records.v1,
+            records.omega1, *halves, drag, simulation.settings.gravity_mps2, space.seen, space.runs, space.keys,
+            space.values, count, *space.stacks,
+        )  # fmt: skip
+        space.runs += done + 1  # the next one has left traces
+        order, size = order[done:], 2 * len(space.keys)
+        if not order.size:
+            break
     found = space.keys[:count].copy(), space.values[:count].copy()
     if spaces is not None:
         spaces.append(space)
@@ -188,16 +194,22 @@ class _Space:
     ----------
     keys, values : its passages.
     seen : (cells,) the last run in each, of all `runs` that were followed, from 1.
+    stacks : of searches in the terrain.
     """
 
     def __init__(self, cells: int) -> None:
+        from ..terrain.kernels import STACK_SIZE
+
         self.seen, self.runs = np.zeros(cells, np.int32), 0
         self.keys, self.values = np.empty(0, np.int32), np.empty((0, len(QUANTITIES)), np.float32)
+        self.stacks = np.empty(STACK_SIZE, np.int64), np.empty(STACK_SIZE), np.empty(STACK_SIZE, np.int64)
 
-    def make_room(self, passages: int, runs: int) -> None:
-        """For so many passages of so many runs."""
+    def make_room(self, passages: int, runs: int, filled: int) -> None:
+        """For so many passages, of which some are there, and so many further runs."""
         if passages > len(self.keys):
-            self.keys, self.values = np.empty(passages, np.int32), np.empty((passages, len(QUANTITIES)), np.float32)
+            keys, values = np.empty(passages, np.int32), np.empty((passages, len(QUANTITIES)), np.float32)
+            keys[:filled], values[:filled] = self.keys[:filled], self.values[:filled]
+            self.keys, self.values = keys, values
         if self.runs + runs >= MOST_RUNS:
             self.seen[:], self.runs = 0, 0
 

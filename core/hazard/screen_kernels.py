@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which ways of runs come near screens. Compiled kernels."""
 
-import numpy as np
-
-from ..compiled import kernel
+from ..compiled import borrowing
 
 
-@kernel
-def near_boxes(run, position, boxes):  # type: ignore[no-untyped-def]
-    """Records (k,) from which the way to the next touches a box (s, 4) in plan: x, y least and most."""
-    found, count = np.empty(256, np.int64), 0
+@borrowing
+def near_boxes(run, position, boxes, found):  # type: ignore[no-untyped-def]
+    """Fill `found` (k,) with records from which the way to the next touches a box (s, 4) in plan: x, y least and most.
+
+    Returns how many there are.
+    """
+    count = 0
     for i in range(1, run.size):
         if run[i] != run[i - 1]:
             continue
@@ -20,11 +21,7 @@ def near_boxes(run, position, boxes):  # type: ignore[no-untyped-def]
             y0, y1 = y1, y0
         for k in range(boxes.shape[0]):
             if x1 >= boxes[k, 0] and y1 >= boxes[k, 1] and x0 <= boxes[k, 2] and y0 <= boxes[k, 3]:
-                if count == found.size:
-                    more = np.empty(2 * count, np.int64)
-                    more[:count] = found
-                    found = more
                 found[count] = i - 1
                 count += 1
                 break
-    return found[:count]
+    return count

@@ -214,7 +214,8 @@ def _near(simulation: Simulation, screens: Sequence[Screen]) -> Indices:
 
     ends = [np.stack([screen.line[:-1], screen.line[1:]], axis=1) for screen in screens]
     boxes = np.vstack([np.column_stack([part.min(axis=1), part.max(axis=1)]) for part in ends])
-    return near_boxes(simulation.records.run, simulation.records.position, boxes)
+    found = np.empty(len(simulation.records), np.intp)
+    return found[: near_boxes(simulation.records.run, simulation.records.position, boxes, found)]
 
 
 def _only(simulation: Simulation, ways: Indices) -> Simulation:

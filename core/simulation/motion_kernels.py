@@ -40,7 +40,7 @@ from .record_kernels import ALL, ENDED, FLIES_OFF, IMPACT, IMPACTS, ON_GROUND, R
 from .rotation import drawn_axes, turn
 from .tree_kernels import MOST_FALLEN, PARTS, against_stem, first_stem, let_fall, round_stem, stem_on_way
 
-STOPPED, LEFT, LIMIT = 0, 1, 2
+STOPPED, LEFT, LIMIT, NO_ROOM = 0, 1, 2, -2
 """How a run ends."""
 NO_ROLLING, AZZONI, COULOMB = 0, 1, 2
 
@@ -227,13 +227,14 @@ def _leaves(bounds, p, v, a, radius):  # type: ignore[no-untyped-def]
     return leave
 
 
-@kernel
+@borrowing
 def run_block(  # type: ignore[no-untyped-def]
     tree, facets, zone, rebound, parameters, friction, own, draws, stack, times, nearby, close, rows, count,
     run, seed, p, v, w, radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems,
-    fallen,
+    fallen, uniform,
 ):  # fmt: skip
-    """Fill `rows` from `count` on; returns (rows, count, end, time, impacts, length, v_max, trees).
+    """Fill `rows` from `count` on; returns (count, end, time, impacts, length, v_max, trees), the end `NO_ROOM` if they
+    are too short.
 
     Parameters
     ----------
@@ -246,6 +247,7 @@ def run_block(  # type: ignore[no-untyped-def]
     law : `NO_ROLLING`, `AZZONI` or `COULOMB`.
     record : `ENDS_ONLY`, `IMPACTS` or `ALL`.
     stems : see `tree_kernels`; empty for none. fallen : work space, those that gave way to this block.
+    uniform : (3,) work space.
     """
     zero = (0.0, 0.0, 0.0)
     bounds = box(tree)
@@ -261,14 +263,15 @@ def run_block(  # type: ignore[no-untyped-def]
     fallen[0], leant, stem_met = 0, -inf, -1
     tumbles, axes, spun = moments[0] != moments[1] or moments[1] != moments[2], UNTURNED, 0.0
     if tumbles:
-        u = np.empty(3)
-        fill_uniform(seed, run, ATTITUDE, u)
-        axes = drawn_axes(u)
+        fill_uniform(seed, run, ATTITUDE, uniform)
+        axes = drawn_axes(uniform)
+    if count + 2 >= rows.shape[0]:
+        return count, NO_ROOM, time, impacts, length, v_max, trees
     write(rows, count, run, RELEASED, time, p, v, w, v, w, n, -1)
     count += 1
     while end < 0:
         if count + 2 >= rows.shape[0]:
-            rows = grown(rows)
+            return count, NO_ROOM, time, impacts, length, v_max, trees
         if impacts + trees >= most_impacts or time >= most_s:
             end = LIMIT
             break
@@ -542,9 +545,9 @@ def run_block(  # type: ignore[no-untyped-def]
     if tumbles and not grounded:
         axes, w = turn(moments, axes, w, time - spun)
     if count + 2 >= rows.shape[0]:
-        rows = grown(rows)
+        return count, NO_ROOM, time, impacts, length, v_max, trees
     write(rows, count, run, ENDED, time, p, v, w, v, w, n, place)
-    return rows, count + 1, end, time, impacts, length, v_max, trees
+    return count + 1, end, time, impacts, length, v_max, trees
 
 
 @kernel
@@ -563,16 +566,20 @@ def run_blocks(  # type: ignore[no-untyped-def]
     nearby = np.empty(MOST_NEAR, np.int64), np.empty((MOST_NEAR, 6)), np.empty(6)
     close = np.empty((2, MOST_CLOSE), np.int64), np.empty((3, MOST_CLOSE)), np.empty(KNOWN)
     draws, fallen, count = np.empty(draw_count), np.empty(1 + MOST_FALLEN, np.int64), np.int64(0)
+    uniform = np.empty(3)
     for i in range(len(runs)):
-        first = count
-        rows, count, end, time, impacts, length, v_max, trees = run_block(
-            tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows, count,
-            runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
-            (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
-            (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],
-            (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record, stems,
-            fallen,
-        )  # fmt: skip
+        first, end = count, NO_ROOM
+        while end == NO_ROOM:  # with longer records it begins again: to make them there costs all of it each turn
+            count, end, time, impacts, length, v_max, trees = run_block(
+                tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows,
+                first, runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
+                (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
+                (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],
+                (moments[i, 0], moments[i, 1], moments[i, 2]), drag[i], gravity, law, most_impacts, most_s, record,
+                stems, fallen, uniform,
+            )  # fmt: skip
+            if end == NO_ROOM:
+                rows = grown(rows)
         rows[first:count, 0] = among[i]
         results[i, 0], results[i, 1], results[i, 2] = end, time, impacts
         results[i, 3], results[i, 4], results[i, 5], results[i, 6] = length, v_max, trees, count - first

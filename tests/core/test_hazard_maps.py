@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.hazard import cell_tally
 from rockfall.core.hazard.cell_tally import CellTally, passages_of
 from rockfall.core.hazard.cells import Cells, cells_over
 from rockfall.core.hazard.maps import LAYERS
@@ -197,6 +198,21 @@ def test_below_an_overhang_the_height_is_that_above_the_ground_below() -> None:
     key, values = passages(thrown(terrain, [2.5, 12.5, 4.0], [30.0, 0.0, 0.0]), cells)
     below = dict(zip((key - 24).tolist(), values[:, 3].tolist(), strict=True))
     assert below[4] == pytest.approx(4 - 0.5 * G * (17.5 / 30) ** 2, rel=1e-5)
+
+
+def test_passages_for_which_the_room_is_too_small_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of blocks on the same way: the run that has no room for its last is followed again from its beginning."""
+    ground = make_ground(rough())
+    releases = make_releases(np.tile([3.5, 30.5, 0.5], (9, 1)), velocity=np.tile([5.0, 0, 0], (9, 1)), diameter_m=0.5)
+    runs, cells = simulate(ground, releases, PLAIN), cells_over(ground.surface, 1.0)
+    key, values = passages_of(runs, cells)
+    assert (key < 0).sum() == 9 * np.unique(key[key < 0]).size, "each run has a first passage through each cell"
+    monkeypatch.setattr(cell_tally, "PER_METRE", 0.0)
+    for room in (1, 2, 3):
+        monkeypatch.setattr(cell_tally, "PER_RUN", room)
+        again, their_values = passages_of(runs, cells)
+        np.testing.assert_array_equal(again, key)
+        np.testing.assert_array_equal(their_values, values)
 
 
 def test_deposits_and_classes_of_energy() -> None:

@@ -302,6 +302,21 @@ def test_the_same_bits_for_any_threads_and_batches(monkeypatch: pytest.MonkeyPat
     assert not np.array_equal(simulate(ground, releases, Settings("stevens_1998", seed=5)).position, one.position)
 
 
+def test_records_for_which_the_room_is_too_small_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The run that does not fit is simulated again with more room: nothing of it is kept, and nothing is lost."""
+    ground, spheres = drops(rough(), 7)
+    releases = make_releases(spheres.position, axes_m=np.tile([0.4, 0.5, 0.7], (7, 1)), shape="ellipsoid")
+    settings = Settings("pfeiffer_bowen_1989", {"roughness": 0.1})
+    whole = simulate(ground, releases, settings)
+    monkeypatch.setattr(engine, "ROOM", dict.fromkeys(engine.ROOM, 1))
+    again = simulate(ground, releases, settings)
+    assert len(whole.records) > 100
+    for name in type(whole.records).__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(again.records, name), getattr(whole.records, name), name)
+    np.testing.assert_array_equal(again.length_m, whole.length_m)
+    np.testing.assert_array_equal(again.impacts, whole.impacts)
+
+
 def test_every_block_has_an_end() -> None:
     ground, releases = drops(rough(), 200)
     run = simulate(ground, releases, Settings("stevens_1998"))

@@ -283,8 +283,8 @@ def _corners(grey: np.ndarray, taken: Array) -> Array:
     found = cv2.goodFeaturesToTrack(grey, 4000, 0.004, apart)
     found = np.zeros((0, 2)) if found is None else found.reshape(-1, 2).astype(np.float64)
     if len(taken) and len(found):
-        nearest = np.min(np.hypot(*(found[:, None] - taken[None]).transpose(2, 0, 1)), axis=1)
-        found = found[nearest > apart]
+        squared = (found**2).sum(axis=1)[:, None] - 2 * found @ taken.T + (taken**2).sum(axis=1)
+        found = found[squared.min(axis=1) > apart**2]
     room = np.full(GRID[0] * GRID[1], PER_CELL)
     np.subtract.at(room, _cell(taken, width, height), 1)
     cell = _cell(found, width, height)

@@ -72,7 +72,7 @@ def test_an_error_comes_through_after_what_was_made_before_it() -> None:
     seen = []
     with pytest.raises(InputError, match="cannot be decoded"):  # noqa: PT012
         for number in ahead(counting([], 5, InputError("Frame 5 cannot be decoded"))):
-            seen.append(number)  # noqa: PERF402
+            seen.append(number)
     assert seen == [0, 1, 2, 3, 4]
 
 

@@ -100,6 +100,23 @@ def test_whoever_has_enough_just_stops() -> None:
     assert not decoding()
 
 
+def test_of_what_is_being_made_when_the_caller_stops_only_that_is_finished() -> None:
+    made, go = [], threading.Event()
+
+    def items() -> Iterator[int]:
+        for number in range(10):
+            if number:
+                go.wait()
+            made.append(number)
+            yield number
+
+    stream = ahead(items())
+    assert next(stream) == 0
+    threading.Timer(0.5, go.set).start()
+    stream.close()  # type: ignore[attr-defined]
+    assert made == [0, 1]
+
+
 def test_frames_of_a_file_are_decoded_beside_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
     threads = set()
 

@@ -101,17 +101,19 @@ def test_whoever_has_enough_just_stops() -> None:
 
 
 def test_of_what_is_being_made_when_the_caller_stops_only_that_is_finished() -> None:
-    made, go = [], threading.Event()
+    made, begun, go = [], threading.Event(), threading.Event()
 
     def items() -> Iterator[int]:
         for number in range(10):
             if number:
+                begun.set()
                 go.wait()
             made.append(number)
             yield number
 
     stream = ahead(items())
     assert next(stream) == 0
+    begun.wait()
     threading.Timer(0.5, go.set).start()
     stream.close()  # type: ignore[attr-defined]
     assert made == [0, 1]

@@ -199,6 +199,12 @@ class Plates:
         return shift @ _centred(plate.across[frame - self._first])
 
 
+def over_channels(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(h, w) sums over the channels of the products of two pictures (h, w, 3), float32."""
+    total: np.ndarray = opencv().transform(one * other, np.ones((1, 3), np.float32))
+    return total
+
+
 def _centred(homography: Array) -> Array:
     """For OpenCV, whose pixels count from the centre of the first."""
     return BACK @ homography @ CORNER
@@ -222,7 +228,7 @@ def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarr
             for picture, q in zip((middle, low, high), QUARTILES, strict=True):
                 cv2.copyTo(ordered[int(q * max(fewer - 1, 0))], there, picture)
     spread = (high.astype(np.float32) - low) / IQR_PER_SD
-    variance = cv2.blur(np.einsum("ijk,ijk->ij", spread, spread) / np.float32(3), (5, 5))
+    variance = cv2.blur(over_channels(spread, spread) / np.float32(3), (5, 5))
     return middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen
 
 

@@ -1,28 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The next pictures are decoded in a thread of their own while the caller works on those before."""
+"""The next picture is decoded in a thread of its own while the caller works on the one before."""
 
-from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-
-AHEAD = 2
-"""Pictures that are decoded before they are asked for: one is being worked on, one is there, one is being made."""
+from concurrent.futures import ThreadPoolExecutor
 
 
-def ahead[T](items: Iterator[T], most: int = AHEAD) -> Iterator[T]:
-    """The same items in the same order, up to `most` of them made beforehand.
+def ahead[T](items: Iterator[T]) -> Iterator[T]:
+    """The same items in the same order, each made while the caller works on the one before.
 
     What making one raises is raised here where the item would come. When the caller ends early, by an error, an
-    interrupt or because it has enough, the item being made is waited for and no further one is begun.
+    interrupt or because it has enough, the item that is being made is waited for, and the thread has ended.
     """
     end = object()
-    waiting: deque[Future[T | object]] = deque()
     with ThreadPoolExecutor(1, "rockfall-ahead") as thread:
-        try:
-            waiting.extend(thread.submit(next, items, end) for _ in range(most))
-            while (item := waiting.popleft().result()) is not end:
-                waiting.append(thread.submit(next, items, end))
-                yield item  # type: ignore[misc]
-        finally:
-            for other in waiting:
-                other.cancel()
+        coming = thread.submit(next, items, end)
+        while (item := coming.result()) is not end:
+            coming = thread.submit(next, items, end)
+            yield item  # type: ignore[misc]

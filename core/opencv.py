@@ -4,6 +4,7 @@
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from .output import write_bytes
 FFMPEG_QUIET = "-8"
 
 
+@cache
 def opencv() -> Any:
     """The module; what FFmpeg would print about a damaged file is told by our own messages."""
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)

@@ -60,6 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Track, write the tables and the picture, print the summary."""
     from ..exchange.footage_tables import write_events, write_track
+    from ..footage.advice import layered_background
     from ..footage.background import background_motion, no_motion
     from ..footage.kinks import find_kinks
     from ..footage.pictures import draw_track
@@ -102,6 +103,8 @@ def run(arguments: argparse.Namespace) -> int:
             picture = draw_track(source, track, motion, kinks, labels, clicks[0][0])
             write_picture(folder / "track.png", picture)
     _print_summary(arguments, track, motion, kinks, events)
+    if said := layered_background(motion, video.width):
+        print(said)
     return 0
 
 

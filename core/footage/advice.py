@@ -5,6 +5,7 @@ from math import pi, sqrt
 
 import numpy as np
 
+from .background import BackgroundMotion, layers_px
 from .video import Video
 
 FRAMES_PER_TURN = 5.0
@@ -117,3 +118,15 @@ def content_advice(video: Video) -> list[str]:
             f"Pixels are {video.pixel_aspect:.3f} times as wide as high: solve the camera with fx and fy apart."
         )
     return sentences
+
+
+def layered_background(motion: BackgroundMotion, width: int) -> str:
+    """That the background does not move as one in pictures of this width, and what follows; empty where it does."""
+    found = layers_px(motion, width)
+    if found is None:
+        return ""
+    return (
+        f"Parts of the background move differently, by {found[0]:.1f} px about frame {found[1]}: near and far ground "
+        "before a camera that was moved, or a lens that distorts. The pixels of the track are as they are seen, but "
+        "impacts proposed from it may be off; look at each."
+    )

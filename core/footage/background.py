@@ -7,7 +7,7 @@ found, not with the one before, so that errors do not add up; a homography to th
 (MAGSAC++, Barath et al. 2020), then by least squares.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,6 +39,12 @@ FEWEST_SHARE = 0.25
 RENEW_SHARE = 0.6
 type Steps = tuple[int, float]
 
+REGIONS, FAR_PX = (4, 3), 3.0
+"""Of the picture, in which corners are compared with the motion of all; no corner counts as further off [px]."""
+STEADY = 9
+"""Frames of which the median tells whether a region is off."""
+APART_PX, APART_SHARE = 0.4, 1 / 3200
+"""One ground gives less, also where its corners are bad, and less than this share of the picture's width."""
 GLANCES, GLANCED_AT = 4, 250_000
 """Pictures of a first look, and the pixels that they are reduced to."""
 LEAST_GLANCED = 120
@@ -59,6 +65,8 @@ class BackgroundMotion:
     inliers : (f,) corners that agree.
     rms_px : (f,) of their residuals, in the reference frame.
     still : the camera does not move: every homography is the identity.
+    apart_px : (f,) how far the corners of one region of the picture lie, on average, from where the motion of all puts
+        them, in the region in which it is furthest; empty where nobody has looked.
     """
 
     frames: Indices
@@ -66,6 +74,15 @@ class BackgroundMotion:
     inliers: Indices
     rms_px: Array
     still: bool
+    apart_px: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def steadily_apart_px(self) -> Array:
+        """(f,) `apart_px` without single frames that stand out, such as blurred ones."""
+        if not self.apart_px.size:
+            return self.apart_px
+        beyond = np.pad(self.apart_px, STEADY // 2, mode="edge")
+        return np.median(np.lib.stride_tricks.sliding_window_view(beyond, STEADY), axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +120,17 @@ def stabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
 def destabilise(motion: BackgroundMotion, frame: Indices, pixels: Array) -> Array:
     """(n, 2) pixels of the reference frame as they lie in frames (n,); undoes `stabilise`."""
     return _through(np.linalg.inv(_of(motion, frame)).astype(np.float64), pixels)
+
+
+def layers_px(motion: BackgroundMotion, width: int) -> tuple[float, int] | None:
+    """By how much parts of the background move differently [px], and the frame in which they are furthest apart.
+
+    None where all of it moves as one plane does, or as seen by a camera that only turns, in pictures of this width.
+    """
+    apart = motion.steadily_apart_px
+    if motion.still or not apart.size or apart.max() <= max(APART_PX, APART_SHARE * width):
+        return None
+    return float(apart.max()), int(motion.frames[np.argmax(apart)])
 
 
 def glance(source: Source) -> float:
@@ -145,7 +173,7 @@ def background_motion(
     """
     last = source.time_s.size - 1 if last is None else last
     scale = 1.0
-    follower, numbers, homographies, inliers, rms = None, [], [], [], []
+    follower, numbers, homographies, inliers, rms, apart = None, [], [], [], [], []
     sightings: list[tuple[int, Indices, Array]] = []
     for frame, picture in frames(source, range(first, last + 1)):
         progress("Following the background", frame - first, last - first + 1)
@@ -158,6 +186,7 @@ def background_motion(
         homographies.append(follower.homography)
         inliers.append(follower.names.size)
         rms.append(scale * follower.rms)
+        apart.append(scale * follower.apart)
         sightings.append((frame, follower.names, scale * follower.pixel))
     still = _is_still(sightings)
     count = len(numbers)
@@ -174,6 +203,7 @@ def background_motion(
         inliers=np.array(inliers),
         rms_px=np.array(rms),
         still=still,
+        apart_px=np.array(apart),
     ), features
 
 
@@ -184,7 +214,7 @@ class _Follower:
     """
 
     def __init__(self, grey: np.ndarray, frame: int) -> None:
-        self.homography, self.rms = np.eye(3), 0.0
+        self.homography, self.rms, self.apart = np.eye(3), 0.0, 0.0
         self.names = np.zeros(0, dtype=np.intp)
         self.pixel = self.reference = np.zeros((0, 2))
         self.count = self.key_count = 0
@@ -208,14 +238,15 @@ class _Follower:
         if good.sum() < FEWEST:
             raise _lost(frame, f"only {good.sum()} corners of the frames before are found again in it")
         homography, agrees = _fit(pixel[good], self.reference[good])
+        off = _through(homography, pixel[good]) - self.reference[good]
+        self.apart = _apart(off, _cell(pixel[good], width, height, REGIONS))
         kept = np.flatnonzero(good)[agrees]
         if kept.size < max(FEWEST, FEWEST_SHARE * self.pixel.shape[0]):
             raise _lost(frame, f"only {kept.size} of {self.pixel.shape[0]} corners move together")
         self.small, self.homography = small, homography
         self.names, self.pixel = self.names[kept], pixel[kept]
         self.reference, self.key_pixel = self.reference[kept], self.key_pixel[kept]
-        residual = _through(homography, self.pixel) - self.reference
-        self.rms = float(np.sqrt(np.mean(np.sum(residual**2, axis=1))))
+        self.rms = float(np.sqrt(np.mean(np.sum(off[agrees] ** 2, axis=1))))
         if self.names.size < RENEW_SHARE * self.key_count:
             self._renew(grey)
 
@@ -283,8 +314,8 @@ def _corners(grey: np.ndarray, taken: Array) -> Array:
     found = cv2.goodFeaturesToTrack(grey, 4000, 0.004, apart)
     found = np.zeros((0, 2)) if found is None else found.reshape(-1, 2).astype(np.float64)
     if len(taken) and len(found):
-        nearest = np.min(np.hypot(*(found[:, None] - taken[None]).transpose(2, 0, 1)), axis=1)
-        found = found[nearest > apart]
+        squared = (found**2).sum(axis=1)[:, None] - 2 * found @ taken.T + (taken**2).sum(axis=1)
+        found = found[squared.min(axis=1) > apart**2]
     room = np.full(GRID[0] * GRID[1], PER_CELL)
     np.subtract.at(room, _cell(taken, width, height), 1)
     cell = _cell(found, width, height)
@@ -295,10 +326,20 @@ def _corners(grey: np.ndarray, taken: Array) -> Array:
     return found[rank < room[cell]]
 
 
-def _cell(pixel: Array, width: int, height: int) -> Indices:
-    column = np.clip(pixel[:, 0] * GRID[0] / width, 0, GRID[0] - 1).astype(np.intp)
-    row = np.clip(pixel[:, 1] * GRID[1] / height, 0, GRID[1] - 1).astype(np.intp)
-    return row * GRID[0] + column
+def _cell(pixel: Array, width: int, height: int, grid: tuple[int, int] = GRID) -> Indices:
+    """(n,) number of the cell of a grid."""
+    column = np.clip(pixel[:, 0] * grid[0] / width, 0, grid[0] - 1).astype(np.intp)
+    row = np.clip(pixel[:, 1] * grid[1] / height, 0, grid[1] - 1).astype(np.intp)
+    return row * grid[0] + column
+
+
+def _apart(off: Array, region: Indices) -> float:
+    """How far corners (n, 2) lie from where the one motion of all puts them, in the region in which most do so [px]."""
+    size = REGIONS[0] * REGIONS[1]
+    number = np.bincount(region, minlength=size)
+    many = number >= FEWEST
+    mean = [np.bincount(region, np.clip(along, -FAR_PX, FAR_PX), size)[many] / number[many] for along in off.T]
+    return float(np.hypot(*mean).max(initial=0.0))
 
 
 def _flow(

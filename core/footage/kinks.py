@@ -78,8 +78,13 @@ def find_kinks(
     step = np.hypot(*np.diff(pixel, axis=0).T)
     sigma = np.sqrt(sigma_px**2 + (SMOOTH * np.minimum(np.r_[step[0], step], np.r_[step, step[-1]])) ** 2)
     cuts = _cuts(time_s, pixel, sigma)
+    met: dict[tuple[int, ...], tuple[float, float, Array, Array, Array, float, float]] = {}
     while True:  # the least of the kinks goes as long as one is too small, and its pieces are joined
-        found = [_meet(time_s, pixel, sigma, cuts, i) for i in range(1, len(cuts) - 1)]
+        around = [tuple(cuts[i - 1 : i + 2].tolist()) for i in range(1, len(cuts) - 1)]
+        for i, three in enumerate(around, start=1):
+            if three not in met:  # where one has gone only those beside it are others
+                met[three] = _meet(time_s, pixel, sigma, cuts, i)
+        found = [met[three] for three in around]
         worth = [min(kink[5] / least_score, kink[6] / least_turn) for kink in found]
         if not worth or min(worth) >= 1:
             return _kinks(found)

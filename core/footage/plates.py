@@ -29,9 +29,13 @@ BORDER = 3
 """Next to the edge of a part its sigma is another one than in the whole plate [px]."""
 ROOM, LEAST_ROOM = 0.6, 60
 """Around what is asked for a part is larger by so many times its size, of so many pixels at least."""
+CORNER, BACK = (np.array([[1, 0, half], [0, 1, half], [0, 0, 1]]) for half in (0.5, -0.5))
+"""From OpenCV's pixels to those that count from the corner of the picture, and back."""
 
 type Box = tuple[int, int, int, int]
 """Left, top, right, bottom [px]."""
+type Layers = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Picture (h, w, 3), its sigma (h, w), and where it is known (h, w), float32."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +72,15 @@ class Plate:
     Attributes
     ----------
     anchor : that frame.
+    across : (f, 3, 3) from each frame of the footage onto the anchor.
+    wandered : (f,) how far the corners of each frame lie from those of the anchor, as a share of the picture.
     samples : frames of which it is the median, and their pictures.
     part : what has been made of it.
     """
 
     anchor: int
+    across: Array
+    wandered: Array
     samples: list[tuple[int, np.ndarray]]
     part: Part | None = None
 
@@ -86,11 +94,22 @@ class Plates:
         size = (source.width, source.height)
         self._margin = (0, 0) if motion.still else (int(np.ceil(WANDERED * size[0])), int(np.ceil(WANDERED * size[1])))
         self._size = (size[0] + 2 * self._margin[0], size[1] + 2 * self._margin[1])
+        self._first = int(motion.frames[0])
+        self._last: tuple[int, int, int, Layers] | None = None
 
-    def window(
-        self, frame: int, left: int, top: int, width: int, height: int
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Background of a window of a frame: picture (height, width, 3), its sigma, and where it is known (float32)."""
+    def window(self, frame: int, left: int, top: int, width: int, height: int) -> Layers:
+        """Background of a window of a frame."""
+        if self._last is not None and self._last[0] == frame:  # about the same block more than one thing is asked
+            column, row, layers = left - self._last[1], top - self._last[2], self._last[3]
+            rows, columns = layers[1].shape
+            if column >= 0 and row >= 0 and column + width <= columns and row + height <= rows:
+                a, b, c = (layer[row : row + height, column : column + width] for layer in layers)
+                return a, b, c
+        layers = self._window(frame, left, top, width, height)
+        self._last = frame, left, top, layers
+        return layers
+
+    def _window(self, frame: int, left: int, top: int, width: int, height: int) -> Layers:
         plate = self._plate(frame)
         if self._motion.still:
             part = self._part(plate, (left, top, left + width, top + height))
@@ -98,7 +117,7 @@ class Plates:
             return tuple(a[own].astype(np.float32) for a in (part.picture, part.sigma, part.seen > 0))  # type: ignore[return-value]
         cv2 = opencv()
         shift = np.array([[1.0, 0.0, left], [0.0, 1.0, top], [0.0, 0.0, 1.0]])
-        across = self._onto(frame, plate.anchor) @ shift
+        across = self._onto(frame, plate) @ shift
         part = self._part(plate, self._box(across, width, height))
         across = np.array([[1.0, 0.0, -part.left], [0.0, 1.0, -part.top], [0.0, 0.0, 1.0]]) @ across
         size, flags = (width, height), cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -132,61 +151,63 @@ class Plates:
         cv2 = opencv()
         left, top, right, bottom = box
         layers, known = [], []
+        full = np.full((self._source.height, self._source.width), 255, np.uint8)
         for frame, picture in plate.samples:
             if self._motion.still:
                 layers.append(picture[top:bottom, left:right].copy())
                 continue
             shift = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
-            across, size = shift @ self._onto(frame, plate.anchor), (right - left, bottom - top)
-            full = np.full(picture.shape[:2], 255, np.uint8)
+            across, size = shift @ self._onto(frame, plate), (right - left, bottom - top)
             known.append(cv2.warpPerspective(full, across, size) > 250)
             layers.append(cv2.warpPerspective(picture, across, size))
         return Part(left, top, *_median(layers, known))
 
     def _plate(self, frame: int) -> Plate:
         for plate in reversed(self._kept):
-            near = abs(plate.anchor - frame) <= REACH
-            if near and (self._motion.still or self._wandered(frame, plate.anchor) < WANDERED):
+            if abs(plate.anchor - frame) <= REACH and plate.wandered[frame - self._first] < WANDERED:
                 return plate
-        plate = Plate(frame, self._samples(frame))
+        across = np.linalg.solve(self._motion.homography[frame - self._first], self._motion.homography)
+        wandered = self._wandered(across)
+        plate = Plate(frame, across, wandered, self._samples(frame, wandered))
         self._kept = [*self._kept[-1:], plate]
         return plate
 
-    def _samples(self, anchor: int) -> list[tuple[int, np.ndarray]]:
+    def _samples(self, anchor: int, wandered: Array) -> list[tuple[int, np.ndarray]]:
         """Frames from all over the footage around the anchor, those that need not be decoded if there are enough."""
         self._progress(f"Making the background around frame {anchor}", 0, 0)
-        low = max(anchor - REACH, int(self._motion.frames[0]))
-        high = min(anchor + REACH, int(self._motion.frames[-1]))
-        near = [frame for frame in range(low, high + 1) if self._wandered(frame, anchor) < 1 - SHARED]
+        numbers = self._motion.frames
+        near = numbers[(np.abs(numbers - anchor) <= REACH) & (wandered < 1 - SHARED)].tolist()
         if isinstance(self._source, Kept):
             there = [frame for frame in near if self._source.has(frame)]
             near = there if len(there) >= SAMPLES else near
         chosen = sorted({near[i] for i in np.linspace(0, len(near) - 1, SAMPLES).round().astype(int)})
         return list(frames(self._source, chosen))
 
-    def _wandered(self, frame: int, anchor: int) -> float:
-        """How far the corners of a frame lie from those of the anchor, as a share of the picture."""
+    def _wandered(self, across: Array) -> Array:
+        """(f,) how far homographies (f, 3, 3) move the corners, the furthest, as a share of the picture."""
         if self._motion.still:
-            return 0.0
+            return np.zeros(len(across))
         size = np.array([self._source.width, self._source.height], dtype=np.float64)
         corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
-        moved = np.column_stack([corners, np.ones(4)]) @ self._between(frame, anchor).T
-        return float(np.abs((moved[:, :2] / moved[:, 2:] - corners) / size).max())
+        moved = np.column_stack([corners, np.ones(4)]) @ across.swapaxes(1, 2)
+        share: Array = np.abs((moved[..., :2] / moved[..., 2:] - corners) / size).max(axis=(1, 2))
+        return share
 
-    def _onto(self, frame: int, anchor: int) -> Array:
+    def _onto(self, frame: int, plate: Plate) -> Array:
         """Frame → plate, which is larger than a frame all around, for OpenCV."""
         shift = np.array([[1.0, 0.0, self._margin[0]], [0.0, 1.0, self._margin[1]], [0.0, 0.0, 1.0]])
-        return shift @ _centred(self._between(frame, anchor))
+        return shift @ _centred(plate.across[frame - self._first])
 
-    def _between(self, frame: int, anchor: int) -> Array:
-        first = int(self._motion.frames[0])
-        return np.linalg.solve(self._motion.homography[anchor - first], self._motion.homography[frame - first])
+
+def over_channels(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """(h, w) sums over the channels of the products of two pictures (h, w, 3), float32."""
+    total: np.ndarray = opencv().transform(one * other, np.ones((1, 3), np.float32))
+    return total
 
 
 def _centred(homography: Array) -> Array:
     """For OpenCV, whose pixels count from the centre of the first."""
-    corner = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
-    return np.linalg.inv(corner) @ homography @ corner
+    return BACK @ homography @ CORNER
 
 
 def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -207,7 +228,7 @@ def _median(layers: list[np.ndarray], known: list[np.ndarray]) -> tuple[np.ndarr
             for picture, q in zip((middle, low, high), QUARTILES, strict=True):
                 cv2.copyTo(ordered[int(q * max(fewer - 1, 0))], there, picture)
     spread = (high.astype(np.float32) - low) / IQR_PER_SD
-    variance = cv2.blur(np.einsum("ijk,ijk->ij", spread, spread) / np.float32(3), (5, 5))
+    variance = cv2.blur(over_channels(spread, spread) / np.float32(3), (5, 5))
     return middle, np.sqrt(variance + np.float32(NOISE_FLOOR) ** 2), seen
 
 

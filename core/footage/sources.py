@@ -8,6 +8,7 @@ import numpy as np
 
 from ..memory import available_bytes
 from ..vectors import Array
+from .ahead import ahead
 from .video import Video, read_frames
 
 CHUNK, CHUNK_BYTES = (12, 48), 300_000_000
@@ -80,7 +81,7 @@ class Kept:
     def ascending(self, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
         """Index and picture of ascending frames, those decoded that are not there."""
         missing = [index for index in indices if index not in self._pictures]
-        decoded, kept = read_frames(self.video, missing), dict.fromkeys(missing)
+        decoded, kept = _decoded(self.video, missing), dict.fromkeys(missing)
         for index in indices:
             picture = next(decoded)[1] if index in kept else self._pictures[index]
             if index % self._every == 0 and (len(self._pictures) + 1) * self.frame_bytes <= self._room:
@@ -111,4 +112,8 @@ def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.nda
 
 
 def _ascending(source: Video | Kept, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-    return source.ascending(indices) if isinstance(source, Kept) else read_frames(source, indices)
+    return source.ascending(indices) if isinstance(source, Kept) else _decoded(source, indices)
+
+
+def _decoded(video: Video, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
+    return ahead(read_frames(video, indices)) if len(indices) > 1 else read_frames(video, indices)

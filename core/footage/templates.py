@@ -13,7 +13,7 @@ import numpy as np
 
 from ..opencv import opencv
 from ..vectors import Array
-from .plates import Plates
+from .plates import Plates, over_channels
 
 SHAPE_ERROR = 0.15
 """Of the covered share: real blocks have facets and are not discs."""
@@ -92,7 +92,7 @@ def cover(picture: np.ndarray, frame: int, plates: Plates, looks: Appearance, ce
         return Cover(left, top, empty, empty, empty)
     behind, sigma, seen = plates.window(frame, left, top, right - left, bottom - top)
     change = picture[top:bottom, left:right].astype(np.float32) - behind
-    change -= np.median(change.reshape(-1, 3), axis=0)
+    change -= np.median(np.ascontiguousarray(change.reshape(-1, 3).T), axis=1)  # in the order in which it is quick
     alpha, noise, other = _shares(change, behind, sigma, looks.colours)
     alpha = alpha / (1 + other / OTHER_COLOUR)
     weight = seen / (noise + SHAPE_ERROR**2)
@@ -104,12 +104,12 @@ def _shares(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of each pixel: share covered by the colour that explains it best, its variance by noise, what is left over."""
     variance = sigma**2
-    total = np.einsum("ijk,ijk->ij", change, change) / variance
+    total = over_channels(change, change) / variance
 
     def explained(colour: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         contrast = colour - behind
-        power = np.maximum(np.einsum("ijk,ijk->ij", contrast, contrast) / variance, 1e-3)
-        along = np.einsum("ijk,ijk->ij", change, contrast) / variance
+        power = np.maximum(over_channels(contrast, contrast) / variance, 1e-3)
+        along = over_channels(change, contrast) / variance
         share = np.clip(along / power, -0.5, 1.25)
         return share, 1 / power, np.maximum(total - 2 * share * along + share**2 * power - 2, 0)
 
@@ -181,7 +181,8 @@ def search(here: Cover, looks: Appearance, streak: Array) -> tuple[Array, Array]
     near = (disc(u, v, np.zeros(2), diameter * (1 + 2 * MARGIN), streak) > 0.02).astype(np.float64)
     pad = int(np.ceil(diameter / 2))
     alpha, weight, noise = (
-        np.pad(a, pad) for a in (here.alpha * here.weight, here.weight, here.weight * (here.alpha**2 - here.noise))
+        cv2.copyMakeBorder(a, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0.0)
+        for a in (here.alpha * here.weight, here.weight, here.weight * (here.alpha**2 - here.noise))
     )
 
     def summed(what: Array, kernel: Array) -> Array:
@@ -274,7 +275,8 @@ def _change(
     left, top, right, bottom = window
     behind, sigma, seen = plates.window(frame, left, top, right - left, bottom - top)
     part = picture[top:bottom, left:right].astype(np.float32)
-    return part, np.sqrt(np.mean((part - behind) ** 2, axis=2)) / sigma * seen
+    change = part - behind
+    return part, np.sqrt(over_channels(change, change) / np.float32(3)) / sigma * seen
 
 
 def first_looks(

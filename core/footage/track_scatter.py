@@ -32,13 +32,13 @@ def scatter_sigma(time_s: Array, stable: Array, fitted_px: Array, diameter_px: A
     unlike = np.maximum(np.median(score) - 0.03 - score, 0)
     fitted, shape = np.maximum(fitted_px, 0.01), SHAPE * diameter_px + 0.35 * diameter_px * unlike
     scale, breaks = 1.5, np.zeros(0)
-    for _ in range(3):
-        sigma = np.hypot(fitted * scale, shape)
-        ratio = _smooth_ratio(time_s, stable, sigma, breaks)
+    for again in (False, True, True):
+        if again:
+            breaks = find_kinks(time_s, stable, np.hypot(fitted * scale, shape)).time_s
+        ratio = _smooth_ratio(time_s, stable, np.hypot(fitted * scale, shape), breaks)
         if ratio.size < 8:
             break
         scale = float(np.clip(scale * np.sqrt(np.mean(np.minimum(ratio, 12.0)) / 2), 0.3, 8.0))
-        breaks = find_kinks(time_s, stable, np.hypot(fitted * scale, shape)).time_s
     return np.hypot(fitted * scale, shape)
 
 

@@ -2,6 +2,7 @@
 """Where tracking starts: what is at a click, and how fast it moves."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class Footage:
         low, high = max(frame - 1, 0), min(frame + 1, time.size - 1)
         return float(time[high] - time[low]) / max(high - low, 1)
 
-    @property
+    @cached_property
     def usual_step_s(self) -> float:
         """From one frame to the next [s], the median."""
         return float(np.median(np.diff(self.video.time_s))) if self.video.time_s.size > 1 else 1.0

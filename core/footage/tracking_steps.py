@@ -125,14 +125,16 @@ def follow(footage: Footage, start: Start, end: int, progress: Progress) -> tupl
     InputError : the block hardly stands out at the start.
     """
     step, total = 1 if end >= start.frame else -1, abs(end - start.frame)
-    pictures = frames(footage.video, range(start.frame, end + step, step))
-    progress("Following the block", 0, total)
-    state = _begin(footage, start, next(pictures)[1])
-    for done, (frame, picture) in enumerate(pictures, start=1):
+    state: State | None = None
+    for done, (frame, picture) in enumerate(frames(footage.video, range(start.frame, end + step, step))):
         progress("Following the block", done, total)
+        if state is None:
+            state = _begin(footage, start, picture)
+            continue
         state, lost = _next(footage, state, frame, picture)
         if lost:
             return state.credible, lost
+    assert state is not None  # the frame of the start is always among them
     if state.missed:
         verb = "leaves the picture" if state.leaving else "is not seen"
         return state.credible, f"It {verb} after frame {state.rows[-1].frame}"

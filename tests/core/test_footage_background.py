@@ -1,14 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion of the background: made clips whose homographies are known, a tripod, and what cannot be followed."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
+import rockfall
 from rockfall.core.errors import InputError
-from rockfall.core.footage.background import _fit, background_motion, destabilise, glance, no_motion, stabilise
+from rockfall.core.footage.advice import layered_background
+from rockfall.core.footage.background import (
+    BackgroundMotion,
+    _fit,
+    background_motion,
+    destabilise,
+    glance,
+    layers_px,
+    no_motion,
+    stabilise,
+)
 from rockfall.core.footage.sources import Pictures
+from rockfall.core.footage.video import open_video
 from scipy.optimize import least_squares
 
+DEMO = Path(rockfall.__file__).parent / "assets" / "demo" / "footage" / "footage.mp4"
 SIZE = (400, 300)
 CORNER = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
 
@@ -166,3 +181,71 @@ def test_a_first_look_tells_a_hand_from_a_tripod() -> None:
 def test_a_first_look_at_different_scenes_says_nothing() -> None:
     other = [np.clip(ground(seed)[:300, :400], 0, 255).astype(np.uint8) for seed in (3, 4, 5, 6)]
     assert np.isnan(glance(clip(other)))
+
+
+def swayed(frame: int, moved_px: float) -> np.ndarray:
+    """(3, 3) frame → ground of one layer, which a camera that is moved from side to side shifts by so much at most."""
+    across = hand(frame)
+    across[:2, 2] += moved_px * np.sin(frame / 12), 0.6 * moved_px * (1 - np.cos(frame / 15))
+    return across
+
+
+def layered(count: int, share: float, far_px: float, near_px: float) -> list[np.ndarray]:
+    """Far ground, before it the near ground in the lower `share` of the first picture, each shifted in its own way."""
+    rng, far, near = np.random.default_rng(1), ground(), ground(7)
+    edge = 150 + SIZE[1] * (1 - share) + 15 * np.sin(np.arange(near.shape[1]) / 40)
+    inside, flags = (
+        (np.arange(near.shape[0])[:, None] > edge).astype(np.float64),
+        cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
+    )
+    pictures = []
+    for frame in range(count):
+        behind = cv2.warpPerspective(far, swayed(frame, far_px), SIZE, flags=flags)
+        before, there = (cv2.warpPerspective(a, swayed(frame, near_px), SIZE, flags=flags) for a in (near, inside))
+        picture = behind * (1 - there) + before * there + rng.normal(scale=3.0, size=behind.shape)
+        pictures.append(np.clip(picture, 0, 255).astype(np.uint8))
+    return pictures
+
+
+def error_px(motion: BackgroundMotion, moved_px: float, row: float) -> float:
+    """How far the middle of a row is off at worst, as it lies on a layer that is shifted by so much."""
+    place, worst = np.array([[200.0, row]]), 0.0
+    for frame in motion.frames.tolist():
+        across = CORNER @ np.linalg.inv(swayed(0, moved_px)) @ swayed(frame, moved_px) @ np.linalg.inv(CORNER)
+        true = across @ (*place[0], 1.0)
+        worst = max(worst, float(np.hypot(*(stabilise(motion, np.array([frame]), place)[0] - true[:2] / true[2]))))
+    return worst
+
+
+@pytest.mark.parametrize("share", [0.25, 0.4, 0.6, 0.75])
+def test_near_and_far_ground_that_move_differently_are_noticed(share: float) -> None:
+    """One motion of all cannot be right for both: it is off by half a pixel or several, and this is said."""
+    motion, _ = background_motion(clip(layered(60, share, 2.0, 8.0)))
+    assert max(error_px(motion, 2.0, 40.0), error_px(motion, 8.0, 270.0)) > 0.5
+    found = layers_px(motion, SIZE[0])
+    assert found is not None
+    assert 0.4 < found[0] < 3
+    said = layered_background(motion, SIZE[0])
+    assert f"{found[0]:.1f} px about frame {found[1]}" in said
+
+
+@pytest.mark.parametrize(("share", "far_px", "near_px"), [(0.0, 2, 8), (1.0, 2, 8), (0.4, 5, 5), (0.4, 0, 0.5)])
+def test_of_one_ground_nothing_is_said(share: float, far_px: float, near_px: float) -> None:
+    """Nor of two that move alike, or nearly, so that the motion is right for both."""
+    motion, _ = background_motion(clip(layered(60, share, far_px, near_px)))
+    assert layers_px(motion, SIZE[0]) is None
+    assert layered_background(motion, SIZE[0]) == ""
+    if share == 0.4:
+        assert max(error_px(motion, far_px, 40.0), error_px(motion, near_px, 270.0)) < 0.3
+
+
+def test_of_the_demo_and_of_what_passes_through_the_picture_nothing_is_said() -> None:
+    passing = film(30)
+    for frame, picture in enumerate(passing):
+        cv2.rectangle(picture, (10 * frame - 60, 200), (10 * frame + 60, 260), 90.0, -1)
+        cv2.putText(picture, "ROCK", (10 * frame - 55, 245), cv2.FONT_HERSHEY_SIMPLEX, 1.3, 220.0, 3)
+    assert layers_px(background_motion(clip(passing))[0], SIZE[0]) is None
+    assert layers_px(no_motion(0, 9), SIZE[0]) is None
+    if DEMO.exists():
+        video = open_video(DEMO)
+        assert layers_px(background_motion(video, last=60)[0], video.width) is None

@@ -43,6 +43,26 @@ def test_tables_picture_and_words(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert saturated.sum() > 2000  # the line
 
 
+@pytest.mark.parametrize("near_px", [0.0, 8.0])
+def test_near_and_far_ground_that_move_differently_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], near_px: float
+) -> None:
+    rng, film = np.random.default_rng(5), str(tmp_path / "film.avi")
+    far, near = (cv2.GaussianBlur(rng.integers(0, 255, (400, 500, 3), np.uint8), (0, 0), 2) for _ in "ab")
+    writer = cv2.VideoWriter(film, cv2.VideoWriter_fourcc(*"MJPG"), 30, (400, 300))
+    for frame in range(40):
+        pan = 2 * frame
+        picture = far[:300, pan : pan + 400].copy()
+        beyond = round(near_px * np.sin(frame / 6))
+        picture[190:] = near[190 + 20 + beyond : 320 + beyond, pan : pan + 400]
+        cv2.circle(picture, (30 + 8 * frame, 40 + 4 * frame), 9, (255, 255, 255), -1)
+        writer.write(picture)
+    writer.release()
+    assert main(["track", film, "--click", "10,110,80", "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().out
+    assert ("Parts of the background move differently, by " in told) == (near_px > 0)
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -4,6 +4,7 @@
 import bpy
 
 from ....core.errors import RockfallError
+from ....core.footage.advice import layered_background
 from ....core.footage.background import BackgroundMotion, background_motion
 from ....core.footage.sources import kept
 from ....core.footage.tracking import BlockTrack, track_block
@@ -59,7 +60,8 @@ class ROCKFALL_OT_track_block(job.InBackground, bpy.types.Operator):
             if camera_paths.is_solved(there):
                 alignment.keep_background(there, motion)
             frames = f"{track.frame.size} pictures, {track.frame[0]} to {track.frame[-1]}"
-            return f"{name} is followed through {frames}. After: {track.stopped[1]}."
+            said = layered_background(motion, video.width)
+            return f"{name} is followed through {frames}. After: {track.stopped[1]}. {said}".rstrip()
 
         return job.Work("picking", compute, keep)
 

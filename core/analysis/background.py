@@ -40,7 +40,7 @@ class Job:
                 text = "Cancelled; nothing was kept."
             except RockfallError as error:
                 text = escape(str(error))
-            except Exception as error:  # else the page would wait for ever for work that has ended
+            except Exception as error:  # noqa: BLE001 the page would wait for ever for work that has ended
                 text = escape(f"Something is wrong in Rockfall itself ({type(error).__name__}: {error}).")
             self._later(lambda: self._end(done, result, text))
 

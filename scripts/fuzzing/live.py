@@ -11,6 +11,7 @@ import logging
 import re
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -161,7 +162,8 @@ def _listening() -> Iterator[_Heard]:
 
 def explore(at: Path) -> object:
     """Serve the page of a table, say all lines of moves.txt, and see what still works."""
-    with _listening() as heard:
+    with _listening() as heard, warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a session that Bokeh would have ended a moment later
         asyncio.run(_served(at, (at / "moves.txt").read_bytes()))
     assert not heard.places, heard.places[0]
     return at

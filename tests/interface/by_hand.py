@@ -12,7 +12,8 @@ sys.path.append(str(Path(__file__).parent))
 
 import workspace
 
-KEYS = dict(zip("0123456789.-", "ZERO ONE TWO THREE FOUR FIVE SIX SEVEN EIGHT NINE PERIOD MINUS".split(), strict=True))
+DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
+KEYS = {**{str(digit): name for digit, name in enumerate(DIGITS)}, ".": "PERIOD", "-": "MINUS"}
 DENSITY = 342
 """How far below the panel's header the field for a density of one's own is [px]."""
 FOOT_M = 0.3048

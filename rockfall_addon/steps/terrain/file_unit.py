@@ -9,7 +9,7 @@ US_SURVEY_FOOT_M = 1200 / 3937
 UNITS = (  # identifier, name, what it is, its length [m]; the last one is any other
     ("METRE", "Metres", "As nearly all surveys are", 1.0),
     ("FOOT", "Feet", "International feet of 0.3048 m", 0.3048),
-    ("US_FOOT", "US survey feet", "Of 1200/3937 m, as in many plane coordinates of the United States", US_SURVEY_FOOT_M),
+    ("US_FOOT", "US survey feet", "Of 1200/3937 m, as in plane coordinates of the United States", US_SURVEY_FOOT_M),
     ("CENTIMETRE", "Centimetres", "Of 0.01 m", 0.01),
     ("MILLIMETRE", "Millimetres", "Of 0.001 m, as in many programs for construction", 0.001),
 )

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Refusals that no other test reaches: each says what is wrong, of what, and what to do."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from errno import ENOSPC
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,13 +13,15 @@ import numpy as np
 import pytest
 from rockfall.core.analysis.priors import make_priors
 from rockfall.core.cli import main
-from rockfall.core.errors import InputError, RockfallError
+from rockfall.core.errors import DependencyError, InputError, RockfallError
 from rockfall.core.exchange.geotiff_maps import _place
+from rockfall.core.exchange.partial_factors import open_factors
 from rockfall.core.exchange.simulation_entry import TreesEntry
 from rockfall.core.exchange.trees import open_trees
 from rockfall.core.film.composed.templates.timing import hit_times
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.cells import Cells
+from rockfall.core.hazard.design import design_values
 from rockfall.core.hazard.face_tally import FaceTally
 from rockfall.core.hazard.screen_tally import ScreenTally
 from rockfall.core.hazard.screens import Screen
@@ -35,6 +39,7 @@ from rockfall.core.simulation.tree_hits import tree_hits_of
 from rockfall.core.terrain.cloud import Cloud, nearest_points
 from rockfall.core.terrain.readers import read_terrain
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.design_sheet import design_sheet
 from rockfall.core.workflow.ensembles import HereAlone, Work, run_ensemble
 from rockfall.core.workflow.following import follow_background
 from rockfall.core.workflow.maps import map_models
@@ -242,6 +247,80 @@ def test_a_parameter_that_a_zone_has_of_its_own_is_not_fitted() -> None:
     with pytest.raises(InputError) as caught:
         back_analyse(ground, SimpleNamespace(), ONE, settings, priors)  # type: ignore[arg-type]
     assert str(caught.value) == "The zone wood has a rt of its own. Leave it out there to fit it."
+
+
+def test_a_zone_with_two_frictions(tmp_path: Path) -> None:
+    from rockfall.core.exchange.zones import read_zones
+
+    ring = [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 1.0]]
+    features = [
+        {
+            "type": "Feature",
+            "properties": {"name": "wood", "friction": friction},
+            "geometry": {"type": "Polygon", "coordinates": [ring]},
+        }
+        for friction in (0.4, 0.5)
+    ]
+    file = tmp_path / "zones.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    with pytest.raises(InputError) as caught:
+        read_zones(file, FLAT, ["noel_2017"])
+    said = str(caught.value)
+    assert said.startswith(f"{file}: ")
+    assert "wood" in said.removeprefix(str(file))
+    assert "friction" in said.removeprefix(str(file))
+
+
+def test_nothing_to_design_for() -> None:
+    factors = open_factors("none")
+    road = Screen("road", LINE)
+    with pytest.raises(InputError) as caught:
+        design_sheet(GROUND, ONE, [SETTINGS], [], factors)
+    assert str(caught.value) == "There is no screen to design for. Draw a line across the slope, and name it."
+    with pytest.raises(InputError) as caught:
+        design_values(road, [], factors, 20)  # type: ignore[arg-type]
+    assert str(caught.value) == (
+        "None of 20 blocks comes to 'road': there is nothing to design for. "
+        "Draw the screen where blocks pass, or release more."
+    )
+
+
+def test_films_need_the_newer_opencv(monkeypatch: pytest.MonkeyPatch) -> None:
+    from rockfall.core.film.composed import canvas
+
+    monkeypatch.setattr(canvas, "opencv", lambda: SimpleNamespace(__version__="4.11.0"))
+    with pytest.raises(
+        DependencyError, match=r"lettered by OpenCV 5, and 4\.11\.0 is installed.*pip install --upgrade"
+    ):
+        canvas._face.__wrapped__()
+
+
+def test_a_video_that_does_not_show_the_block() -> None:
+    from rockfall.core.film.composed.templates.stills import stroboscopic
+
+    filmed, fall = (
+        SimpleNamespace(name="side", span_s=(0.0, 2.0)),
+        SimpleNamespace(name="B10", time_s=np.array([3.0, 9])),
+    )
+    material: Any = SimpleNamespace(filmed=filmed, falls=[fall], words={})
+    with pytest.raises(InputError, match=r"^The video 'side' does not show B10\. Name another one with --video\.$"):
+        stroboscopic(material)
+
+
+def test_a_temporary_folder_that_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rockfall.core.outreach import animator
+
+    def save(*_: object) -> None:
+        raise OSError(ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(animator, "save_animation", save)
+    with pytest.raises(InputError) as caught:
+        animator.write_animation(SimpleNamespace(), [tmp_path / "a.glb"], ["none"])  # type: ignore[arg-type]
+    assert str(caught.value).endswith(
+        ": The temporary folder cannot be written (No space left on device). "
+        "Make room there, or set TMPDIR to a folder with room."
+    )
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("share", ["0", "1", "1.5", "nan", "-0.2"])

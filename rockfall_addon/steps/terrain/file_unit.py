@@ -5,13 +5,14 @@ from collections.abc import Sequence
 
 import bpy
 
-US_SURVEY_FOOT_M = 1200 / 3937
+from ....core.constants import UNITS_M
+
 UNITS = (  # identifier, name, what it is, its length [m]; the last one is any other
-    ("METRE", "Metres", "As nearly all surveys are", 1.0),
-    ("FOOT", "Feet", "International feet of 0.3048 m", 0.3048),
-    ("US_FOOT", "US survey feet", "Of 1200/3937 m, as in plane coordinates of the United States", US_SURVEY_FOOT_M),
-    ("CENTIMETRE", "Centimetres", "Of 0.01 m", 0.01),
-    ("MILLIMETRE", "Millimetres", "Of 0.001 m, as in many programs for construction", 0.001),
+    ("METRE", "Metres", "As nearly all surveys are", UNITS_M["m"]),
+    ("FOOT", "Feet", "International feet of 0.3048 m", UNITS_M["ft"]),
+    ("US_FOOT", "US survey feet", "Of 1200/3937 m, as in plane coordinates of the United States", UNITS_M["us-ft"]),
+    ("CENTIMETRE", "Centimetres", "Of 0.01 m", UNITS_M["cm"]),
+    ("MILLIMETRE", "Millimetres", "Of 0.001 m, as in many programs for construction", UNITS_M["mm"]),
 )
 OTHER = ("OTHER", "Other", "Give its length in metres")
 ITEMS = [(*words, "", number) for number, (*words, _) in enumerate(UNITS)] + [(*OTHER, "", len(UNITS))]

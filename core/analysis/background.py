@@ -71,5 +71,9 @@ class Job:
         done(result)
 
     def _later(self, what: Callable[[], None]) -> None:
-        if not self._closed.is_set():
+        if self._closed.is_set():
+            return
+        try:
             self._document.add_next_tick_callback(what)
+        except AttributeError:  # Bokeh takes a document apart before it says that its page is gone
+            self.close()

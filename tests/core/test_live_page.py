@@ -125,7 +125,8 @@ class Later:
     gone = False
 
     def add_next_tick_callback(self, what: Callable[[], None]) -> None:
-        assert not self.gone
+        if self.gone:
+            raise AttributeError("_change_callbacks")
         what()
 
 
@@ -150,14 +151,19 @@ def test_work_that_fails_in_an_unforeseen_way_ends() -> None:
     assert said == ["Something is wrong in Rockfall itself (ValueError: a &lt;b&gt;).", "There are none. Give one."]
 
 
-def test_a_page_that_is_gone_is_told_nothing() -> None:
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("is_told", [True, False])
+def test_a_page_that_is_gone_is_told_nothing(is_told: bool) -> None:
     document, said = Later(), list[str]()
     job = Job(document, said.append)
 
     def work(progress: Any) -> None:
         document.gone = True
-        job.close()
-        progress("Fitting", 1, 2)
+        if is_told:
+            job.close()
+        for done in range(3):
+            progress("Fitting", done, 2)
+        raise AssertionError("it goes on for nobody")
 
     job.begin(work, lambda _: said.append("done"))
     assert job._thread is not None

@@ -75,5 +75,5 @@ class Job:
             return
         try:
             self._document.add_next_tick_callback(what)
-        except AttributeError:  # Bokeh takes a document apart before it says that its page is gone
+        except (AttributeError, RuntimeError):  # its document is taken apart, or the server is about to end
             self.close()

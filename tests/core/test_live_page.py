@@ -122,11 +122,11 @@ def test_after_a_drawing_that_failed_the_next_move_is_drawn(page: Opened, monkey
 class Later:
     """A document that does at once what it is asked to do later, and cannot once it is gone."""
 
-    gone = False
+    gone: Exception | None = None
 
     def add_next_tick_callback(self, what: Callable[[], None]) -> None:
         if self.gone:
-            raise AttributeError("_change_callbacks")
+            raise self.gone
         what()
 
 
@@ -153,12 +153,13 @@ def test_work_that_fails_in_an_unforeseen_way_ends() -> None:
 
 @pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("is_told", [True, False])
-def test_a_page_that_is_gone_is_told_nothing(is_told: bool) -> None:
+@pytest.mark.parametrize("gone", [AttributeError("_change_callbacks"), RuntimeError("Event loop is closed")])
+def test_a_page_that_is_gone_is_told_nothing(gone: Exception, is_told: bool) -> None:
     document, said = Later(), list[str]()
     job = Job(document, said.append)
 
     def work(progress: Any) -> None:
-        document.gone = True
+        document.gone = gone
         if is_told:
             job.close()
         for done in range(3):

@@ -18,3 +18,6 @@ SAME_TIME_S = 1e-6
 
 IQR_PER_SD = 1.349
 """Interquartile range of a normal distribution in standard deviations."""
+
+UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
+"""Names of units of length of a file, and their lengths [m]."""

@@ -19,7 +19,7 @@ class Job:
 
     def __init__(self, document: Any, say: Callable[[str], None]) -> None:
         self._document, self._say = document, say
-        self._stop = Event()
+        self._stop, self._closed = Event(), Event()
         self._thread: Thread | None = None
         self._said, self._said_at = "", 0.0
 
@@ -40,6 +40,8 @@ class Job:
                 text = "Cancelled; nothing was kept."
             except RockfallError as error:
                 text = escape(str(error))
+            except Exception as error:  # noqa: BLE001 the page would wait for ever for work that has ended
+                text = escape(f"Something is wrong in Rockfall itself ({type(error).__name__}: {error}).")
             self._later(lambda: self._end(done, result, text))
 
         self._thread = Thread(target=run, daemon=True)
@@ -47,6 +49,11 @@ class Job:
 
     def cancel(self) -> None:
         """Ask the work to stop."""
+        self._stop.set()
+
+    def close(self) -> None:
+        """The page is gone: ask the work to stop, and say nothing any more."""
+        self._closed.set()
         self._stop.set()
 
     def _progress(self, text: str, done: int, total: int) -> None:
@@ -64,4 +71,9 @@ class Job:
         done(result)
 
     def _later(self, what: Callable[[], None]) -> None:
-        self._document.add_next_tick_callback(what)
+        if self._closed.is_set():
+            return
+        try:
+            self._document.add_next_tick_callback(what)
+        except (AttributeError, RuntimeError):  # its document is taken apart, or the server is about to end
+            self.close()

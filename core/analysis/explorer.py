@@ -106,7 +106,7 @@ def open_page(document: Any, exploration: Exploration) -> None:
         live=True,
         **frame(page.linked.graphs),
     )
-    document.on_session_destroyed(lambda _context: page.job.cancel())
+    document.on_session_destroyed(lambda _context: page.job.close())
 
 
 def _said_of(result: FittedModel) -> str:
@@ -191,28 +191,39 @@ class _Page:
 
     def _inputs(self, name: str) -> ParameterInputs:
         model = find_model(name)
-        inputs = parameter_inputs(model, model.settings(self.given[name]), lambda key, value: self._set(key, value))
+        inputs = parameter_inputs(
+            model,
+            model.settings(self.given[name]),
+            lambda key, value: self._set(name, key, value),
+            lambda problem: self._say(escape(problem)),
+        )
         inputs.layout.visible = name == self.model
         return inputs
 
-    def _set(self, key: str, value: Value) -> None:
-        model, given = find_model(self.model), self.given[self.model]
+    def _set(self, name: str, key: str, value: Value) -> None:
+        model, given = find_model(name), self.given[name]
         given[key] = value
         followers = [spec.name for spec in model.parameters if spec.follows and spec.follows[0] == key]
-        for name in followers:
-            given.pop(name, None)
+        for follower in followers:
+            given.pop(follower, None)
         if followers:
-            self.inputs[self.model].show(model.settings(given))
-        self._show()
+            self.inputs[name].show(model.settings(given))
+        self._show([name])
 
     def _choose(self, name: str) -> None:
+        if name not in self.inputs:  # no browser says that
+            self.select.value = self.model
+            return
         self.inputs[self.model].layout.visible = False
         self.model = name
         self.inputs[name].layout.visible = True
         self._offer()
         self._show()
 
-    def _draw(self, run: int) -> None:
+    def _draw(self, run: int | None) -> None:
+        if run not in (0, 1):  # no browser says that
+            self.runs.active = self.run
+            return
         self.run = run
         self._offer_draws()
         self._show(self.start.models)
@@ -293,12 +304,12 @@ class _Page:
 
     def _show_points(self) -> None:
         impacts, columns = self.start.impacts, dict[str, Any]()
-        for name in self.behind:
+        behind, self.behind = self.behind, set()
+        for name in behind:
             run = self.run if find_model(name).is_random else 0
             found = predict(impacts, self.start.courses, [name], self.given, replicates=run, seed=self.seed)
             place = self.start.models.index(name)
             columns |= model_columns(impacts, thinned(found, MOST_SHOWN), name, run, place)
-        self.behind.clear()
         self.linked.source.data.update(columns)
         if self.scoring is not None:
             self.document.remove_timeout_callback(self.scoring)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
+from ..errors import InputError
 from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.parameters import ParameterSpec, Value
 from ..impact_models.machinery.sliders import slider_range
@@ -14,6 +15,9 @@ from .linked_graphs import SHEET
 
 Changed = Callable[[str, Value], None]
 """Called with the parameter's name and its new value."""
+
+Refused = Callable[[str], None]
+"""Called with what is wrong with a value; what is shown is again what it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,26 +34,41 @@ class ParameterInputs:
     show: Callable[[Mapping[str, Value]], None]
 
 
-def parameter_inputs(model: ImpactModel, values: Mapping[str, Value], changed: Changed) -> ParameterInputs:
-    """Inputs that show `values` and report what is changed."""
+def parameter_inputs(
+    model: ImpactModel, values: Mapping[str, Value], changed: Changed, refused: Refused
+) -> ParameterInputs:
+    """Inputs that show `values` and report what is changed, if it is within its range.
+
+    The inputs keep to the range by themselves: anything else did not come from them.
+    """
     from bokeh.layouts import column
 
     quiet = [False]  # while values are shown, not entered
 
-    def report(name: str, value: Value) -> None:
-        if not quiet[0]:
-            changed(name, value)
+    known = dict(values)
+
+    def report(spec: ParameterSpec, entered: object) -> None:
+        if quiet[0] or entered is None:
+            return
+        try:
+            value = spec.checked(entered, model.name)
+        except InputError as error:
+            show({spec.name: known[spec.name]})
+            refused(str(error))
+            return
+        show({spec.name: value})
+        changed(spec.name, value)
 
     parts = {
-        spec.name: _input(spec, values[spec.name], f"{model.name}.{spec.name}", report, quiet)
-        for spec in model.parameters
+        spec.name: _input(spec, values[spec.name], f"{model.name}.{spec.name}", report) for spec in model.parameters
     }
 
     def show(values: Mapping[str, Value]) -> None:
+        known.update(values)
         quiet[0] = True
         try:
-            for name, (_, setter) in parts.items():
-                setter(values[name])
+            for name, value in values.items():
+                parts[name][1](value)
         finally:
             quiet[0] = False
 
@@ -58,7 +77,7 @@ def parameter_inputs(model: ImpactModel, values: Mapping[str, Value], changed: C
 
 
 def _input(
-    spec: ParameterSpec, value: Value, name: str, report: Changed, quiet: list[bool]
+    spec: ParameterSpec, value: Value, name: str, report: Callable[[ParameterSpec, object], None]
 ) -> tuple[Any, Callable[[Value], None]]:
     from bokeh.layouts import column, row
     from bokeh.models import Div, InlineStyleSheet, Select, Slider, Spinner
@@ -73,7 +92,7 @@ def _input(
             stylesheets=[sheet],
             sizing_mode="stretch_width",
         )
-        menu.on_change("value", lambda _attribute, _old, new: report(spec.name, str(new)))
+        menu.on_change("value", lambda _attribute, _old, new: report(spec, new))
         return column(label, menu, sizing_mode="stretch_width"), lambda new: menu.update(value=str(new))
 
     start, end, step = slider_range(spec)
@@ -103,16 +122,11 @@ def _input(
         field.value = float(new)
         slider.value = min(max(float(new), start), end)
 
-    def moved(new: Any) -> None:
-        if quiet[0] or new is None:
-            return
-        quiet[0] = True
-        show(round(float(new), 12))
-        quiet[0] = False
-        report(spec.name, float(field.value))
+    def moved(_attribute: str, _old: Any, new: Any) -> None:
+        report(spec, round(new, 12) if isinstance(new, (int, float)) else new)
 
-    slider.on_change("value", lambda _attribute, _old, new: moved(new))
-    field.on_change("value", lambda _attribute, _old, new: moved(new))
+    slider.on_change("value", moved)
+    field.on_change("value", moved)
     return column(label, row(slider, field, sizing_mode="stretch_width"), sizing_mode="stretch_width"), show
 
 

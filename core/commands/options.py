@@ -9,6 +9,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..constants import UNITS_M
 from ..errors import DependencyError, InputError, RockfallError
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 """The first is taken where none is asked for."""
-UNITS_M = {"m": 1.0, "mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937}
 
 
 def add_terrain_colours(parser: "argparse.ArgumentParser | argparse._ArgumentGroup") -> None:

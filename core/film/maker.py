@@ -18,6 +18,7 @@ from ..errors import DependencyError, RockfallError
 from ..progress import Progress, silent
 from .engines import choose_engine
 from .job import AS_SET_UP, FilmJob
+from .room import watched_room
 
 CRASHED = "Blender stopped while it made {name} (status {status}).{said} {advice}"
 OTHER_ENGINE = "Try the engine Cycles (--engine cycles)."
@@ -128,6 +129,17 @@ def run_job(command: Sequence[str], name: str, progress: Progress, advice: str =
     return tuple(remarks)
 
 
+def make_file(command: Sequence[str], job: FilmJob, progress: Progress) -> tuple[str, ...]:
+    """As `run_job`, for the file of a job; where its disk is full, that is said.
+
+    Raises
+    ------
+    RockfallError : the file cannot be made.
+    """
+    with watched_room(job.out.absolute().parent, job.out.name, progress) as watched:
+        return run_job([*command, job.to_json()], job.out.name, watched)
+
+
 def _lines(stream: IO[str]) -> Iterator[str]:
     """The lines of a stream as they come; now and then an empty one, without an end of line, while none comes."""
     come: SimpleQueue[str | None] = SimpleQueue()
@@ -150,5 +162,5 @@ def _lines(stream: IO[str]) -> Iterator[str]:
 
 def _make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
     package = __name__.partition(".core.")[0]
-    command = [sys.executable, "-m", f"{package}.rockfall_addon.steps.film", job.to_json()]
-    return run_job(command, job.out.name, progress)
+    command = [sys.executable, "-m", f"{package}.rockfall_addon.steps.film"]
+    return make_file(command, job, progress)

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from ..dependencies import require_blender_libraries
 from ..errors import DependencyError, InputError, RockfallError
 from ..film.maker import run_job
+from ..film.room import watched_room
 from ..output import output_folder
 from ..progress import Progress, silent
 from .animation import Animation, save_animation
@@ -73,10 +74,12 @@ def write_animation(
             ) from error
         drafts = [folder / file.name for file in files]
         job = json.dumps({"source": str(source), "files": [str(draft.absolute()) for draft in drafts]})
-        run_job([*command, job], ", ".join(file.name for file in files), progress, ROOM)
-        for draft in drafts:
-            if not _is_whole(draft):
-                raise RockfallError(f"What Blender has written of {draft.name} is not whole. {ROOM}")
+        names = ", ".join(file.name for file in files)
+        with watched_room(folder, names, progress) as watched:
+            run_job([*command, job], names, watched, ROOM)
+            for draft in drafts:
+                if not _is_whole(draft):
+                    raise RockfallError(f"What Blender has written of {draft.name} is not whole. {ROOM}")
 
 
 def _is_whole(file: Path) -> bool:

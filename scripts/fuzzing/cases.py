@@ -108,7 +108,9 @@ def _simulations(terrain: bytes) -> dict[str, Case]:
 def _shown(terrain: bytes, folder: Path) -> dict[str, Case]:
     """What films, pages and animations read."""
     files = {"terrain.ply": terrain, **shown.files(folder)}
-    found = {name: Case(files, damaged, read) for name, (damaged, read) in shown.readers().items()}
+    found = {
+        name: Case(files, damaged, read, slow=name in shown.SLOW) for name, (damaged, read) in shown.readers().items()
+    }
     return found | {
         f"rockfall {name}": Case(files, damaged, _ran(*words), command=True, slow=True)
         for name, (damaged, words) in shown.COMMANDS.items()

@@ -7,9 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import examples
+import live
 import numpy as np
 from examples import DATA, SHIFT
 
+MOVES = "moves of the live page"
+SLOW = (MOVES,)
 VIDEO = "constant.mp4"
 """40 frames of 64 × 48 pixels in 1.3 s."""
 EXTRA = b"""
@@ -57,6 +60,7 @@ def files(folder: Path) -> dict[str, bytes]:
         "frames/film.json": json.dumps({"film": "a"}, indent=2, sort_keys=True).encode(),
         "frames/000000.png": cv2.imencode(".png", np.full((5, 7, 3), 9, np.uint8))[1].tobytes(),
         "impacts.csv": examples.IMPACTS, "p.toml": examples.PARAMETERS, "releases.csv": examples.RELEASES,
+        "moves.txt": live.moves(),
     }  # fmt: skip
 
 
@@ -80,11 +84,12 @@ def readers() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
         "frames": (("frames/film.json", "frames/000000.png"), frames),
         "animation": (("project.toml", "picks.csv", "terrain.ply"), animation),
         "explore": (("impacts.csv", "p.toml"), _explore),
+        MOVES: (("moves.txt",), live.explore),
     }
 
 
 def _explore(at: Path) -> object:
-    """The live page is put together, with what it would save; nothing on it is moved."""
+    """The live page is put together, with what it would save; `live` moves what is on it."""
     from bokeh.document import Document
     from rockfall.core.analysis.courses import find_courses
     from rockfall.core.analysis.explorer import Exploration, open_page
@@ -128,6 +133,13 @@ COMMANDS = {
         ("project.toml", "picks.csv", "side.mp4", "side.toml"),
         ("web", "@project.toml", "--simulate", "noel_2017", "--number", "2", "--terrain-colours", "footage"),
     ),
+    **{
+        f"export {name}": (
+            ("project.toml", "picks.csv", "terrain.ply"),
+            ("export", "@project.toml", "--format", name, "--rate", "5", "--simulate", "noel_2017", "--number", "2"),
+        )
+        for name in ("glb", "usdc", "usda", "abc")
+    },
     "spin": (("project.toml", "marks.csv", "side.toml", "picks.csv"), ("spin", "@project.toml")),
 }  # fmt: skip
 """Name → the files that are damaged, and the words; terrain.ply and all of `files` are beside them."""

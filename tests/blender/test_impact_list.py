@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The list of impacts: it selects, follows the selection, sorts and filters."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -44,3 +46,13 @@ def test_the_table_sorts_and_filters(scene: bpy.types.Scene, part) -> None:
     assert (scene.rockfall.table_sort, scene.rockfall.table_descending) == ("rn", False)
     assert bpy.ops.rockfall.sort_impacts(column="rn") == {"FINISHED"}
     assert scene.rockfall.table_descending
+
+
+def test_a_heading_says_what_its_numbers_are(scene: bpy.types.Scene, part) -> None:
+    """The heading has room for a symbol alone: its tooltip has the words and the unit of the manual's table."""
+    operators = part("rockfall_addon.steps.impacts.operators")
+    for column, words in {"speed1_mps": "Incident speed [m/s]", "theta_dev_deg": "[°]", "rn": "normal"}.items():
+        said = operators.ROCKFALL_OT_sort_impacts.description(bpy.context, SimpleNamespace(column=column))
+        assert words in said
+        assert "Sort the impact table" in said
+    assert "Sort" in operators.ROCKFALL_OT_sort_impacts.description(bpy.context, SimpleNamespace(column="none"))

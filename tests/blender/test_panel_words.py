@@ -212,3 +212,10 @@ def test_the_card_of_a_lone_impact_has_no_question_marks(scene, part, numbers) -
     rest = {name: value for name, value in numbers(pick).items() if name not in unknown}
     part("rockfall_addon.scene.impact_numbers").keep(pick, rest)
     assert words.numbers(pick) == []
+
+
+def test_one_point_is_not_several(part) -> None:
+    said = part("rockfall_addon.steps.picking.tracking").said_of
+    assert said("B10", 8, 1).startswith("8 impacts are proposed for B10, and a point in flight where")
+    assert said("B10", 1, 2).startswith("One impact is proposed for B10, and 2 points in flight where")
+    assert said("B10", 3, 0).startswith("3 impacts are proposed for B10. Look at each")

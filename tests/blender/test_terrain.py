@@ -2,7 +2,9 @@
 """The terrain in the scene is the surveyed one."""
 
 import re
+from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -102,3 +104,33 @@ def test_a_scan_in_millimetres_is_noticed_and_read_again(part, tmp_path: Path) -
     np.testing.assert_allclose(middle[:2], points.reshape(-1, 3).mean(axis=0)[:2], atol=0.01)
     assert np.abs(tile.bound_box).max() < 10_000, "near the origin of the scene"
     assert not following.next_step(scene).tile
+
+
+def test_a_unit_is_chosen_by_its_name(part) -> None:
+    """The lengths are those of NIST's Handbook 44, appendix C; single precision would move a place by decimetres."""
+    unit = part("rockfall_addon.steps.terrain.file_unit")
+    lengths = {"FOOT": Fraction(3048, 10000), "US_FOOT": Fraction(1200, 3937), "MILLIMETRE": Fraction(1, 1000)}
+    for number, name in enumerate(item[0] for item in unit.ITEMS):
+        if name in lengths:
+            told = SimpleNamespace(unit_m=1.0, types_unit=True)
+            unit.set_by_name(told, number)
+            told.unit_m = float(np.float32(told.unit_m))  # as Blender keeps it
+            assert unit.get(told) == number
+            assert unit.exact(told.unit_m) == float(lengths[name])
+    other = SimpleNamespace(unit_m=1.0, types_unit=False)
+    unit.set_by_name(other, len(unit.ITEMS) - 1)
+    assert (other.unit_m, unit.ITEMS[unit.get(other)][0]) == (1.0, "OTHER")
+    assert unit.exact(float(np.float32(0.9144))) == 0.9144
+    assert unit.size([131.2336, 131.2336, 6.5617], 0.3048) == "Read so, it measures 40 × 40 × 2 m."
+
+
+def test_survey_feet_far_from_the_origin_come_to_their_place(part, tmp_path: Path) -> None:
+    file, foot = tmp_path / "feet.obj", Fraction(1200, 3937)
+    corners = [(7_000_000, 2_000_000, 100), (7_000_400, 2_000_000, 100), (7_000_000, 2_000_400, 300)]
+    file.write_text("\n".join([*("v {} {} {}".format(*c) for c in corners), "f 1 2 3"]) + "\n", encoding="utf-8")
+    assert bpy.ops.rockfall.import_terrain(filepath=str(file), unit_m=float(foot)) == {"FINISHED"}
+    (tile,) = part("rockfall_addon.scene.terrain").tiles(bpy.context.scene)
+    shift = part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene)
+    found = np.array([vertex.co for vertex in tile.data.vertices]) + shift.vector
+    known = np.array([[float(c * foot) for c in corner] for corner in corners])
+    np.testing.assert_allclose(np.sort(found, axis=0), np.sort(known, axis=0), atol=0.002)

@@ -12,6 +12,7 @@ from rockfall.core.footage.advice import layered_background
 from rockfall.core.footage.background import (
     BackgroundMotion,
     _fit,
+    _Follower,
     background_motion,
     destabilise,
     glance,
@@ -129,6 +130,25 @@ def test_a_homography_is_the_least_squares_fit_to_the_corners_that_agree() -> No
     best = least_squares(residual, (true / true[2, 2]).ravel()[:8], x_scale="jac", xtol=1e-15, ftol=1e-15)
     found = residual((homography / homography[2, 2]).ravel()[:8])
     assert found @ found == pytest.approx(2 * best.cost, rel=1e-4)
+
+
+def test_where_corners_are_looked_for_follows_a_turn() -> None:
+    """A jerk of 8° moves the edges of the picture by 28 px about its middle, where no one shift is right."""
+    angle = np.radians(8)
+    c, s = np.cos(angle), np.sin(angle)
+    middle = np.array([SIZE[0] / 2, SIZE[1] / 2])
+    first = np.array([[1, 0, 300.0], [0, 1, 200.0], [0, 0, 1]])
+    turned = first @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned[:2, 2] += first[:2, :2] @ (middle - np.array([[c, -s], [s, c]]) @ middle)
+    flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
+    grey = [np.clip(cv2.warpPerspective(ground(), way, SIZE, flags=flags), 0, 255).astype(np.uint8)
+            for way in (first, turned)]  # fmt: skip
+    follower = _Follower(grey[0], 0)
+    guess, _ = follower._guess(cv2.pyrDown(cv2.pyrDown(grey[1])))
+    away = follower.pixel - middle
+    true = middle + away @ np.array([[c, -s], [s, c]])  # the picture turns the other way
+    assert np.median(np.hypot(*(guess - true).T)) < 2.0
+    assert np.median(np.hypot(*(follower.pixel - true).T)) > 10.0
 
 
 def test_a_tripod_is_the_identity() -> None:

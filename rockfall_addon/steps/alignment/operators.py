@@ -401,8 +401,10 @@ class AlignTool(bpy.types.WorkSpaceTool):
     @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:
         """What to do next, in the header, where it is not drawn over the view."""
-        if not context.space_data.overlay.show_overlays:
-            layout.label(text=alignment.hint(context.scene, videos.active_camera(context.scene)))
+        overlay = context.space_data.overlay
+        hint = "" if overlay.show_overlays else alignment.hint(context.scene, videos.active_camera(context.scene))
+        if hint:  # a button, as words alone have no ground there; it shows the marks again
+            layout.prop(overlay, "show_overlays", text=hint, toggle=True)
 
 
 CLASSES = (

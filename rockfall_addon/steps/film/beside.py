@@ -17,7 +17,7 @@ from .... import __package__ as PACKAGE  # noqa: N812
 from ....core.errors import RockfallError
 from ....core.film.composed.request import FilmRequest
 from ....core.film.job import AS_SET_UP, FilmJob
-from ....core.film.maker import run_job
+from ....core.film.maker import make_file
 from ....core.output import output_file
 from ....core.progress import Progress
 from ...scene.project import save_project
@@ -53,7 +53,7 @@ def film_of(scene: bpy.types.Scene, path: Path) -> Callable[[Progress], None]:
     def render(progress: Progress) -> None:
         try:
             with output_file(path) as draft:
-                run_job([*command, FilmJob("film", copy, draft, AS_SET_UP, scene=name).to_json()], path.name, progress)
+                make_file(command, FilmJob("film", copy, draft, AS_SET_UP, scene=name), progress)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -83,7 +83,7 @@ def composed_of(scene: bpy.types.Scene, request: FilmRequest, path: Path, codec:
     def make(progress: Progress) -> Remarks:
         try:
             job = FilmJob("composed", file, path, request=asked.to_json(), codec=codec)
-            return run_job([*command, job.to_json()], path.name, progress)
+            return make_file(command, job, progress)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 

@@ -21,6 +21,12 @@ class ROCKFALL_OT_sort_impacts(bpy.types.Operator):
 
     column: StringProperty()
 
+    @classmethod
+    def description(cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties) -> str:
+        """What the numbers below this heading are, which has no room for that."""
+        column = context.scene.rockfall.bl_rna.properties["table_sort"].enum_items.get(properties.column)
+        return f"{column.description}.\n{cls.__doc__}" if column is not None else str(cls.__doc__)
+
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
         settings = context.scene.rockfall

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty
 from ....core.errors import RockfallError
 from ...scene import clicks, picks, pictures, places, sightings, store
 from ...scene.trajectories import flights_of
-from ...view import look, pointing
+from ...view import look, pointing, tool_header
 from ...view.reporting import possible, reported
 from . import editing
 from .properties import KINDS
@@ -275,10 +275,8 @@ class PickTool(bpy.types.WorkSpaceTool):
 
     @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:
-        settings = context.scene.rockfall_picking
-        layout.prop(settings, "trajectory", text="", icon="OUTLINER_OB_CURVE")
-        for name in ("kind", "aim", "sigma_px", "show_loupe"):
-            layout.prop(settings, name)
+        names = ("trajectory", "kind", "aim", "sigma_px", "show_loupe")
+        tool_header.settings(layout, context.scene.rockfall_picking, names)
 
 
 CLASSES = (ROCKFALL_OT_drag_pick, ROCKFALL_OT_pick_kind, ROCKFALL_OT_remove_pick, ROCKFALL_OT_use_triangulated)

@@ -95,10 +95,16 @@ class ROCKFALL_OT_propose_impacts(_OfTrack, bpy.types.Operator):
         if new:
             look.frame(context, flights_of(context.scene, name), beside=True)
         passes = sum(obj[store.KIND] == "pass" for obj in made)
-        count = f"{len(made) - passes} impacts are" if len(made) - passes != 1 else "One impact is"
-        ends = f", and {passes} points in flight where the track begins or ends" if passes else ""
-        self.report({"INFO"}, f"{count} proposed for {name}{ends}. Look at each, and move or remove it.")
+        self.report({"INFO"}, said_of(name, len(made) - passes, passes))
         return {"FINISHED"} if made else {"CANCELLED"}
+
+
+def said_of(name: str, impacts: int, passes: int) -> str:
+    """What was proposed for a trajectory."""
+    count = f"{impacts} impacts are" if impacts != 1 else "One impact is"
+    points = f"{passes} points" if passes != 1 else "a point"
+    ends = f", and {points} in flight where the track begins or ends" if passes else ""
+    return f"{count} proposed for {name}{ends}. Look at each, and move or remove it."
 
 
 class ROCKFALL_OT_clear_track(_OfTrack, bpy.types.Operator):

@@ -10,7 +10,7 @@ from ....core.errors import RockfallError
 from ....core.workflow.spin_marks import AXES, AXIS_WORDS
 from ...scene import camera_paths, clocks, pictures, places, spins, store, sync, videos
 from ...scene.spins import Measured
-from ...view import pointing
+from ...view import pointing, tool_header
 from ...view.reporting import possible, reported
 
 TOOL = "rockfall.spin_tool"
@@ -238,10 +238,7 @@ class SpinTool(bpy.types.WorkSpaceTool):
 
     @staticmethod
     def draw_settings(context: bpy.types.Context, layout: bpy.types.UILayout, tool: object) -> None:
-        settings = context.scene.rockfall_picking
-        layout.prop(settings, "trajectory", text="", icon="OUTLINER_OB_CURVE")
-        for name in ("sigma_px", "show_loupe"):
-            layout.prop(settings, name)
+        tool_header.settings(layout, context.scene.rockfall_picking, ("trajectory", "sigma_px", "show_loupe"))
 
 
 CLASSES = (

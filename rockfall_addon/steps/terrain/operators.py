@@ -31,6 +31,7 @@ from ...scene.next_step import MILLIMETRE_M
 from ...view import job, look
 from ...view.first_import import FirstImport, begin_file
 from ...view.reporting import possible, reported
+from . import file_unit
 from .removing import tiles_of, what_stays
 
 ACCURACY_M = {"TERRESTRIAL": 0.02, "DRONE": 0.05, "AIRBORNE": 0.2}
@@ -56,9 +57,14 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         items=[("auto", "Automatic", "Z, but Y for glTF"), ("z", "Z", ""), ("y", "Y", "")],
     )  # fmt: skip
     unit_m: FloatProperty(
-        name="File unit [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
+        name="Its length [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
         default=1.0, min=1e-6, precision=4,
     )  # fmt: skip
+    unit: EnumProperty(
+        name="File unit", description="The unit of the file's coordinates; all becomes metres",
+        items=file_unit.ITEMS, get=file_unit.get, set=file_unit.set_by_name, options={"SKIP_SAVE"},
+    )  # fmt: skip
+    types_unit: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     source: EnumProperty(
         name="Source", description="How accurate the terrain's height is: what the refinement's intervals rest on",
         items=[
@@ -115,6 +121,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         self.proposed = " ".join((self.shift_x, self.shift_y, self.shift_z))
         self.asked, self.y_up, self.asked_unit_m = True, found.y_up, self.unit_m
         self.is_cloud = found.kind == "cloud"
+        self.extent_m = (found.maximum - found.minimum).tolist()
         self.facts = [found.name, *found.summary]
         self.facts += [said for said in sentences(found.minimum, found.maximum, shift) if said not in self.facts]
         return context.window_manager.invoke_props_dialog(
@@ -124,7 +131,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     def _inspected(self) -> TerrainInfo:
         """What the file holds; where that cannot be metres, millimetres are proposed, and can be changed."""
         try:
-            return inspect_terrain(self.filepath, unit_m=float(f"{self.unit_m:.7g}"))
+            return inspect_terrain(self.filepath, unit_m=file_unit.exact(self.unit_m))
         except InputError:
             if self.unit_m != 1.0:
                 raise
@@ -156,8 +163,10 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             row = column.row(align=True)
             row.alert = self.up == "auto"
             row.prop(self, "up", expand=True)
-        for name in (*(() if self.y_up else ("up",)), "unit_m", "source"):
+        for name in (*(() if self.y_up else ("up",)), "unit", *(("unit_m",) if self.unit == "OTHER" else ())):
             layout.prop(self, name)
+        layout.column().label(text=file_unit.size(self.extent_m, self.unit_m / self.asked_unit_m))
+        layout.prop(self, "source")
         if self.is_cloud:
             self._draw_meshing(layout)
         self.draw_offer(context, layout)
@@ -193,7 +202,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         told = {
             "shift": None if self._changed_since(context.scene) else self._shift(context.scene),
             "up": self.up,
-            "unit_m": float(f"{self.unit_m:.7g}"),
+            "unit_m": file_unit.exact(self.unit_m),
             "max_edge_m": self.max_edge_m or None,
             "ground_only": {"AUTO": None, "GROUND": True, "ALL": False, "FILTER": None}[self.ground],
             "ground_filter_m": self.filter_m if self.ground == "FILTER" else None,
@@ -221,7 +230,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
                 if first:
                     begin_file(there, opens_workspace=opens_workspace)
             said = f"{surface.name}: {len(surface.faces):,} triangles. Terrain > What Was Read tells the rest."
-            return " ".join((*replaced, said))
+            return " ".join(filter(None, (*replaced, said)))
 
         return job.Work("terrain", compute, keep)
 

@@ -78,10 +78,10 @@ class Kept:
         """Whether a frame is there without decoding it."""
         return frame in self._pictures
 
-    def ascending(self, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-        """Index and picture of ascending frames, those decoded that are not there."""
+    def ascending(self, indices: Sequence[int], *, beside: bool = True) -> Iterator[tuple[int, np.ndarray]]:
+        """Index and picture of ascending frames, those decoded that are not there, `beside` the caller's own work."""
         missing = [index for index in indices if index not in self._pictures]
-        decoded, kept = _decoded(self.video, missing), dict.fromkeys(missing)
+        decoded, kept = _decoded(self.video, missing, beside), dict.fromkeys(missing)
         for index in indices:
             picture = next(decoded)[1] if index in kept else self._pictures[index]
             if index % self._every == 0 and (len(self._pictures) + 1) * self.frame_bytes <= self._room:
@@ -106,14 +106,18 @@ def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.nda
     elif len(indices) > 1 and indices[1] < indices[0]:
         chunk = int(np.clip(CHUNK_BYTES // (3 * source.width * source.height), *CHUNK))
         for start in range(0, len(indices), chunk):
-            yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]))))
+            yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]), False)))
     else:
-        yield from _ascending(source, indices)
+        yield from _ascending(source, indices, True)
 
 
-def _ascending(source: Video | Kept, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-    return source.ascending(indices) if isinstance(source, Kept) else _decoded(source, indices)
+def _ascending(source: Video | Kept, indices: Sequence[int], beside: bool) -> Iterator[tuple[int, np.ndarray]]:
+    if isinstance(source, Kept):
+        return source.ascending(indices, beside=beside)
+    return _decoded(source, indices, beside)
 
 
-def _decoded(video: Video, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-    return ahead(read_frames(video, indices)) if len(indices) > 1 else read_frames(video, indices)
+def _decoded(video: Video, indices: Sequence[int], beside: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """Frames of a file; `beside` the caller's work on them, if there are several."""
+    found = read_frames(video, indices)
+    return ahead(found) if beside and len(indices) > 1 else found

@@ -6,6 +6,7 @@ when it is asked for, so that help is quick.
 """
 
 import argparse
+import gc
 import os
 import signal
 import sys
@@ -157,4 +158,6 @@ def _version() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    ended = main()
+    gc.freeze()  # see `start`
+    sys.exit(ended)

@@ -6,7 +6,7 @@ from math import isfinite, sqrt
 import numpy as np
 
 from ..compiled import borrowing, kernel
-from .kernels import STACK_SIZE, along_ray, enter_box, inverse, nearest_hit, nearest_point
+from .kernels import STACK_SIZE, along_ray, enter_box, inverse, nearest_hit, nearest_point, push_children
 
 REFUSED = -2
 """In place of a face: a coordinate is not finite, or a direction has length zero."""
@@ -70,19 +70,7 @@ def hits_anything(tree, stack, origin, direction, limit):  # type: ignore[no-unt
         left = first[node]
         near_left = enter_box(bounds, left, ox, oy, oz, ix, iy, iz, limit)
         near_right = enter_box(bounds, left + 1, ox, oy, oz, ix, iy, iz, limit)
-        if near_left <= near_right:  # branches, which the processor foresees: choices by number take half as long again
-            if near_right < np.inf:
-                stack[top] = left + 1
-                top += 1
-            if near_left < np.inf:
-                stack[top] = left
-                top += 1
-        else:
-            if near_left < np.inf:
-                stack[top] = left
-                top += 1
-            stack[top] = left + 1
-            top += 1
+        top = push_children(stack, top, left, near_left, near_right)
     return False
 
 

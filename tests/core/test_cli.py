@@ -348,3 +348,14 @@ def test_linear_algebra_has_one_thread_unless_more_are_asked_for(asked, threads)
     count, told = done.stdout.splitlines()[-1].split()
     assert told == threads
     assert asked or count == "1"
+
+
+def test_a_process_that_ends_looks_for_no_garbage_once_more() -> None:
+    """What is frozen is left alone by the collection at Python's end; in another program, as Blender, nothing is."""
+    for module, frozen in (("start", True), ("cli", False)):
+        code = (
+            f"import gc, sys; from rockfall.core.{module} import main; sys.argv = ['rockfall', 'models']; main(); "
+            "print(gc.get_freeze_count())"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert (int(done.stdout.splitlines()[-1]) > 1000) == frozen

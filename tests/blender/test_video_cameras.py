@@ -29,6 +29,7 @@ def test_a_camera_that_is_no_longer_solved_stays_where_it_was_shown(part: Part) 
     camera_paths.set_camera_path(scene(), camera, solved(part, camera, 20))
     scene().frame_set(scene().frame_start + 3)
     shown = np.array(camera.matrix_world)
+    assert all(camera.lock_location), "a solved camera is not moved by accident"
     camera_paths.unsolve(camera)
     camera.location.x += 1.0
     for frame in (scene().frame_start, scene().frame_end):

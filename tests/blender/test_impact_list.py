@@ -56,3 +56,17 @@ def test_a_heading_says_what_its_numbers_are(scene: bpy.types.Scene, part) -> No
         assert words in said
         assert "Sort the impact table" in said
     assert "Sort" in operators.ROCKFALL_OT_sort_impacts.description(bpy.context, SimpleNamespace(column="none"))
+
+
+def test_the_panel_shows_what_is_stored_of_a_pick(scene: bpy.types.Scene, part) -> None:
+    store = part("rockfall_addon.scene.store")
+    pick = picks_of(scene, "A")[1]
+    for status in ("ok", "doubtful", "shattered", "discarded"):
+        pick[store.STATUS] = status
+        assert pick.rockfall_pick.status == status
+    for status in ("doubtful", "ok"):
+        pick.rockfall_pick.status = status
+        assert pick[store.STATUS] == status
+    for kind in ("impact", "release", "pass", "contact", "stop", "takeoff"):
+        pick[store.KIND] = kind
+        assert pick.rockfall_pick.kind == kind

@@ -269,3 +269,14 @@ def test_a_time_shown_in_short_keeps_its_digits(scene: bpy.types.Scene) -> None:
     assert pick.rockfall_pick.time_s == "11.8123"
     pick.rockfall_pick.time_s = "11.8123"  # Enter in the field, with nothing typed
     assert pick["rockfall_time_s"] == 11.812345678901234
+
+
+def test_a_marker_stands_on_the_slope(slope: bpy.types.Scene) -> None:
+    """Its z axis is at right angles to the plane, whose fall is known."""
+    update()
+    across = np.array([SLOPE, 0.0, 1.0]) / np.hypot(SLOPE, 1.0)
+    impacts = [obj for obj in picks_of(slope, "A") if obj["rockfall_kind"] == "impact"]
+    assert len(impacts) == 3
+    for obj in impacts:
+        up = obj.matrix_world.to_3x3().normalized().col[2]
+        np.testing.assert_allclose(up, across, atol=1e-5)

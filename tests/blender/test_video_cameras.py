@@ -23,6 +23,21 @@ def test_a_camera_that_stands_has_no_keys_of_one_that_moved(part: Part) -> None:
     np.testing.assert_allclose(camera.matrix_world.translation, standing.reference.position, atol=1e-5)
 
 
+def test_a_camera_that_is_no_longer_solved_stays_where_it_was_shown(part: Part) -> None:
+    """Free to be moved: keys of a camera that moved would take it back at the next picture."""
+    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "variable.mp4")
+    camera_paths.set_camera_path(scene(), camera, solved(part, camera, 20))
+    scene().frame_set(scene().frame_start + 3)
+    shown = np.array(camera.matrix_world)
+    assert all(camera.lock_location), "a solved camera is not moved by accident"
+    camera_paths.unsolve(camera)
+    camera.location.x += 1.0
+    for frame in (scene().frame_start, scene().frame_end):
+        scene().frame_set(frame)
+        np.testing.assert_allclose(np.array(camera.matrix_world)[:3, 3] - shown[:3, 3], [1, 0, 0], atol=1e-5)
+    assert not any(camera.lock_location)
+
+
 def test_pixels_that_are_not_square(part: Part) -> None:
     """Of the same angle of view across and up: fx · width of a pixel = fy · height of a pixel."""
     from dataclasses import replace

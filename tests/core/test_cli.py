@@ -98,7 +98,8 @@ def test_options_reach_the_reconstruction(picks, tmp_path):
 def test_terrain_becomes_a_ply_that_reads_the_same(terrain, tmp_path, capsys):
     assert main(["terrain", str(terrain), "--no-picture", "--out", str(tmp_path / "one")]) == 0
     said = capsys.readouterr().out
-    assert "Written: terrain.ply" in said
+    assert "Written: terrain.ply in" in said
+    assert [path.name for path in (tmp_path / "one").iterdir()] == ["terrain.ply"], "no picture was asked for"
     assert main(["terrain", str(tmp_path / "one" / "terrain.ply"), "--no-picture", "--out", str(tmp_path / "two")]) == 0
     one, two = ((tmp_path / name / "terrain.ply").read_bytes() for name in ("one", "two"))
     assert one == two

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rockfall.core.analysis.priors import make_priors
+from rockfall.core.analysis.sections import axis_of
 from rockfall.core.cli import main
 from rockfall.core.errors import DependencyError, InputError, RockfallError
 from rockfall.core.exchange.geotiff_maps import _place
@@ -36,7 +37,7 @@ from rockfall.core.simulation.release import make_releases
 from rockfall.core.simulation.release_sources import on_line, on_points, steeper_than
 from rockfall.core.simulation.run_lines import lines_of
 from rockfall.core.simulation.tree_hits import tree_hits_of
-from rockfall.core.terrain.cloud import Cloud, nearest_points
+from rockfall.core.terrain.cloud import Cloud, build_point_index, nearest_points
 from rockfall.core.terrain.readers import read_terrain
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow.design_sheet import design_sheet
@@ -68,6 +69,11 @@ def slot() -> Ground:
 
 def thin_cloud() -> Ground:
     return make_ground(Cloud(np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0]]), GlobalShift(), "three.xyz"))
+
+
+def dense_cloud() -> Ground:
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0, 4, 0.08), np.arange(0, 4, 0.08)))
+    return make_ground(Cloud(np.column_stack([x, y, 0 * x]), GlobalShift(), "lattice.xyz"))
 
 
 def stops() -> Any:
@@ -152,6 +158,23 @@ REFUSED: dict[str, tuple[Callable[[], object], str]] = {
     "other screens": (
         lambda: ScreenTally([Screen("road", LINE)]).merge(ScreenTally([Screen("rail", LINE)])),
         "Hits of other screens cannot be added. Add those of one simulation.",
+    ),
+    "no points": (
+        lambda: build_point_index(np.empty((0, 3))),
+        "A cloud without points has no spatial index.",
+    ),
+    "beside a cloud": (
+        lambda: on_points(dense_cloud(), np.array([[500.0, 500.0, 0.0]]), STONE),
+        "There is no terrain at 500.00, 500.00, 0.00. Correct the coordinates, or give a terrain that reaches so far.",
+    ),
+    "runs that go nowhere": (
+        lambda: axis_of(
+            SimpleNamespace(  # type: ignore[arg-type]
+                first_piece=np.array([0, 1]), start=np.zeros((1, 3)), end=np.array([[0.0, 0.0, -9.0]]),
+                stop=np.full((1, 3), NAN),
+            )
+        ),
+        "The observed runs go nowhere, in plan. Give picks of blocks that move.",
     ),
     "no cells": (lambda: Cells(0.0, 0.0, 1.0, 0, 4), "The maps have 0 × 4 cells. Give at least one."),
     "cells that are nowhere": (
@@ -336,6 +359,19 @@ def test_what_a_project_says_is_not_said_again(tmp_path: Path, capsys: pytest.Ca
     words = ["compare-runs", str(tmp_path / "project.toml"), option, "a", "--out", str(tmp_path / "out")]
     assert main(words) == 1
     assert capsys.readouterr().err.endswith(f"{option} is what a project says itself. Write it into the project.\n")
+
+
+def test_workers_leave_no_paths_for_a_geopackage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("distributed")
+    (tmp_path / "slope.obj").write_text("v 0 0 50\nv 90 0 0\nv 90 60 0\nv 0 60 50\nf 1 2 3\nf 1 3 4\n")
+    (tmp_path / "r.csv").write_text("release,x_m,y_m,z_m,diameter_m,number\na,10,30,,0.4,2\n")
+    words = ["simulate", str(tmp_path / "r.csv"), "--terrain", str(tmp_path / "slope.obj"), "--workers", "1"]
+    assert main([*words, "--geopackage", "--model", "noel_2017", "--out", str(tmp_path / "out")]) == 1
+    assert capsys.readouterr().err.endswith(
+        "Blocks on workers leave no paths and impacts for a GeoPackage. Give --record none, for one with the releases, "
+        "stops and screens, or leave out --workers.\n"
+    )
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_drop_is_finite() -> None:

@@ -267,6 +267,23 @@ def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
     assert camera_line is view.path_of(tracked, "B10", None), "it is kept until the picks change"
 
 
+def test_sightings_beyond_the_path_are_not_joined_with_it(tracked, part) -> None:
+    view, clocks = (part(f"rockfall_addon.{name}") for name in ("view.footage_view", "scene.clocks"))
+    (camera,) = part("rockfall_addon.scene.videos").cameras(tracked)
+    first, *_, last = picks_of(tracked)
+    bpy.data.objects.remove(last)
+    part("rockfall_addon.scene.sync").sync(tracked)
+    end = picks_of(tracked)[-1]["rockfall_time_s"]
+    tracked.frame_set(60)
+    lines = view.draw(tracked, camera, first).lines
+    joined = [one.segments for one in lines if tuple(one.colour[0, 0]) == (*view.SEEN, 0.8)]
+    seen = part("rockfall_addon.scene.sightings").seen_in(camera, "B10")
+    common = clocks.clock_of(camera).to_common(seen.time_s)
+    within = (common >= first["rockfall_time_s"]) & (common <= end)
+    assert 0 < within.sum() < len(seen) - 5
+    assert sum(map(len, joined)) == within.sum()
+
+
 def test_paths_bend_with_the_lens(part) -> None:
     """A straight line in space, through a lens with k1, is curved as OpenCV has it."""
     view, model = part("rockfall_addon.view.footage_view"), part("core.camera.model")

@@ -383,11 +383,14 @@ def test_an_old_film_stays_where_the_new_one_is_not_whole(scene, small_film, par
     def stopped(*_: object) -> None:
         raise progress.CancelledError
 
-    beside = part("rockfall_addon.steps.film.beside")
-    monkeypatch.setattr(beside, "run_job", half)
-    with pytest.raises(RuntimeError, match=r"1 of its 3 frames can be read\. The old film\.mp4 is as it was\."):
+    beside, maker = part("rockfall_addon.steps.film.beside"), part("core.film.maker")
+    monkeypatch.setattr(maker, "run_job", half)
+    with pytest.raises(
+        RuntimeError,
+        match=r"made film\.mp4 as it should be: 1 of its 3 frames can be read\. The old film\.mp4 is as it was\.",
+    ):
         bpy.ops.rockfall.render_film()
-    monkeypatch.setattr(beside, "run_job", stopped)
+    monkeypatch.setattr(maker, "run_job", stopped)
     with pytest.raises(progress.CancelledError):
         beside.film_of(scene, path)(progress.silent)
     assert [(file.name, file.read_bytes()) for file in tmp_path.glob("*film*")] == [("film.mp4", b"an old film")]

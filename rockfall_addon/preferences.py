@@ -10,7 +10,7 @@ import bpy
 from .. import __package__ as ADDON_ID  # noqa: N812
 from .. import __version__
 from ..core.constants import ROCK_DENSITY_KGPM3
-from .scene.settings import BLOCK_SHAPES, COLOURINGS
+from .scene.settings import BLOCK_SHAPES, COLOURINGS, DENSITIES, DIAMETERS
 
 problem = ""
 """Why nothing but this module is registered; empty when all is well. Set by the add-on's `register`."""
@@ -67,11 +67,11 @@ class RockfallPreferences(bpy.types.AddonPreferences):
     )  # fmt: skip
     block_diameter_m: bpy.props.FloatProperty(
         name="Block diameter", description="Of the blocks of new projects",
-        default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_changed,
+        default=0.35, **DIAMETERS, unit="LENGTH", precision=3, update=_changed,
     )  # fmt: skip
     density_kgpm3: bpy.props.FloatProperty(
         name="Density [kg/m³]", description="Of the rock of new projects",
-        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_changed,
+        default=ROCK_DENSITY_KGPM3, **DENSITIES, precision=0, update=_changed,
     )  # fmt: skip
     block_shape: bpy.props.EnumProperty(
         name="Block shape", description="Of the blocks of new projects", items=BLOCK_SHAPES, update=_changed

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from ..terrain.surface import Surface
 
 
+DENSEST_GPCM3 = 23.0
+"""No substance is denser than osmium, with 22.6 g/cm³."""
+
+
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
     """What was made of the picks.
@@ -118,8 +122,23 @@ def reconstruct(
         gravity_mps2=gravity_mps2,
         drag=drag,
         ends=flights,
-        remarks=remarks + _lonely(picks),
+        remarks=remarks + _lonely(picks) + _in_grams(picks, block),
     )
+
+
+def _in_grams(picks: Picks, block: Block | Mapping[str, Block]) -> tuple[Remark, ...]:
+    """Densities that are those of rock if their unit is g/cm³."""
+    starts, remarks = picks.group_starts, []
+    density = per_pick(picks, block, lambda one: one.density)[starts]
+    for value in np.unique(density[density < DENSEST_GPCM3]).tolist():
+        names = picks.trajectory[starts[density == value]].tolist()
+        which = f"{names[0]} and {len(names) - 1} more" if len(names) > 1 else names[0]
+        text = (
+            f"Trajectory {which}: a block of {value:g} kg/m³, which no rock has. "
+            f"In g/cm³? Then give {1000 * value:g} kg/m³."
+        )
+        remarks.append(Remark(text, "warning", names[0]))
+    return tuple(remarks)
 
 
 def _lonely(picks: Picks) -> tuple[Remark, ...]:

@@ -5,11 +5,16 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ...core.constants import ROCK_DENSITY_KGPM3
+from ...core.plausibility import limits
 
 BLOCK_SHAPES = (
     ("ellipsoid", "Ellipsoid", "Volume π/6·d₁·d₂·d₃: a rounded block"),
     ("box", "Box", "Volume d₁·d₂·d₃: a slab or a cube"),
 )
+
+DIAMETERS = {**dict(zip(("min", "max"), limits("diameter_m"), strict=True)), "soft_min": 0.01, "soft_max": 5.0}
+DENSITIES = {**dict(zip(("min", "max"), limits("density_kgpm3"), strict=True)), "soft_min": 500.0, "soft_max": 5000.0}
+"""Of a block: what files may have, so that nothing of them is changed; and what a slider offers."""
 
 COLOURINGS = (
     ("SPEED", "Speed", "Speed of the block"),
@@ -65,11 +70,11 @@ class SceneSettings(bpy.types.PropertyGroup):
 
     block_diameter_m: FloatProperty(
         name="Block diameter", description="Mean diameter of the blocks that the project does not describe one by one",
-        default=0.35, min=0.01, soft_max=5.0, unit="LENGTH", precision=3, update=_changed,
+        default=0.35, **DIAMETERS, unit="LENGTH", precision=3, update=_changed,
     )  # fmt: skip
     density_kgpm3: FloatProperty(
         name="Density [kg/m³]", description="Of the rock; masses and energies come from it",
-        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0, update=_changed,
+        default=ROCK_DENSITY_KGPM3, **DENSITIES, precision=0, update=_changed,
     )  # fmt: skip
     block_shape: EnumProperty(
         name="Block shape", description="Of blocks without one of their own; volume, mass and inertia come from it",

@@ -206,6 +206,17 @@ def test_each_trajectory_may_have_its_own_block():
         reconstruct(picks, block={"a": Block()})
 
 
+def test_a_density_that_was_meant_in_grams_is_told():
+    picks = run(*["impact"] * 6, trajectory=list("aabbcc"))
+    assert reconstruct(picks, block=Block(density=80.6)).remarks == (), "a ball of plastic"
+    (remark,) = reconstruct(picks, block=Block(density=2.7)).remarks
+    assert (remark.about, remark.severity) == ("a", "warning")
+    said = "a block of 2.7 kg/m³, which no rock has. In g/cm³? Then give 2700 kg/m³."
+    assert remark.text == f"Trajectory a and 2 more: {said}"
+    (remark,) = reconstruct(picks, block={"a": Block(), "b": Block(density=2.7), "c": Block()}).remarks
+    assert (remark.about, remark.text) == ("b", f"Trajectory b: {said}")
+
+
 def test_height_above_the_chord_is_an_eighth_of_g_t_squared_on_the_level():
     level = make_picks(["a"] * 2, [0, 1.2], [(0, 0, 0), (6, 0, 0)])
     slope = make_picks(["a"] * 2, [0, 1.2], [(0, 0, 0), (6, 0, -6)])

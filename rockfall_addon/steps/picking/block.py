@@ -9,10 +9,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ....core.reconstruction.block import SHAPES, Block
 from ...scene import impact_rows, own_blocks, places, store, sync
-from ...scene.settings import BLOCK_SHAPES
+from ...scene.settings import BLOCK_SHAPES, DENSITIES, DIAMETERS
 from ...view.panel import RockfallPanel, facts, fields, kilograms, paragraph
-
-DIAMETERS_M, DENSITIES_KGPM3 = (0.01, 100.0), (500.0, 5000.0)
 
 
 def trajectory_in_hand(scene: bpy.types.Scene) -> str:
@@ -25,8 +23,9 @@ def _block(settings: bpy.types.PropertyGroup) -> Block:
     return places.block_of(settings.id_data, trajectory_in_hand(settings.id_data))
 
 
-def _number(name: str, least: float, most: float) -> dict[str, Callable | float]:
+def _number(name: str, span: dict[str, float]) -> dict[str, Callable | float]:
     """How a property reads and writes one number of the block, and its range; the others keep all their digits."""
+    least, most = span["min"], span["max"]
 
     def read(self: bpy.types.PropertyGroup) -> float:
         return getattr(_block(self), name)
@@ -35,7 +34,7 @@ def _number(name: str, least: float, most: float) -> dict[str, Callable | float]
         scene, value = self.id_data, min(most, max(least, value))  # Blender keeps to the range in its fields alone
         own_blocks.give(scene, trajectory_in_hand(scene), replace(_block(self), **{name: store.double(value)}))
 
-    return {"get": read, "set": write, "update": _changed, "min": least, "max": most}
+    return {"get": read, "set": write, "update": _changed, **span}
 
 
 def _changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -73,19 +72,19 @@ class BlockProperties(bpy.types.PropertyGroup):
     )  # fmt: skip
     d1: FloatProperty(
         name="Diameter 1", description="Of the three diameters at right angles to each other",
-        soft_max=5.0, unit="LENGTH", precision=3, **_number("d1", *DIAMETERS_M),
+        unit="LENGTH", precision=3, **_number("d1", DIAMETERS),
     )  # fmt: skip
     d2: FloatProperty(
         name="Diameter 2", description="Of the three diameters at right angles to each other",
-        soft_max=5.0, unit="LENGTH", precision=3, **_number("d2", *DIAMETERS_M),
+        unit="LENGTH", precision=3, **_number("d2", DIAMETERS),
     )  # fmt: skip
     d3: FloatProperty(
         name="Diameter 3", description="Of the three diameters at right angles to each other",
-        soft_max=5.0, unit="LENGTH", precision=3, **_number("d3", *DIAMETERS_M),
+        unit="LENGTH", precision=3, **_number("d3", DIAMETERS),
     )  # fmt: skip
     density: FloatProperty(
         name="Density [kg/m³]", description="Of the rock; mass and energies come from it",
-        precision=0, **_number("density", *DENSITIES_KGPM3),
+        precision=0, **_number("density", DENSITIES),
     )  # fmt: skip
     shape: EnumProperty(
         name="Shape", description="Volume, mass and inertia come from it", items=BLOCK_SHAPES,

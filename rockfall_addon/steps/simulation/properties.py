@@ -21,6 +21,7 @@ from ....core.simulation.block_shapes import SHAPES
 from ....core.simulation.engine import FRICTION
 from ....core.simulation.trees import HEIGHT_M, KIND, SPECIES
 from ...scene import drawn_releases, models, simulation, store
+from ...scene.settings import DENSITIES, DIAMETERS
 from ...view.reporting import redraw
 
 
@@ -101,7 +102,7 @@ class SimulationSettings(bpy.types.PropertyGroup):
     seed: IntProperty(name="Seed", description="Of the random numbers: the same seed gives the same blocks", min=0)
     diameter_m: FloatProperty(
         name="Diameter", description="Mean diameter of the blocks; measured releases have that of their trajectory",
-        default=0.5, min=0.01, soft_max=10.0, unit="LENGTH", precision=2,
+        default=0.5, **DIAMETERS, unit="LENGTH", precision=2,
     )  # fmt: skip
     diameter_law: EnumProperty(
         name="Sizes", description="How the diameters of the blocks are drawn",
@@ -123,7 +124,7 @@ class SimulationSettings(bpy.types.PropertyGroup):
     )  # fmt: skip
     density_kgpm3: FloatProperty(
         name="Density [kg/m³]", description="Of the rock",
-        default=ROCK_DENSITY_KGPM3, min=500.0, max=5000.0, precision=0,
+        default=ROCK_DENSITY_KGPM3, **DENSITIES, precision=0,
     )  # fmt: skip
     shape: EnumProperty(
         name="Shape", description="Decides mass and inertia; the ground is met by the sphere of the mean diameter",

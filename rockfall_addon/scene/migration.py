@@ -81,9 +81,17 @@ def _from_0(scene: bpy.types.Scene) -> None:
 
 
 def _from_1(scene: bpy.types.Scene) -> None:
-    """The numbers of an impact were a group of lists."""
+    """The numbers of an impact were a group of lists, the flags among them."""
     for obj in store.of_role(scene, store.PICK_ROLE):
-        impact_numbers.from_group(obj)
+        kept = obj.get(store.RESULT)
+        if not hasattr(kept, "to_dict"):
+            continue
+        values = kept.to_dict()
+        try:
+            impact_numbers.keep(obj, values)
+            obj[store.FLAGS] = str(values.get("flags", ""))
+        except (TypeError, ValueError):  # somebody has changed it; it is computed anew
+            del obj[store.RESULT]
 
 
 STEPS = (_from_0, _from_1)

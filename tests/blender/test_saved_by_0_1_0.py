@@ -185,6 +185,17 @@ def test_numbers_of_impacts_come_over(opened, numbers, old) -> None:
         assert set(kept) - set(found) == {"flags"}
 
 
+def test_files_hold_the_numbers_of_an_impact_in_this_order(part) -> None:
+    """Another order needs another schema, and a step to it."""
+    judged = ("rn", "rt", "r", "theta1", "theta_dev")
+    deviations = ("rn", "rt", "r", "theta1_deg", "theta_dev_deg", "speed1", "speed2", "kinetic1_j", "kinetic2_j")
+    assert list(part("rockfall_addon.scene.impact_numbers").SHAPE) == [
+        "number", "incident_mps", "restituted_mps", "rn", "rt", "r", "theta1_deg", "theta_dev_deg", "normal_spread_deg",
+        "kinetic1_j", "kinetic2_j", "bounce_height_m", "chord_height_m", *(f"sigma_{name}" for name in deviations),
+        *(f"interval_{name}" for name in (*judged, "rn_contact", "rt_contact", "theta1_contact")),
+    ]  # fmt: skip
+
+
 def test_numbers_that_cannot_be_computed_anew_come_over(scene, part, numbers, old) -> None:
     migration, pick = part("rockfall_addon.scene.migration"), scene.objects["A impact 1"]
     kept = next(each["rockfall_result"] for each in old["picks"] if "rockfall_result" in each)

@@ -68,7 +68,7 @@ def case_words_of_the_tools_header(window):
 
 
 def case_type_a_density(window):
-    """The mass follows at once; what no rock can be is taken to the nearest density that one can."""
+    """The mass follows at once; what was meant in g/cm³ is told, and what cannot be ends at the range of the field."""
     for panel in ("picking", "tracking"):
         window.unfold(f"ROCKFALL_PT_{panel}", False)
     yield from with_picks(window)
@@ -79,17 +79,20 @@ def case_type_a_density(window):
     with window.override():
         bpy.ops.ed.undo_push(message="own block")
     yield 0.5
-    for text, density in (("3100", 3100.0), ("2700.5", 2700.5), ("-5", 500.0), ("2.7", 500.0)):
+    for text, density in (("3100", 3100.0), ("2700.5", 2700.5), ("-5", 0.1), ("2.7", 2.7)):
         yield from enter(window, text, x + 110, header - DENSITY)
+        yield 0.5
         window.screenshot(f"density-{text}")
         block = block_of(bpy.context.scene, "B10")
         assert block.density == density, (text, block)
         assert np.isclose(block.mass_kg, before.mass_kg * density / before.density)
-    with window.override():
-        bpy.ops.ed.undo()
-        bpy.ops.ed.undo()
-    yield 0.5
-    assert block_of(bpy.context.scene, "B10").density == 2700.5, "each entry is a step"
+        said = " ".join(one.text for one in window.part("rockfall_addon.scene.problems").remarks(bpy.context.scene))
+        assert ("In g/cm³?" in said) == (density < 500.0)
+        if density < 500.0:  # what is said moves the field
+            with window.override():
+                bpy.ops.ed.undo()
+            yield 0.5
+            assert block_of(bpy.context.scene, "B10").density == 2700.5, "each entry is a step"
 
 
 def case_a_scan_in_feet_is_read_again(window):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The numbers of an impact at its pick's object.
 
-They are one list there: ten thousand impacts as groups of thirty lists, each of which Blender keeps twice, took 130 MB more.
+They are one list there: ten thousand groups of thirty lists, each of which Blender keeps twice, took 130 MB more.
 """
 
 from collections.abc import Mapping, Sequence

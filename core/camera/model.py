@@ -108,7 +108,8 @@ class Projection:
     depth : (n,) along the camera's axis [m].
     d_point, d_position : (n, 2, 3) by the point and by the camera's position [px/m].
     d_rotation : (n, 2, 3) by w at 0 in ``R' = exp([w]×) R`` [px/rad]: about the camera's own axes.
-    d_intrinsics : (n, 2, 9) in the order of `INTRINSICS`.
+    focal_px : (2,) of the camera.
+    plane, bent : (n, 2) normalised coordinates without and with the distortion.
     """
 
     pixel: Array
@@ -116,7 +117,22 @@ class Projection:
     d_point: Array
     d_rotation: Array
     d_position: Array
-    d_intrinsics: Array
+    focal_px: Array
+    plane: Array
+    bent: Array
+
+    @property
+    def d_intrinsics(self) -> Array:
+        """(n, 2, 9) by the inner parameters in the order of `INTRINSICS`; made when asked for, since few ask."""
+        x, y = self.plane.T
+        r2 = x * x + y * y
+        found = np.zeros((x.size, 2, 9))
+        found[:, 0, 0], found[:, 1, 1] = self.bent.T
+        found[:, 0, 2] = found[:, 1, 3] = 1.0
+        found[:, :, 4:7] = (self.plane * self.focal_px)[:, :, None] * np.stack([r2, r2**2, r2**3], axis=1)[:, None, :]
+        found[:, :, 7] = np.stack([2 * x * y, r2 + 2 * y * y], axis=1) * self.focal_px
+        found[:, :, 8] = np.stack([r2 + 2 * x * x, 2 * x * y], axis=1) * self.focal_px
+        return found
 
 
 def with_intrinsics(camera: Camera, values: ArrayLike) -> Camera:
@@ -258,26 +274,16 @@ def project_with_derivatives(
         inverse = 1 / depth
     reach = validity_radius(camera)
     plane[~((depth > 0) & (np.einsum("ni,ni->n", plane, plane) <= reach**2))] = np.nan
-    x, y = plane.T
     focal = np.array([camera.fx, camera.fy])
     bent = _distorted(camera, plane)
 
     a, b, c = _bending(camera, plane)
     by_plane = np.stack([np.stack([a, b], axis=1), np.stack([b, c], axis=1)], axis=1) * focal[:, None]
-    by_seen = np.empty((x.size, 2, 3))
+    by_seen = np.empty((depth.size, 2, 3))
     by_seen[:, :, :2] = by_plane * inverse[:, None, None]
     by_seen[:, :, 2] = -np.einsum("nij,nj->ni", by_plane, plane) * inverse[:, None]
     turn = camera.rotation if rotation is None else np.asarray(rotation, dtype=np.float64)
     by_point = by_seen @ turn
-
-    r2 = x * x + y * y
-    radial = np.stack([r2, r2**2, r2**3], axis=1)
-    by_inner = np.zeros((x.size, 2, 9))
-    by_inner[:, 0, 0], by_inner[:, 1, 1] = bent.T
-    by_inner[:, 0, 2] = by_inner[:, 1, 3] = 1.0
-    by_inner[:, :, 4:7] = (plane * focal)[:, :, None] * radial[:, None, :]
-    by_inner[:, :, 7] = np.stack([2 * x * y, r2 + 2 * y * y], axis=1) * focal
-    by_inner[:, :, 8] = np.stack([r2 + 2 * x * x, 2 * x * y], axis=1) * focal
 
     return Projection(
         pixel=bent * focal + [camera.cx, camera.cy],
@@ -285,7 +291,9 @@ def project_with_derivatives(
         d_point=by_point,
         d_rotation=cross(seen[:, None, :], by_seen),
         d_position=-by_point,
-        d_intrinsics=by_inner,
+        focal_px=focal,
+        plane=plane,
+        bent=bent,
     )
 
 

@@ -27,6 +27,9 @@ CULLED = {5: 12, 11: 6}
 FOCAL_WIDTHS = (0.35, 30.0)
 """The focal lengths that are tried, in diagonals of the image; 0.35 is 130° wide, 30 is 1300 mm on full frame."""
 
+SETTLED = 0.01
+"""A step that moves no pixel further than so many standard deviations."""
+
 FAR = 1e4
 """Residual of a pair that has no pixel [standard deviations]."""
 
@@ -243,18 +246,17 @@ def _normalised_residuals(
     camera: Camera, pixels: Array, points: Array, position: Array, rotation: Array, focal: Array
 ) -> Array:
     """(k, n) distances in the image [px]; infinite where a point has no pixel. The lens counts as undistorted."""
-    seen = np.einsum("kij,knj->kni", rotation, points[None] - position[:, None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        plane = seen[..., :2] / seen[..., 2:]
-    plain = replace(camera, fx=1.0, fy=camera.fy / camera.fx, cx=0.0, cy=0.0, k1=0.0, k2=0.0, k3=0.0, p1=0.0, p2=0.0)
+    turned = (rotation.reshape(-1, 3) @ points.T).reshape(len(rotation), 3, len(points))
+    x, y, z = (turned - (rotation @ position[:, :, None])).swapaxes(0, 1)
     # The pixels as they would be without the distortion, which depends on the focal length.
     focals, number = np.unique(focal, return_inverse=True)
     rays = _bearings(camera, pixels, focals)
     with np.errstate(divide="ignore", invalid="ignore"):
-        straight = (rays[..., :2] / rays[..., 2:])[number]
-        away = (plane - straight) * focal[:, None, None] * [1.0, plain.fy]
-        distance = norm(away)
-    return np.where((seen[..., 2] > 0) & np.isfinite(distance), distance, np.inf)
+        straight = np.ascontiguousarray((rays[..., :2] / rays[..., 2:]).transpose(2, 0, 1))
+        across = x / z - straight[0][number]
+        down = (y / z - straight[1][number]) * (camera.fy / camera.fx)
+        distance = np.sqrt(across**2 + down**2) * focal[:, None]
+    return np.where((z > 0) & np.isfinite(distance), distance, np.inf)
 
 
 def _robust_cost(residual: Array) -> Array:
@@ -330,6 +332,8 @@ def _improved(
         normal = np.swapaxes(weighted, 1, 2) @ slopes
         right = (np.swapaxes(weighted, 1, 2) @ gap[:, :, None])[..., 0]
         step = damped_step(normal, right, damping)
+        if squared.max() < 9 and np.abs(slopes @ step[..., None]).max() < SETTLED:
+            break  # all pairs fit all candidates: a narrower cost would weigh them alike
         new_focal = focal
         if free_focal:
             new_focal = np.clip(focal * np.exp(np.clip(step[:, 6] / focal, -0.5, 0.5)), *_focal_range(camera))

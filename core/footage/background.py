@@ -75,6 +75,15 @@ class BackgroundMotion:
     rms_px: Array
     still: bool
     apart_px: Array = field(default_factory=lambda: np.zeros(0))
+    brightness: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def exposure(self) -> Array | None:
+        """(f,) brightness in units of the middle one; None where it stays, or where nobody has looked."""
+        if not self.brightness.size:
+            return None
+        relative: Array = self.brightness / np.sort(self.brightness)[self.brightness.size // 2]
+        return relative if np.abs(relative - 1).max() > LEVELLED else None
 
     @property
     def steadily_apart_px(self) -> Array:
@@ -173,7 +182,7 @@ def background_motion(
     """
     last = source.time_s.size - 1 if last is None else last
     scale = 1.0
-    follower, numbers, homographies, inliers, rms, apart = None, [], [], [], [], []
+    follower, numbers, homographies, inliers, rms, apart, brightness = None, [], [], [], [], [], []
     sightings: list[tuple[int, Indices, Array]] = []
     for frame, picture in frames(source, range(first, last + 1)):
         progress("Following the background", frame - first, last - first + 1)
@@ -187,6 +196,7 @@ def background_motion(
         inliers.append(follower.names.size)
         rms.append(scale * follower.rms)
         apart.append(scale * follower.apart)
+        brightness.append(follower.brightness)
         sightings.append((frame, follower.names, scale * follower.pixel))
     still = _is_still(sightings)
     count = len(numbers)
@@ -204,6 +214,7 @@ def background_motion(
         rms_px=np.array(rms),
         still=still,
         apart_px=np.array(apart),
+        brightness=np.array(brightness),
     ), features
 
 
@@ -215,6 +226,7 @@ class _Follower:
 
     def __init__(self, grey: np.ndarray, frame: int) -> None:
         self.homography, self.rms, self.apart = np.eye(3), 0.0, 0.0
+        self.brightness = self.key_brightness = 1.0
         self.names = np.zeros(0, dtype=np.intp)
         self.pixel = self.reference = np.zeros((0, 2))
         self.count = self.key_count = 0
@@ -228,7 +240,9 @@ class _Follower:
         """Follow all corners into the next frame."""
         small = _quartered(grey)
         guess, levels = self._guess(small)
-        bright = _as_bright(grey, _brightness(small, guess) / _brightness(self.key_small, self.key_pixel))
+        ratio = float(np.median(_brightness(small, guess) / _brightness(self.key_small, self.key_pixel)))
+        self.brightness = ratio * self.key_brightness
+        bright = darkened(grey, ratio)
         pixel, good = _flow(self.key, bright, self.key_pixel, guess, levels)
         checked = np.flatnonzero(good & (self.names % CHECKED == frame % CHECKED))
         back, back_good = _flow(bright, self.key, pixel[checked], self.key_pixel[checked], 0, COARSE)
@@ -273,6 +287,7 @@ class _Follower:
         self.pixel = np.concatenate([self.pixel, fresh])
         self.reference = np.concatenate([self.reference, _through(self.homography, fresh)])
         self.key, self.key_small, self.key_pixel, self.key_count = grey, self.small, self.pixel, self.names.size
+        self.key_brightness = self.brightness
 
 
 def _reduced(grey: np.ndarray) -> tuple[np.ndarray, float]:
@@ -297,12 +312,11 @@ def _brightness(small: np.ndarray, pixel: Array) -> Array:
     return small[row, column].astype(np.float64) + 1.0
 
 
-def _as_bright(grey: np.ndarray, ratio: Array) -> np.ndarray:
-    """A picture with the exposure of another one, which corners tell: the flow takes grey levels as kept."""
-    factor = float(np.median(ratio))
-    if abs(factor - 1.0) < LEVELLED:
-        return grey
-    levelled: np.ndarray = opencv().convertScaleAbs(grey, alpha=1.0 / factor)
+def darkened(picture: np.ndarray, brightness: float) -> np.ndarray:
+    """A picture of uint8 whose brightness differs, as if it did not: the flow and the plates take it as kept."""
+    if abs(brightness - 1.0) < LEVELLED:
+        return picture
+    levelled: np.ndarray = opencv().convertScaleAbs(picture, alpha=1.0 / brightness)
     return levelled
 
 

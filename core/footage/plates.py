@@ -10,7 +10,7 @@ from ..constants import IQR_PER_SD
 from ..opencv import opencv
 from ..progress import Progress, silent
 from ..vectors import Array
-from .background import BackgroundMotion
+from .background import BackgroundMotion, darkened
 from .sources import Kept, Source, frames
 
 SAMPLES = 15
@@ -31,6 +31,9 @@ ROOM, LEAST_ROOM = 0.6, 60
 """Around what is asked for a part is larger by so many times its size, of so many pixels at least."""
 CORNER, BACK = (np.array([[1, 0, half], [0, 1, half], [0, 0, 1]]) for half in (0.5, -0.5))
 """From OpenCV's pixels to those that count from the corner of the picture, and back."""
+
+EVERY = 16
+"""Rows and columns of a picture, one of which tells its brightness where the background was not followed."""
 
 type Box = tuple[int, int, int, int]
 """Left, top, right, bottom [px]."""
@@ -95,7 +98,20 @@ class Plates:
         self._margin = (0, 0) if motion.still else (int(np.ceil(WANDERED * size[0])), int(np.ceil(WANDERED * size[1])))
         self._size = (size[0] + 2 * self._margin[0], size[1] + 2 * self._margin[1])
         self._first = int(motion.frames[0])
+        self._exposure = motion.exposure
+        self._glimpse: np.ndarray | None = None
         self._last: tuple[int, int, int, Layers] | None = None
+
+    @property
+    def spacing(self) -> float:
+        """About how far the pictures of one plate are apart [frames]."""
+        return min(self._motion.frames.size, 2 * REACH) / SAMPLES
+
+    def beside(self, picture: np.ndarray, frame: int, box: Box) -> tuple[np.ndarray, Layers]:
+        """A window of a frame's picture, (h, w, 3) float32 with the exposure of the background, and the background."""
+        left, top, right, bottom = box
+        part = darkened(picture[top:bottom, left:right], self._brightness(frame, picture))
+        return part.astype(np.float32), self.window(frame, left, top, right - left, bottom - top)
 
     def window(self, frame: int, left: int, top: int, width: int, height: int) -> Layers:
         """Background of a window of a frame."""
@@ -153,14 +169,25 @@ class Plates:
         layers, known = [], []
         full = np.full((self._source.height, self._source.width), 255, np.uint8)
         for frame, picture in plate.samples:
+            brightness = self._brightness(frame, picture)
             if self._motion.still:
-                layers.append(picture[top:bottom, left:right].copy())
+                layers.append(darkened(picture[top:bottom, left:right].copy(), brightness))
                 continue
             shift = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
             across, size = shift @ self._onto(frame, plate), (right - left, bottom - top)
             known.append(cv2.warpPerspective(full, across, size) > 250)
-            layers.append(cv2.warpPerspective(picture, across, size))
+            layers.append(darkened(cv2.warpPerspective(picture, across, size), brightness))
         return Part(left, top, *_median(layers, known))
+
+    def _brightness(self, frame: int, picture: np.ndarray) -> float:
+        """Of a frame, in units of the usual one, or of the first one that is looked at by a camera said to be still."""
+        if self._exposure is not None:
+            return float(self._exposure[frame - self._first])
+        if self._motion.brightness.size or not self._motion.still:
+            return 1.0
+        seen = picture[::EVERY, ::EVERY].astype(np.float32) + 1
+        self._glimpse = seen if self._glimpse is None else self._glimpse
+        return float(np.median(seen / self._glimpse))
 
     def _plate(self, frame: int) -> Plate:
         for plate in reversed(self._kept):

@@ -24,6 +24,9 @@ REACH = 14
 SIDE = 2 * REACH + 1
 LAG = 3.0
 """Travel between the two sightings that are compared, in diameters."""
+SLOW = 2.5
+"""A block that takes longer for it than from one picture of the background to so many later stands in the background
+itself."""
 FEWEST, MOST = 12, 160
 """Pairs of sightings from which an outline is told."""
 DISAGREE = 0.1
@@ -64,24 +67,21 @@ def patch_of(picture: np.ndarray, frame: int, plates: Plates, centre: Array, dia
     left, top, right, bottom = clip_window(picture, centre, reach)
     if (centre - reach < 0).any() or (centre + reach > picture.shape[1::-1]).any():
         return None
-    behind, _, seen = plates.window(frame, left, top, right - left, bottom - top)
+    part, (behind, _, seen) = plates.beside(picture, frame, (left, top, right, bottom))
     if not seen.all():
         return None
     cv2 = opencv()
     place = np.array([[cell, 0.0, 0.0], [0.0, cell, 0.0]])
     place[:, 2] = centre - (left, top) - 0.5 - REACH * cell
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    part = picture[top:bottom, left:right]
     if cell > 2:
         part, behind = (cv2.blur(a, (int(cell),) * 2) for a in (part, behind))
     size = (SIDE, SIDE)
-    return Patch(
-        cv2.warpAffine(part, place, size, flags=flags),
-        np.round(cv2.warpAffine(behind, place, size, flags=flags)).astype(np.uint8),
-    )
+    picture, behind = (cv2.warpAffine(a, place, size, flags=flags) for a in (part, behind))
+    return Patch(cv2.convertScaleAbs(picture), cv2.convertScaleAbs(behind))
 
 
-def outline_offsets(patches: list[Patch | None], stable: Array, diameter: Array) -> tuple[Array, Array]:
+def outline_offsets(patches: list[Patch | None], stable: Array, diameter: Array, spacing: float) -> tuple[Array, Array]:
     """(m, 2) from the tracked centres to those of the outline [px], and (m,) its diameter over the tracked one.
 
     Zeros and ones where nothing tells, or where both agree.
@@ -91,10 +91,11 @@ def outline_offsets(patches: list[Patch | None], stable: Array, diameter: Array)
     patches : (m,) of the sightings.
     stable : (m, 2) their places in the reference frame of the background [px].
     diameter : (m,) by which the patches are scaled [px].
+    spacing : of the pictures that the background is made of [frames].
     """
     count = len(patches)
     nothing = np.zeros((count, 2)), np.ones(count)
-    first, second = _pairs(patches, stable, diameter)
+    first, second = _pairs(patches, stable, diameter, int(min(AROUND, SLOW * spacing)))
     whole = _outline(patches, first, second)
     halves = [_outline(patches, first[part::2], second[part::2]) for part in (0, 1)] if whole is not None else []
     if whole is None or np.hypot(*whole.offset) < SLIGHT:
@@ -116,14 +117,14 @@ def outline_offsets(patches: list[Patch | None], stable: Array, diameter: Array)
     return moved * diameter[:, None], np.interp(rows, where, size)
 
 
-def _pairs(patches: list[Patch | None], stable: Array, diameter: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Sightings, and for each the next one that the block has travelled far enough to reach."""
+def _pairs(patches: list[Patch | None], stable: Array, diameter: Array, longest: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sightings, and for each the next one that the block has travelled far enough to reach, in time."""
     travelled = np.r_[0.0, np.cumsum(np.hypot(*np.diff(stable, axis=0).T) / diameter[1:])]
     later = np.searchsorted(travelled, travelled + LAG)
     pairs = [
         (i, j)
         for i, j in enumerate(later.tolist())
-        if j < len(patches) and j <= i + AROUND and patches[i] and patches[j]
+        if j < len(patches) and j <= i + longest and patches[i] and patches[j]
     ]
     both = np.array(pairs, dtype=np.intp).reshape(-1, 2)
     return both[:, 0], both[:, 1]

@@ -90,8 +90,8 @@ def cover(picture: np.ndarray, frame: int, plates: Plates, looks: Appearance, ce
     if right <= left or bottom <= top:
         empty = np.zeros((0, 0))
         return Cover(left, top, empty, empty, empty)
-    behind, sigma, seen = plates.window(frame, left, top, right - left, bottom - top)
-    change = picture[top:bottom, left:right].astype(np.float32) - behind
+    part, (behind, sigma, seen) = plates.beside(picture, frame, (left, top, right, bottom))
+    change = part - behind
     change -= np.median(np.ascontiguousarray(change.reshape(-1, 3).T), axis=1)  # in the order in which it is quick
     alpha, noise, other = _shares(change, behind, sigma, looks.colours)
     alpha = alpha / (1 + other / OTHER_COLOUR)
@@ -272,9 +272,7 @@ def _change(
     picture: np.ndarray, frame: int, plates: Plates, window: tuple[int, int, int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """The window of a frame, and how much it differs from the background in standard deviations."""
-    left, top, right, bottom = window
-    behind, sigma, seen = plates.window(frame, left, top, right - left, bottom - top)
-    part = picture[top:bottom, left:right].astype(np.float32)
+    part, (behind, sigma, seen) = plates.beside(picture, frame, window)
     change = part - behind
     return part, np.sqrt(over_channels(change, change) / np.float32(3)) / sigma * seen
 

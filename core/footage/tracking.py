@@ -100,7 +100,7 @@ def track_block(
         back, _ = follow(footage, other, start.frame, progress)
         rows += _joined(there, back[::-1])[1:]
     forwards, after = follow(footage, starts[-1], last, progress)
-    return _assembled(motion, [*rows, *forwards[1:]], (before, after))
+    return _assembled(motion, [*rows, *forwards[1:]], (before, after), footage.plates.spacing)
 
 
 def _check(video: Source, marks: Sequence[tuple[int, tuple[float, float]]], first: int, last: int) -> None:
@@ -129,14 +129,15 @@ def _joined(there: Sequence[Row], back: Sequence[Row]) -> list[Row]:
     return [row for row in there if row.frame <= turn] + [row for row in back if row.frame > turn]
 
 
-def _assembled(motion: BackgroundMotion, rows: Sequence[Row], stopped: tuple[str, str]) -> BlockTrack:
+def _assembled(motion: BackgroundMotion, rows: Sequence[Row], stopped: tuple[str, str], spacing: float) -> BlockTrack:
     time_s, frame = np.array([row.time_s for row in rows]), np.array([row.frame for row in rows], dtype=np.intp)
     pixel, sigma, diameter, score = (
         np.array([getattr(row.seen, name) for row in rows]) for name in ("pixel", "sigma_px", "diameter_px", "score")
     )
     score = np.minimum(score, 1.0)
     stable = np.array([row.stable for row in rows])
-    offset, larger = outline_offsets([row.patch for row in rows], stable, np.array([row.scale_px for row in rows]))
+    scale = np.array([row.scale_px for row in rows])
+    offset, larger = outline_offsets([row.patch for row in rows], stable, scale, spacing)
     pixel, diameter = pixel + offset, diameter * larger
     stable = stabilise(motion, frame, pixel)
     return BlockTrack(

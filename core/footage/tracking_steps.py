@@ -27,10 +27,14 @@ CONFIRMED = 3
 LARGEST_JUMP = 1.6
 """Change of the step between frames at an impact, in steps before it, at most."""
 SHUTTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
-LEARNING = 0.12
+LEARNING, SLOW = 0.12, 0.1
+"""Share of what is new in each sighting; none of one that moves by less than so many diameters a frame: a block that
+nearly rests fades into its background.
+"""
 VISIBLE = 0.4
-CONTRAST = 2.0
-"""With the background, in standard deviations of a pixel, at least."""
+CONTRAST, HELD_CONTRAST = 2.0, 1.5
+"""With the background, in standard deviations of a pixel, at least; and where the block is expected, so that it does
+not come and go at the limit."""
 KINK_SIGMAS = 4.0
 
 
@@ -246,7 +250,7 @@ def _as_expected(state: State, here: Cover, expected: Expected, found: tuple[Arr
     for i in np.argsort(-(np.minimum(score, most) - 0.3 * (away / expected.tight) ** 2)):
         if away[i] <= expected.tight and score[i] >= needed - 0.1:
             seen = fit(here, state.looks, pixel[i], expected.step * state.looks.shutter)
-            if seen is not None and seen.score >= needed and seen.visible > 0.15 and seen.contrast > CONTRAST:
+            if seen is not None and seen.score >= needed and seen.visible > 0.15 and seen.contrast > HELD_CONTRAST:
                 return seen
     return None
 
@@ -321,8 +325,9 @@ def _accepted(
     past = (*past[1 - MEMORY :], Place(expected.time_s, stable, max(seen.sigma_px, 0.1)))
     rows = (*state.rows, _row(footage, frame, picture, seen, stable, state.looks))
     state = replace(state, missed=0, past=past, rows=rows, rivals=())
-    blurred = float(np.hypot(*step)) * state.looks.shutter > 0.6 * seen.diameter_px
-    if seen.score > 0.75 and seen.visible > 0.9 and state.confirmed >= CONFIRMED and not blurred:
+    moved = float(np.hypot(*step))
+    blurred, slow = moved * state.looks.shutter > 0.6 * seen.diameter_px, moved < SLOW * seen.diameter_px
+    if seen.score > 0.75 and seen.visible > 0.9 and state.confirmed >= CONFIRMED and not (blurred or slow):
         return replace(state, looks=learn(picture, frame, footage.plates, state.looks, seen, LEARNING))
     return state
 

@@ -105,6 +105,7 @@ def test_an_exposure_that_changes_does_not_bend_the_path(sign: int) -> None:
     ]
     points = np.array([[0.0, 0.0], [400, 0], [0, 300], [400, 300], [200, 150]])
     motion, _ = background_motion(clip(exposed))
+    assert motion.brightness == pytest.approx(1 + sign * 0.33 * np.arange(count) / count, abs=0.03)
     worst = max(
         float(np.hypot(*(stabilise(motion, np.full(5, frame), points) - true_places(frame, points)).T).max())
         for frame in range(count)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture without what moves: medians, spreads and places of made frames, computed independently."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rockfall.core.footage.background import BackgroundMotion, no_motion
@@ -13,6 +15,14 @@ WIDTH, HEIGHT = 120, 80
 def grey(values: list[int]) -> Pictures:
     """Frames of one grey level each."""
     return Pictures([np.full((HEIGHT, WIDTH), value, np.uint8) for value in values], np.arange(len(values)) / 30.0)
+
+
+def spot(values: list[int]) -> Pictures:
+    """Frames of one grey level, the same in all, but for 40 × 35 pixels from (5, 15)."""
+    images = [np.full((HEIGHT, WIDTH), 90, np.uint8) for _ in values]
+    for image, value in zip(images, values, strict=True):
+        image[15:50, 5:45] = value
+    return Pictures(images, np.arange(len(values)) / 30.0)
 
 
 def panning(count: int, step: int, first: int = 0) -> BackgroundMotion:
@@ -33,7 +43,7 @@ def test_samples_in_any_order_are_sorted(count: int) -> None:
 @pytest.mark.parametrize("count", [1, 4, 15])
 def test_a_still_camera_gives_the_median_and_the_quartiles(count: int) -> None:
     values = np.random.default_rng(count).permutation(np.arange(count) * 7 + 20)
-    picture, sigma, seen = Plates(grey(values.tolist()), no_motion(0, count - 1)).window(0, 10, 20, 30, 25)
+    picture, sigma, seen = Plates(spot(values.tolist()), no_motion(0, count - 1)).window(0, 10, 20, 30, 25)
     assert picture.shape == (25, 30, 3)
     ordered = np.sort(values)
     assert (picture == ordered[(count - 1) // 2]).all()
@@ -44,8 +54,36 @@ def test_a_still_camera_gives_the_median_and_the_quartiles(count: int) -> None:
 
 def test_fifteen_frames_from_all_of_a_long_clip_make_a_plate() -> None:
     values = np.arange(200).tolist()
-    picture, _, _ = Plates(grey(values), no_motion(0, 199)).window(0, 0, 0, 5, 5)
+    picture, _, _ = Plates(spot(values), no_motion(0, 199)).window(0, 20, 30, 5, 5)
     assert (picture == np.sort(np.linspace(0, 199, 15).round())[7]).all()
+
+
+@pytest.mark.parametrize("looked", [True, False])
+def test_an_exposure_that_changes_leaves_the_picture_as_the_plate(looked: bool) -> None:
+    """Frames of one texture in other exposures, of a camera whose brightness is known or that is said to be still."""
+    exposure = np.linspace(0.7, 1.3, 9)
+    texture = np.random.default_rng(5).integers(60, 180, (HEIGHT, WIDTH, 3)).astype(np.float64)
+    pictures = [np.round(texture * factor).astype(np.uint8) for factor in exposure]
+    pictures[6][40:50, 60:70] = 200  # what moves
+    motion = no_motion(0, 8)
+    motion = replace(motion, brightness=2 * exposure) if looked else motion
+    part, (behind, sigma, _) = Plates(Pictures(pictures, np.arange(9) / 30), motion).beside(
+        pictures[6], 6, (30, 20, 90, 60)
+    )
+    apart = np.abs(part - behind)
+    moving = np.zeros(apart.shape[:2], bool)
+    moving[20:30, 30:40] = True
+    assert apart[~moving].max() <= 3  # roundings
+    assert apart[moving].mean() > 20
+    assert np.median(sigma) < 1.5 * NOISE_FLOOR
+
+
+def test_an_exposure_that_stays_changes_nothing() -> None:
+    motion = replace(no_motion(0, 8), brightness=1 + 0.004 * np.sin(np.arange(9.0)))
+    assert motion.exposure is None
+    texture = np.random.default_rng(5).integers(60, 180, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+    part, _ = Plates(Pictures([texture] * 9, np.arange(9) / 30), motion).beside(texture, 4, (30, 20, 90, 60))
+    assert (part == texture[20:60, 30:90]).all()
 
 
 def test_the_plate_of_a_panning_camera_lies_where_the_picture_does() -> None:

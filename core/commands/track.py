@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         first = arguments.first or 0
         last = video.frames - 1 if arguments.last is None else arguments.last
         _check(video, clicks, first, last)
-        source = kept(video, first, last)
+        source = kept(video, first, last, clicks[0][0])
         if arguments.still:
             motion = no_motion(first, last)
         else:
@@ -100,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
             write_events(events, folder / "events.csv")
             progress("Drawing the picture")
             labels = [f"{time:.3f} s" for time in kinks.time_s]
-            picture = draw_track(source, track, motion, kinks, labels, clicks[0][0])
+            picture = draw_track(video, track, motion, kinks, labels, clicks[0][0])
             write_picture(folder / "track.png", picture)
     _print_summary(arguments, track, motion, kinks, events)
     if said := layered_background(motion, video.width):

@@ -7,7 +7,7 @@ found, not with the one before, so that errors do not add up; a homography to th
 (MAGSAC++, Barath et al. 2020), then by least squares.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..opencv import opencv
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
-from .sources import Source, frames
+from .sources import Kept, Source, frames, reduced, reduction
 
 GRID = (16, 10)
 PER_CELL = 4
@@ -26,8 +26,6 @@ FINE, COARSE = (30, 0.02), (10, 0.03)
 GUESSED_FROM, GUESS_INLIER_PX = 100, 4.0
 """So many corners tell about where all have gone."""
 TOGETHER = 0.8
-LARGEST = 2_200_000
-"""Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
 LEVELLED = 0.01
 """By how much brightness may differ from frame to frame before it is made the same."""
 FORWARD_BACKWARD_PX = 0.5
@@ -109,6 +107,19 @@ class TrackedFeatures:
     pixel: Array
 
 
+def reduced_motion(motion: BackgroundMotion, scale: int) -> BackgroundMotion:
+    """The motion in pictures that are so many times less wide and high."""
+    if scale == 1:
+        return motion
+    size = np.diag([scale, scale, 1.0])
+    return replace(
+        motion,
+        homography=np.linalg.inv(size) @ motion.homography @ size,
+        rms_px=motion.rms_px / scale,
+        apart_px=motion.apart_px / scale,
+    )
+
+
 def no_motion(first: int, last: int) -> BackgroundMotion:
     """What is known of a camera on a tripod without looking: frames `first` to `last` do not move."""
     count = last - first + 1
@@ -181,12 +192,13 @@ def background_motion(
     InputError : the background cannot be followed, with the frame.
     """
     last = source.time_s.size - 1 if last is None else last
-    scale = 1.0
+    inside = reduction(source.width, source.height)
+    scale = inside * source.scale if isinstance(source, Kept) else inside
     follower, numbers, homographies, inliers, rms, apart, brightness = None, [], [], [], [], [], []
     sightings: list[tuple[int, Indices, Array]] = []
-    for frame, picture in frames(source, range(first, last + 1)):
+    for frame, picture in frames(source, range(first, last + 1), as_decoded=True):
         progress("Following the background", frame - first, last - first + 1)
-        grey, scale = _reduced(opencv().cvtColor(picture, opencv().COLOR_BGR2GRAY))
+        grey = opencv().cvtColor(reduced(picture, inside), opencv().COLOR_BGR2GRAY)
         if follower is None:
             follower = _Follower(grey, frame)
         else:
@@ -197,15 +209,15 @@ def background_motion(
         rms.append(scale * follower.rms)
         apart.append(scale * follower.apart)
         brightness.append(follower.brightness)
-        sightings.append((frame, follower.names, scale * follower.pixel))
+        sightings.append((frame, follower.names, scale * (follower.pixel + 0.5)))
     still = _is_still(sightings)
     count = len(numbers)
     features = TrackedFeatures(
         frame=np.concatenate([np.full(names.size, frame) for frame, names, _ in sightings]),
         feature=np.concatenate([names for _, names, _ in sightings]),
-        pixel=np.concatenate([pixel for _, _, pixel in sightings]) + 0.5,
+        pixel=np.concatenate([pixel for _, _, pixel in sightings]),
     )
-    corner = np.array([[scale, 0, 0.5], [0, scale, 0.5], [0, 0, 1]])
+    corner = np.array([[scale, 0, scale / 2], [0, scale, scale / 2], [0, 0, 1]])
     homography = np.tile(np.eye(3), (count, 1, 1)) if still else corner @ np.array(homographies) @ np.linalg.inv(corner)
     return BackgroundMotion(
         frames=np.array(numbers),
@@ -288,14 +300,6 @@ class _Follower:
         self.reference = np.concatenate([self.reference, _through(self.homography, fresh)])
         self.key, self.key_small, self.key_pixel, self.key_count = grey, self.small, self.pixel, self.names.size
         self.key_brightness = self.brightness
-
-
-def _reduced(grey: np.ndarray) -> tuple[np.ndarray, float]:
-    """A picture of no more than `LARGEST` pixels, and how many times as wide the whole one is."""
-    scale = 1.0
-    while grey.size > LARGEST:
-        grey, scale = opencv().pyrDown(grey), 2 * scale
-    return grey, scale
 
 
 def _quartered(grey: np.ndarray) -> np.ndarray:

@@ -205,7 +205,7 @@ class Plates:
         numbers = self._motion.frames
         near = numbers[(np.abs(numbers - anchor) <= REACH) & (wandered < 1 - SHARED)].tolist()
         if isinstance(self._source, Kept):
-            there = [frame for frame in near if self._source.has(frame)]
+            there = [frame for frame in near if self._source.holds(frame)]
             near = there if len(there) >= SAMPLES else near
         chosen = sorted({near[i] for i in np.linspace(0, len(near) - 1, SAMPLES).round().astype(int)})
         return list(frames(self._source, chosen))

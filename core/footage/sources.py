@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..memory import available_bytes
+from ..opencv import opencv
 from ..vectors import Array
 from .ahead import ahead
 from .video import Video, read_frames
@@ -15,6 +16,10 @@ CHUNK, CHUNK_BYTES = (12, 48), 300_000_000
 """Frames held at a time while a video is read backwards: as many as fit, at least and at most."""
 MOST_BYTES, PART_OF_MEMORY = 900_000_000, 0.25
 """Room for the frames that are kept, and as a part of the memory that is there."""
+SPREAD, SPREAD_FRAMES = 20, 30
+"""So many of the frames that are kept are evenly spaced, or one in so many of a long film if these are more."""
+LARGEST = 2_300_000
+"""Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,16 +47,29 @@ class Pictures:
 
 
 class Kept:
-    """A video whose frames, once decoded, are kept in memory: all of a short clip, evenly spaced ones of a longer.
+    """A video whose frames, once decoded, are kept in memory, as far as there is room, large ones reduced.
 
-    Following the background, making it without what moves, and following the block all go through the same frames.
+    Following the background, making it without what moves, and following the block all go through the same frames. Of
+    a film that does not fit, evenly spaced frames are kept, and those before and after the frame `upto`: from there the
+    block is followed back, in which direction a film cannot be decoded.
+
+    Attributes
+    ----------
+    video : the file.
+    scale : how many times as wide and high as the kept ones its pictures are; 1 when `whole` is asked for.
     """
 
-    def __init__(self, video: Video, first: int = 0, last: int | None = None) -> None:
-        last = video.frames - 1 if last is None else last
+    def __init__(
+        self, video: Video, first: int = 0, last: int | None = None, upto: int | None = None, *, whole: bool = False
+    ) -> None:
+        count = (video.frames - 1 if last is None else last) - first + 1
         self.video = video
-        self._room = int(min(MOST_BYTES, PART_OF_MEMORY * available_bytes()))
-        self._every = max(-(-(last - first + 1) * self.frame_bytes // max(self._room, 1)), 1)
+        self.scale = 1 if whole else reduction(video.width, video.height)
+        self._room = int(min(MOST_BYTES, PART_OF_MEMORY * available_bytes())) // self.frame_bytes
+        spread = self._room if upto is None else min(self._room, max(SPREAD, count // SPREAD_FRAMES))
+        self._every = 1 if self._room >= count else max(-(-count // max(spread, 1)), 1)
+        begin = first if upto is None else max(upto + 1 - (self._room - spread), first)
+        self._around = range(begin, begin + self._room - spread)
         self._pictures: dict[int, np.ndarray] = {}
 
     @property
@@ -61,44 +79,91 @@ class Kept:
 
     @property
     def width(self) -> int:
-        """[px]."""
-        return self.video.width
+        """Of a kept picture [px]."""
+        return self.video.width // self.scale
 
     @property
     def height(self) -> int:
-        """[px]."""
-        return self.video.height
+        """Of a kept picture [px]."""
+        return self.video.height // self.scale
 
     @property
     def frame_bytes(self) -> int:
         """Of a picture in memory."""
-        return 3 * self.width * self.height
+        return self.width * self.height * 3 // (2 if self._is_even else 1)
 
-    def has(self, frame: int) -> bool:
-        """Whether a frame is there without decoding it."""
-        return frame in self._pictures
+    @property
+    def _is_even(self) -> bool:
+        return self.width % 2 == self.height % 2 == 0
 
-    def ascending(self, indices: Sequence[int], *, beside: bool = True) -> Iterator[tuple[int, np.ndarray]]:
-        """Index and picture of ascending frames, those decoded that are not there, `beside` the caller's own work."""
+    def holds(self, frame: int) -> bool:
+        """Whether a frame is one of the evenly spaced ones that are there without decoding."""
+        return frame % self._every == 0 and frame in self._pictures
+
+    def ascending(
+        self, indices: Sequence[int], *, beside: bool = True, as_decoded: bool = False
+    ) -> Iterator[tuple[int, np.ndarray]]:
+        """Index and picture of ascending frames, those decoded that are not there, `beside` the caller's own work.
+
+        All are as they come out of memory, so that a picture that a film repeats is the same, unless `as_decoded`.
+        """
         missing = [index for index in indices if index not in self._pictures]
-        decoded, kept = _decoded(self.video, missing, beside), dict.fromkeys(missing)
+        decoded, fresh = _decoded(self.video, missing, beside), dict.fromkeys(missing)
         for index in indices:
-            picture = next(decoded)[1] if index in kept else self._pictures[index]
-            if index % self._every == 0 and (len(self._pictures) + 1) * self.frame_bytes <= self._room:
-                self._pictures[index] = picture
-            yield index, picture
+            if index not in fresh:
+                yield index, _unpacked(self._pictures[index])
+                continue
+            picture = reduced(next(decoded)[1], self.scale)
+            packed = _packed(picture) if self._is_even else picture
+            if (index % self._every == 0 or index in self._around) and len(self._pictures) < self._room:
+                self._pictures[index] = packed
+            yield index, picture if as_decoded else _unpacked(packed)
+
+
+def reduction(width: int, height: int) -> int:
+    """How many times as wide and high as its followed picture a video's is: 1, 2, 4, …, by which it can be divided."""
+    scale = 1
+    while width * height > LARGEST * scale**2 and width % (2 * scale) == height % (2 * scale) == 0:
+        scale *= 2
+    return scale
+
+
+def reduced(picture: np.ndarray, scale: int) -> np.ndarray:
+    """A picture so many times less wide and high, each pixel the mean of those that it covers."""
+    if scale == 1:
+        return picture
+    cv2, (height, width) = opencv(), picture.shape[:2]
+    smaller: np.ndarray = cv2.resize(picture, (width // scale, height // scale), interpolation=cv2.INTER_AREA)
+    return smaller
+
+
+def _packed(picture: np.ndarray) -> np.ndarray:
+    """A picture of even width and height as films hold it, colours at half the resolution: half the memory."""
+    cv2 = opencv()
+    packed: np.ndarray = cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420)
+    return packed
+
+
+def _unpacked(picture: np.ndarray) -> np.ndarray:
+    """(h, w, 3) BGR."""
+    cv2 = opencv()
+    whole: np.ndarray = cv2.cvtColor(picture, cv2.COLOR_YUV2BGR_I420) if picture.ndim == 2 else picture
+    return whole
 
 
 type Source = Video | Pictures | Kept
 
 
-def kept(source: Source, first: int, last: int) -> Pictures | Kept:
-    """The source with its frames from first to last kept in memory, as far as there is room."""
-    return Kept(source, first, last) if isinstance(source, Video) else source
+def kept(source: Source, first: int, last: int, upto: int | None = None) -> Pictures | Kept:
+    """The source with its frames from first to last kept in memory, as far as there is room; see `Kept`."""
+    return Kept(source, first, last, upto) if isinstance(source, Video) else source
 
 
-def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
-    """Index and (h, w, 3) BGR picture of the frames `indices`, all ascending or all descending."""
+def frames(source: Source, indices: Sequence[int], *, as_decoded: bool = False) -> Iterator[tuple[int, np.ndarray]]:
+    """Index and (h, w, 3) BGR picture of the frames `indices`, all ascending or all descending.
+
+    `as_decoded` is quicker, and takes that frames which are kept differ by roundings from one time to the next.
+    """
     if isinstance(source, Pictures):
         for index in indices:
             picture = source.images[index]
@@ -106,14 +171,16 @@ def frames(source: Source, indices: Sequence[int]) -> Iterator[tuple[int, np.nda
     elif len(indices) > 1 and indices[1] < indices[0]:
         chunk = int(np.clip(CHUNK_BYTES // (3 * source.width * source.height), *CHUNK))
         for start in range(0, len(indices), chunk):
-            yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]), False)))
+            yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]), False, as_decoded)))
     else:
-        yield from _ascending(source, indices, True)
+        yield from _ascending(source, indices, True, as_decoded)
 
 
-def _ascending(source: Video | Kept, indices: Sequence[int], beside: bool) -> Iterator[tuple[int, np.ndarray]]:
+def _ascending(
+    source: Video | Kept, indices: Sequence[int], beside: bool, as_decoded: bool
+) -> Iterator[tuple[int, np.ndarray]]:
     if isinstance(source, Kept):
-        return source.ascending(indices, beside=beside)
+        return source.ascending(indices, beside=beside, as_decoded=as_decoded)
     return _decoded(source, indices, beside)
 
 

@@ -71,7 +71,7 @@ class Sighting:
     diameter_px : fitted.
     score : likeness, 1 for a perfect disc of the block's colour on a free background.
     amplitude : share of the block's contrast that is found.
-    visible : share of the disc that lies in the picture.
+    visible : share of the disc that lies in the picture, where the background is known.
     contrast : contrast with the background in standard deviations of a pixel, where the block should be.
     """
 
@@ -92,7 +92,9 @@ def cover(picture: np.ndarray, frame: int, plates: Plates, looks: Appearance, ce
         return Cover(left, top, empty, empty, empty)
     part, (behind, sigma, seen) = plates.beside(picture, frame, (left, top, right, bottom))
     change = part - behind
-    change -= np.median(np.ascontiguousarray(change.reshape(-1, 3).T), axis=1)  # in the order in which it is quick
+    known = change.reshape(-1, 3) if seen.all() else change[seen > 0]
+    if len(known):
+        change -= np.median(np.ascontiguousarray(known.T), axis=1)  # in the order in which it is quick
     alpha, noise, other = _shares(change, behind, sigma, looks.colours)
     alpha = alpha / (1 + other / OTHER_COLOUR)
     weight = seen / (noise + SHAPE_ERROR**2)
@@ -251,7 +253,7 @@ def fit(here: Cover, looks: Appearance, centre: Array, streak: Array) -> Sightin
         diameter_px=float(diameter * np.exp(values[2])),
         score=float(found / max(energy, 1e-9)),
         amplitude=float(values[3]),
-        visible=float(np.sum(shape) / whole),
+        visible=float(np.sum(shape * (weight > 0)) / whole),
         contrast=float(np.sqrt(inside)),
     )
 

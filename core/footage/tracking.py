@@ -10,13 +10,18 @@ import numpy as np
 from ..errors import InputError
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
-from .background import BackgroundMotion, background_motion, stabilise
+from .background import BackgroundMotion, background_motion, reduced_motion, stabilise
 from .plates import Plates
 from .silhouette import outline_offsets
-from .sources import Source, kept
+from .sources import Kept, Source, kept
 from .track_scatter import scatter_sigma
-from .tracking_start import Footage, start_at
+from .tracking_start import Footage, Start, start_at
 from .tracking_steps import Row, follow
+
+SMALLEST = 8.0
+"""A block is not made smaller than this by reducing pictures [px]."""
+type Mark = tuple[int, tuple[float, float]]
+"""A click: frame, and pixel (u, v)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,12 +92,11 @@ def track_block(
     first, last = 0 if first is None else first, video.time_s.size - 1 if last is None else last
     marks = sorted({int(f): (float(u), float(v)) for f, u, v in [*clicks, (frame, *pixel)]}.items())
     _check(video, marks, first, last)
-    source = kept(video, first, last)
+    source = kept(video, first, last, marks[0][0])
     motion = (
         background_motion(source, first=first, last=last, progress=progress)[0] if background is None else background
     )
-    footage = Footage(source, motion, Plates(source, motion, progress))
-    starts = [start_at(footage, at, np.array(place), diameter_px) for at, place in marks]
+    footage, starts, scale = _begun(source, motion, marks, diameter_px, progress)
     backwards, before = follow(footage, starts[0], first, progress)
     rows = list(backwards[::-1])
     for start, other in pairwise(starts):
@@ -100,10 +104,38 @@ def track_block(
         back, _ = follow(footage, other, start.frame, progress)
         rows += _joined(there, back[::-1])[1:]
     forwards, after = follow(footage, starts[-1], last, progress)
-    return _assembled(motion, [*rows, *forwards[1:]], (before, after), footage.plates.spacing)
+    return _assembled(motion, [*rows, *forwards[1:]], (before, after), footage.plates.spacing, scale)
 
 
-def _check(video: Source, marks: Sequence[tuple[int, tuple[float, float]]], first: int, last: int) -> None:
+def _begun(
+    source: Source, motion: BackgroundMotion, marks: Sequence[Mark], diameter_px: float | None, progress: Progress
+) -> tuple[Footage, list[Start], int]:
+    """The footage in which the block is followed, what it is where it was clicked, and by how much both are reduced.
+
+    Large pictures are reduced unless the block is too small for it.
+    """
+
+    def begun(pictures: Source, scale: int) -> tuple[Footage, list[Start], int]:
+        moved = reduced_motion(motion, scale)
+        footage = Footage(pictures, moved, Plates(pictures, moved, progress))
+        size = None if diameter_px is None else diameter_px / scale
+        return footage, [start_at(footage, at, np.array(place) / scale, size) for at, place in marks], scale
+
+    if not isinstance(source, Kept) or source.scale == 1:
+        return begun(source, 1)
+    if diameter_px is None or diameter_px >= SMALLEST * source.scale:
+        try:
+            found = begun(source, source.scale)
+        except InputError:
+            pass  # perhaps it is seen in the whole picture; what that raises is told
+        else:
+            if min(start.looks.diameter_px for start in found[1]) >= SMALLEST:
+                return found
+    return begun(Kept(source.video, int(motion.frames[0]), int(motion.frames[-1]), marks[0][0], whole=True), 1)
+
+
+def _check(source: Source, marks: Sequence[Mark], first: int, last: int) -> None:
+    video = source.video if isinstance(source, Kept) else source
     count = video.time_s.size
     if not 0 <= first <= last < count:
         raise InputError(f"Frames {first} to {last} are not in the video, which has the frames 0 to {count - 1}")
@@ -129,24 +161,26 @@ def _joined(there: Sequence[Row], back: Sequence[Row]) -> list[Row]:
     return [row for row in there if row.frame <= turn] + [row for row in back if row.frame > turn]
 
 
-def _assembled(motion: BackgroundMotion, rows: Sequence[Row], stopped: tuple[str, str], spacing: float) -> BlockTrack:
+def _assembled(
+    motion: BackgroundMotion, rows: Sequence[Row], stopped: tuple[str, str], spacing: float, scale: int
+) -> BlockTrack:
+    """The track in whole pictures, of rows in reduced ones."""
     time_s, frame = np.array([row.time_s for row in rows]), np.array([row.frame for row in rows], dtype=np.intp)
     pixel, sigma, diameter, score = (
         np.array([getattr(row.seen, name) for row in rows]) for name in ("pixel", "sigma_px", "diameter_px", "score")
     )
     score = np.minimum(score, 1.0)
-    stable = np.array([row.stable for row in rows])
-    scale = np.array([row.scale_px for row in rows])
-    offset, larger = outline_offsets([row.patch for row in rows], stable, scale, spacing)
+    stable, size = np.array([row.stable for row in rows]), np.array([row.scale_px for row in rows])
+    offset, larger = outline_offsets([row.patch for row in rows], stable, size, spacing)
     pixel, diameter = pixel + offset, diameter * larger
-    stable = stabilise(motion, frame, pixel)
+    stable = stabilise(reduced_motion(motion, scale), frame, pixel)
     return BlockTrack(
         frame=frame,
         time_s=time_s,
-        pixel=pixel,
-        sigma_px=scatter_sigma(time_s, stable, sigma, diameter, score),
+        pixel=scale * pixel,
+        sigma_px=scale * scatter_sigma(time_s, stable, sigma, diameter, score),
         score=score,
-        stable=stable,
-        diameter_px=diameter,
+        stable=scale * stable,
+        diameter_px=scale * diameter,
         stopped=stopped,
     )

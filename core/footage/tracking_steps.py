@@ -20,7 +20,7 @@ RIVAL = 0.12
 """Scores that are nearer than this are not told apart."""
 GAP_FRAMES = 12
 JUMP_FRAMES = 4
-"""Unseen frames after which it is looked for only where its motion leads, or where it left the picture."""
+"""Unseen frames after which it is looked for only where its motion leads; as one that has left the picture is."""
 MEMORY = 10
 CONFIRMED = 3
 """Sightings in a row that make one after a gap or a jump credible."""
@@ -105,7 +105,7 @@ class Expected:
     ----------
     frame, time_s : the frame.
     stable, sigma_px : (2,) place in the reference frame of the background, its standard deviation [px].
-    centre : (2,) place in the picture [px].
+    centre, inside : (2,) place in the picture or beside it, and the nearest one in it [px].
     velocity, step : (2,) [px/s], and to the next frame [px].
     tight, wide : how far around it is looked for as expected, and after an impact [px].
     """
@@ -115,6 +115,7 @@ class Expected:
     stable: Array
     sigma_px: float
     centre: Array
+    inside: Array
     velocity: Array
     step: Array
     tight: float
@@ -180,9 +181,9 @@ def _next(footage: Footage, state: State, frame: int, picture: np.ndarray) -> tu
     state, expected = _expected(footage, state, frame, time_s)
     before, state = state.picture, replace(state, picture=picture)
     reach = expected.wide + state.looks.diameter_px + 0.5 * float(np.hypot(*expected.step)) * state.looks.shutter + 3
-    if before is not None and _repeated(before, picture, expected.centre, reach):
+    if before is not None and _repeated(before, picture, expected.inside, reach):
         return state, ""
-    here = cover(picture, frame, footage.plates, state.looks, expected.centre, reach)
+    here = cover(picture, frame, footage.plates, state.looks, expected.inside, reach)
     found = search(here, state.looks, expected.step * state.looks.shutter)
     if (seen := _as_expected(state, here, expected, found)) is not None:
         return _accepted(footage, state, picture, here, seen, expected, jumped=False), ""
@@ -208,12 +209,12 @@ def _expected(footage: Footage, state: State, frame: int, time_s: float) -> tupl
     centre, step = footage.pixel(frame, stable), velocity * footage.step_s(frame)
     outside = bool((centre < 0).any() or (centre > size).any())
     leaving = outside and (state.leaving or state.missed <= 2)
+    gone = bool((centre < -diameter / 2).any() or (centre > size + diameter / 2).any())
     tight = 0.5 * diameter + 3 * sigma
     wide = diameter + LARGEST_JUMP * float(np.hypot(*step)) * (1 + min(state.missed, JUMP_FRAMES))
-    wide = max(tight, wide) if leaving or state.missed < JUMP_FRAMES else tight
+    wide = max(tight, wide) if state.missed < JUMP_FRAMES and not gone else tight
     wide = min(wide, 0.25 * float(size.max()))
-    inside = np.clip(centre, 0.0, size)
-    expected = Expected(frame, time_s, stable, sigma, inside, velocity, step, tight, wide)
+    expected = Expected(frame, time_s, stable, sigma, centre, np.clip(centre, 0.0, size), velocity, step, tight, wide)
     return replace(state, leaving=leaving), expected
 
 
@@ -353,7 +354,7 @@ def _without_doubtful(state: State) -> State:
 def _reason(state: State, here: Cover, expected: Expected, found: tuple[Array, Array]) -> str:
     """Why the block is not seen where it is expected."""
     rows, columns = here.noise.shape
-    row, column = int(expected.centre[1] - here.top), int(expected.centre[0] - here.left)
+    row, column = int(expected.inside[1] - here.top), int(expected.inside[0] - here.left)
     half = max(int(state.looks.diameter_px / 2), 1)
     around = here.noise[max(row - half, 0) : row + half + 1, max(column - half, 0) : column + half + 1]
     if 0 <= row < rows and 0 <= column < columns and around.size and np.median(around) > 0.5:

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import rockfall
 from rockfall.core.errors import InputError
-from rockfall.core.footage import tracking_steps
-from rockfall.core.footage.background import no_motion
+from rockfall.core.footage import sources, tracking, tracking_steps
+from rockfall.core.footage.background import BackgroundMotion, no_motion
 from rockfall.core.footage.kinks import find_kinks
+from rockfall.core.footage.plates import Plates
 from rockfall.core.footage.sources import Pictures
-from rockfall.core.footage.templates import Appearance, Sighting, fit
+from rockfall.core.footage.templates import Appearance, Sighting, cover, fit
 from rockfall.core.footage.tracking import BlockTrack, track_block
 from rockfall.core.footage.tracking_steps import SHUTTERS, State, _moves
 from rockfall.core.footage.video import open_video
@@ -267,6 +268,25 @@ def test_leaving_the_picture_is_told() -> None:
     assert np.abs(error[:-2]).max() < 0.5
 
 
+def test_what_is_unknown_of_the_background_does_not_tell_how_bright_the_picture_is() -> None:
+    """A camera that pans: of the upper part of its last picture there are too few others. No block is in it."""
+    clip = Clip()
+    ground = texture(np.random.default_rng(1), clip, 60).astype(np.uint8)
+    pictures = Pictures([ground[120 - 10 * k : 240 - 10 * k, :200] for k in range(9)], np.arange(9) / RATE_HZ)
+    homography = np.tile(np.eye(3), (9, 1, 1))
+    homography[:, 1, 2] = -10.0 * np.arange(9)
+    motion = BackgroundMotion(np.arange(9), homography, np.full(9, 50), np.zeros(9), False)
+    looks = Appearance(np.array([[ground.mean() - 40.0] * 3, [205.0] * 3]), 8.0)
+    plates = Plates(pictures, motion)
+    picture = np.repeat(pictures.images[8][:, :, None], 3, axis=2)
+    here = cover(picture, 8, plates, looks, np.array([100.0, 10.0]), 24.0)
+    known = here.weight > 0
+    assert 0.2 < known.mean() < 0.5
+    assert np.abs(here.alpha[known]).max() < 0.1
+    seen = fit(here, looks, np.array([100.0, 20.0]), np.zeros(2))
+    assert seen is None or seen.visible < 0.7
+
+
 def test_a_second_click_brings_the_track_back() -> None:
     pictures, truth = film(Clip(wall=(180, 320)))
     alone = track_block(pictures, 10, truth[10], background=no_motion(0, 47))
@@ -356,3 +376,27 @@ def residual(time_s: np.ndarray, pixel: np.ndarray) -> float:
     """Root mean square about a parabola [px]."""
     fitted = np.polynomial.polynomial.polyfit(time_s, pixel, 2)
     return float(np.sqrt(np.mean((np.polynomial.polynomial.polyval(time_s, fitted).T - pixel) ** 2)))
+
+
+def test_large_pictures_are_followed_reduced_unless_the_block_is_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The filmed ball: at half the size its places are those of the whole pictures; too small there, the same ones."""
+    video = open_video(BALL / "balle1-vp9.avi")
+
+    span = 40, 290
+
+    def followed() -> BlockTrack:
+        still = no_motion(span[0], span[1])
+        return track_block(video, 60, (148.0, 48.0), background=still, first=span[0], last=span[1])
+
+    whole = followed()
+    monkeypatch.setattr(sources, "LARGEST", 0.6 * video.width * video.height)
+    half = followed()
+    shared, a, b = np.intersect1d(whole.frame, half.frame, return_indices=True)
+    assert shared.size > 0.9 * whole.frame.size
+    assert np.median(np.hypot(*(whole.pixel[a] - half.pixel[b]).T)) < 0.05 * np.median(whole.diameter_px)
+    assert np.median(np.hypot(*(whole.stable[a] - half.stable[b]).T)) < 0.05 * np.median(whole.diameter_px)
+    assert np.median(half.diameter_px) == pytest.approx(np.median(whole.diameter_px), rel=0.1)
+    assert 0.3 < np.median(half.sigma_px) / np.median(whole.sigma_px) < 3
+    monkeypatch.setattr(tracking, "SMALLEST", 1e3)
+    small = followed()
+    assert np.abs(small.pixel - whole.pixel).max() < 0.2

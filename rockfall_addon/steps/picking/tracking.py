@@ -46,7 +46,7 @@ class ROCKFALL_OT_track_block(job.InBackground, bpy.types.Operator):
         frame, u, v = clicks[0]
 
         def compute(progress: Progress) -> tuple[BlockTrack, BackgroundMotion]:
-            source = kept(video, first, last)
+            source = kept(video, first, last, frame)
             motion, _ = background_motion(source, first=first, last=last, progress=progress)
             more = {"clicks": clicks[1:], "background": motion, "first": first, "last": last}
             return track_block(source, frame, (u, v), **more, progress=progress), motion

@@ -60,15 +60,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Track, write the tables and the picture, print the summary."""
     from ..exchange.footage_tables import write_events, write_track
-    from ..footage.advice import layered_background
-    from ..footage.background import background_motion, no_motion
     from ..footage.kinks import find_kinks
     from ..footage.pictures import draw_track
-    from ..footage.sources import kept
-    from ..footage.tracking import track_block
     from ..footage.video import open_video
     from ..opencv import write_picture
     from ..output import output_folder
+    from ..workflow.tracking import follow_block
 
     clicks, name = _clicks(arguments)
     with PrintedProgress() as progress:
@@ -76,20 +73,13 @@ def run(arguments: argparse.Namespace) -> int:
         first = arguments.first or 0
         last = video.frames - 1 if arguments.last is None else arguments.last
         _check(video, clicks, first, last)
-        source = kept(video, first, last, clicks[0][0])
-        if arguments.still:
-            motion = no_motion(first, last)
-        else:
-            motion, _ = background_motion(source, first=first, last=last, progress=progress)
-        track = track_block(
-            source,
-            clicks[0][0],
-            clicks[0][1:],
-            clicks=clicks[1:],
+        track, motion, said = follow_block(
+            video,
+            clicks,
+            first,
+            last,
+            still=arguments.still,
             diameter_px=arguments.diameter_px,
-            background=motion,
-            first=first,
-            last=last,
             progress=progress,
         )
         time_s = track.time_s if arguments.capture_rate is None else track.frame / arguments.capture_rate
@@ -103,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
             picture = draw_track(video, track, motion, kinks, labels, clicks[0][0])
             write_picture(folder / "track.png", picture)
     _print_summary(arguments, track, motion, kinks, events)
-    if said := layered_background(motion, video.width):
+    if said:
         print(said)
     return 0
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import bpy
+import cv2
 import numpy as np
 import pytest
 
@@ -407,6 +408,29 @@ def test_the_block_is_tracked(site, part) -> None:
     turned = np.degrees(np.arccos((np.einsum("nij,ij->n", relative, relative[0]) - 1) / 2)).max()
     assert float(said.text.split(" by ")[1].split("°")[0]) == pytest.approx(turned, abs=0.5), "as the demo was filmed"
     assert part("rockfall_addon.scene.next_step").next_step(site).sentence == said.text
+
+
+def test_near_and_far_ground_that_move_differently_are_told(
+    scene: bpy.types.Scene, part, tmp_path: Path, capfd
+) -> None:
+    rng, film = np.random.default_rng(5), tmp_path / "film.avi"
+    far, near = (cv2.GaussianBlur(rng.integers(0, 255, (400, 500, 3), np.uint8), (0, 0), 2) for _ in "ab")
+    writer = cv2.VideoWriter(str(film), cv2.VideoWriter_fourcc(*"MJPG"), 30, (400, 300))
+    for frame in range(40):
+        pan, beyond = 2 * frame, round(8 * np.sin(frame / 6))
+        picture = far[:300, pan : pan + 400].copy()
+        picture[190:] = near[210 + beyond : 320 + beyond, pan : pan + 400]
+        cv2.circle(picture, (30 + 8 * frame, 40 + 4 * frame), 9, (255, 255, 255), -1)
+        writer.write(picture)
+    writer.release()
+    camera = part("rockfall_addon.scene.new_videos").add_video(scene, film)
+    scene.camera = camera
+    part("rockfall_addon.scene.sightings").click(camera, "B1", 10, 10 / 30, np.array([110.0, 80.0]), 1.0)
+    scene.rockfall_picking.trajectory, scene.rockfall_picking.whole_video = "B1", True
+    assert bpy.ops.rockfall.track_block() == {"FINISHED"}
+    told = capfd.readouterr().out
+    assert "B1 is followed through" in told
+    assert "Parts of the background move differently, by " in told
 
 
 def test_the_guide_leads_through_the_synchronisation_of_two_videos(site, part) -> None:

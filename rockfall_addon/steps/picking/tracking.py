@@ -4,11 +4,8 @@
 import bpy
 
 from ....core.errors import RockfallError
-from ....core.footage.advice import layered_background
-from ....core.footage.background import BackgroundMotion, background_motion
-from ....core.footage.sources import kept
-from ....core.footage.tracking import BlockTrack, track_block
 from ....core.progress import Progress
+from ....core.workflow.tracking import FollowedBlock, follow_block
 from ...scene import alignment, camera_paths, clocks, places, sightings, store, video_files, videos
 from ...scene.trajectories import flights_of
 from ...view import job, look
@@ -43,25 +40,20 @@ class ROCKFALL_OT_track_block(job.InBackground, bpy.types.Operator):
             clicks = [click for click in clicks if first <= click[0] <= last]
             if not clicks:
                 raise RockfallError("No click or pick is within these pictures. Go to one, or follow the whole video.")
-        frame, u, v = clicks[0]
 
-        def compute(progress: Progress) -> tuple[BlockTrack, BackgroundMotion]:
-            source = kept(video, first, last, frame)
-            motion, _ = background_motion(source, first=first, last=last, progress=progress)
-            more = {"clicks": clicks[1:], "background": motion, "first": first, "last": last}
-            return track_block(source, frame, (u, v), **more, progress=progress), motion
+        def compute(progress: Progress) -> FollowedBlock:
+            return follow_block(video, clicks, first, last, progress=progress)
 
-        def keep(scene: bpy.types.Scene, found: tuple[BlockTrack, BackgroundMotion]) -> str:
-            track, motion = found
+        def keep(scene: bpy.types.Scene, found: FollowedBlock) -> str:
+            track = found.track
             there = videos.by_id(scene, identifier)
             if there is None:
                 raise RockfallError("The camera was deleted while its video was tracked: the track is not kept.")
             sightings.keep_track(there, name, track)
             if camera_paths.is_solved(there):
-                alignment.keep_background(there, motion)
+                alignment.keep_background(there, found.background)
             frames = f"{track.frame.size} pictures, {track.frame[0]} to {track.frame[-1]}"
-            said = layered_background(motion, video.width)
-            return f"{name} is followed through {frames}. After: {track.stopped[1]}. {said}".rstrip()
+            return f"{name} is followed through {frames}. After: {track.stopped[1]}. {found.said}".rstrip()
 
         return job.Work("picking", compute, keep)
 

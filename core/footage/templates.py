@@ -168,8 +168,8 @@ def _discs(u: Array, v: Array, centres: Array, diameters: Array, streak: Array) 
     return share[:, 0] if count == 1 else share.mean(axis=1)
 
 
-def search(here: Cover, looks: Appearance, streak: Array) -> tuple[Array, Array]:
-    """Places that look like the block, best first: (n, 2) centres [px] and (n,) scores.
+def search(here: Cover, looks: Appearance, streak: Array, most: int = 8) -> tuple[Array, Array]:
+    """Places that look like the block, best first: (n, 2) centres [px] and (n,) scores, n ≤ `most`.
 
     Centres up to half a diameter outside the window are found as well.
     """
@@ -196,7 +196,7 @@ def search(here: Cover, looks: Appearance, streak: Array) -> tuple[Array, Array]
     score[model < 0.2 * np.sum(shape**2)] = 0  # less than a contrast of half a standard deviation
     grown = cv2.dilate(score, np.ones((2 * int(diameter // 3) + 1,) * 2))
     rows, columns = np.nonzero((score >= grown) & (score > 0.3))
-    order = np.argsort(-score[rows, columns])[:8]
+    order = np.argsort(-score[rows, columns])[:most]
     place = np.column_stack([columns[order], rows[order]]).astype(np.float64)
     return place + np.array([here.left, here.top]) - pad + 0.5, score[rows[order], columns[order]]
 

@@ -15,6 +15,10 @@ from .templates import Appearance, cover, first_looks, search
 
 ACCEPTED = 0.5
 """Score of a sighting where the block is expected, at least."""
+MANY = 40
+"""Places in the frames beside a click that may be the block's: faint things can be many."""
+SLOWER = 0.05
+"""Of pairs of sightings that are as good, the slower one: what a diameter from frame to frame counts, in scores."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +88,9 @@ def start_at(footage: Footage, frame: int, click: Array, diameter_px: float | No
     for other in others:
         away = reach * abs(other - frame)
         here = cover(around[other], other, plates, looks, footage.pixel(other, origin), away)
-        pixel, score = search(here, looks, streak)
-        good = score > max(ACCEPTED, score.max(initial=0) - 0.2)
+        pixel, score = search(here, looks, streak, MANY)
+        score = np.minimum(score, 1 / np.maximum(score, ACCEPTED))  # above 1 are faint things
+        good = score > ACCEPTED
         places[other] = stabilise(motion, np.full(good.sum(), other), pixel[good]), score[good]
     return Start(frame, centre, looks, _velocity(video.time_s, frame, origin, places, looks.diameter_px))
 
@@ -111,9 +116,11 @@ def _velocity(
         (one, a), (two, b) = options.values()
         step = max(abs(time_s[other] - time_s[frame]) for other in options)
         differs = np.hypot(*(one[:, None] - two[None]).transpose(2, 0, 1)) * step / diameter
-        cost = differs - a[:, None] - b[None]
+        far = np.hypot(*one.T)[:, None] + np.hypot(*two.T)
+        cost = differs + SLOWER * far * step / diameter - a[:, None] - b[None]
         i, j = np.unravel_index(int(np.argmin(cost)), cost.shape)
         return 0.5 * (one[i] + two[j])
-    for velocity, score in options.values():
-        return velocity[int(np.argmax(score))]
+    for other, (velocity, score) in options.items():
+        far = np.hypot(*velocity.T) * abs(time_s[other] - time_s[frame]) / diameter
+        return velocity[int(np.argmax(score - SLOWER * far))]
     return None

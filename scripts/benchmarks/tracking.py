@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How quickly the block and the background are followed, against a template that is looked for in every whole frame."""
+"""How quickly the block and the background are followed, against a template that is looked for in every whole frame.
+
+And how much chance there is in a track: from other clicks, in clips that begin a little later, whose backgrounds are made
+of other pictures.
+"""
 
 import argparse
 import os
@@ -17,6 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BALL = ROOT / "assets" / "examples" / "bouncing_ball" / "balle1-vp9.avi"
 DEMO = ROOT / "assets" / "demo" / "footage"
 FOUND_PX = 5.0
+BEGINS, CLICKED = (0, 7, 14), (50, 60, 75, 100, 130, 160, 190, 220)
+"""Of the demo's footage: frames at which clips begin, and that are clicked."""
 SETTLED_FRAME, LAST_FRAME = 30, 230
 """Of the ball: out of the hand, not yet out of the picture."""
 
@@ -82,6 +88,25 @@ def from_the_file(path: Path, click: tuple[int, float, float], truth: np.ndarray
     )
 
 
+def from_other_clicks(path: Path, truth: np.ndarray, visible: np.ndarray) -> None:
+    """Print how far the tracks are off, how many frames they lack, and how many hold something else than the block."""
+    video = open_video(path)
+    off, missing, false = [], [], []
+    for first in BEGINS:
+        source = kept(video, first, video.frames - 1)
+        motion, _ = background_motion(source, first=first)
+        for frame in CLICKED:
+            track = track_block(source, frame, truth[frame] + (1, -1), background=motion, first=first)
+            apart = np.hypot(*(track.pixel - truth[track.frame]).T)
+            off.append(np.median(apart))
+            missing.append(np.setdiff1d(np.flatnonzero(visible), track.frame).size)
+            false.append(int(((apart > FOUND_PX) | ~visible[track.frame]).sum()))
+    print(
+        f"From {len(off)} clicks: median error {min(off):.2f} to {max(off):.2f} px, mean {np.mean(off):.2f}; "
+        f"{min(missing)} to {max(missing)} of {visible.sum()} frames missing; {sum(false)} frames with something else"
+    )
+
+
 def main() -> None:
     """Print the rates."""
     argparse.ArgumentParser(description=__doc__).parse_args()
@@ -104,6 +129,9 @@ def main() -> None:
         truth[block["frame"]] = np.column_stack([block["u_px"], block["v_px"]])
         seen = np.isfinite(truth[:, 0])
         from_the_file(DEMO / "footage.mp4", (int(first["frame"]), first["u_px"], first["v_px"]), truth)
+        visible = np.zeros(video.time_s.size, bool)
+        visible[block["frame"]] = block["visible"] > 0
+        from_other_clicks(DEMO / "footage.mp4", truth, visible)
         compare("Demo footage", demo, (int(first["frame"]), first["u_px"], first["v_px"]), truth, seen, still=False)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How quickly the block and the background are followed, against a template that is looked for in every whole frame.
 
-And how much chance there is in a track: from other clicks, in clips that begin a little later, whose backgrounds are made
-of other pictures.
+And how much chance there is in a track: from other clicks, in clips that begin a little later, whose backgrounds are
+made of other pictures.
 """
 
 import argparse

@@ -20,6 +20,8 @@ SPREAD, SPREAD_FRAMES = 20, 30
 """So many of the frames that are kept are evenly spaced, or one in so many of a long film if these are more."""
 LARGEST = 2_300_000
 """Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
+SMALLEST = 5.0
+"""A block is not made smaller than this by reducing pictures [px]; at 5 its places are a fifth less exact at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,10 @@ class Kept:
         """Whether a frame is one of the evenly spaced ones that are there without decoding."""
         return frame % self._every == 0 and frame in self._pictures
 
+    def forget(self) -> None:
+        """Give the memory back; what is asked for again is decoded again."""
+        self._pictures.clear()
+
     def ascending(
         self, indices: Sequence[int], *, beside: bool = True, as_decoded: bool = False
     ) -> Iterator[tuple[int, np.ndarray]]:
@@ -154,9 +160,17 @@ def _unpacked(picture: np.ndarray) -> np.ndarray:
 type Source = Video | Pictures | Kept
 
 
-def kept(source: Source, first: int, last: int, upto: int | None = None) -> Pictures | Kept:
-    """The source with its frames from first to last kept in memory, as far as there is room; see `Kept`."""
-    return Kept(source, first, last, upto) if isinstance(source, Video) else source
+def kept(
+    source: Source, first: int, last: int, upto: int | None = None, diameter_px: float | None = None
+) -> Pictures | Kept:
+    """The source with its frames from first to last kept in memory, as far as there is room; see `Kept`.
+
+    diameter_px : of the block that is followed, where it is known: small ones are followed in whole pictures.
+    """
+    if not isinstance(source, Video):
+        return source
+    small = diameter_px is not None and diameter_px < SMALLEST * reduction(source.width, source.height)
+    return Kept(source, first, last, upto, whole=small)
 
 
 def frames(source: Source, indices: Sequence[int], *, as_decoded: bool = False) -> Iterator[tuple[int, np.ndarray]]:

@@ -13,13 +13,11 @@ from ..vectors import Array, Indices
 from .background import BackgroundMotion, background_motion, reduced_motion, stabilise
 from .plates import Plates
 from .silhouette import outline_offsets
-from .sources import Kept, Source, kept
+from .sources import SMALLEST, Kept, Source, kept
 from .track_scatter import scatter_sigma
 from .tracking_start import Footage, Start, start_at
 from .tracking_steps import Row, follow
 
-SMALLEST = 8.0
-"""A block is not made smaller than this by reducing pictures [px]."""
 type Mark = tuple[int, tuple[float, float]]
 """A click: frame, and pixel (u, v)."""
 
@@ -92,7 +90,7 @@ def track_block(
     first, last = 0 if first is None else first, video.time_s.size - 1 if last is None else last
     marks = sorted({int(f): (float(u), float(v)) for f, u, v in [*clicks, (frame, *pixel)]}.items())
     _check(video, marks, first, last)
-    source = kept(video, first, last, marks[0][0])
+    source = kept(video, first, last, marks[0][0], diameter_px)
     motion = (
         background_motion(source, first=first, last=last, progress=progress)[0] if background is None else background
     )
@@ -131,6 +129,7 @@ def _begun(
         else:
             if min(start.looks.diameter_px for start in found[1]) >= SMALLEST:
                 return found
+    source.forget()
     return begun(Kept(source.video, int(motion.frames[0]), int(motion.frames[-1]), marks[0][0], whole=True), 1)
 
 

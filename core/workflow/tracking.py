@@ -49,7 +49,7 @@ def follow_block(
     InputError : see `track_block`.
     """
     frame, u, v = clicks[0]
-    source = kept(video, first, last, frame)
+    source = kept(video, first, last, frame, diameter_px)
     if still:
         background = no_motion(first, last)
     else:

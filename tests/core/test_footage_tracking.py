@@ -420,3 +420,14 @@ def test_large_pictures_are_followed_reduced_unless_the_block_is_small(monkeypat
     monkeypatch.setattr(tracking, "SMALLEST", 1e3)
     small = followed()
     assert np.abs(small.pixel - whole.pixel).max() < 0.2
+
+
+def test_reduced_to_five_pixels_a_block_is_found_as_exactly_as_its_sigma_says() -> None:
+    clip = Clip(diameter=10.0)
+    pictures, truth = film(clip)
+    half = Pictures([sources.reduced(picture, 2) for picture in pictures.images], pictures.time_s)
+    track = track_block(half, 20, truth[20] / 2, background=no_motion(0, 47))
+    error = 2 * track.pixel - truth[track.frame]
+    assert track.frame.size == 48
+    assert np.sqrt(np.mean(error**2)) < 0.12
+    assert 0.65 < turned(track, error / 2) < 1.3

@@ -27,9 +27,9 @@ CONFIRMED = 3
 LARGEST_JUMP = 1.6
 """Change of the step between frames at an impact, in steps before it, at most."""
 SHUTTERS = (0.0, 0.25, 0.5, 0.75, 1.0)
-LEARNING, SLOW = 0.12, 0.1
-"""Share of what is new in each sighting; none of one that moves by less than so many diameters a frame: a block that
-nearly rests fades into its background.
+LEARNING = 0.12
+"""Share of what is new in each sighting; none where the block moves by less than its diameter from one picture of the
+background to the next: it fades into it.
 """
 VISIBLE = 0.4
 CONTRAST, HELD_CONTRAST = 2.0, 1.5
@@ -327,7 +327,8 @@ def _accepted(
     rows = (*state.rows, _row(footage, frame, picture, seen, stable, state.looks))
     state = replace(state, missed=0, past=past, rows=rows, rivals=())
     moved = float(np.hypot(*step))
-    blurred, slow = moved * state.looks.shutter > 0.6 * seen.diameter_px, moved < SLOW * seen.diameter_px
+    blurred = moved * state.looks.shutter > 0.6 * seen.diameter_px
+    slow = moved * footage.plates.spacing < seen.diameter_px
     if seen.score > 0.75 and seen.visible > 0.9 and state.confirmed >= CONFIRMED and not (blurred or slow):
         return replace(state, looks=learn(picture, frame, footage.plates, state.looks, seen, LEARNING))
     return state

@@ -200,15 +200,17 @@ class Plates:
         return plate
 
     def _samples(self, anchor: int, wandered: Array) -> list[tuple[int, np.ndarray]]:
-        """Frames from all over the footage around the anchor, those that need not be decoded if there are enough."""
+        """Frames from all over the footage around the anchor, those that are kept if there are enough."""
         self._progress(f"Making the background around frame {anchor}", 0, 0)
         numbers = self._motion.frames
         near = numbers[(np.abs(numbers - anchor) <= REACH) & (wandered < 1 - SHARED)].tolist()
         if isinstance(self._source, Kept):
-            there = [frame for frame in near if self._source.holds(frame)]
-            near = there if len(there) >= SAMPLES else near
+            spread = [frame for frame in near if self._source.is_spread(frame)]
+            near = spread if len(spread) >= SAMPLES else near
         chosen = sorted({near[i] for i in np.linspace(0, len(near) - 1, SAMPLES).round().astype(int)})
-        return list(frames(self._source, chosen))
+        there = dict(sample for plate in self._kept for sample in plate.samples)
+        there |= dict(frames(self._source, [frame for frame in chosen if frame not in there]))
+        return [(frame, there[frame]) for frame in chosen]
 
     def _wandered(self, across: Array) -> Array:
         """(f,) how far homographies (f, 3, 3) move the corners, the furthest, as a share of the picture."""

@@ -98,9 +98,9 @@ class Kept:
     def _is_even(self) -> bool:
         return self.width % 2 == self.height % 2 == 0
 
-    def holds(self, frame: int) -> bool:
-        """Whether a frame is one of the evenly spaced ones that are there without decoding."""
-        return frame % self._every == 0 and frame in self._pictures
+    def is_spread(self, frame: int) -> bool:
+        """Whether a frame is one of the evenly spaced ones, which are kept once they are decoded."""
+        return frame % self._every == 0
 
     def forget(self) -> None:
         """Give the memory back; what is asked for again is decoded again."""

@@ -129,6 +129,7 @@ def _begun(
         else:
             if min(start.looks.diameter_px for start in found[1]) >= SMALLEST:
                 return found
+            del found
     source.forget()
     return begun(Kept(source.video, int(motion.frames[0]), int(motion.frames[-1]), marks[0][0], whole=True), 1)
 

@@ -16,11 +16,10 @@ if TYPE_CHECKING:
     from ..footage.kinks import Kinks
     from ..footage.tracking import BlockTrack
     from ..footage.video import Video
+    from ..workflow.tracking import Click
 
-Click = tuple[int, float, float]
 
-
-def click(text: str) -> Click:
+def click(text: str) -> "Click":
     """FRAME,U,V."""
     try:
         frame, u, v = text.split(",")
@@ -98,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _clicks(arguments: argparse.Namespace) -> tuple[list[Click], str]:
+def _clicks(arguments: argparse.Namespace) -> "tuple[list[Click], str]":
     """Clicks of one trajectory, and its name.
 
     Raises
@@ -130,7 +129,7 @@ def _clicks(arguments: argparse.Namespace) -> tuple[list[Click], str]:
     return sorted(clicks), next(iter(names), "")
 
 
-def _check(video: "Video", clicks: list[Click], first: int, last: int) -> None:
+def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None:
     """Before the work begins.
 
     Raises

@@ -254,7 +254,7 @@ class _Follower:
         guess, levels = self._guess(small)
         ratio = float(np.median(_brightness(small, guess) / _brightness(self.key_small, self.key_pixel)))
         self.brightness = ratio * self.key_brightness
-        bright = darkened(grey, ratio)
+        bright = levelled(grey, ratio)
         pixel, good = _flow(self.key, bright, self.key_pixel, guess, levels)
         checked = np.flatnonzero(good & (self.names % CHECKED == frame % CHECKED))
         back, back_good = _flow(bright, self.key, pixel[checked], self.key_pixel[checked], 0, COARSE)
@@ -316,12 +316,12 @@ def _brightness(small: np.ndarray, pixel: Array) -> Array:
     return small[row, column].astype(np.float64) + 1.0
 
 
-def darkened(picture: np.ndarray, brightness: float) -> np.ndarray:
+def levelled(picture: np.ndarray, brightness: float) -> np.ndarray:
     """A picture of uint8 whose brightness differs, as if it did not: the flow and the plates take it as kept."""
     if abs(brightness - 1.0) < LEVELLED:
         return picture
-    levelled: np.ndarray = opencv().convertScaleAbs(picture, alpha=1.0 / brightness)
-    return levelled
+    alike: np.ndarray = opencv().convertScaleAbs(picture, alpha=1.0 / brightness)
+    return alike
 
 
 def _corners(grey: np.ndarray, taken: Array) -> Array:

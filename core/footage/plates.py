@@ -10,7 +10,7 @@ from ..constants import IQR_PER_SD
 from ..opencv import opencv
 from ..progress import Progress, silent
 from ..vectors import Array
-from .background import BackgroundMotion, darkened
+from .background import BackgroundMotion, levelled
 from .sources import Kept, Source, frames
 
 SAMPLES = 15
@@ -110,7 +110,7 @@ class Plates:
     def beside(self, picture: np.ndarray, frame: int, box: Box) -> tuple[np.ndarray, Layers]:
         """A window of a frame's picture, (h, w, 3) float32 with the exposure of the background, and the background."""
         left, top, right, bottom = box
-        part = darkened(picture[top:bottom, left:right], self._brightness(frame, picture))
+        part = levelled(picture[top:bottom, left:right], self._brightness(frame, picture))
         return part.astype(np.float32), self.window(frame, left, top, right - left, bottom - top)
 
     def window(self, frame: int, left: int, top: int, width: int, height: int) -> Layers:
@@ -171,12 +171,12 @@ class Plates:
         for frame, picture in plate.samples:
             brightness = self._brightness(frame, picture)
             if self._motion.still:
-                layers.append(darkened(picture[top:bottom, left:right].copy(), brightness))
+                layers.append(levelled(picture[top:bottom, left:right].copy(), brightness))
                 continue
             shift = np.array([[1.0, 0.0, -left], [0.0, 1.0, -top], [0.0, 0.0, 1.0]])
             across, size = shift @ self._onto(frame, plate), (right - left, bottom - top)
             known.append(cv2.warpPerspective(full, across, size) > 250)
-            layers.append(darkened(cv2.warpPerspective(picture, across, size), brightness))
+            layers.append(levelled(cv2.warpPerspective(picture, across, size), brightness))
         return Part(left, top, *_median(layers, known))
 
     def _brightness(self, frame: int, picture: np.ndarray) -> float:

@@ -40,6 +40,7 @@ CORE_FLOORS = (
         "versions",
     },
     {"georeference"},
+    {"formats"},
     {"terrain", "footage", "camera", "impact_models"},
     {"reconstruction"},
     {"simulation"},

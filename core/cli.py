@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from errno import EINVAL
 from importlib import import_module
 from pathlib import Path
@@ -89,7 +90,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str]) -> int:
     try:
         arguments = _parser(argv).parse_args(argv)
-        status: int = arguments.run(arguments)
+        with _blends(argv):
+            status: int = arguments.run(arguments)
     except SystemExit as leaving:  # argparse has printed its help or its complaint
         return leaving.code if isinstance(leaving.code, int) else USAGE
     except RockfallError as error:
@@ -105,6 +107,15 @@ def _run(argv: Sequence[str]) -> int:
         print(f"rockfall: {_in_words(error)}", file=sys.stderr)
         return BAD_INPUT
     return status
+
+
+def _blends(argv: Sequence[str]) -> AbstractContextManager[None]:
+    """Saved .blend files can be read where one is named; other commands do without what that takes to load."""
+    if not any(word.lower().endswith(".blend") for word in argv):
+        return nullcontext()
+    from .exchange.saved_blend import saved_blends
+
+    return saved_blends(print)
 
 
 def _interrupted(error: KeyboardInterrupt) -> int:

@@ -8,11 +8,10 @@ from contextlib import contextmanager
 
 import bpy
 
-from ..core import cli
+from ..core import blender_process, cli
 from ..core.children import rockfall_command
 from ..core.film.job import FilmJob
 from ..core.film.maker import FilmMaker, inside_blender
-from ..core.outreach import animator
 from ..core.progress import Progress
 
 _handles: list[object] = []
@@ -29,9 +28,9 @@ def unregister() -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
-    from .steps.share.beside import animator_command
+    from .steps.share.beside import blender_command
 
-    animating = animator.inside_blender.set(animator_command())
+    other = blender_process.inside_blender.set(blender_command())
     token = inside_blender.set(FilmMaker(_make, _probe_command()))
     blender = bpy.app.binary_path  # none where Blender is a module: there Python itself runs the command line
     again = (blender, "--background", "--command", "rockfall") if blender else rockfall_command.get()
@@ -40,7 +39,7 @@ def run(arguments: list[str]) -> int:
         return cli.main(arguments)
     finally:
         rockfall_command.reset(told)
-        animator.inside_blender.reset(animating)
+        blender_process.inside_blender.reset(other)
         inside_blender.reset(token)
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv, or a project.toml with picks")
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv, or a project with picks (.toml, .blend)")
     add_out(parser)
     parser.add_argument("--model", required=True, metavar="NAME", help="of the model (`rockfall models` lists them)")
     add_fit_arguments(

@@ -40,7 +40,7 @@ SHOWN = (("rn", "R_N"), ("rt", "R_T"), ("r", "R"), ("theta_dev_deg", "θ_dev [°
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv, or a project.toml with picks")
+    parser.add_argument("impacts", metavar="IMPACTS", help="impacts.csv, or a project with picks (.toml, .blend)")
     add_out(parser)
     add_model_option(parser, "models to compare (default: the six of Noël et al. 2018)")
     add_parameter_options(parser)

@@ -28,7 +28,9 @@ CELL_M = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("project", metavar="PROJECT", help="project.toml; its [simulation] says what falls, and where")
+    parser.add_argument(
+        "project", metavar="PROJECT", help="a project (.toml, .blend); its simulation says what falls, and where"
+    )
     add_out(parser)
     parser.add_argument(
         "--screen",

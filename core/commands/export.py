@@ -37,13 +37,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Place the blocks, and let Blender write the files."""
+    from ..blender_process import blender_command
     from ..outreach.animation import animate, known_format
-    from ..outreach.animator import animator_command, write_animation
+    from ..outreach.animator import write_animation
     from ..outreach.show import open_show
 
     formats = dict.fromkeys(known_format(text) for text in arguments.format or DEFAULT)
     request = show_as_asked(arguments)
-    command = animator_command()
+    command = blender_command("glTF, USD and Alembic are written")
     files = [Path(arguments.out) / f"{STEM}.{ending}" for ending in formats]
     with PrintedProgress() as progress:
         with naming(str(arguments.project)):

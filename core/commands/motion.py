@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("project", metavar="PROJECT", help="project.toml; with cameras and tracks also their residuals")
+    parser.add_argument(
+        "project",
+        metavar="PROJECT",
+        help="a project (.toml, .blend); with cameras and tracks also their residuals",
+    )
     add_out(parser)
     parser.add_argument("--trajectory", action="extend", nargs="+", metavar="NAME", help="only these (default: all)")
     add_figure_options(parser)

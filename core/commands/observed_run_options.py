@@ -46,7 +46,9 @@ DIAMETER_M = 0.35
 def add_observed_arguments(parser: argparse.ArgumentParser) -> None:
     """The observed runs, and how blocks that start as they did are simulated."""
     parser.add_argument(
-        "table", metavar="OBSERVED", help="project.toml or picks.csv; with --stops the releases.csv of the blocks"
+        "table",
+        metavar="OBSERVED",
+        help="a project (.toml, .blend) or picks.csv; with --stops the releases.csv of the blocks",
     )
     add_out(parser)
     parser.add_argument(
@@ -116,8 +118,9 @@ def case_as_asked(
     ------
     InputError : anything that is wrong with the files or the options.
     """
-    project = arguments.table.lower().endswith(".toml")
-    return (_of_project if project else _of_table)(arguments, models, number, progress, flights)
+    from ..exchange.saved_blend import is_project
+
+    return (_of_project if is_project(arguments.table) else _of_table)(arguments, models, number, progress, flights)
 
 
 def _of_project(

@@ -294,9 +294,10 @@ def impacts_as_asked(file: str) -> "Impacts":
     """
     from ..exchange.opening import open_project
     from ..exchange.project import read_project
+    from ..exchange.saved_blend import is_project
     from ..exchange.tables import read_impacts
 
-    if not file.endswith(".toml"):
+    if not is_project(file):
         return read_impacts(file)
     with naming(file):
         return open_project(read_project(file))[1].impacts

@@ -21,7 +21,9 @@ DEFAULT_DIAMETER_M = 0.35
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("picks", metavar="PICKS", help="picks.csv; or project.toml, which says the rest itself")
+    parser.add_argument(
+        "picks", metavar="PICKS", help="picks.csv; or a project (.toml, .blend), which says the rest itself"
+    )
     add_out(parser)
     add_terrain_files(parser, "mesh, grid or cloud; not needed with nx, ny, nz")
     parser.add_argument(
@@ -87,6 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reconstruct, write the tables, print the summary."""
+    from ..exchange.saved_blend import is_project
     from ..exchange.tables import write_impacts, write_trajectories
     from ..output import output_folder
     from ..reconstruction.sampling import sample_trajectories
@@ -97,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     names = ["impacts.csv", "trajectories.csv", *(["impacts.parquet"] if arguments.parquet else [])]
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         progress(f"Reading {arguments.picks}")
-        made = _of_project if arguments.picks.endswith(".toml") else _of_table
+        made = _of_project if is_project(arguments.picks) else _of_table
         surface, reconstruction, turned = made(arguments, progress)
         progress("Writing the tables")
         for name in names[:1] + names[2:]:

@@ -30,7 +30,9 @@ POSE = ("rx", "ry", "rz", "x", "y", "z")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("project", metavar="PROJECT", help="project.toml, with videos that have a camera and a track")
+    parser.add_argument(
+        "project", metavar="PROJECT", help="a project (.toml, .blend), with videos that have a camera and a track"
+    )
     add_out(parser)
     parser.add_argument(
         "--free",
@@ -100,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
             progress=progress,
         )
         progress("Writing the tables")
-        written = _write(folder, project, how, footage, refined, surface, arguments.step)
+        written = _write(folder, project, Path(arguments.project), how, footage, refined, surface, arguments.step)
     for sentence in (*notes, *footage.notes, *_summary(refined)):
         print(sentence)
     print(f"Written: {', '.join(written)} in {arguments.out}")
@@ -138,6 +140,7 @@ def _picks(project: "Project", surface: "Surface | None", footage: "Footage") ->
 def _write(
     folder: Path,
     project: "Project",
+    source: Path,
     how: "RefinementSettings",
     footage: "Footage",
     refined: "Refined",
@@ -148,6 +151,7 @@ def _write(
     from ..exchange.cameras import write_camera
     from ..exchange.footage_tables import write_refinement_residuals, write_what_if
     from ..exchange.project import write_project
+    from ..exchange.saved_blend import keep_files
     from ..exchange.tables import write_impacts, write_picks, write_trajectories
     from ..reconstruction.sampling import sample_trajectories
 
@@ -196,7 +200,7 @@ def _write(
         reconstruction=reconstruction,
         refinement=how,
     )
-    write_project(result, folder / "project.toml")
+    write_project(keep_files(result, source, folder), folder / "project.toml")
     return [*written, "project.toml"]
 
 

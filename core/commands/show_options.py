@@ -23,7 +23,7 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
     """The project, and which blocks beside the measured ones."""
     from ..film.simulated import NUMBER
 
-    parser.add_argument("project", metavar="PROJECT", type=Path, help="project.toml")
+    parser.add_argument("project", metavar="PROJECT", type=Path, help="project.toml or a .blend")
     add_model_option(
         parser,
         "let blocks of impact models fall beside the real ones, from the same starts to their ends",

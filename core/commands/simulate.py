@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "releases",
         metavar="RELEASES",
         nargs="?",
-        help="releases.csv: x_m, y_m and, if not on the terrain, z_m; or project.toml with all that is needed; else "
-        "one of the sources below",
+        help="releases.csv: x_m, y_m and, if not on the terrain, z_m; or a project (.toml, .blend) with all that is "
+        "needed; else one of the sources below",
     )
     add_out(parser)
     add_terrain_files(parser, "mesh, grid or cloud; a project names its own")

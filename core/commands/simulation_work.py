@@ -79,13 +79,14 @@ def work_as_asked(arguments: argparse.Namespace, progress: PrintedProgress) -> W
     ------
     InputError : anything that is wrong with the files or the options.
     """
+    from ..exchange.saved_blend import is_project
     from ..exchange.simulation_entry import RECORDS
     from ..exchange.simulation_output import default_records
     from ..workflow.enough import in_chance_order
     from ..workflow.simulation import ground_of
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
-    prepare = _project if (arguments.releases or "").endswith(".toml") else _scenario
+    prepare = _project if is_project(arguments.releases or "") else _scenario
     asked = prepare(arguments, progress)
     ground = ground_of(asked.scenario)
     screens, screen_files = _screens(arguments.screen, ground, asked.scenario.screens)

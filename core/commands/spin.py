@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument(
-        "project", metavar="PROJECT", help="project.toml, with videos that have a camera and a table of spin_marks"
+        "project",
+        metavar="PROJECT",
+        help="a project (.toml, .blend), with videos that have a camera and a table of spin_marks",
     )
     add_out(parser)
 

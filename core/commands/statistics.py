@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "impacts",
         nargs="+",
         metavar="IMPACTS",
-        help="impacts.csv, of one site or several; a merged package; or a project.toml with picks",
+        help="impacts.csv, of one site or several; a merged package; or a project with picks (.toml, .blend)",
     )
     add_out(parser)
     parser.add_argument(

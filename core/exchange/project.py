@@ -18,6 +18,7 @@ from ..reading import reader
 from ..reconstruction.block import SHAPES
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
 from ..terrain.opening import HowToRead
+from .saved_blend import BLEND, project_of
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
 from .toml_text import TomlTable, Vector3, read_toml
 
@@ -233,13 +234,13 @@ class Project:
         return next((block for block in self.blocks if block.name == trajectory), self.block)
 
 
-NO_PROJECT = (".csv", ".tsv", ".txt", ".parquet", ".ply", ".obj", ".las", ".laz", ".mp4", ".mov", ".blend", ".json")
+NO_PROJECT = (".csv", ".tsv", ".txt", ".parquet", ".ply", ".obj", ".las", ".laz", ".mp4", ".mov", ".json")
 """Endings of files that people give in the place of a project."""
 
 
 @reader("project")
 def read_project(path: str | Path) -> Project:
-    """Read ``project.toml``.
+    """Read ``project.toml``, or a saved .blend on the command line (see `saved_blends`).
 
     Raises
     ------
@@ -253,6 +254,11 @@ def read_project(path: str | Path) -> Project:
             file=path,
             advice="Give project.toml; Blender writes one (Share > Export Project), and `rockfall demo` an example",
         )
+    if path.suffix.lower() == BLEND and path.is_file():
+        written = project_of(path)
+        if written is None:
+            raise InputError("A .blend is read by the command line only", file=path, advice="Export the project")
+        path = written
     top = TomlTable(read_toml(path, "project"), "", path)
     _check_schema(top)
     site, terrain, picks = top.table("site"), top.table("terrain"), top.table("picks")

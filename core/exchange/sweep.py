@@ -28,9 +28,9 @@ from typing import Any
 
 from ..errors import InputError
 from ..reading import reader
+from .saved_blend import PROJECT, is_project
 from .toml_text import TomlTable, is_number, read_toml
 
-PROJECT = "project.toml"
 SCHEMA = 1
 MOST_JOBS = 100_000
 MOST_LETTERS = 120
@@ -59,7 +59,7 @@ class Job:
 def find_jobs(source: str | Path) -> tuple[Job, ...]:
     """The jobs of a folder of projects, or of a sweep file.
 
-    Of a folder those are project.toml in each of its folders, and each other TOML file in it.
+    Of a folder those are project.toml in each of its folders, and each other TOML file and saved .blend in it.
 
     Raises
     ------
@@ -82,11 +82,14 @@ def find_jobs(source: str | Path) -> tuple[Job, ...]:
 
 def _of_folder(folder: Path) -> tuple[Job, ...]:
     inner = [one for one in folder.glob(f"*/{PROJECT}") if not one.parent.name.startswith(".")]
-    alone = [one for one in folder.glob("*.toml") if one.is_file() and not one.name.startswith(".")]
+    files = sorted(folder.iterdir())
+    alone = [one for one in files if is_project(one) and one.is_file() and not one.name.startswith(".")]
     jobs = [Job(_safe(one.parent.name), one) for one in inner] + [Job(_safe(one.stem), one) for one in alone]
     if not jobs:
         raise InputError(
-            "There is no project in this folder", file=folder, advice=f"Each project is a folder with its {PROJECT}"
+            "There is no project in this folder",
+            file=folder,
+            advice=f"Each project is a folder with its {PROJECT}, or a saved .blend",
         )
     return tuple(sorted(jobs, key=lambda job: job.name))
 

@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files of animations are written by Blender, in a process of its own; they are staged like all output."""
 
-import importlib.util
 import json
-import sys
 from collections.abc import Sequence
-from contextvars import ContextVar
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ..dependencies import require_blender_libraries
-from ..errors import DependencyError, InputError, RockfallError
-from ..film.maker import run_job
+from ..blender_process import run_job
+from ..errors import InputError, RockfallError
 from ..film.room import watched_room
 from ..output import output_folder
 from ..progress import Progress, silent
@@ -20,29 +16,6 @@ from .animation import Animation, save_animation
 ROOM = "Make room on the disk, or choose another folder."
 LEAST_BYTES = 200
 """No file of an animation is smaller: Blender on a full disk may leave a piece."""
-
-inside_blender: ContextVar[tuple[str, ...] | None] = ContextVar("animator_inside_blender", default=None)
-"""The command that runs the other Blender; set by the add-on while Blender itself runs a command."""
-
-
-def animator_command() -> tuple[str, ...]:
-    """What runs Blender to write files.
-
-    Raises
-    ------
-    DependencyError : this Python has no Blender.
-    """
-    inside = inside_blender.get()
-    if inside is not None:
-        return inside
-    if importlib.util.find_spec("bpy") is None:
-        raise DependencyError(
-            "glTF, USD and Alembic are written by Blender, which this Python does not have. "
-            "Install it with: pip install rockfall[blender]"
-        )
-    require_blender_libraries()
-    package = __name__.partition(".core.")[0]
-    return sys.executable, "-m", f"{package}.rockfall_addon.steps.share"
 
 
 def write_animation(
@@ -56,7 +29,7 @@ def write_animation(
     Parameters
     ----------
     files : in one folder; their endings are of `FORMATS`.
-    command : what runs Blender, see `animator_command`.
+    command : what runs Blender, see `blender_command`.
 
     Raises
     ------

@@ -273,7 +273,7 @@ def test_a_full_disk_leaves_nothing(rockfall, part, tmp_path: Path, monkeypatch:
     show, animation = part("core.outreach.show"), part("core.outreach.animation")
     demo = Path(part("core").__file__).parents[1] / "assets" / "demo" / "project.toml"
     made = animation.animate(show.open_show(show.ShowRequest(demo)), 5.0)
-    beside = part("rockfall_addon.steps.share.beside").animator_command()
+    beside = part("rockfall_addon.steps.share.beside").blender_command()
     limited = ("prlimit", f"--fsize={1_000_000}:{resource.RLIM_INFINITY}", *beside)
     old = tmp_path / "a.usdc"
     old.write_bytes(b"old")

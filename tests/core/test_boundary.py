@@ -18,6 +18,7 @@ BLENDER_MODULES = {"bpy", "bmesh", "gpu", "blf", "mathutils", "bpy_extras", "gpu
 
 CORE_FLOORS = (
     {
+        "blender_process",
         "children",
         "constants",
         "errors",

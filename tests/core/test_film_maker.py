@@ -6,11 +6,12 @@ from pathlib import Path
 
 import pytest
 from rockfall.core import cli
+from rockfall.core.blender_process import run_job
 from rockfall.core.errors import DependencyError, RockfallError
 from rockfall.core.film import maker as maker_module
 from rockfall.core.film.engines import MEASURED, PASSED, choose_engine, probe, probe_script
 from rockfall.core.film.job import AS_SET_UP, FilmJob
-from rockfall.core.film.maker import FilmMaker, film_maker, inside_blender, run_job
+from rockfall.core.film.maker import OTHER_ENGINE, FilmMaker, film_maker, inside_blender
 from rockfall.core.progress import CancelledError
 
 KILL_YOURSELF = [sys.executable, "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"]
@@ -62,7 +63,7 @@ def test_the_progress_of_a_process_is_reported() -> None:
         "print('error of an add-on'); print('progress bar'); print('rockfall progress 0 9 Simulating a model'); "
         "print('rockfall progress 2 2 Rendering'); print('rockfall remark 3 blocks stopped.')"
     )
-    remarks = run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said))
+    remarks = run_job([sys.executable, "-c", script], "x.mp4", lambda *said: seen.append(said), "")
     assert remarks == ("3 blocks stopped.",)
     assert list(dict.fromkeys(seen)) == [("Starting Blender", 0, 0), ("Simulating a model", 0, 9), ("Rendering", 2, 2)]
 
@@ -76,19 +77,19 @@ def test_a_process_that_says_nothing_is_ended_when_a_person_wants_it() -> None:
             raise CancelledError
 
     with pytest.raises(CancelledError):
-        run_job([sys.executable, "-c", script], "x.mp4", stop)
+        run_job([sys.executable, "-c", script], "x.mp4", stop, "")
 
 
 def test_what_a_process_says_is_wrong_is_our_error() -> None:
     script = "import sys; print('rockfall error The project names no picks.'); sys.exit(1)"
     with pytest.raises(RockfallError, match=r"^The project names no picks\.$"):
-        run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None)
+        run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None, OTHER_ENGINE)
 
 
 def test_a_crash_is_told_with_its_last_words() -> None:
     script = "import os, signal; os.write(2, b'deep trouble'); os.kill(os.getpid(), signal.SIGSEGV)"
     with pytest.raises(RockfallError, match=r"while it made x\.mp4 \(status -11\)\. It said: deep trouble\. Try"):
-        run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None)
+        run_job([sys.executable, "-c", script], "x.mp4", lambda *_: None, OTHER_ENGINE)
 
 
 def test_without_blender_the_advice_is_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:

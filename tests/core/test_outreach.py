@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rockfall
-from rockfall.core import cli
+from rockfall.core import blender_process, cli
 from rockfall.core.camera.model import rotation_from_vector
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.project import Site, read_project
-from rockfall.core.outreach import animator
 from rockfall.core.outreach.animation import animate, known_format, load_animation, save_animation
 from rockfall.core.outreach.animator import write_animation
 from rockfall.core.outreach.packing import Packing, in_reading_order, quantise
@@ -323,6 +322,6 @@ def test_a_blender_that_fails_leaves_the_old_files(show: Show, tmp_path: Path) -
 
 
 def test_without_blender_it_is_said_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(animator.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(RockfallError, match=r"pip install rockfall\[blender\]"):
-        animator.animator_command()
+    monkeypatch.setattr(blender_process.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(RockfallError, match=r"^They are written by Blender, .* pip install rockfall\[blender\]"):
+        blender_process.blender_command("They are written")

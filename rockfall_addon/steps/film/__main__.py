@@ -13,10 +13,10 @@ from typing import NoReturn
 import bpy
 
 from .... import rockfall_addon
+from ....core.blender_process import OURS
 from ....core.children import end_with_parent
 from ....core.errors import RockfallError
 from ....core.film.job import FilmJob
-from ....core.film.maker import OURS
 from .render import make
 
 

@@ -5,8 +5,9 @@ import bpy
 
 from ....core.errors import InputError
 from ....core.film.job import AS_SET_UP, FilmJob
-from ...scene import migration, store
+from ...scene import store
 from ...scene.film_preset import preset_of
+from ...scene.saved import open_saved
 from . import dressing, remembered, up_to_date
 from .engine import engine_of, quickest_engine
 from .properties import graphs_of
@@ -19,14 +20,7 @@ def open_film(job: FilmJob) -> bpy.types.Scene:
     ------
     RockfallError : it cannot be opened, there is nothing to film, or something has changed since it was set up.
     """
-    try:
-        bpy.ops.wm.open_mainfile(filepath=str(job.source.absolute()))
-    except RuntimeError as error:
-        problem = str(error).removeprefix("Error: ").strip().rstrip(".")
-        raise InputError(f"Blender cannot open this ({problem})", file=job.source, advice="Save it again") from error
-    scene = bpy.data.scenes[job.scene] if job.scene else bpy.context.scene
-    if migration.is_newer(scene):
-        raise InputError(migration.warning(scene), file=job.source)
+    scene = open_saved(job.source, job.scene)
     if not store.has_role(scene, store.FLIGHTS_ROLE):
         raise InputError(
             "There are no trajectories to film", file=job.source, advice="Import picks in Blender, and save the file"

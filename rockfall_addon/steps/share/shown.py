@@ -19,7 +19,7 @@ from ...view.job import InBackground, Work
 from ...view.reporting import possible
 from ...view.terrain_colours import terrain_colours
 from .animation import check_formats
-from .beside import animator_command
+from .beside import blender_command
 
 LANGUAGES = [(name, said["language"], "") for name, said in page_texts().items()]
 KINDS = [
@@ -144,7 +144,7 @@ class ROCKFALL_OT_export_animation(_Shown, bpy.types.Operator):
         stem = path.with_suffix("") if path.suffix.lower().removeprefix(".") in FORMATS else path
         formats = [name for name in FORMATS if name in self.formats] or [KINDS[0][0]]
         check_formats(formats)
-        files, command = [stem.with_name(f"{stem.name}.{name}") for name in formats], animator_command()
+        files, command = [stem.with_name(f"{stem.name}.{name}") for name in formats], blender_command()
 
         def compute(progress: Progress) -> object:
             animation = animate(shown.show(asked, progress), rate, block, progress)

@@ -146,8 +146,8 @@ def _simulate_here(arguments: argparse.Namespace, work: Work, folder: Path, prog
     mapped = _fallen(arguments, work, progress)
     remarks = gravest_first(_remarks(mapped, work))
     written = write_simulations(
-        mapped.simulations, folder, record=work.record, inputs=work.inputs, maps=mapped.cells, faces=mapped.faces,
-        screens=mapped.screens, remarks=remarks, progress=progress,
+        mapped.simulations, folder, record=work.record, inputs=work.inputs, mapped=mapped, remarks=remarks,
+        progress=progress,
     )  # fmt: skip
     if arguments.geopackage:
         write_simulation_geopackage(
@@ -170,7 +170,7 @@ def _fallen(arguments: argparse.Namespace, work: Work, progress: PrintedProgress
                 work.ground, work.releases, scenario.settings,
                 record=record, first_run=work.first_run, threads=arguments.threads, progress=counted,
             )  # fmt: skip
-            return Mapped(simulations, {}, {}, {})
+            return Mapped(simulations, {})
         return map_models(
             work.ground, work.releases, scenario.settings, work.cell_m, work.screens, faces=work.faces,
             until_known=work.until_known, record=record, first_run=work.first_run, threads=arguments.threads,

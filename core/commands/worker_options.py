@@ -105,7 +105,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
         )
         remarks = gravest_first([*said])
         written = write_chunk_tables(stores, folder, simulations, mapped.screens, progress=progress)
-        written += write_all_maps(simulations, mapped.cells, mapped.faces, folder, progress)
+        written += write_all_maps(mapped, folder, progress)
         written += write_met_trees(simulations, folder)
         if arguments.geopackage:
             write_simulation_geopackage(

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from ..georeference import GlobalShift
 from ..hazard.classes import classes_in
+from ..hazard.evidence import FEW, face_evidence
 from ..hazard.face_tally import FACE_LAYERS, FaceMaps
 from ..vectors import cross, norm
 from .geopackage import FeatureLayer, write_geopackage
 from .map_output import CONDITIONAL
-from .qgis_styles import polygon_style
+from .qgis_styles import hatch_style, polygon_style
 from .tables import write_columns
 
 SHOWN = "Reach_probability"
@@ -59,7 +60,16 @@ def write_face_maps(
         "faces", "Faces of the mesh that blocks touch, and what happens there", rings,
         np.arange(len(corners) + 1) * 4, columns, style, closed=True,
     )  # fmt: skip
-    write_geopackage(folder / GEOPACKAGE, [layer], shift, said)
+    evidence, layers = face_evidence(maps), [layer]
+    if evidence.in_words:
+        said["evidence"] = "; ".join(evidence.in_words)
+        rows = np.flatnonzero(evidence.weak)
+        outlines = corners[rows][:, [0, 1, 2, 0]].reshape(-1, 3)
+        text = f"Faces that fewer than {FEW} blocks touch: their values say little"
+        numbers = {"face": maps.faces[rows], "Nr_blocks": columns["Nr_blocks"][rows]}
+        first = np.arange(len(rows) + 1) * 4
+        layers.append(FeatureLayer("evidence", text, outlines, first, numbers, hatch_style(), closed=True))
+    write_geopackage(folder / GEOPACKAGE, layers, shift, said)
     places = dict(zip(("x_m", "y_m", "z_m"), shift.to_survey(corners.mean(axis=1)).T, strict=True))
     write_columns(folder / TABLE, {"face": columns["face"], "of": columns["of"], **places, **columns})
     return [GEOPACKAGE, TABLE]

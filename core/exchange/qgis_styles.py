@@ -114,6 +114,21 @@ def polygon_style(column: str, classes: Classes, greatest: float, unit: str) -> 
 """
 
 
+def hatch_style() -> str:
+    """The style of polygons that are hatched in black, so that what lies below is seen."""
+    line = _symbol("line", "SimpleLine", {"line_color": "20,20,20,255", "line_width": "0.2"}, 1.0, "@0@0")
+    pattern = {"angle": "45", "distance": "1.6", "distance_unit": "MM", "line_width": "0.2", "line_width_unit": "MM"}
+    return f"""{HEAD}<qgis version="{VERSION}" styleCategories="Symbology">
+  <renderer-v2 type="singleSymbol" symbollevels="0" enableorderby="0" forceraster="0">
+    <symbols>
+{_symbol("fill", "LinePatternFill", pattern, 1.0, "0", line)}
+    </symbols>
+  </renderer-v2>
+  <blendMode>0</blendMode>
+</qgis>
+"""
+
+
 def _single_symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float) -> str:
     return f"""{HEAD}<qgis version="{VERSION}" styleCategories="Symbology">
   <renderer-v2 type="singleSymbol" symbollevels="0" enableorderby="0" forceraster="0">
@@ -126,7 +141,8 @@ def _single_symbol(kind: str, layer: str, options: Mapping[str, str], opacity: f
 """
 
 
-def _symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float, name: str) -> str:
+def _symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float, name: str, inner: str = "") -> str:
+    """A symbol of one layer. inner : the symbol that this layer repeats, where it does."""
     told = "\n".join(
         f'            <Option type="QString" name="{option}" value="{value}"/>' for option, value in options.items()
     )
@@ -134,7 +150,7 @@ def _symbol(kind: str, layer: str, options: Mapping[str, str], opacity: float, n
         <layer class="{layer}" enabled="1" pass="0" locked="0">
           <Option type="Map">
 {told}
-          </Option>
+          </Option>{f"{chr(10)}{inner}" if inner else ""}
         </layer>
       </symbol>"""
 

@@ -6,16 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import cast
 
 import numpy as np
 
-from ..hazard.cell_tally import CellTally
-from ..hazard.cells import cells_over
-from ..hazard.face_tally import FaceTally
 from ..hazard.run_tally import COLUMNS, RunTally
 from ..hazard.screen_tally import ScreenTally
-from ..hazard.screens import Screen, check_screens
+from ..hazard.screens import Screen
 from ..hazard.tally import Tally
 from ..progress import Progress, silent
 from ..simulation.engine import Recorded, Records, Settings, Simulation
@@ -24,14 +20,14 @@ from ..simulation.release import Releases
 from ..vectors import Array
 from ..versions import versions
 from ..workflow.ensembles import CHUNK, Pool, Tables, Work, run_ensemble
-from ..workflow.maps import Mapped, check_faces
+from ..workflow.maps import Mapped, tallies_for
 from .chunk_store import ChunkStore
 from .content_digest import content_digest
 from .screens import write_screens
-from .simulation_output import MAPS, recorded_for, write_tables
+from .simulation_output import recorded_for, write_tables
 from .simulation_tables import append_screen_hits, drawn_names
 
-RUNS, SCREENS, FACES = "runs", "screens", "faces"
+RUNS = "runs"
 HITS = "hits.csv"
 KEY_LETTERS = 16
 
@@ -90,31 +86,19 @@ def simulate_in_chunks(
     recorded = kept_records = recorded_for(record, bool(ground.structures))
     tables = TablesOf(tuple(sorted(record)), recorded, drawn_names(settings))
     tallies: dict[str, Tally] = {RUNS: RunTally()}
-    if cell_m is not None:
-        tallies[MAPS] = CellTally(cells_over(ground.surface, cell_m))
-    if faces:
-        check_faces(ground)
-        tallies[FACES] = FaceTally(len(ground.owner))
-    if screens:
-        check_screens(screens, ground)
-        tallies[SCREENS] = ScreenTally(screens)
+    tallies |= tallies_for(ground, cell_m, faces, screens)
     if len(tallies) > 1:
         recorded = "all"
     simulations, stores = [], []
-    maps, touched, passed = dict[str, CellTally](), dict[str, FaceTally](), dict[str, ScreenTally]()
+    counted = dict[str, dict[str, Tally]]()
     for one in settings:
         began = time.perf_counter()
         decides = (ground, releases, one, first_run, size, tables, cell_m, faces, tuple(screens), versions())
         store = ChunkStore(kept / content_digest(*decides)[:KEY_LETTERS])
         work = Work(ground, one, tallies, recorded, tables, kept_records)
         found = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)
-        if cell_m is not None:
-            maps[one.model] = cast(CellTally, found[MAPS])
-        if faces:
-            touched[one.model] = cast(FaceTally, found[FACES])
-        if screens:
-            passed[one.model] = cast(ScreenTally, found[SCREENS])
-        ends = found[RUNS].arrays()
+        ends = found.pop(RUNS).arrays()
+        counted[one.model] = found
         columns = {name: ends[name].astype(np.intp if kind is np.int32 else kind) for name, kind in COLUMNS.items()}
         simulations.append(
             Simulation(
@@ -123,7 +107,7 @@ def simulate_in_chunks(
             )
         )  # fmt: skip
         stores.append(store)
-    return Mapped(tuple(simulations), maps, touched, passed), tuple(stores)
+    return Mapped(tuple(simulations), counted), tuple(stores)
 
 
 def write_chunk_tables(

@@ -3,7 +3,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 
 from ..hazard.cell_tally import CellTally
 from ..hazard.face_tally import FaceTally
@@ -11,6 +10,7 @@ from ..hazard.screen_tally import ScreenTally
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Simulation
+from ..workflow.maps import Mapped
 from .face_maps import write_face_maps
 from .map_output import draw_maps, write_maps
 from .screens import write_screens
@@ -19,9 +19,7 @@ from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
 from .simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary, write_tree_hits
 from .trees import write_trees
 
-MAPS = "maps"
-NO_MAPS: Mapping[str, CellTally] = MappingProxyType({})
-NO_FACES: Mapping[str, FaceTally] = MappingProxyType({})
+MAPS, WITH_BARRIERS = "maps", "with_barriers"
 LARGE = 20_000
 """From so many blocks on, motion in time is written only when it is asked for."""
 HUGE = 1_000_000
@@ -46,9 +44,7 @@ def write_simulations(
     *,
     record: Collection[str],
     inputs: Mapping[str, Path],
-    maps: Mapping[str, CellTally] = NO_MAPS,
-    faces: Mapping[str, FaceTally] = NO_FACES,
-    screens: Mapping[str, ScreenTally] = NO_SCREENS,
+    mapped: Mapped | None = None,
     remarks: Sequence[Remark] = (),
     progress: Progress = silent,
 ) -> list[str]:
@@ -61,8 +57,7 @@ def write_simulations(
     simulations : of one ground and the same releases, one for each model.
     record : of `RECORDS`; the simulations must have been recorded for them.
     inputs : what it is → file, for the hashes in summary.json.
-    maps, faces : model → what its maps are made of. They go to maps/, those of several models to maps/MODEL/.
-    screens : model → what passes screens, where there are any.
+    mapped : what was counted of them: maps, see `write_all_maps`, and what passes screens.
 
     Returns
     -------
@@ -72,8 +67,9 @@ def write_simulations(
     ------
     OSError : the folder cannot be written.
     """
+    screens = NO_SCREENS if mapped is None else mapped.screens
     written = write_tables(simulations, folder, record=record, screens=screens, progress=progress)
-    written += write_all_maps(simulations, maps, faces, folder, progress)
+    written += [] if mapped is None else write_all_maps(mapped, folder, progress)
     if screens:
         write_screens(screens, folder / "screens.csv")
         written.append("screens.csv")
@@ -91,32 +87,48 @@ def write_met_trees(simulations: Sequence[Simulation], folder: Path) -> list[str
     return ["trees.csv"]
 
 
-def write_all_maps(
-    simulations: Sequence[Simulation],
-    maps: Mapping[str, CellTally],
-    faces: Mapping[str, FaceTally],
-    folder: Path,
-    progress: Progress = silent,
-) -> list[str]:
-    """Write the maps of `write_simulations`; returns the names of their folders."""
-    written, models = [], list(dict.fromkeys([*maps, *faces]))
+def write_all_maps(mapped: Mapped, folder: Path, progress: Progress = silent) -> list[str]:
+    """Write all maps; returns the names of their folders.
+
+    Those of one model go to maps/, those of several to maps/MODEL/. They are of the blocks as they fall; where there
+    are barriers, those of the blocks that these leave have the same names in a folder with_barriers/ there.
+    """
+    written, models = [], list(dict.fromkeys([*mapped.cells, *mapped.faces]))
     for model in models:
         place = folder / MAPS if len(models) == 1 else folder / MAPS / model
-        about, said = {"MODEL": model, "SEED": str(simulations[0].settings.seed)}, model
-        if (trees := simulations[0].settings.trees) is not None:
-            about["TREES"], said = str(len(trees)), f"{model} among {len(trees)} trees"
-        written.append(f"{place.relative_to(folder).as_posix()}/")
-        if model in faces:
-            progress("Writing the maps of faces", 0, 0)
-            ground = simulations[0].ground
-            write_face_maps(faces[model].maps(ground), place, ground.shift, about)
-        if model not in maps:
-            continue
-        drawn, shift = maps[model].maps(), simulations[0].ground.shift
-        write_maps(drawn, place, shift, about, progress)
-        releases = simulations[0].releases.position
-        draw_maps(drawn, simulations[0].ground.terrain, place, said=said, releases=releases, progress=progress)
+        settings = mapped.simulations[0].settings
+        about, said = {"MODEL": model, "SEED": str(settings.seed)}, model
+        if settings.trees is not None:
+            about["TREES"], said = str(len(settings.trees)), f"{model} among {len(settings.trees)} trees"
+        kinds: list[tuple[Path, CellTally | None, FaceTally | None, Mapping[str, str], str]] = [
+            (place, mapped.cells.get(model), mapped.faces.get(model), about, said)
+        ]
+        if model in mapped.held_cells or model in mapped.held_faces:
+            held = (mapped.held_cells.get(model), mapped.held_faces.get(model))
+            kinds.append((place / WITH_BARRIERS, *held, about | {"BARRIERS": "yes"}, f"{said}, with the barriers"))
+        for where, cells, faces, facts, words in kinds:
+            written.append(f"{where.relative_to(folder).as_posix()}/")
+            _write_maps(mapped.simulations[0], cells, faces, where, facts, words, progress)
     return written
+
+
+def _write_maps(
+    simulation: Simulation,
+    cells: CellTally | None,
+    faces: FaceTally | None,
+    place: Path,
+    about: Mapping[str, str],
+    said: str,
+    progress: Progress,
+) -> None:
+    ground = simulation.ground
+    if faces is not None:
+        progress("Writing the maps of faces", 0, 0)
+        write_face_maps(faces.maps(ground), place, ground.shift, about)
+    if cells is not None:
+        maps, releases = cells.maps(), simulation.releases.position
+        write_maps(maps, ground.terrain, place, ground.shift, about, progress)
+        draw_maps(maps, ground.terrain, place, said=said, releases=releases, progress=progress)
 
 
 def write_tables(

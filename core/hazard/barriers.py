@@ -1,14 +1,50 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The same runs with barriers: those that one holds end there."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..simulation.engine import ENDED, ENDS, IMPACT, ON_GROUND, STOPPED, TREE, Records, Simulation
 from ..vectors import norm
+from .cell_tally import CellTally
+from .cells import Cells
+from .face_tally import FaceTally
 from .screen_tally import held
-from .screens import ScreenHits
+from .screens import Screen, ScreenHits, hits_at
+
+
+class HeldCellTally(CellTally):
+    """A `CellTally` of the runs as barriers leave them."""
+
+    def __init__(self, cells: Cells, barriers: Sequence[Screen] = ()) -> None:
+        super().__init__(cells)
+        self.barriers = tuple(barriers)
+
+    def empty(self) -> "HeldCellTally":
+        """One for the same cells and barriers to which nothing was added."""
+        return HeldCellTally(self.cells, self.barriers)
+
+    def add(self, simulation: Simulation) -> None:
+        """See `CellTally.add`."""
+        super().add(with_barriers(simulation, hits_at(simulation, self.barriers)))
+
+
+class HeldFaceTally(FaceTally):
+    """A `FaceTally` of the runs as barriers leave them."""
+
+    def __init__(self, faces: int, barriers: Sequence[Screen] = ()) -> None:
+        super().__init__(faces)
+        self.barriers = tuple(barriers)
+
+    def empty(self) -> "HeldFaceTally":
+        """One for the same faces and barriers to which nothing was added."""
+        return HeldFaceTally(self.faces, self.barriers)
+
+    def add(self, simulation: Simulation) -> None:
+        """See `FaceTally.add`."""
+        super().add(with_barriers(simulation, hits_at(simulation, self.barriers)))
 
 
 def with_barriers(simulation: Simulation, hits: ScreenHits) -> Simulation:

@@ -2,7 +2,7 @@
 """What passes through the cells of maps, and what comes to rest in them."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,7 +98,7 @@ class CellTally:
         }
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "CellTally":
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
         """See `Tally`."""
         made = cls(Cells(*arrays["corner"].tolist(), *arrays["shape"].tolist()))
         made.blocks = int(arrays["blocks"])

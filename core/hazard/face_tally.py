@@ -4,7 +4,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +118,7 @@ class FaceTally:
         return {"faces": np.array([self.faces, self.blocks]), **own}
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "FaceTally":
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
         """See `Tally`."""
         faces, blocks = arrays["faces"].tolist()
         made = cls(faces)

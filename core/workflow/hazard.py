@@ -16,8 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hazard.barriers import with_barriers
-from ..hazard.screens import Screen, check_screens, hits_at
 from ..hazard.tally import Tally
 from ..progress import CancelledError, Progress, silent
 from ..simulation.engine import AT_ONCE, Recorded, RecordSpace, Settings, Simulation, check_settings, simulate
@@ -75,8 +73,6 @@ def run_chunks(
     settings: Settings,
     tallies: Sequence[Tally],
     *,
-    behind: Sequence[Tally] = (),
-    barriers: Sequence[Screen] = (),
     first_run: int = 0,
     threads: int | None = None,
     enough: Enough | None = None,
@@ -88,23 +84,21 @@ def run_chunks(
 
     Parameters
     ----------
-    tallies : what counts the runs as they are.
-    behind : what counts the same runs where `barriers` hold blocks.
+    tallies : what counts the runs.
     first_run : see `simulate`.
     threads : None takes all cores.
     enough : asked after `ROUND` runs, twice as many, four times …; the first yes ends it.
-    take : gets each chunk, without what `barriers` do, and of its records what `record` says; its runs are in their
+    take : gets each chunk, and of its records what `record` says; its runs are in their
         order, the chunks are not: see `joined`.
     progress : called with the number of finished blocks; a `CancelledError` raised in it ends it with the blocks that
         are finished, from the first on without a gap: see `take_turns`.
 
     Raises
     ------
-    InputError : settings, barriers or blocks that cannot be.
+    InputError : settings or blocks that cannot be.
     CancelledError : the work was ended before the first blocks were finished.
     """
     check_settings(ground, settings)
-    check_screens(barriers, ground)
     ground.refuse_small(releases.radius_m)
     n, started = len(releases), time.perf_counter()
     ends, counted, impacts = np.zeros(0, np.int64), 0, 0
@@ -118,18 +112,14 @@ def run_chunks(
         part = np.sort(part)
         space = spaces.pop() if spaces else RecordSpace()
         simulation = simulate(ground, releases.take(part), settings, record="all", runs=first_run + part, space=space)
-        own, later = [each.empty() for each in tallies], [each.empty() for each in behind]
+        own = [each.empty() for each in tallies]
         for each in own:
             each.add(simulation)
-        if later:
-            held = with_barriers(simulation, hits_at(simulation, barriers)) if barriers else simulation
-            for each in later:
-                each.add(held)
         ended = np.bincount(simulation.end, minlength=len(simulation.ends))
         kept = None if take is None else simulation.with_records(record)
         if kept is not simulation:  # else its records are in the space
             spaces.append(space)
-        return _Chunk(simulation.ends, ended, int(simulation.impacts.sum()), kept, [*own, *later])
+        return _Chunk(simulation.ends, ended, int(simulation.impacts.sum()), kept, own)
 
     def add(done: _Chunk, finished: int) -> None:
         nonlocal ends, impacts, names
@@ -138,7 +128,7 @@ def run_chunks(
         impacts += done.impacts
         if take is not None and done.whole is not None:
             take(done.whole)
-        for whole, part in zip((*tallies, *behind), done.tallies, strict=True):
+        for whole, part in zip(tallies, done.tallies, strict=True):
             whole.merge(part)
         progress("Simulating", counted + finished, n)
 

@@ -13,6 +13,7 @@ from ..analysis.figures import FORMATS, INK, MUTED, PAGE_IN, STYLE, save_named
 from ..colours import rounded_top
 from ..extras import FIGURES, demand
 from ..hazard.classes import classes_of
+from ..hazard.evidence import Evidence, cell_evidence, entered, row_runs
 from ..hazard.maps import LAYERS, Maps
 from ..progress import Progress, silent
 from ..terrain.cloud import Cloud, heights_above_points
@@ -23,6 +24,7 @@ from ..vectors import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import PathPatch
 
 DRAWN = ("Reach_probability", "E_95CI", "Ph_95CI", "V_95CI", "Nr_deposited")
 """Maps of which there are figures, where none are named."""
@@ -34,6 +36,8 @@ SHADE_PIXELS = 900
 DARKEST = 0.45
 """Of the hillshade, so that colours are told apart upon it."""
 OPACITY = 0.82
+HATCH = "/////"
+"""Over what says little, see `Evidence`."""
 WEST_NORTH = np.array([-0.5, 0.5, np.sqrt(0.5)])
 """The light: from the north-west, 45° high, where maps have it."""
 
@@ -85,9 +89,7 @@ def save_map_figures(
 def reached(maps: Maps) -> Window:
     """The part of the map that blocks reach, with some room around it; all of it when they reach nothing."""
     cells = maps.cells
-    passed = np.zeros(cells.shape, np.bool_)
-    for values in maps.layers.values():
-        passed |= np.nan_to_num(values, nan=0.0) > 0
+    passed = entered(maps)
     rows, columns = np.flatnonzero(passed.any(axis=1)), np.flatnonzero(passed.any(axis=0))
     if not rows.size:
         rows, columns = np.array([0, cells.rows - 1]), np.array([0, cells.columns - 1])
@@ -157,6 +159,8 @@ def map_figure(
         coloured = classes.colours_of(values)
         coloured[..., 3] *= OPACITY
         axes.imshow(coloured, origin="lower", extent=whole, interpolation="nearest", zorder=2)
+        evidence = cell_evidence(maps, terrain)
+        axes.add_patch(_hatching(evidence, maps, np.array([west, south])))
         drawn: list[Any] = []
         if releases is not None:
             drawn = axes.plot(
@@ -180,7 +184,9 @@ def map_figure(
         )  # fmt: skip
         rows = zip(classes.labels, classes.colours, strict=True)
         patches = [Patch(facecolor=colour, edgecolor=INK, linewidth=0.3, label=label) for label, colour in rows]
-        handles = [*patches[::-1], *drawn]
+        weak = [Patch(facecolor="white", edgecolor=INK, linewidth=0.3, hatch=HATCH, label=_broken(words))
+                for words in evidence.in_words]  # fmt: skip
+        handles = [*patches[::-1], *weak, *drawn]
         legend = axes.legend(
             handles=handles, title=layer.unit or layer.title, loc="upper left", bbox_to_anchor=(1.02, 1.0),
             frameon=False, fontsize=6.5, title_fontsize=7.0, borderaxespad=0.0, handlelength=1.5, handleheight=1.1,
@@ -192,6 +198,24 @@ def map_figure(
             textcoords="offset points", fontsize=6.0, color=MUTED,
         )  # fmt: skip
         return figure
+
+
+def _hatching(evidence: Evidence, maps: Maps, corner: Array) -> "PathPatch":
+    """Over the cells that say little. corner : south-west, as the axes have it."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    row, first, end = row_runs(evidence.weak).T.astype(np.float64)
+    corners = np.stack([[first, row], [end, row], [end, row + 1], [first, row + 1], [first, row]], axis=0)
+    places = corner + maps.cells.size_m * corners.transpose(2, 0, 1).reshape(-1, 2)
+    codes = np.tile([Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY], len(row))
+    outline = Outline(places.reshape(-1, 2), codes if len(codes) else None)
+    return PathPatch(outline, facecolor="none", edgecolor=INK, linewidth=0.0, hatch=HATCH, zorder=2.5)
+
+
+def _broken(words: str) -> str:
+    """In two lines, so that a legend stays narrow."""
+    return words.replace(": ", ":\n", 1)
 
 
 def _ticks(axes: "Axes") -> None:

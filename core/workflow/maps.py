@@ -5,8 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..errors import InputError
+from ..hazard.barriers import HeldCellTally, HeldFaceTally
 from ..hazard.cell_tally import CellTally
 from ..hazard.cells import cells_over
+from ..hazard.evidence import FEW
 from ..hazard.face_tally import FaceTally
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import Screen, check_screens
@@ -21,8 +23,8 @@ from ..terrain.cloud import Cloud
 from .enough import is_known
 from .hazard import run_chunks
 
-FEW = 20
-"""Fewer blocks in a cell have no standard error of their 95 % values."""
+MAPS, FACES, SCREENS, HELD_MAPS, HELD_FACES = "maps", "faces", "screens", "held maps", "held faces"
+"""Names of tallies: of the blocks as they fall, and of those that barriers leave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +34,68 @@ class Mapped:
     Attributes
     ----------
     simulations : as those of `run_models`.
-    cells : model → what its maps are made of. faces : model → contacts with each face.
-    screens : model → what passes the screens.
+    counted : model → name of a tally (see `tallies_for`) → what it has counted.
     """
 
     simulations: tuple[Simulation, ...]
-    cells: Mapping[str, CellTally]
-    faces: Mapping[str, FaceTally]
-    screens: Mapping[str, ScreenTally]
+    counted: Mapping[str, Mapping[str, Tally]]
+
+    @property
+    def cells(self) -> dict[str, CellTally]:
+        """Model → what its maps are made of."""
+        return self._all(MAPS, CellTally)
+
+    @property
+    def faces(self) -> dict[str, FaceTally]:
+        """Model → contacts with each face."""
+        return self._all(FACES, FaceTally)
+
+    @property
+    def screens(self) -> dict[str, ScreenTally]:
+        """Model → what passes the screens."""
+        return self._all(SCREENS, ScreenTally)
+
+    @property
+    def held_cells(self) -> dict[str, HeldCellTally]:
+        """As `cells`, with the barriers; nothing where there are none."""
+        return self._all(HELD_MAPS, HeldCellTally)
+
+    @property
+    def held_faces(self) -> dict[str, HeldFaceTally]:
+        """As `faces`, with the barriers; nothing where there are none."""
+        return self._all(HELD_FACES, HeldFaceTally)
+
+    def _all[T](self, name: str, kind: type[T]) -> dict[str, T]:
+        found = {model: tallies[name] for model, tallies in self.counted.items() if name in tallies}
+        return {model: tally for model, tally in found.items() if isinstance(tally, kind)}
+
+
+def tallies_for(ground: Ground, cell_m: float | None, faces: bool, screens: Sequence[Screen] = ()) -> dict[str, Tally]:
+    """Name → an empty tally, for all that is to be counted; maps with barriers too where a screen holds blocks.
+
+    Parameters
+    ----------
+    cell_m, faces, screens : see `map_models`.
+
+    Raises
+    ------
+    InputError : cells or screens that cannot be, blocks that meet points.
+    """
+    check_screens(screens, ground)
+    barriers, found = [screen for screen in screens if screen.holds], dict[str, Tally]()
+    if cell_m is not None:
+        cells = cells_over(ground.surface, cell_m)
+        found[MAPS] = CellTally(cells)
+        if barriers:
+            found[HELD_MAPS] = HeldCellTally(cells, barriers)
+    if faces:
+        check_faces(ground)
+        found[FACES] = FaceTally(len(ground.owner))
+        if barriers:
+            found[HELD_FACES] = HeldFaceTally(len(ground.owner), barriers)
+    if screens:
+        found[SCREENS] = ScreenTally(screens)
+    return found
 
 
 def map_models(
@@ -73,20 +129,14 @@ def map_models(
     """
     if not settings:
         raise InputError("There is no model to simulate with", advice="Give at least one impact model")
-    check_screens(screens, ground)
-    cells = None if cell_m is None else cells_over(ground.surface, cell_m)
+    wanted_tallies = tallies_for(ground, cell_m, faces, screens)
     for one in settings:
         check_settings(ground, one)
     n, simulations = len(releases), list[Simulation]()
-    if faces:
-        check_faces(ground)
-    maps, touched, passed = dict[str, CellTally](), dict[str, FaceTally](), dict[str, ScreenTally]()
+    counts = dict[str, dict[str, Tally]]()
     for place, one in enumerate(settings):
         parts, hits = list[Simulation](), ScreenTally(screens)
-        of_cells, of_faces = None if cells is None else CellTally(cells), FaceTally(len(ground.owner))
-        tallies: list[Tally] = [] if of_cells is None else [of_cells]
-        tallies += [of_faces] if faces else []
-        tallies += [hits] if screens else []
+        tallies = {name: tally.empty() for name, tally in wanted_tallies.items()} | ({SCREENS: hits} if screens else {})
 
         def told(text: str, done: int = 0, _: int = 0, place: int = place, model: str = one.model) -> None:
             progress(f"{text} {find_model(model).title}", place * n + done, len(settings) * n)
@@ -96,7 +146,7 @@ def map_models(
 
         try:
             counted = run_chunks(
-                ground, releases, one, tallies, first_run=first_run, threads=threads, take=parts.append,
+                ground, releases, one, list(tallies.values()), first_run=first_run, threads=threads, take=parts.append,
                 record=record, enough=None if until_known is None else enough, progress=told,
             )  # fmt: skip
         except CancelledError:
@@ -107,15 +157,10 @@ def map_models(
         ended = until_known is not None and is_known(hits, until_known)
         wanted = counted.blocks if ended else n
         simulations.append(replace(whole, wanted=wanted, seconds=counted.seconds))
-        if of_cells is not None:
-            maps[one.model] = of_cells
-        if faces:
-            touched[one.model] = of_faces
-        if screens:
-            passed[one.model] = hits
+        counts[one.model] = tallies
         if counted.blocks < wanted:
             break
-    return Mapped(tuple(simulations), maps, touched, passed)
+    return Mapped(tuple(simulations), counts)
 
 
 def check_faces(ground: Ground) -> None:
@@ -144,6 +189,6 @@ def map_remarks(tallies: Mapping[str, CellTally]) -> tuple[Remark, ...]:
             f"Maps of {tally.blocks} blocks with {title}, in cells of {cells.size_m:g} m: {reached} cells are reached"
         )
         if few:
-            text += f", {few} of them by fewer than {FEW} blocks, whose 95 % values have no standard error"
+            text += f", {few} of them by fewer than {FEW} blocks: they are hatched, and say little"
         remarks.append(Remark(f"{text}.", "warning" if 2 * few > reached else "note", "maps"))
     return tuple(remarks)

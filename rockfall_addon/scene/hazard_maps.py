@@ -6,27 +6,30 @@ It is never seen; the overlay paints the terrain from it. So maps are saved, cop
 
 import json
 from dataclasses import dataclass
+from typing import cast
 
 import bpy
 import numpy as np
 
 from ...core.hazard.cell_tally import CellTally
-from ...core.hazard.cells import Cells, cells_over
+from ...core.hazard.cells import Cells
+from ...core.hazard.evidence import Evidence, cell_evidence, entered, few_blocks
 from ...core.hazard.face_tally import FACE_LAYERS, FaceMaps, FaceTally
 from ...core.hazard.maps import LAYERS, Maps
-from ...core.hazard.tally import Tally
+from ...core.hazard.screens import Screen
 from ...core.progress import Progress
 from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.vectors import Array
 from ...core.workflow.hazard import run_chunks
-from ...core.workflow.maps import map_remarks
+from ...core.workflow.maps import FACES, HELD_FACES, HELD_MAPS, MAPS, map_remarks, tallies_for
 from ...core.workflow.simulation import ground_of
-from . import simulated_sources, simulation_setup, store
+from . import screens, simulated_sources, simulation_setup, store
 from .simulation_setup import Plan
 
 COLLECTION = "Maps"
-CELL = "cell"
-"""Attribute: number of the cell, row by row from the south-west."""
+CELL, EVIDENCE = "cell", "evidence"
+"""Attributes: number of the cell, row by row from the south-west; 1 where few blocks enter it, 2 where it is beyond the
+terrain, 3 for both."""
 FACE, OF = "face", "face_of"
 """Attributes: number of the face in the ground, and of what it is among the names that the object has."""
 
@@ -40,11 +43,13 @@ class MapPlan:
     plan : one model, and the blocks of the maps.
     cell_m : side of a cell [m].
     model : its name.
+    barriers : that hold blocks; none where the maps are of the blocks as they fall.
     """
 
     plan: Plan
     cell_m: float
     model: str
+    barriers: tuple[Screen, ...] = ()
 
 
 def plan(scene: bpy.types.Scene) -> MapPlan:
@@ -57,14 +62,21 @@ def plan(scene: bpy.types.Scene) -> MapPlan:
     settings = scene.rockfall_simulation
     model = settings.map_model
     planned = simulation_setup.plan(scene, simulated_sources.entry_with(scene, [model], settings.map_number))
-    return MapPlan(planned, store.double(settings.map_cell_m), model)
+    barriers = tuple(screen for screen in planned.screens if screen.holds) if settings.map_with_barriers else ()
+    return MapPlan(planned, store.double(settings.map_cell_m), model, barriers)
 
 
 def fingerprint(scene: bpy.types.Scene) -> str:
     """Of all that decides what maps there would be now."""
     settings = scene.rockfall_simulation
     runs = simulation_setup.fingerprint(scene, [settings.map_model], settings.map_number)
-    return f"{runs} {store.double(settings.map_cell_m):g}"
+    held = " with barriers" if settings.map_with_barriers and has_barriers(scene) else ""
+    return f"{runs} {store.double(settings.map_cell_m):g}{held}"
+
+
+def has_barriers(scene: bpy.types.Scene) -> bool:
+    """Whether a drawn screen holds blocks."""
+    return any(screen.holds for screen in screens.screens_of(scene))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +86,8 @@ class Found:
     cells: Maps
     faces: FaceMaps | None
     remarks: tuple[Remark, ...]
+    evidence: Evidence
+    with_barriers: bool = False
 
 
 def run(asked: MapPlan, progress: Progress) -> Found:
@@ -86,17 +100,16 @@ def run(asked: MapPlan, progress: Progress) -> Found:
     """
     progress("Preparing the ground", 0, 0)
     ground = ground_of(asked.plan.scenario)
-    tally = CellTally(cells_over(asked.plan.scenario.terrain, asked.cell_m))
-    of_faces = FaceTally(len(ground.owner)) if len(ground.faces) else None
-    tallies: list[Tally] = [tally] if of_faces is None else [tally, of_faces]
+    with_faces = len(ground.faces) > 0
+    barriers = asked.barriers
+    tallies = tallies_for(ground, asked.cell_m, with_faces, barriers)
+    names = (HELD_MAPS, HELD_FACES) if barriers else (MAPS, FACES)
+    tally = cast(CellTally, tallies[names[0]])
+    of_faces = cast(FaceTally, tallies[names[1]]) if with_faces else None
     progress("Releasing the blocks", 0, 0)
     releases = asked.plan.scenario.releases(ground)
-    barriers = [screen for screen in asked.plan.screens if screen.holds]
-    settings = asked.plan.scenario.settings[0]
-    if barriers:  # what is mapped is what is shown: blocks end where a barrier holds them
-        counted = run_chunks(ground, releases, settings, [], behind=tallies, barriers=barriers, progress=progress)
-    else:
-        counted = run_chunks(ground, releases, settings, tallies, progress=progress)
+    wanted = [tally] if of_faces is None else [tally, of_faces]
+    counted = run_chunks(ground, releases, asked.plan.scenario.settings[0], wanted, progress=progress)
     remarks = list(map_remarks({asked.model: tally}))
     if counted.blocks < counted.wanted:
         text = f"Stopped by you: the maps are of {counted.blocks} of {counted.wanted} blocks."
@@ -107,7 +120,9 @@ def run(asked: MapPlan, progress: Progress) -> Found:
     text = "All numbers are conditional on the release: how often blocks are released is not in them."
     remarks.append(Remark(text, "note", "maps"))
     faces = None if of_faces is None else of_faces.maps(ground)
-    return Found(tally.maps(), faces, tuple(gravest_first([*asked.plan.remarks, *remarks])))
+    maps = tally.maps()
+    evidence = cell_evidence(maps, asked.plan.scenario.terrain)
+    return Found(maps, faces, tuple(gravest_first([*asked.plan.remarks, *remarks])), evidence, bool(barriers))
 
 
 def show(scene: bpy.types.Scene, found: Found, model: str, said: str) -> bpy.types.Object:
@@ -131,11 +146,14 @@ def show(scene: bpy.types.Scene, found: Found, model: str, said: str) -> bpy.typ
     for name, values in maps.layers.items():
         attribute = mesh.attributes.new(name, "FLOAT", "POINT")
         attribute.data.foreach_set("value", values.ravel()[cell].astype(np.float32))
+    said_little = found.evidence.few + 2 * found.evidence.beyond
+    mesh.attributes.new(EVIDENCE, "INT", "POINT").data.foreach_set("value", said_little.ravel()[cell].astype(np.int32))
     obj = bpy.data.objects.new("Maps", mesh)
     obj[store.ROLE], obj[store.MODEL] = store.MAPS_ROLE, model
     obj[store.MAP_CELLS] = [cells.x0_m, cells.y0_m, cells.size_m, float(cells.columns), float(cells.rows)]
     obj[store.MAP_BLOCKS] = maps.blocks
-    obj[store.MAP_OF] = json.dumps({"print": said, "remarks": to_plain(remarks)})
+    about = {"print": said, "remarks": to_plain(remarks), "with_barriers": found.with_barriers}
+    obj[store.MAP_OF] = json.dumps(about)
     obj.hide_viewport = obj.hide_render = obj.hide_select = True
     store.link(store.collection(scene, COLLECTION), obj)
     return obj
@@ -237,6 +255,26 @@ def read(obj: bpy.types.Object) -> Maps:
 
 
 _read: list[tuple[tuple, Maps]] = []
+
+
+def evidence_of(obj: bpy.types.Object, maps: Maps) -> Evidence:
+    """On what the maps of an object rest; older files do not say which cells are beyond the terrain."""
+    reached, kept = entered(maps), np.zeros(len(maps.cells), np.int32)
+    attribute = obj.data.attributes.get(EVIDENCE)
+    if attribute is None or (attribute.data_type, attribute.domain) != ("INT", "POINT"):
+        return Evidence(reached, few_blocks(maps), np.zeros(reached.shape, bool))
+    cell, value = (np.empty(len(obj.data.vertices), np.int32) for _ in range(2))
+    obj.data.attributes[CELL].data.foreach_get("value", cell)
+    attribute.data.foreach_get("value", value)
+    inside = (cell >= 0) & (cell < len(kept))
+    kept[cell[inside]] = value[inside]
+    kept = kept.reshape(maps.cells.shape)
+    return Evidence(reached, kept & 1 > 0, kept & 2 > 0)
+
+
+def with_barriers(obj: bpy.types.Object) -> bool:
+    """Whether the maps of an object are of the blocks that barriers leave."""
+    return bool(store.read_json(obj, store.MAP_OF, {}).get("with_barriers", False))
 
 
 def remarks(scene: bpy.types.Scene) -> list[Remark]:

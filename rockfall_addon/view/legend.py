@@ -16,6 +16,8 @@ WIDTH, HEIGHT, MARGIN, TEXT = 220, 12, 28, 12  # in pixels at interface scale 1
 Colour = tuple[float, float, float]
 EDGE: Colour = (0.1, 0.1, 0.1)
 """Around a swatch, which may be white on a light ground."""
+HATCHED: Colour = (0.85, 0.85, 0.85)
+"""Below the lines of a hatched swatch."""
 GROUND = (0.08, 0.08, 0.09, 0.62)
 """Behind a legend, so that it can be read on footage, trails and maps."""
 PAD = 7
@@ -35,9 +37,12 @@ def end() -> None:
     blf.disable(0, blf.SHADOW)
 
 
-def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], title: str, above: float = 0.0) -> None:
+def swatches(
+    left: float, scale: float, rows: Sequence[tuple[str, Colour | None]], title: str, above: float = 0.0
+) -> None:
     """A square with a dark edge and a name for each row, from the lower margin up, and a title above.
 
+    rows : a hatched square where there is no colour.
     above : how much higher it begins [px], where another legend is below.
     """
     size, step, bottom = HEIGHT * scale, 1.7 * HEIGHT * scale, MARGIN * scale + above
@@ -48,10 +53,16 @@ def swatches(left: float, scale: float, rows: Sequence[tuple[str, Colour]], titl
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for i, (name, colour) in enumerate(reversed(rows)):
         low = bottom + i * step
-        for more, shade in ((max(1.0, scale), EDGE), (0.0, colour)):
+        for more, shade in ((max(1.0, scale), EDGE), (0.0, colour or HATCHED)):
             a, b, c, d = left - more, left + size + more, low - more, low + size + more
             shader.uniform_float("color", (*shade, 1.0))
             batch_for_shader(shader, "TRI_STRIP", {"pos": [(a, c), (b, c), (a, d), (b, d)]}).draw(shader)
+        if colour is None:
+            shader.uniform_float("color", (*EDGE, 1.0))
+            for x in (0.0, 0.25, 0.5):
+                bar = [(x, 0.0), (x + 0.15, 0.0), (x + 0.35, 1.0), (x + 0.5, 1.0)]
+                places = [(left + size * u, low + size * v) for u, v in bar]
+                batch_for_shader(shader, "TRI_STRIP", {"pos": places}).draw(shader)
         text(left + 1.6 * size, low + 0.1 * size, name)
     for i, words in enumerate(reversed(lines)):
         text(left, bottom + (len(rows) + 0.2) * step + 1.4 * TEXT * i * scale, words)

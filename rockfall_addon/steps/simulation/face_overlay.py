@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps of the faces in the 3-D view: each face that blocks touch in the colour of its class; and its numbers."""
 
+import functools
 from typing import NamedTuple
 
 import bpy
@@ -10,6 +11,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ....core.georeference import GlobalShift
 from ....core.hazard.classes import Classes, classes_in
+from ....core.hazard.evidence import face_evidence
 from ....core.hazard.face_tally import AT_CONTACT, FACE_LAYERS, FaceMaps
 from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES
 from ....core.terrain.raycast import cast_ray
@@ -24,6 +26,28 @@ BEHIND_M = 0.02
 OPACITY = 0.9
 
 
+HATCH = 8.0
+"""Pixels at interface scale 1 from line to line of the hatching of faces that few blocks touch."""
+VERTEX = """
+void main() {
+  shown = color;
+  hatched = weak;
+  gl_Position = ModelViewProjectionMatrix * vec4(pos, 1.0);
+}
+"""
+FRAGMENT = """
+vec3 linear(vec3 c) {
+  return mix(c / 12.92, pow((max(c, vec3(0.0)) + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), c));
+}
+
+void main() {
+  vec3 seen = shown.rgb;
+  if (hatched > 0.5 && mod(gl_FragCoord.x + gl_FragCoord.y, hatch) < 0.25 * hatch) { seen = vec3(0.05); }
+  fragColor = vec4(srgbTarget ? linear(seen) : seen, shown.a);
+}
+"""
+
+
 class _Painted(NamedTuple):
     key: tuple
     classes: Classes
@@ -36,6 +60,7 @@ _surfaces: list[tuple[FaceMaps, Surface]] = []
 
 def unregister() -> None:
     _painted.clear()
+    _shader.cache_clear()
     _surfaces.clear()
 
 
@@ -49,9 +74,29 @@ def draw(scene: bpy.types.Scene, maps: FaceMaps) -> None:
     painted = _of(scene, maps)
     if painted is None:
         return
-    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    shader = _shader()
     shader.bind()
+    shader.uniform_float("hatch", HATCH * bpy.context.preferences.system.ui_scale)
     painted.batch.draw(shader)
+
+
+@functools.cache
+def _shader() -> gpu.types.GPUShader:
+    between = gpu.types.GPUStageInterfaceInfo("faces_between")
+    between.smooth("VEC4", "shown")
+    between.smooth("FLOAT", "hatched")
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("MAT4", "ModelViewProjectionMatrix")
+    info.push_constant("FLOAT", "hatch")
+    info.push_constant("BOOL", "srgbTarget")
+    info.vertex_in(0, "VEC3", "pos")
+    info.vertex_in(1, "VEC4", "color")
+    info.vertex_in(2, "FLOAT", "weak")
+    info.vertex_out(between)
+    info.fragment_out(0, "VEC4", "fragColor")
+    info.vertex_source(VERTEX)
+    info.fragment_source(FRAGMENT)
+    return gpu.shader.create_from_info(info)
 
 
 def classes(scene: bpy.types.Scene, maps: FaceMaps) -> Classes | None:
@@ -83,10 +128,9 @@ def _of(scene: bpy.types.Scene, maps: FaceMaps) -> _Painted | None:
         there = colours[:, 3] > 0
         places = maps.corners[there].reshape(-1, 3).astype(np.float32)
         each = np.repeat(colours[there], 3, axis=0).astype(np.float32)
-        batch = batch_for_shader(
-            gpu.shader.from_builtin("SMOOTH_COLOR"), "TRIS",
-            {"pos": np.ascontiguousarray(places), "color": np.ascontiguousarray(each)},
-        )  # fmt: skip
+        weak = np.repeat(face_evidence(maps).weak[there], 3).astype(np.float32)
+        values = {"pos": np.ascontiguousarray(places), "color": np.ascontiguousarray(each), "weak": weak}
+        batch = batch_for_shader(_shader(), "TRIS", values)
         _painted[:] = [_Painted(key, found, batch)]
     return _painted[0]
 

@@ -10,6 +10,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ....core.hazard.classes import Classes, classes_of
+from ....core.hazard.evidence import face_evidence
 from ....core.hazard.face_tally import FACE_LAYERS
 from ....core.hazard.maps import LAYERS, Maps
 from ....core.impact_models.registry import MODELS
@@ -20,6 +21,10 @@ from . import face_overlay
 NEARER = 2e-5
 """The map is drawn so much nearer, in depth, that the terrain that it lies on does not speckle it."""
 OPACITY = 0.85
+HATCH = 8.0
+"""Pixels at interface scale 1 from line to line of the hatching, which is the same from near and far."""
+WEAK = 0.5
+"""Opacity of hatched cells in the texture: it tells them apart, and is not drawn."""
 LEGEND_WIDTH = 250
 SIMULATION_ROWS = 1.7
 """Height of the title of the legend below, in rows."""
@@ -42,7 +47,9 @@ void main() {
   vec4 colour = texelFetch(map, cell, 0);
   if (colour.a <= 0.0) { discard; }
   vec3 seen = colour.rgb * (0.45 + 0.55 * brightness);
-  fragColor = vec4(srgbTarget ? linear(seen) : seen, colour.a * opacity);
+  bool weak = colour.a < 0.75;
+  if (weak && mod(gl_FragCoord.x + gl_FragCoord.y, hatch) < 0.25 * hatch) { seen = vec3(0.05); }
+  fragColor = vec4(srgbTarget ? linear(seen) : seen, opacity);
 }
 """
 
@@ -58,6 +65,7 @@ class _Painted(NamedTuple):
     texture: gpu.types.GPUTexture
     classes: Classes
     grid: tuple[float, float, float]
+    weak: tuple[str, ...]
 
 
 def register() -> None:
@@ -91,6 +99,7 @@ def _shader() -> gpu.types.GPUShader:
     info.push_constant("MAT4", "ModelViewProjectionMatrix")
     info.push_constant("VEC3", "grid")
     info.push_constant("FLOAT", "opacity")
+    info.push_constant("FLOAT", "hatch")
     info.push_constant("BOOL", "srgbTarget")  # Blender sets it: whether the frame buffer takes linear colours
     info.sampler(0, "FLOAT_2D", "map")
     info.vertex_in(0, "VEC3", "pos")
@@ -139,6 +148,7 @@ def _draw_cells(scene: bpy.types.Scene, painted: _Painted) -> None:
         shader.bind()
         shader.uniform_float("grid", painted.grid)
         shader.uniform_float("opacity", OPACITY)
+        shader.uniform_float("hatch", HATCH * bpy.context.preferences.system.ui_scale)
         shader.uniform_sampler("map", painted.texture)
         batch.draw(shader)
 
@@ -153,12 +163,14 @@ def _painted(scene: bpy.types.Scene, obj: bpy.types.Object) -> _Painted | None:
     if not _texture or _texture[0].key != key:
         classes, cells = classes_of(name, values), maps.cells
         rows, columns = _reached(maps)
+        evidence = hazard_maps.evidence_of(obj, maps)
         colours = classes.colours_of(values[rows, columns]).astype(np.float32)
+        colours[..., 3] *= np.where(evidence.weak[rows, columns], WEAK, 1.0)
         height, width = colours.shape[:2]
         buffer = gpu.types.Buffer("FLOAT", colours.size, np.ascontiguousarray(colours).ravel())
         texture = gpu.types.GPUTexture((width, height), format="RGBA8", data=buffer)
         corner = cells.x0_m + columns.start * cells.size_m, cells.y0_m + rows.start * cells.size_m
-        _texture[:] = [_Painted(key, texture, classes, (*corner, cells.size_m))]
+        _texture[:] = [_Painted(key, texture, classes, (*corner, cells.size_m), evidence.in_words)]
     return _texture[0]
 
 
@@ -211,17 +223,21 @@ def _draw_legend() -> None:
         return
     if faces is not None:
         layer, classes = FACE_LAYERS[settings.face_layer], face_overlay.classes(scene, faces)
+        weak = face_evidence(faces).in_words
     else:
         painted = _painted(scene, obj)
         layer, classes = LAYERS[settings.map_layer], None if painted is None else painted.classes
+        weak = () if painted is None else painted.weak
     if classes is None:
         return
     scale = context.preferences.system.ui_scale
     left = context.region.width - legend.covered_right(context.area) - (LEGEND_WIDTH + legend.MARGIN) * scale
     left = max(left, legend.covered_left(context.area) + legend.MARGIN * scale)
     rows = [(label, tuple(colour)) for label, colour in zip(classes.labels, classes.colours.tolist(), strict=True)]
+    rows = [(words, None) for words in weak[::-1]] + rows
     unit = f" [{layer.unit}]" if layer.unit else ""
     blocks = f"{terrain.grouped(int(obj[store.MAP_BLOCKS]))} blocks, {MODELS[str(obj[store.MODEL])].title}"
+    blocks += ", with barriers" if hazard_maps.with_barriers(obj) else ""
     state = "; changed since: compute again" if hazard_maps.is_stale(scene) else ""
     legend.begin(scale)
     legend.swatches(left, scale, rows[::-1], f"{layer.title}{unit}; {blocks}{state}", _below(context, scale))

@@ -28,6 +28,8 @@ class ROCKFALL_PT_simulation_maps(RockfallPanel, bpy.types.Panel):
         column.prop(settings, "map_model", text="")
         column.prop(settings, "map_number")
         column.prop(settings, "map_cell_m")
+        if hazard_maps.has_barriers(scene):
+            layout.prop(settings, "map_with_barriers")
         row = layout.row()
         row.scale_y = 1.4
         row.operator("rockfall.compute_maps", icon="MESH_GRID")

@@ -8,6 +8,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from ....core.exchange.face_maps import write_face_maps
 from ....core.exchange.map_output import draw_maps, write_maps
+from ....core.exchange.simulation_output import WITH_BARRIERS
 from ....core.impact_models.registry import find_model
 from ....core.output import output_folder
 from ....core.progress import Progress
@@ -81,17 +82,19 @@ class ROCKFALL_OT_export_maps(InBackground, bpy.types.Operator):
     def prepare(self, context: bpy.types.Context) -> Work:
         scene, folder = context.scene, Path(bpy.path.abspath(self.directory))
         obj = hazard_maps.maps_of(scene)
-        maps, model = hazard_maps.read(obj), str(obj[store.MODEL])
+        maps, model, held = hazard_maps.read(obj), str(obj[store.MODEL]), hazard_maps.with_barriers(obj)
         faces = hazard_maps.faces_of(scene)
         surface, shift = simulation_setup.ground(scene), georeference.read_shift(scene)
         seed = str(scene.rockfall_simulation.seed)
 
         def compute(progress: Progress) -> object:
-            with output_folder(folder) as place:
-                about = {"MODEL": model, "SEED": seed}
-                written = write_maps(maps, place, shift, about, progress)
+            with output_folder(folder) as staged:
+                place, about, said = staged, {"MODEL": model, "SEED": seed}, find_model(model).title
+                if held:  # the same names as on the command line
+                    place, said = staged / WITH_BARRIERS, f"{said}, with the barriers"
+                    about["BARRIERS"] = "yes"
+                written = write_maps(maps, surface, place, shift, about, progress)
                 written += [] if faces is None else write_face_maps(faces, place, shift, about)
-                said = find_model(model).title
                 return written + draw_maps(maps, surface, place, said=said, progress=progress)
 
         def keep(scene: bpy.types.Scene, written: object) -> str:

@@ -233,6 +233,10 @@ class SimulationSettings(bpy.types.PropertyGroup):
         name="Cells", description="Side of a cell",
         default=2.0, min=LEAST_M, soft_min=0.5, soft_max=20.0, unit="LENGTH", precision=2,
     )  # fmt: skip
+    map_with_barriers: BoolProperty(
+        name="With Barriers", default=False,
+        description="Maps of the blocks that the drawn barriers do not hold; without, barriers do nothing in the maps",
+    )  # fmt: skip
     map_layer: EnumProperty(
         name="Map", description="What is painted on the terrain",
         items=[(name, layer.title, f"{layer.meaning} ({name})") for name, layer in LAYERS.items()],

@@ -143,6 +143,7 @@ def _read(arguments: argparse.Namespace, progress: "Progress") -> "tuple[Impacts
     from ..exchange.database import digest, merge
     from ..exchange.selection import matching, rows_of
     from ..exchange.statistics_tables import described
+    from ..reconstruction.summary import normal_radius_in_words
 
     files, notes = arguments.impacts, []
     if len(files) == 1 and Path(files[0]).is_file() and Path(files[0]).suffix != ".json" and not arguments.site:
@@ -158,6 +159,8 @@ def _read(arguments: argparse.Namespace, progress: "Progress") -> "tuple[Impacts
         found = matching(impacts, arguments.where)
         notes.append(f"{int(found.sum())} of {len(impacts)} impacts meet --where.")
         impacts = rows_of(impacts, found)
+    radius = normal_radius_in_words(impacts)
+    notes += [radius] if radius else []
     if not len(impacts):
         raise InputError("No impact is left", advice="Check --where")
     return impacts, {"inputs": inputs}, notes

@@ -35,6 +35,8 @@ def summarise(reconstruction: Reconstruction) -> tuple[str, ...]:
         f"{int(impacts.complete.sum())} with all coefficients."
     ]
     sentences += _typical(impacts)
+    radius = normal_radius_in_words(impacts)
+    sentences += [radius] if radius else []
     flagged = [f"{name} {int(impacts.flags[name].sum())}" for name in FLAGS if impacts.flags[name].any()]
     if flagged:
         sentences.append(f"Flags: {', '.join(flagged)}.")
@@ -51,6 +53,17 @@ def summarise(reconstruction: Reconstruction) -> tuple[str, ...]:
     if notes[MOST_NOTES:]:
         sentences.append(f"… and {len(notes) - MOST_NOTES} more.")
     return tuple(sentences)
+
+
+def normal_radius_in_words(impacts: Impacts) -> str:
+    """Over which radius the normals of the terrain were fitted, on which R_N, R_T and θ₁ depend; "" without any."""
+    radii = impacts.normal_radius_m[np.isfinite(impacts.normal_radius_m)]
+    if not radii.size:
+        return ""
+    low, high = f"{radii.min():.2f}", f"{radii.max():.2f}"
+    if low == high:
+        return f"The terrain normals are of a radius of {low} m; with another radius R_N, R_T and θ1 differ."
+    return f"The terrain normals are of radii from {low} to {high} m; R_N, R_T and θ1 depend on the radius."
 
 
 def _typical(impacts: Impacts) -> list[str]:

@@ -43,7 +43,7 @@ class Evidence:
     def in_words(self) -> tuple[str, ...]:
         """What the hatching says, for legends and metadata; nothing where there is none."""
         number = int(self.reached.sum())
-        found = ((f"fewer than {FEW} blocks", self.few), ("beyond the edge of the terrain", self.beyond))
+        found = ((f"fewer than {FEW} blocks", self.few), ("beyond the terrain", self.beyond))
         return tuple(f"{words}: {int(of.sum()):,} of {number:,} {self.parts}" for words, of in found if of.any())
 
 

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.figures import FORMATS, INK, MUTED, PAGE_IN, STYLE, save_named
 from ..colours import rounded_top
 from ..extras import FIGURES, demand
 from ..hazard.classes import classes_of
-from ..hazard.evidence import Evidence, cell_evidence, entered, row_runs
+from ..hazard.evidence import cell_evidence, entered, row_runs
 from ..hazard.maps import LAYERS, Maps
 from ..progress import Progress, silent
 from ..terrain.cloud import Cloud, heights_above_points
@@ -36,8 +37,8 @@ SHADE_PIXELS = 900
 DARKEST = 0.45
 """Of the hillshade, so that colours are told apart upon it."""
 OPACITY = 0.82
-HATCH = "/////"
-"""Over what says little, see `Evidence`."""
+HATCH, BEYOND = "/////", "\\\\\\\\\\"
+"""Over cells of few blocks, and over those beyond the terrain; see `Evidence`."""
 WEST_NORTH = np.array([-0.5, 0.5, np.sqrt(0.5)])
 """The light: from the north-west, 45° high, where maps have it."""
 
@@ -160,7 +161,11 @@ def map_figure(
         coloured[..., 3] *= OPACITY
         axes.imshow(coloured, origin="lower", extent=whole, interpolation="nearest", zorder=2)
         evidence = cell_evidence(maps, terrain)
-        axes.add_patch(_hatching(evidence, maps, np.array([west, south])))
+        masks = [(mask, hatch) for mask, hatch in ((evidence.few, HATCH), (evidence.beyond, BEYOND)) if mask.any()]
+        weak = []
+        for (mask, hatch), words in zip(masks, evidence.in_words, strict=True):
+            axes.add_patch(_hatching(mask, maps, np.array([west, south]), hatch))
+            weak.append(Patch(facecolor="white", edgecolor=INK, linewidth=0.3, hatch=hatch, label=_broken(words)))
         drawn: list[Any] = []
         if releases is not None:
             drawn = axes.plot(
@@ -184,8 +189,6 @@ def map_figure(
         )  # fmt: skip
         rows = zip(classes.labels, classes.colours, strict=True)
         patches = [Patch(facecolor=colour, edgecolor=INK, linewidth=0.3, label=label) for label, colour in rows]
-        weak = [Patch(facecolor="white", edgecolor=INK, linewidth=0.3, hatch=HATCH, label=_broken(words))
-                for words in evidence.in_words]  # fmt: skip
         handles = [*patches[::-1], *weak, *drawn]
         legend = axes.legend(
             handles=handles, title=layer.unit or layer.title, loc="upper left", bbox_to_anchor=(1.02, 1.0),
@@ -200,17 +203,17 @@ def map_figure(
         return figure
 
 
-def _hatching(evidence: Evidence, maps: Maps, corner: Array) -> "PathPatch":
-    """Over the cells that say little. corner : south-west, as the axes have it."""
+def _hatching(mask: NDArray[np.bool_], maps: Maps, corner: Array, hatch: str) -> "PathPatch":
+    """Over some cells. corner : south-west, as the axes have it."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
-    row, first, end = row_runs(evidence.weak).T.astype(np.float64)
+    row, first, end = row_runs(mask).T.astype(np.float64)
     corners = np.stack([[first, row], [end, row], [end, row + 1], [first, row + 1], [first, row]], axis=0)
     places = corner + maps.cells.size_m * corners.transpose(2, 0, 1).reshape(-1, 2)
     codes = np.tile([Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY], len(row))
     outline = Outline(places.reshape(-1, 2), codes if len(codes) else None)
-    return PathPatch(outline, facecolor="none", edgecolor=INK, linewidth=0.0, hatch=HATCH, zorder=2.5)
+    return PathPatch(outline, facecolor="none", edgecolor=INK, linewidth=0.0, hatch=hatch, zorder=2.5)
 
 
 def _broken(words: str) -> str:

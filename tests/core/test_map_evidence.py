@@ -40,7 +40,7 @@ def test_few_blocks_and_cells_beyond_the_terrain_are_told_apart() -> None:
     assert set(zip(*np.nonzero(found.beyond), strict=True)) == {(4, 15), (5, 15)}
     assert found.in_words == (
         "fewer than 20 blocks: 4 of 7 cells",
-        "beyond the edge of the terrain: 2 of 7 cells",
+        "beyond the terrain: 2 of 7 cells",
     )
 
 
@@ -88,20 +88,20 @@ def test_a_figure_hatches_and_counts_them() -> None:
     """The hatched area is that of the cells, and the legend has the numbers."""
     pytest.importorskip("matplotlib")
     from matplotlib.patches import PathPatch
-    from rockfall.core.workflow.map_figures import HATCH, hillshade, map_figure, reached
+    from rockfall.core.workflow.map_figures import BEYOND, HATCH, hillshade, map_figure, reached
 
     maps, terrain = numbered(MAPS), half_plane()
     window = reached(maps)
     figure = map_figure(maps, "E_95CI", window, hillshade(terrain, window, 1.0), terrain)
-    (patch,) = [one for one in figure.axes[0].patches if isinstance(one, PathPatch) and one.get_hatch() == HATCH]
-    area = 0.0
-    for polygon in patch.get_path().to_polygons():
-        x, y = (polygon - polygon[0]).T
-        area += abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
-    assert area == pytest.approx(5.0)  # of the five cells that are hatched
+    areas = {}
+    for patch in figure.axes[0].patches:
+        if isinstance(patch, PathPatch):
+            sides = [(polygon - polygon[0]).T for polygon in patch.get_path().to_polygons()]
+            areas[patch.get_hatch()] = sum(abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2 for x, y in sides)
+    assert areas == pytest.approx({HATCH: 4.0, BEYOND: 2.0})  # m², of cells of 1 m²
     labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert "fewer than 20 blocks:\n4 of 7 cells" in labels
-    assert "beyond the edge of the terrain:\n2 of 7 cells" in labels
+    assert "beyond the terrain:\n2 of 7 cells" in labels
 
 
 def test_maps_with_a_barrier_have_a_folder_of_their_own(tmp_path: Path) -> None:

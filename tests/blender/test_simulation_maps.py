@@ -180,3 +180,39 @@ def test_the_probe_tells_the_numbers_of_the_face(mapped: bpy.types.Scene, part) 
     energy = next(cells for cells in table if cells[0] == "kinetic energy [kJ]")
     assert energy[table[0].index("max")] == f"{faces.layers['E_max'][row]:.3g}"
     assert probe.card_of(faces, -1) == (["No block touches this face."], [])
+
+
+def test_maps_mean_the_same_with_and_without_barriers(mapped: bpy.types.Scene, part) -> None:
+    """A drawn barrier changes no map by itself; with *With Barriers* fewer blocks come below it, and the maps are old."""
+    maps, screens = part("rockfall_addon.scene.hazard_maps"), part("rockfall_addon.scene.screens")
+    plain = np.nan_to_num(kept(part, mapped).layers["Nr_blocks"]).copy()
+    surface = part("rockfall_addon.scene.reconstruction").ground(mapped)
+    screen = part("core.hazard.screens").Screen("net", np.array([[30.0, -10.0], [30.0, 130.0]]), 3.0, 1e9)
+    screens.keep(mapped, screen, surface)
+    assert bpy.ops.rockfall.compute_maps() == {"FINISHED"}
+    np.testing.assert_array_equal(np.nan_to_num(kept(part, mapped).layers["Nr_blocks"]), plain)
+    mapped.rockfall_simulation.map_with_barriers = True
+    assert maps.is_stale(mapped)
+    assert bpy.ops.rockfall.compute_maps() == {"FINISHED"}
+    held = np.nan_to_num(kept(part, mapped).layers["Nr_blocks"])
+    assert (held <= plain).all()
+    assert held.sum() < plain.sum()
+    assert maps.with_barriers(maps.maps_of(mapped))
+    assert "Blocks end where a barrier holds them: net" in said(part, mapped)
+
+
+def test_what_says_little_is_kept_with_the_maps(mapped: bpy.types.Scene, part, tmp_path: Path) -> None:
+    maps = part("rockfall_addon.scene.hazard_maps")
+    few = part("core.hazard.evidence").FEW
+    mapped.rockfall_simulation.map_number, mapped.rockfall_simulation.map_cell_m = 300, 10.0
+    assert bpy.ops.rockfall.compute_maps() == {"FINISHED"}
+    read = kept(part, mapped)
+    found = maps.evidence_of(maps.maps_of(mapped), read)
+    blocks = np.nan_to_num(read.layers["Nr_blocks"])
+    np.testing.assert_array_equal(found.few, (blocks > 0) & (blocks < few))
+    assert 0 < found.few.sum() < (blocks > 0).sum()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "maps.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "maps.blend"))
+    again = maps.evidence_of(maps.maps_of(bpy.context.scene), kept(part, bpy.context.scene))
+    np.testing.assert_array_equal(again.weak, found.weak)
+    assert again.in_words == found.in_words

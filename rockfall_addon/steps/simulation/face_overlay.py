@@ -11,7 +11,7 @@ from gpu_extras.batch import batch_for_shader
 
 from ....core.georeference import GlobalShift
 from ....core.hazard.classes import Classes, classes_in
-from ....core.hazard.evidence import face_evidence
+from ....core.hazard.evidence import FEW, face_evidence
 from ....core.hazard.face_tally import AT_CONTACT, FACE_LAYERS, FaceMaps
 from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES
 from ....core.terrain.raycast import cast_ray
@@ -168,6 +168,7 @@ def card_of(maps: FaceMaps, row: int) -> tuple[list[str], list[list[str]]]:
         f"{value('Nr_contacts'):.0f} contact{'s' * (value('Nr_contacts') != 1)}; it dips {dip:.0f}°",
         "; ".join(f"{value(f'E_over_{limit}kJ'):.3g} % above {limit} kJ" for limit in CLASSES_KJ),
     ]
+    said += [f"Fewer than {FEW} blocks: these values say little"] if value("Nr_blocks") < FEW else []
     columns = ["mean", *(f"{share}CI" for share in SHARES), "95CI_error", "max"]
     table = [["", "mean", "median", *(f"{share} %" for share in SHARES[1:]), "± (95 %)", "max"]]
     for prefix in AT_CONTACT:

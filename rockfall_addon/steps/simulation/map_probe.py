@@ -10,6 +10,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ....core.errors import RockfallError
+from ....core.hazard.evidence import FEW
 from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES, Maps
 from ....core.terrain.raycast import cast_ray
 from ...scene import hazard_maps, problems, simulation_setup
@@ -50,6 +51,7 @@ def card_of(maps: Maps, row: int, column: int) -> tuple[list[str], list[list[str
         f"{value('Nr_passages'):.0f} passages; {np.nan_to_num(value('Nr_deposited')):.0f} blocks stay here",
         "; ".join(f"{value(f'E_over_{limit}kJ'):.3g} % above {limit} kJ" for limit in CLASSES_KJ),
     ]
+    said += [f"Fewer than {FEW} blocks: these values say little"] if blocks < FEW else []
     columns = ["mean", *(f"{share}CI" for share in SHARES), "95CI_error", "max"]
     table = [["", "mean", "median", *(f"{share} %" for share in SHARES[1:]), "± (95 %)", "max"]]
     for prefix, (name, unit, _) in QUANTITIES.items():

@@ -84,9 +84,3 @@ def check_finite(points: Array, kind: str, path: Path, before: int = 0) -> None:
             file=path,
             advice=f"Remove {plural} with NaN or infinite coordinates and export again",
         )
-
-
-def triangulated(polygons: list[list[int]]) -> NDArray[np.int64]:
-    """Polygons as fans of triangles, (m, 3)."""
-    fan = [(p[0], p[i], p[i + 1]) for p in polygons for i in range(1, len(p) - 1)]
-    return np.array(fan, dtype=np.int64).reshape(-1, 3)

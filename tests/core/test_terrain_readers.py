@@ -154,7 +154,7 @@ def test_obj_of_several_objects_with_polygons_and_relative_numbers(tmp_path):
 
 def test_obj_that_is_read_in_several_blocks_counts_its_corners_and_rows_through(tmp_path):
     path, quads = tmp_path / "long.obj", 15_000
-    heights = np.random.default_rng(2).uniform(0, 9, 4 * quads)
+    heights = np.random.default_rng(2).uniform(0, 0.2, 4 * quads)
     corners = [f"v {i % 4 in (1, 2):d}.25 {i // 4 + (i % 4 > 1)}.5 {z:.9f}" for i, z in enumerate(heights)]
     lines = [line for i in range(quads) for line in (*corners[4 * i : 4 * i + 4], "f -4 -3 -2 -1")]
     path.write_bytes("\r\n".join(lines).encode())
@@ -182,8 +182,11 @@ def test_lines_in_blocks_are_those_of_the_whole_text(tmp_path, newline):
 
 def test_obj_of_polygons_as_trimesh_reads_it(tmp_path):
     rng = np.random.default_rng(4)
-    points = rng.normal(0, 1, (60, 3)) + LV95
-    corners = [rng.choice(60, count, replace=False) + 1 for count in rng.choice([3, 5, 6, 7], 300)]
+    counts = rng.choice([3, 5, 6, 7], 300)
+    on_circles = [np.sort(rng.choice(60, count, replace=False)) + 1 for count in counts]
+    angles = np.linspace(0, 2 * np.pi, 60, endpoint=False)  # polygons of points on a circle are convex
+    points = LV95 + np.stack([9 * np.cos(angles), 9 * np.sin(angles), 3 * np.cos(angles)], axis=1)
+    corners = [np.roll(face, k) for face, k in zip(on_circles, rng.integers(0, 7, 300), strict=True)]
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()] + ["vt 0 0", "vn 0 0 1"]
     lines += ["f " + " ".join(f"{corner}/1/1" for corner in face) for face in corners]
     path = write(tmp_path / "a.obj", "\n".join(lines))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reading import check_promise, reading
@@ -16,6 +17,8 @@ from .source import Source
 from .text import number_table, read_text
 
 DAMAGED = "It is truncated or damaged: copy or export it again"
+WITHHELD, SYNTHETIC = np.uint8(1), np.uint8(2)
+"""Marks of a point, ASPRS LAS 1.4 R15, tables 8 and 16; what they are kept as here."""
 GROUND_CLASS = 2
 """ASPRS LAS 1.4 R15, table 17."""
 LOOKED_AT = 500_000
@@ -34,22 +37,32 @@ AXIS_NAMES = (
 def read_las(path: Path, ground_only: bool | None) -> Source:
     """Read a LAS or LAZ cloud, its ground class (2) when it has one and ``ground_only`` is not False.
 
-    Points classified as noise (7 and 18) are left out.
+    Points marked as withheld (to be taken for deleted) or synthetic (not measured), and those classified as noise (7
+    and 18), are left out. Key points and points where flight strips overlap are measured points as any others.
 
     Raises
     ------
     InputError : not a LAS file, truncated, fewer points than its header promises; no ground class when it is asked for.
     """
     header, crs, geographic = _las_header(path)
-    points, classes, colours = _las_points(path, header)
+    points, classes, flags, colours = _las_points(path, header)
     if len(points) != header.point_count:
         raise _truncated(path, header.point_count, len(points))
-    ground = classes == GROUND_CLASS
-    notes = [f"Cloud of {len(points):,} points."]
-    kept = slice(None)
+    notes = [f"Cloud of {len(points):,} points.", *_copc_sentences(header, path)]
+    valid = flags == 0
+    if not valid.all():
+        notes.append(f"Left out {_flagged(flags)}.")
+        if not valid.any():
+            raise InputError(
+                f"All {len(points):,} points are marked as withheld or synthetic",
+                file=path,
+                advice="Export the cloud with the points that count",
+            )
+    ground = valid & (classes == GROUND_CLASS)
+    kept = valid
     if ground_only and not ground.any():
         raise InputError(
-            f"None of the {len(points)} points is classified as ground (class {GROUND_CLASS})",
+            f"None of the {int(valid.sum())} points is classified as ground (class {GROUND_CLASS})",
             file=path,
             advice="Use all points, or classify the cloud first",
         )
@@ -57,9 +70,9 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
         kept = ground
         notes.append(f"Used the {int(ground.sum()):,} points of the ground class ({GROUND_CLASS}).")
     else:
-        noise = (classes == 7) | (classes == 18)
+        noise = valid & ((classes == 7) | (classes == 18))
         if noise.any():
-            kept = ~noise
+            kept = valid & ~noise
             notes.append(f"Left out {int(noise.sum()):,} points classified as noise (7, 18).")
         notes.append(
             "Used all classes, as asked."
@@ -67,20 +80,31 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
             else "The cloud has no ground class: vegetation and buildings, if any, are part of the surface. "
             "The ground filter leaves them out (--ground-filter; in Blender “Points” in the import dialog)."
         )
+    if not kept.all():
+        points, colours = points[kept], None if colours is None else colours[kept]
     return Source(
-        points[kept], crs=crs, geographic=geographic, notes=tuple(notes),
-        colours=None if colours is None else colours[kept],
-    )  # fmt: skip
+        points, crs=crs, geographic=geographic, notes=tuple(notes), colours=colours, step=np.array(header.scales)
+    )
 
 
-def inspect_las(path: Path) -> tuple[Array, int, str, bool, tuple[str, ...]]:
-    """Box (2, 3), number of points, CRS and whether it is geographic, from the header alone; and sentences on the
-    points and, from the first ones, on their classes.
+def _flagged(flags: NDArray[np.uint8]) -> str:
+    """How many points are marked as what."""
+    withheld, synthetic = int((flags & WITHHELD > 0).sum()), int((flags == SYNTHETIC).sum())
+    parts = [
+        *([f"{withheld:,} points marked as withheld"] if withheld else []),
+        *([f"{synthetic:,} marked as synthetic (not measured)"] if synthetic else []),
+    ]
+    return " and ".join(parts)
+
+
+def inspect_las(path: Path) -> tuple[Array, int, Array, str, bool, tuple[str, ...]]:
+    """Box (2, 3), number of points, scales (3,), CRS and whether it is geographic, from the header alone; and sentences
+    on the points and, from the first ones, on their classes.
     """
     header, crs, geographic = _las_header(path)
     count = int(header.point_count)
     said = (f"Cloud of {count:,} points.", _ground_sentence(path, count))
-    return np.array([header.mins, header.maxs]), count, crs, geographic, said
+    return np.array([header.mins, header.maxs]), count, np.array(header.scales), crs, geographic, said
 
 
 def _ground_sentence(path: Path, count: int) -> str:
@@ -88,7 +112,16 @@ def _ground_sentence(path: Path, count: int) -> str:
     import laspy
 
     with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
-        some = np.asarray(opened.read_points(LOOKED_AT).classification)
+        looked_at = opened.read_points(LOOKED_AT)
+        some, flags = np.asarray(looked_at.classification), _flags(looked_at)
+    said = ""
+    if flags.any():
+        of_first = "" if count <= LOOKED_AT else f", of the first {LOOKED_AT:,}"
+        said = f" Left out: {_flagged(flags)}{of_first}."
+    return _class_sentence(some[flags == 0], count) + said
+
+
+def _class_sentence(some: NDArray[np.uint8], count: int) -> str:
     ground = int((some == GROUND_CLASS).sum())
     if not ground:
         known = "No point" if count <= LOOKED_AT else f"None of the first {LOOKED_AT:,} points"
@@ -177,11 +210,16 @@ def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
     return crs_beside(path)
 
 
-def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray, Colours | None]:
+def _flags(points: Any) -> NDArray[np.uint8]:
+    return WITHHELD * np.asarray(points.withheld, np.uint8) | SYNTHETIC * np.asarray(points.synthetic, np.uint8)
+
+
+def _las_points(path: Path, header: Any) -> tuple[Array, NDArray[np.uint8], NDArray[np.uint8], Colours | None]:
+    """Coordinates, classes, `WITHHELD` and `SYNTHETIC`, colours."""
     import laspy
 
     points = np.empty((header.point_count, 3))
-    classes = np.empty(header.point_count, np.uint8)
+    classes, flags = np.empty(header.point_count, np.uint8), np.empty(header.point_count, np.uint8)
     coloured = {"red", "green", "blue"} <= set(header.point_format.dimension_names)
     colours = np.empty((header.point_count if coloured else 0, 3), np.uint16)
     at = 0
@@ -190,12 +228,27 @@ def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray, Colours | N
             part = slice(at, at + len(chunk))
             for axis, name in enumerate("XYZ"):
                 points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
-            classes[part] = np.asarray(chunk.classification)
+            classes[part], flags[part] = np.asarray(chunk.classification), _flags(chunk)
             if coloured:
                 for channel, name in enumerate(("red", "green", "blue")):
                     colours[part, channel] = np.asarray(chunk[name])
             at += len(chunk)
-    return points[:at], classes[:at], colours_of(colours[:at])[0]
+    return points[:at], classes[:at], flags[:at], colours_of(colours[:at])[0]
+
+
+def _copc_sentences(header: Any, path: Path) -> tuple[str, ...]:
+    """What to say of a cloud-optimised file (COPC 1.0): its parts of all resolutions together are the cloud."""
+    from ..formats.copc import counted_points
+
+    record = next((r for r in header.vlrs if r.user_id == "copc" and r.record_id == 1), None)
+    if record is None:
+        return ()
+    counted = counted_points(path, bytes(record.record_data_bytes()))
+    if counted == header.point_count:
+        return ("A cloud-optimised file (COPC): all points of all its levels were read.",)
+    return (
+        f"A cloud-optimised file (COPC), whose levels count {counted:,} points: all {header.point_count:,} were read.",
+    )
 
 
 def _truncated(path: Path, promised: int, held: int | None) -> InputError:

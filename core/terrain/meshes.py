@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
 from .cleaning import merge_duplicates
+from .coordinate_step import single_precision_step
 from .polygons import Triangles, triangles_of
 from .scan_colours import colours_of
 from .source import Source, check_face_indices, check_finite
@@ -179,7 +180,8 @@ def read_stl(path: Path) -> Source:
         beginning = file.read(84)
     promised = int.from_bytes(beginning[80:84], "little") if len(beginning) == 84 else -1
     # A binary header may begin with "solid" too: the size is what tells.
-    if size == 84 + promised * STL_TRIANGLE.itemsize:
+    is_binary = size == 84 + promised * STL_TRIANGLE.itemsize
+    if is_binary:
         corners: Iterator[Array] = (
             np.fromfile(path, STL_TRIANGLE, BLOCK_TRIANGLES, offset=84 + start * STL_TRIANGLE.itemsize)["corners"]
             for start in range(0, promised, BLOCK_TRIANGLES)
@@ -197,7 +199,19 @@ def read_stl(path: Path) -> Source:
     else:
         raise InputError("Not an STL file", file=path, advice="Check its extension or export it again")
     points, faces, merged = _merged(corners, path)
-    return Source(points, check_face_indices(faces, len(points), path), merged=merged)
+    step = single_precision_step(points) if is_binary else None
+    return Source(
+        points, check_face_indices(faces, len(points), path), notes=_unit_words(beginning), merged=merged, step=step
+    )
+
+
+def _unit_words(beginning: bytes) -> tuple[str, ...]:
+    """What to say where the first bytes name a unit: STL has none by its standard, and programs write one there."""
+    header = beginning[:80].split(b"\n")[0].decode("ascii", "replace")
+    found = re.search(r"\bunits?\s*[:=]?\s*([A-Za-z]{1,12})\b", header, re.IGNORECASE)
+    if found is None:
+        return ()
+    return (f'The header names a unit, "{found[0]}"; STL has none, and lengths are taken as asked: check the unit.',)
 
 
 def _merged(corners: Iterable[Array], path: Path) -> tuple[Array, NDArray[np.int32], int]:

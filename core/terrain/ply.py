@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reading import AGAIN
+from .coordinate_step import single_precision_step
 from .polygons import triangles_of
 from .scan_colours import colour_columns, colours_of
 from .source import Source, check_face_indices, check_finite
@@ -88,7 +89,18 @@ def read_ply(path: Path) -> Source:
         check_finite(contents.points, "mesh", path)
         made = triangles_of(contents.points, corners, counts)
         faces, notes = check_face_indices(made.faces, len(contents.points), path), [*made.notes, *notes]
-    return Source(contents.points, faces, crs=crs, notes=tuple(notes), colours=colours)
+    step = _step(elements, contents.points, bool(order))
+    return Source(contents.points, faces, crs=crs, notes=tuple(notes), colours=colours, step=step)
+
+
+def _step(elements: Sequence[Element], points: NDArray[np.float64], binary: bool) -> NDArray[np.float64] | None:
+    """(3,) of which the coordinates are multiples by their types; None where their numbers have to tell."""
+    vertex = next(e for e in elements if e.name == "vertex")
+    types = [next(p.type for p in vertex.properties if p.name == axis) for axis in "xyz"]
+    if "f8" in types or not (binary or all(t[0] in "iu" for t in types)):
+        return None
+    single = single_precision_step(points)
+    return np.where([t[0] in "iu" for t in types], 1.0, single)
 
 
 def _check_corners(corners: NDArray[Any], counts: NDArray[np.int64], vertex_count: int, path: Path) -> None:

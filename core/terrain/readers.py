@@ -216,8 +216,8 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     path, how = Path(path), HowToRead(up, unit_m)
     if path.suffix.lower() in LAS_EXTENSIONS:
         check_path(path)
-        box, count, crs, geographic, said = clouds.inspect_las(path)
-        source = placed(Source(box, crs=crs, geographic=geographic, notes=said), how, path)
+        box, count, scales, crs, geographic, said = clouds.inspect_las(path)
+        source = placed(Source(box, crs=crs, geographic=geographic, notes=said, count=count, step=scales), how, path)
     else:
         source = read_placed(path, how)
         count = len(source.points) + source.merged

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Point clouds: LAS, LAZ and tables of coordinates (XYZ, TXT, CSV)."""
+"""Point clouds in LAS and LAZ."""
 
-import re
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +11,8 @@ from ..errors import InputError
 from ..reading import check_promise, reading
 from ..vectors import Array
 from .crs import crs_beside, crs_from_geokeys, crs_from_wkt
-from .scan_colours import Colours, colour_columns, colours_of
+from .scan_colours import Colours, colours_of
 from .source import Source
-from .text import number_table, read_text
 
 DAMAGED = "It is truncated or damaged: copy or export it again"
 WITHHELD, SYNTHETIC = np.uint8(1), np.uint8(2)
@@ -27,11 +25,6 @@ LAS_HEADER_BYTES, RECORD_HEADER_BYTES, EXTENDED_HEADER_BYTES = 227, 54, 60
 """ASPRS LAS 1.4 R15, tables 3, 6 and 7."""
 COMPRESSED, NOT_KNOWN_YET = 0xC0, 2**64 - 1
 """Bits of the point format, and the place of the table of parts when it was written to a stream: LAZ specification."""
-AXIS_NAMES = (
-    ("x", "x_m", "easting", "east", "e", "x_coord", "//x"),
-    ("y", "y_m", "northing", "north", "n", "y_coord"),
-    ("z", "z_m", "height", "elevation", "altitude", "h", "z_coord"),
-)
 
 
 def read_las(path: Path, ground_only: bool | None) -> Source:
@@ -258,79 +251,3 @@ def _truncated(path: Path, promised: int, held: int | None) -> InputError:
         file=path,
         advice="Copy or export it again",
     )
-
-
-def read_xyz(path: Path) -> Source:
-    """Read a table of coordinates: blanks, commas, semicolons or tabs between columns, a header row or none.
-
-    With a header the columns x, y, z (or easting, northing, elevation) are used, and red, green, blue (or r, g, b)
-    where there are such; else the first three, and the last three of six or more if they are whole and 255 at most.
-
-    Raises
-    ------
-    InputError : a row without three numbers, with its row.
-    """
-    text = read_text(path)
-    if _has_decimal_commas(text):
-        text = text.replace(b",", b".")
-    lines = re.sub(rb"[,;\t]", b" ", text).split(b"\n")
-    original = text.split(b"\n")
-    rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith((b"#", b"//"))]
-    columns, three = [0, 1, 2], [-3, -2, -1]
-    if rows and re.match(rb'[\s"]*[A-Za-z_]', lines[rows[0]]) and not re.match(rb"\s*(nan|inf)", lines[rows[0]], re.I):
-        names = _column_names(original[rows[0]])
-        columns, three = _named_columns(names, path, rows[0] + 1), colour_columns(names)
-        rows = rows[1:]
-    elif rows and len(lines[rows[0]].split()) == 1 and len(rows) > 1 and len(lines[rows[1]].split()) >= 3:
-        rows = rows[1:]  # some programs begin with the number of points
-    table = number_table([lines[i] for i in rows], [i + 1 for i in rows], path, "Coordinates")
-    if not len(table):
-        raise InputError("The table has no points", file=path, advice="Export it again")
-    if table.shape[1] <= max(columns):
-        raise InputError(
-            f"{table.shape[1]} columns, where x, y and z are needed",
-            file=path,
-            row=rows[0] + 1,
-            advice="Export x, y and z",
-        )
-    crs, geographic = crs_beside(path)
-    notes = [f"Cloud of {len(table):,} points."]
-    found = table[:, three] if three and table.shape[1] > max(three) else table[:, :0]
-    if three and three[0] < 0:  # without a header they have to look like colours
-        found = found if table.shape[1] >= 6 and _look_like_colours(found) else table[:, :0]
-    colours, said = colours_of(found)
-    notes += [said] if said else []
-    return Source(
-        np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=tuple(notes), colours=colours
-    )
-
-
-def _look_like_colours(found: Array) -> bool:
-    """Whole numbers from 0 to 255, not a normal or a class."""
-    return bool(((found >= 0) & (found <= 255) & (found % 1 == 0)).all()) and float(found.max()) > 1
-
-
-def _has_decimal_commas(text: bytes) -> bool:
-    """Commas inside of numbers that semicolons, tabs or blanks separate, and no points."""
-    number = rb"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?"
-    row = rb"^[ \t]*%s(?:(?:[ \t]*;[ \t]*|[ \t]+)%s)+[ \t;]*$" % (number, number)
-    beginning = text[:4096].rpartition(b"\n")[0] or text
-    rows = re.findall(row, beginning, re.MULTILINE)
-    return b"." not in b"".join(rows) and any(b"," in found for found in rows)
-
-
-def _column_names(line: bytes) -> list[str]:
-    text = line.decode("utf-8", "replace").lower()
-    return [name.strip(' "') for name in (re.split(r"[,;\t]", text) if re.search(r"[,;\t]", text) else text.split())]
-
-
-def _named_columns(names: list[str], path: Path, row: int) -> list[int]:
-    found = [next((names.index(n) for n in accepted if n in names), -1) for accepted in AXIS_NAMES]
-    if min(found) < 0:
-        raise InputError(
-            f'The header "{" ".join(names)[:80].strip()}" names no x, y and z',
-            file=path,
-            row=row,
-            advice="Name the columns x, y, z",
-        )
-    return found

@@ -13,7 +13,7 @@ from ..plausibility import GREATEST_M
 from ..progress import Progress, silent
 from ..reading import reader
 from ..vectors import Array, Mask
-from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, ptx
+from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, point_tables, ptx
 from .coordinate_step import coarse_sentence, spacing_in_box, spacing_of, stored_step
 from .crs import surely_different
 from .ground_filter import filter_ground
@@ -29,9 +29,9 @@ READERS: dict[str, Callable[[Path], Source]] = {
     ".asc": grids.read_ascii_grid,
     ".tif": geotiff.read_geotiff,
     ".tiff": geotiff.read_geotiff,
-    ".xyz": clouds.read_xyz,
-    ".txt": clouds.read_xyz,
-    ".csv": clouds.read_xyz,
+    ".xyz": point_tables.read_xyz,
+    ".txt": point_tables.read_xyz,
+    ".csv": point_tables.read_xyz,
     ".ptx": ptx.read_ptx,
     ".e57": e57.read_e57,
 }

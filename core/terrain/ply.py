@@ -372,7 +372,10 @@ def _ascii_faces(
     polygons = []
     for line, row in zip(lines, rows, strict=True):
         try:
-            polygons.append([int(word) for word in _split(element, line)[1][name]])
+            singles, lists = _split(element, line)
+            if len(singles) + len(lists) != len(names):
+                raise ValueError
+            polygons.append([int(word) for word in lists[name]])
         except (ValueError, IndexError) as error:
             raise InputError(
                 f'"{shown(line)}" is no face: a count and as many vertex numbers are needed',

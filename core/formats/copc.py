@@ -8,23 +8,21 @@ from ..errors import InputError
 
 ENTRY = struct.Struct("<4iQ2i")
 """Level and place of a part, where it begins, its bytes, its points: COPC 1.0, Hierarchy. Points −1: another page."""
-PAGE_OF_RECORD = struct.Struct("<2Q")
-PAGE_AT, A_PAGE = 40, -1
+A_PAGE = -1
 MOST_PAGES = 1_000_000
 
 
-def counted_points(path: Path, record: bytes) -> int:
+def counted_points(path: Path, offset: int, length: int) -> int:
     """How many points the hierarchy counts: every point is in one part of one level.
 
     Parameters
     ----------
-    record : the file's "info" record.
+    offset, length : of the first page of the hierarchy, as the file's "info" record says [bytes].
 
     Raises
     ------
     InputError : the hierarchy is outside of the file, or has no end.
     """
-    offset, length = PAGE_OF_RECORD.unpack_from(record, PAGE_AT)
     pages, seen, points = [(offset, length)], set[int](), 0
     size = path.stat().st_size
     with path.open("rb") as file:

@@ -84,7 +84,8 @@ def exchanged_axes(low: Array, high: Array) -> str:
     if swiss or (within(0, *NORTHINGS_M) and within(1, *EASTINGS_M)):
         return (
             f"x from {low[0]:,.0f} to {high[0]:,.0f} m looks like a northing, and y from {low[1]:,.0f} to "
-            f"{high[1]:,.0f} m like an easting: if they are exchanged, the terrain is a mirror image. Exchange x and y in the file."
+            f"{high[1]:,.0f} m like an easting: if they are exchanged, the terrain is a mirror image. "
+            "Exchange x and y in the file."
         )
     return ""
 

@@ -236,7 +236,7 @@ def _copc_sentences(header: Any, path: Path) -> tuple[str, ...]:
     record = next((r for r in header.vlrs if r.user_id == "copc" and r.record_id == 1), None)
     if record is None:
         return ()
-    counted = counted_points(path, bytes(record.record_data_bytes()))
+    counted = counted_points(path, record.hierarchy_root_offset, record.hierarchy_root_size)
     if counted == header.point_count:
         return ("A cloud-optimised file (COPC): all points of all its levels were read.",)
     return (

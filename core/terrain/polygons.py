@@ -62,14 +62,16 @@ def triangles_of(points: Array, corners: NDArray[np.integer], counts: Sequence[i
         part = more[begin : begin + AT_ONCE]
         own = np.arange(each[part].sum()) - (np.cumsum(each[part]) - each[part]).repeat(each[part])
         around = corners[starts[part].repeat(each[part]) + own]
-        shapes = _shapes(points[around], each[part])
+        with np.errstate(all="ignore"):
+            shapes = _shapes(points[around], each[part])
         found.bent += int((shapes.off > FLAT * shapes.size).sum())
         found.most_bent_m = max(found.most_bent_m, float(shapes.off.max(initial=0.0)))
         ends = np.cumsum(each[part])
         for i in np.flatnonzero(~shapes.convex).tolist():
             ring = around[ends[i] - each[part[i]] : ends[i]]
             at = first[part[i]]
-            ears, crosses = _ears(points[ring], shapes.normal[i])
+            with np.errstate(all="ignore"):
+                ears, crosses = _ears(points[ring], shapes.normal[i])
             found.concave += 1
             found.crossing += crosses
             if ears is not None:
@@ -127,8 +129,7 @@ def _shapes(corners: Array, counts: NDArray[np.int64]) -> _Shapes:
     edge = own[after] - own
     total = np.add.reduceat(np.cross(own, own[after]), starts)  # Newell: twice the vector area
     area2 = np.linalg.norm(total, axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        normal = np.where(area2[:, None] > 0, total / area2[:, None], 0.0)
+    normal = np.where(area2[:, None] > 0, total / area2[:, None], 0.0)
     along = normal.repeat(counts, axis=0)
     following = edge[after]
     sine = (np.cross(edge, following) * along).sum(axis=1)  # at the corner behind each edge

@@ -97,7 +97,7 @@ def test_missing_file_folder_and_unknown_extension(tmp_path):
         (ONE_FACE.replace("list uchar int", "int") + SQUARE + "3\n", "The faces have no vertex_indices"),
         (
             ONE_FACE.replace("property list", f"{TEXTURE}property list") + SQUARE + "2 7 3 0 1 2\n",
-            'row 14: "2 7 3 0 1 2" is no face',
+            'row 15: "2 7 3 0 1 2" is no face',
         ),
         (
             ONE_FACE.replace("element face", f"{TEXTURE}element face") + SQUARE,

@@ -22,7 +22,11 @@ AXIS_NAMES = (
 )
 FIRST_ROWS, FEWEST_NUMBERED = 200, 10
 """Rows by which the way that a table is written is told; and of points that a counting column takes."""
-BETWEEN_GROUPS = re.compile("(?<=\\d)[ \u00a0\u202f'\u2019](?=\\d{3}(?!\\d))".encode())
+NO_BLANKS, BLANKS = "\u00a0|\u202f|'|\u2019", " |"
+BETWEEN_GROUPS, BETWEEN_GROUPS_OF_CELLS = (
+    re.compile(f"(?<=\\d)(?:{signs})(?=\\d{{3}}(?!\\d))".encode()) for signs in (NO_BLANKS, BLANKS + NO_BLANKS)
+)
+"""Signs between thousands, where blanks stand between columns and where something else does."""
 COMMENTS = (b"#", b"//")
 
 
@@ -115,7 +119,7 @@ def _plainly_written(text: bytes, sign: bytes, path: Path) -> bytes:
     by = sign or (b"," if not decimal and b"," in rows[-1][1] else b"")
     cells = [cell.strip().strip(b'"') for _, line in rows for cell in (line.split(by) if by else line.split())]
     if any(without_groups(cell := each.decode("utf-8", "replace")) != cell for each in cells):
-        text = BETWEEN_GROUPS.sub(b"", text)
+        text = (BETWEEN_GROUPS_OF_CELLS if by else BETWEEN_GROUPS).sub(b"", text)
     if b'"' in sample:
         text = text.replace(b'"', b"")
     return text.replace(b",", b".") if decimal else text
@@ -128,14 +132,16 @@ def _refuse_thousands(line: bytes, sign: bytes, path: Path, row: int) -> None:
         cell.strip().strip('"') for cell in (text.split(sign.decode()) if sign else re.findall(r'"[^"]*"|\S+', text))
     ]
     found = next((cell for cell in cells if has_thousands_marks(cell)), "")
-    quoted = re.search(r'"([-+]?\d*,\d*)"', text) if sign not in (b";", b"\t") else None
+    quoted = re.search(r'"([-+]?\d+,\d+)"', text) if sign not in (b";", b"\t") else None
     if found or quoted:
         word = found or (quoted[1] if quoted else "")
         why, advice = why_no_number(word)
         raise InputError(f'"{word[:60]}" {why}', file=path, row=row, advice=advice)
     words = text.replace(",", " ").split()
-    if sign not in (b";", b"\t") and any(
-        re.fullmatch(r"[-+]?\d{1,3}", a) and re.fullmatch(r"0\d\d(\.\d*)?", b) for a, b in pairwise(words[:3])
+    if (
+        not sign
+        and not _has_groups_between(text.split(","))
+        and any(re.fullmatch(r"[-+]?\d{1,3}", a) and re.fullmatch(r"0\d\d(\.\d*)?", b) for a, b in pairwise(words[:3]))
     ):
         raise InputError(
             f'"{shown(line)}" looks as if blanks or commas stood between thousands as between columns',
@@ -143,6 +149,13 @@ def _refuse_thousands(line: bytes, sign: bytes, path: Path, row: int) -> None:
             row=row,
             advice="Export numbers without them",
         )
+
+
+def _has_groups_between(cells: list[str]) -> bool:
+    """Whether cells are numbers, some of them with blanks between thousands."""
+    cells = [cell.strip().strip('"') for cell in cells]
+    plain = [without_groups(cell) for cell in cells]
+    return len(cells) >= 3 and plain != cells and all(re.fullmatch(r"[-+]?\d*\.?\d*", cell) for cell in plain)
 
 
 def _refuse_point_names(line: bytes, path: Path, row: int) -> None:
@@ -176,7 +189,7 @@ def _has_decimal_commas(sample: bytes, sign: bytes) -> bool:
     """Commas inside of numbers that semicolons, tabs or blanks separate, and no points."""
     if sign == b",":
         return False
-    group = "(?:[ '\u00a0\u202f\u2019]\\d{3})*".encode() if sign else b""
+    group = f"(?:(?:{BLANKS + NO_BLANKS if sign else NO_BLANKS})\\d{{3}})*".encode()
     number = rb'"?[-+]?\d+%s(?:,\d+)?(?:[eE][-+]?\d+)?"?' % group
     between = rb"[ ]*[;\t|][ ]*" if sign else rb"[ \t]+"
     row = rb"^[ \t]*%s(?:%s%s)+[ \t;]*$" % (number, between, number)

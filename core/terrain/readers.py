@@ -175,9 +175,12 @@ def read_structure(
 
 def _cloud(opened: Opened) -> Cloud:
     points = opened.source.points
-    points = points[np.isfinite(points[:, 2])]
-    note = "Blocks meet the points themselves: there is no surface between them."
-    return Cloud(points, opened.shift, opened.name, (*opened.notes, note, *opened.advice))
+    there = np.isfinite(points[:, 2])
+    notes = [*opened.notes, "Blocks meet the points themselves: there is no surface between them."]
+    if not there.all():
+        points = points[there]
+        notes.append(f"{int((~there).sum()):,} cells without data have no point.")
+    return Cloud(points, opened.shift, opened.name, (*notes, *opened.advice))
 
 
 def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Surface:

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
 from .cleaning import merge_duplicates
+from .comments import comment_sentences
 from .coordinate_step import single_precision_step
 from .polygons import Triangles, triangles_of
 from .scan_colours import colours_of
@@ -24,7 +25,7 @@ LEFT_OUT = {
     b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves on surfaces", b"surf": "free-form surfaces",
 }  # fmt: skip
 """Elements of a Wavefront OBJ that are no faces, by the word that they begin with."""
-BLANK, NEWLINE = 32, 10
+BLANK, NEWLINE, FIRST_ROWS = 32, 10, 200
 NO_VERTEX = np.iinfo(np.int32).max
 BLOCK_TRIANGLES = 1 << 16
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -39,9 +40,11 @@ def read_obj(path: Path) -> Source:
     InputError : no vertices or faces, something that is not a number, a vertex that does not exist; with its row.
     """
     vertices, corners = NumberRows(path, "Coordinates"), _Corners(path)
-    before, vertex_row, library, others = 0, 0, b"", Counter[bytes]()
+    before, vertex_row, library, others, comments = 0, 0, b"", Counter[bytes](), list[str]()
     for lines in _whole_lines(line_blocks(path)):
         library = library or next((line[7:].strip() for line in lines if line.startswith(b"mtllib ")), b"")
+        if not before:
+            comments = [line[1:].decode("utf-8", "replace") for line in lines[:FIRST_ROWS] if line.startswith(b"#")]
         others.update(
             line[: line.find(b" ")] for line in lines if line.startswith(tuple(b"%s " % key for key in LEFT_OUT))
         )
@@ -71,7 +74,7 @@ def read_obj(path: Path) -> Source:
         notes.append(f"{many:,} vertices have a fourth number, the weight in a curve: it moves no corner of a face.")
     points = np.ascontiguousarray(points[:, :3])
     made = corners.triangles(points)
-    notes += made.notes
+    notes += [*made.notes, *comment_sentences(comments)]
     if colours is None and not said and library:
         colours, said = texture_colours(path, library.decode("utf-8", "replace"), points)
     notes += [said] if said else []

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Stanford PLY format: ascii or binary of either byte order, any number type, polygons, points only."""
 
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reading import AGAIN
+from .comments import comment_sentences
 from .coordinate_step import single_precision_step
 from .polygons import triangles_of
 from .scan_colours import colour_columns, colours_of
@@ -79,7 +81,7 @@ def read_ply(path: Path) -> Source:
     else:
         contents = _read_ascii(data[start:].tobytes(), header_rows, elements, path)
     colours, said = colours_of(contents.colours)
-    notes = [*_left_out(elements, contents), *([said] if said else [])]
+    notes = [*_left_out(elements, contents), *([said] if said else []), *comment_sentences(_comments(data[:start]))]
     faces = None
     if contents.corners is not None:
         corners, counts = contents.corners
@@ -101,6 +103,11 @@ def _step(elements: Sequence[Element], points: NDArray[np.float64], binary: bool
         return None
     single = single_precision_step(points)
     return np.where([t[0] in "iu" for t in types], 1.0, single)
+
+
+def _comments(header: NDArray[np.uint8]) -> list[str]:
+    lines = header.tobytes().decode("ascii", "replace").splitlines()
+    return [line.split(maxsplit=1)[1] for line in lines if re.match(r"(comment|obj_info)\s+\S", line)]
 
 
 def _check_corners(corners: NDArray[Any], counts: NDArray[np.int64], vertex_count: int, path: Path) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..formats.number_words import has_thousands_marks, stated_separator, why_no_number, without_groups
 from ..vectors import Array
+from .comments import comment_sentences
 from .crs import crs_beside
 from .scan_colours import colour_columns, colours_of
 from .source import Source
@@ -83,6 +84,8 @@ def read_xyz(path: Path) -> Source:
         found = found if enough and _look_like_colours(found) else table[:, :0]
     colours, said = colours_of(found)
     notes += [said] if said else []
+    comments = [line.lstrip(b"#/ ") for line in original[:FIRST_ROWS] if line.lstrip().startswith(COMMENTS)]
+    notes += comment_sentences(line.decode("utf-8", "replace") for line in comments)
     return Source(
         np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=tuple(notes), colours=colours
     )

@@ -761,3 +761,23 @@ def test_what_is_left_out_of_gltf_is_said(tmp_path):
 
     said_of = "Left out: points (1), lines (1), shape keys (1), scenes other than the first (1)."
     assert said_of in read_terrain(gltf(tmp_path, add)).summary
+
+
+@pytest.mark.parametrize(
+    "comment", ["offset 352000 5130000 0", "Global shift: -2600000.0", "scale_x 0.001", "units: feet"]
+)
+def test_comments_that_change_what_numbers_mean_are_said(tmp_path, comment):
+    mesh = hill()
+    mesh.apply_translation(-LV95)
+    ply = ply_bytes(mesh, "binary_little_endian")
+    obj = mesh.export(file_type="obj", header=None)
+    xyz = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in mesh.vertices.tolist())
+    for name, plain, marked in (
+        ("a.ply", ply, ply.replace(b"comment by hand", f"comment {comment}".encode())),
+        ("a.obj", f"# 81 vertices of a hill\n{obj}", f"# {comment}\n{obj}"),
+        ("a.xyz", f"# x y z\n{xyz}", f"# {comment}\n{xyz}"),
+    ):
+        read = READERS[Path(name).suffix]
+        assert not any("Comments in the file" in note for note in read(write(tmp_path / name, plain)).notes)
+        notes = read(write(tmp_path / name, marked)).notes
+        assert f'Comments in the file are not applied: "{comment}". Check shift, scale and unit.' in notes, name

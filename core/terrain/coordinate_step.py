@@ -22,6 +22,8 @@ SHARED_PLACES = 0.2
 """Of points in plan that are at the place of another, with another height: rounding throws them together."""
 MUCH_COARSER = 4.0
 """In plan than in height: of walls built of blocks, whose points share places too, both are alike."""
+ROUNDED = 1e-6
+"""Numbers that were rounded to some digits come in steps of a power of ten; marks set out by the two metres do not."""
 DECIMALS = 1e4
 """Numbers with more than four decimals were computed, not typed."""
 NEIGHBOURS, NEIGHBOURHOODS, NEAR = 8, 200, 20_000
@@ -51,12 +53,13 @@ def stored_step(points: Array, stated: Array | None, kind: str) -> Array:
     steps = np.zeros(3) if stated is None else stated.copy()
     if len(points) < FEWEST_VALUES:
         return steps
-    if stated is None and _was_in_single_precision(points):
+    some = _some(points)
+    if stated is None and _was_in_single_precision(some):
         steps = single_precision_step(points)
     if kind == "grid":
         steps[:2] = 0.0
     spacing = spacing_of(points)
-    found = np.array([_lattice_step(points[:, axis], 2) for axis in range(3)])
+    found = np.array([_lattice_step(some[:, axis], 2, COARSE_SHARE * spacing) for axis in range(3)])
     coarse = found > np.maximum(steps, COARSE_SHARE * spacing)
     in_plan = coarse[:2] & (found[:2] > MUCH_COARSER * found[2]) & (kind != "grid")
     coarse[:2] = in_plan if in_plan.any() and _thrown_together(points) else False
@@ -69,8 +72,9 @@ def spacing_of(points: Array) -> float:
     """How far points (n, 3) lie apart on the surface that they span, as if it were a rectangle."""
     if not len(points):
         return 0.0
-    centred = points - points.mean(axis=0)
-    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(centred.T @ centred / len(points)), 0.0))
+    centred = _some(points)
+    centred = centred - centred.mean(axis=0)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(centred.T @ centred / len(centred)), 0.0))
     return float(np.sqrt(12.0 * spread[-1] * spread[-2] / len(points)))  # a rectangle's variance: its side² / 12
 
 
@@ -100,7 +104,9 @@ def coarse_places_sentence(places: Array) -> str:
     if len(places) < FEWEST_VALUES:
         return ""
     steps = single_precision_step(places) if _was_in_single_precision(places) else np.zeros(3)
-    steps = np.maximum(steps, [_lattice_step(places[:, axis], FEWEST_VALUES) for axis in range(3)])
+    lattice = np.array([_lattice_step(places[:, axis], FEWEST_VALUES, COARSE_PLACE_M / 2) for axis in range(3)])
+    digits = np.log10(np.where(lattice > 0, lattice, np.e))
+    steps = np.maximum(steps, np.where(np.abs(digits - np.rint(digits)) < ROUNDED, lattice, 0.0))
     coarse = steps >= COARSE_PLACE_M
     if not coarse.any():
         return ""
@@ -123,16 +129,19 @@ def _was_in_single_precision(points: Array) -> bool:
         return bool((points * DECIMALS % 1 != 0).mean(axis=0).max() > 0.5)
 
 
-def _lattice_step(values: Array, fewest: int) -> float:
+def _some(points: Array) -> Array:
+    return points[:: max(1, len(points) // LOOKED_AT)]
+
+
+def _lattice_step(values: Array, fewest: int, least: float) -> float:
     """The number of which all differences are multiples; 0 where it is small, and for fewer different values."""
-    values = values[:: max(1, len(values) // LOOKED_AT)]
     distinct = np.unique(values)
     if len(distinct) < fewest:
         return 0.0
     noise = 8 * float(np.spacing(np.abs(distinct[[0, -1]]).max()))
     gaps = np.unique(np.diff(distinct))
     gaps = gaps[gaps > noise]
-    least = max(COARSE_M * 1e-3, 100 * noise)
+    least = max(least, 100 * noise)
     step = 0.0
     for gap in gaps.tolist():
         step = _common(gap, step, max(noise, 1e-6 * step))

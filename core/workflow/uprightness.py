@@ -25,7 +25,7 @@ def turned_picks(picks: Picks, surface: Surface | None) -> tuple[Picks, tuple[st
     """Picks as they lie on the terrain: turned from Y up to Z up as it was, if only so they do; with what to say, also
     of places that are stored coarsely.
     """
-    coarse = tuple(filter(None, [coarse_places_sentence(picks.shift.to_survey(picks.position))]))
+    coarse = _coarse(picks.shift, picks.position)
     if surface is None or not _only_turned(surface, picks.shift, picks.position):
         return picks, coarse
     turned = replace(
@@ -40,10 +40,15 @@ def turned_picks(picks: Picks, surface: Surface | None) -> tuple[Picks, tuple[st
 
 def turned_pairs(pairs: Pairs, surface: Surface | None) -> tuple[Pairs, tuple[str, ...]]:
     """The same of the pairs of a camera."""
+    coarse = _coarse(pairs.shift, pairs.point)
     if surface is None or not _only_turned(surface, pairs.shift, pairs.point):
-        return pairs, ()
+        return pairs, coarse
     turned = replace(pairs, point=_turned(pairs.point, pairs.shift, surface.shift), shift=surface.shift)
-    return turned, ("The pairs were turned from Y up to Z up with the terrain: only so they lie on it.",)
+    return turned, ("The pairs were turned from Y up to Z up with the terrain: only so they lie on it.", *coarse)
+
+
+def _coarse(shift: GlobalShift, places: Array) -> tuple[str, ...]:
+    return tuple(filter(None, [coarse_places_sentence(shift.to_survey(places))]))
 
 
 def turned_camera(camera: Camera) -> Camera:

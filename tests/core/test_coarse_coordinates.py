@@ -195,6 +195,8 @@ def test_picks_that_are_stored_coarsely_are_said():
     assert "steps of 0.5 m (y)" in coarse_places_sentence(places.astype(np.float32).astype(np.float64))
     six = np.array([[float(f"{value:.6g}") for value in place] for place in places])
     assert "steps of 1 m (x) and 10 m (y)" in coarse_places_sentence(six)
+    marks = np.column_stack([2.0 * np.arange(20), np.repeat([0.0, 6.0, 8, 12, 20], 4), places[:, 2]])
+    assert coarse_places_sentence(marks + np.array([352_000, 5_130_000, 0])) == "", "set out on purpose"
     shift = GlobalShift.proposed(places.min(axis=0), places.max(axis=0))
     coarse = places.round(0)
     assert coarse_places_sentence(shift.to_survey(shift.to_local(coarse))) == coarse_places_sentence(coarse) != ""

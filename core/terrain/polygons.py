@@ -158,7 +158,6 @@ def _ears(corners: Array, normal: Array) -> tuple[NDArray[np.int64] | None, bool
     found = mapbox_earcut.triangulate_float64(plan, np.array([len(plan)], np.uint32)).astype(np.int64).reshape(-1, 3)
     a, b, c = (plan[found[:, k]] for k in range(3))
     doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    found[doubled < 0] = found[doubled < 0, ::-1]  # all as the polygon is wound
     after = np.roll(plan, -1, axis=0)
     own = float((plan[:, 0] * after[:, 1] - plan[:, 1] * after[:, 0]).sum())
     return found, abs(float(np.abs(doubled).sum()) - abs(own)) > SAME_AREA * abs(own)

@@ -206,7 +206,7 @@ def _read_binary(data: NDArray[np.uint8], offset: int, elements: list[Element], 
         if not uniform:
             if not list_counts(dtype):
                 raise _truncated(element, (data.size - offset) // max(dtype.itemsize, 1), path)
-            values, end = _walk(data, offset, element, order, path)
+            values, end = walked(data, offset, element, order, path)
         if element.name == "vertex":
             points = np.stack([np.asarray(values[axis], dtype=np.float64) for axis in "xyz"], axis=1)
             names = [p.name for p in element.properties if not p.count_type]
@@ -259,7 +259,7 @@ def list_counts(dtype: np.dtype) -> list[str]:
     return [name for name in dtype.names or () if name.startswith("count ")]
 
 
-def _walk(
+def walked(
     data: NDArray[np.uint8], offset: int, element: Element, order: str, path: Path
 ) -> tuple[dict[str, list[Any]], int]:
     """Row by row, for lists of different lengths: the values of each property, and the offset behind them."""

@@ -17,6 +17,7 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
 from rockfall.core.terrain.meshes import read_obj
 from rockfall.core.terrain.opening import READERS
+from rockfall.core.terrain.ply_attributes import read_ply_attribute
 from rockfall.core.terrain.readers import inspect_terrain, read_terrain
 from rockfall.core.terrain.text import BLOCK_BYTES, line_blocks
 from rockfall.core.terrain.writers import write_ply
@@ -781,3 +782,18 @@ def test_comments_that_change_what_numbers_mean_are_said(tmp_path, comment):
         assert not any("Comments in the file" in note for note in read(write(tmp_path / name, plain)).notes)
         notes = read(write(tmp_path / name, marked)).notes
         assert f'Comments in the file are not applied: "{comment}". Check shift, scale and unit.' in notes, name
+
+
+@pytest.mark.parametrize("of", ["vertex", "face"])
+def test_attributes_of_a_ply_with_lists_at_its_vertices(tmp_path, of):
+    """Of vertices that have lists themselves, and of faces behind such vertices."""
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty list uchar short tags\n"
+    head += "".join(f"property double {axis}\n" for axis in "xyz") + "property int soil\n" * (of == "vertex")
+    head += "element face 1\nproperty list uchar int vertex_indices\n"
+    head += "property int soil\n" * (of == "face") + "end_header\n"
+    data = b""
+    for i, place in enumerate(((0.0, 0.0, 0.5), (2.0, 0.0, 0.25), (2.0, 3.0, 1.5))):
+        data += struct.pack(f"<B{i}h3d", i, *range(i), *place) + (struct.pack("<i", 7 + i) if of == "vertex" else b"")
+    data += struct.pack("<B3i", 3, 0, 1, 2) + (struct.pack("<i", 5) if of == "face" else b"")
+    found = read_ply_attribute(write(tmp_path / "a.ply", head.encode() + data), "soil")
+    np.testing.assert_array_equal(found.values, [7, 8, 9] if of == "vertex" else [5])

@@ -10,11 +10,20 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError, readable
+from ..formats.number_words import (
+    GROUP_SIGNS,
+    as_utf8,
+    has_thousands_marks,
+    stated_separator,
+    why_no_number,
+    without_groups,
+)
 from ..plausibility import implausible, limits
 from ..reading import reader
 from ..vectors import Array, Names
@@ -26,6 +35,9 @@ BLOCK_ROWS, BETWEEN = 20_000, "\0"
 """So many rows of a column are kept as one text, cells between zero bytes: a fifth of the memory of single cells."""
 MOST_OF_CELL = 60
 """Letters of a cell that a message shows."""
+GROUP_SIGN = re.compile(f"[{GROUP_SIGNS}]")
+MARKS = re.compile(r"\d[.,]\d{3}[.,]")
+NUMBER_PARTS = re.compile(r"[-+]?\d+,\d+(\.\d*)?")
 LINE_END = re.compile(rb"[\r\n]")
 EXPORT_ADVICE = "Export it as comma-separated text in UTF-8, with . decimals"
 
@@ -75,7 +87,7 @@ class TextTable:
             return np.full(len(self), np.nan)
         plain = self.columns.numbers(name, required) if isinstance(self.columns, Cells) else None
         texts = self.columns[name] if plain is None else ()
-        blocks = [_numbers(self._with_points(block).split(BETWEEN), required) for block in texts]
+        blocks = [self._block_numbers(block, required) for block in texts]
         good = [block for block in blocks if block is not None]
         if len(good) < len(blocks):
             cells = self.cells(name)
@@ -91,9 +103,19 @@ class TextTable:
 
     def has_numbers(self, name: str) -> bool:
         """Whether there are numbers in a column that is there, and nothing else."""
-        blocks = [_numbers(self._with_points(block).split(BETWEEN), False) for block in self.columns[name]]
+        blocks = [self._block_numbers(block, False) for block in self.columns[name]]
         good = [block for block in blocks if block is not None]
         return len(good) == len(blocks) and bool(np.isfinite(np.concatenate(good)).any())
+
+    def _block_numbers(self, block: str, required: bool) -> Array | None:
+        found = _numbers(self._with_points(block).split(BETWEEN), required)
+        if found is None and GROUP_SIGN.search(block):
+            found = _numbers([self._plain(cell) for cell in block.split(BETWEEN)], required)
+        return found
+
+    def _plain(self, cell: str) -> str:
+        """A cell as Python writes numbers, if it is one."""
+        return self._with_points(without_groups(cell))
 
     def _with_points(self, text: str) -> str:
         return text.replace(self.decimal, ".") if self.decimal != "." else text
@@ -104,12 +126,17 @@ class TextTable:
         if not cell:
             return self.error(i, f"The cell of {name} is empty", "Give a number") if required else None
         try:
-            value = float(self._with_points(cell))
+            value = float(self._plain(cell))
         except ValueError:
             value = None
         if value is None or "_" in cell:
-            advice = "Write decimals with a point" if "," in cell else f"Correct the cell{or_empty}"
-            return self.error(i, f"'{readable(cell, MOST_OF_CELL)}' in column {name} is not a number", advice)
+            why, advice = why_no_number(cell)
+            if self.decimal != "." and cell.count(".") == 1 and not why:
+                why, advice = "has a decimal point, where others have commas", "Write all decimals in the same way"
+            problem = f"'{readable(cell, MOST_OF_CELL)}' in column {name} is not a number"
+            if why:
+                problem = f"'{readable(cell, MOST_OF_CELL)}' in column {name} {why}"
+            return self.error(i, problem, advice or f"Correct the cell{or_empty}")
         if not np.isfinite(value):
             return self.error(
                 i, f"'{readable(cell, MOST_OF_CELL)}' in column {name} is not finite", f"Correct the cell{or_empty}"
@@ -125,7 +152,7 @@ class TextTable:
         left = [name for name in self.columns if name not in known]
         cells = {name: self.text(name) for name in left}
         if self.decimal != ".":
-            cells |= {name: list(map(self._with_points, cells[name])) for name in left if self.has_numbers(name)}
+            cells |= {name: list(map(self._plain, cells[name])) for name in left if self.has_numbers(name)}
         return {name: np.array(text, dtype=np.str_) for name, text in cells.items()}
 
     def error(self, i: int, problem: str, advice: str) -> InputError:
@@ -159,8 +186,8 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         )
     if path.suffix.lower() == SUFFIX:
         return _parquet_table(path, required, known)
-    data = _checked(path, path.read_bytes())
-    separator = _separator(data)
+    stated, data = stated_separator(_checked(path, as_utf8(path.read_bytes(), path, EXPORT_ADVICE)))
+    separator = stated.decode() or _separator(data)
     plain = plain_rows(data) if separator == "," else None
     if plain is not None:
         return _plain_table(path, plain, required, known)
@@ -200,7 +227,10 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
         raise InputError("The table has a header but no rows", file=path, advice="Add rows below it")
     _add_block(blocks, rows)
     columns = {name: texts for name, texts in zip(header, blocks, strict=True) if name}
-    return _in_known_units(TextTable(path, columns, numbers, converted, _decimal(data, separator)), header, known, top)
+    table = TextTable(path, columns, numbers, converted, _decimal(data, separator))
+    if separator != ",":
+        _refuse_thousands_marks(table)
+    return _in_known_units(table, header, known, top)
 
 
 def _plain_table(path: Path, rows: PlainRows, required: Sequence[str], known: Sequence[str]) -> TextTable:
@@ -239,9 +269,24 @@ def _decimal(data: bytes, separator: str) -> str:
     if separator == ",":
         return "."
     sign = separator.encode()
-    cell = rb"(?:^|%s)[ \"]*[-+]?\d*\%%s\d+(?:[eE][-+]?\d+)?[ \"]*(?=%s|\r|\n|$)" % (sign, sign)
+    whole = rb"(?:\d{1,3}(?:(?:[ ']|\xc2\xa0|\xe2\x80[\xaf\x99])\d{3})+|\d*)"
+    cell = rb"(?:^|[%s])[ \"]*[-+]?%s\%%s\d+(?:[eE][-+]?\d+)?[ \"]*(?=[%s]|\r|\n|$)" % (sign, whole, sign)
     commas, points = (re.search(cell % mark, data, re.MULTILINE) for mark in (b",", b"."))
     return "," if commas and not points else "."
+
+
+def _refuse_thousands_marks(table: TextTable) -> None:
+    """Where one number has marks between its thousands, no point or comma of the others is known to be decimal."""
+    first: tuple[int, str, str] | None = None
+    for name, blocks in table.columns.items():
+        if not any(MARKS.search(block) for block in blocks):
+            continue
+        i = next((i for i, cell in enumerate(table.cells(name)) if has_thousands_marks(cell)), None)
+        if i is not None and (first is None or i < first[0]):
+            first = i, name, table.cells(name)[i]
+    if first is not None:
+        why, advice = why_no_number(first[2])
+        raise table.error(first[0], f"'{readable(first[2], MOST_OF_CELL)}' in column {first[1]} {why}", advice)
 
 
 def _in_our_units(
@@ -255,11 +300,12 @@ def _in_our_units(
 
 def _check_row(path: Path, header: list[str], cells: list[str], row: int) -> None:
     if len(cells) != len(header):
+        advice = "Give every row as many cells as the header; put text that contains a comma in quotes"
+        pairs = pairwise(cells)
+        if len(cells) > len(header) and any(NUMBER_PARTS.fullmatch(f"{a},{b}") for a, b in pairs):
+            advice = "Numbers seem to have commas, as decimal marks or between thousands: write them with a point alone"
         raise InputError(
-            f"The row has {len(cells)} cells, the header has {len(header)}",
-            file=path,
-            row=row,
-            advice="Give every row as many cells as the header; put text that contains a comma in quotes",
+            f"The row has {len(cells)} cells, the header has {len(header)}", file=path, row=row, advice=advice
         )
     if "" in header:
         for i, cell in enumerate(cells):
@@ -288,8 +334,6 @@ def _numbers(cells: list[str], required: bool) -> Array | None:
 
 def _checked(path: Path, data: bytes) -> bytes:
     """The data, which are text in UTF-8."""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError("The file is in UTF-16, not UTF-8", file=path, advice=EXPORT_ADVICE)
     if b"\0" in data:
         raise InputError("This is a binary file, not a table", file=path, advice=EXPORT_ADVICE)
     try:

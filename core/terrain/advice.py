@@ -13,6 +13,12 @@ from .source import Source
 HIGHEST_RELIEF_M = 9_000.0
 """More than any slope on Earth; a file with more is not in metres."""
 FAR_M = 100_000.0
+HEIGHTS_M = (-500.0, 9_000.0)
+"""Of land: the Dead Sea lies at −430 m, Mount Everest at 8 849 m."""
+SWISS_EASTINGS_M, SWISS_NORTHINGS_M = (2.4e6, 2.9e6), (1.0e6, 1.4e6)
+"""LV95 (EPSG:2056), with some room about the country."""
+EASTINGS_M, NORTHINGS_M = (100_000.0, 900_000.0), (1_500_000.0, 9_400_000.0)
+"""UTM away from the equator; eastings beyond 1 500 000 m of other systems come with northings beyond 900 000 m."""
 MUCH_MORE = 4.0
 Y_UP = "The surface faces along y much more than along z: if y points up in this file, read it with Y up."
 
@@ -54,9 +60,39 @@ def mesh_faces_along_y(total: Array) -> bool:
     return bool(across[1] > MUCH_MORE * across[2] and across[1] > across[0])
 
 
+def exchanged_axes(low: Array, high: Array) -> str:
+    """What to say of a box in survey coordinates whose axes seem to be exchanged; empty where they do not.
+
+    Heights are never as large as survey coordinates; eastings and northings are told apart where their systems do.
+    """
+
+    def within(axis: int, least: float, most: float) -> bool:
+        return bool(low[axis] >= least and high[axis] <= most)
+
+    def survey(axis: int) -> bool:
+        return bool(low[axis] > LARGE_COORDINATE_M or high[axis] < -LARGE_COORDINATE_M)
+
+    if survey(2) and (survey(0) or survey(1)):
+        place = f"z from {low[2]:,.0f} to {high[2]:,.0f} m is no height"
+        if within(1, *HEIGHTS_M) and survey(0):
+            advice = "read it with Y up" if high[2] < 0 else "exchange y and z in the file"
+            return f"{place}, and y from {low[1]:,.0f} to {high[1]:,.0f} m may be: {advice}."
+        if within(0, *HEIGHTS_M) and survey(1):
+            return f"{place}, and x from {low[0]:,.0f} to {high[0]:,.0f} m may be: bring them into the order x, y, z."
+        return f"{place}: check which columns or axes are x, y and z."
+    swiss = within(0, *SWISS_NORTHINGS_M) and within(1, *SWISS_EASTINGS_M)
+    if swiss or (within(0, *NORTHINGS_M) and within(1, *EASTINGS_M)):
+        return (
+            f"x from {low[0]:,.0f} to {high[0]:,.0f} m looks like a northing, and y from {low[1]:,.0f} to "
+            f"{high[1]:,.0f} m like an easting: if they are exchanged, the terrain is a mirror image. "
+            "Exchange x and y in the file."
+        )
+    return ""
+
+
 def sentences(low: Array, high: Array, shift: GlobalShift) -> list[str]:
-    """Advice on units and place, for the summary."""
-    notes = []
+    """Advice on units, axes and place, for the summary."""
+    notes = list(filter(None, [exchanged_axes(low, high)]))
     if (high - low)[2] > HIGHEST_RELIEF_M:
         notes.append(
             f"The relief of {(high - low)[2]:,.0f} m suggests another unit: "

@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Point clouds: LAS, LAZ and tables of coordinates (XYZ, TXT, CSV)."""
+"""Point clouds in LAS and LAZ."""
 
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reading import check_promise, reading
 from ..vectors import Array
 from .crs import crs_beside, crs_from_geokeys, crs_from_wkt
-from .scan_colours import Colours, colour_columns, colours_of
+from .scan_colours import Colours, colours_of
 from .source import Source
-from .text import number_table, read_text
 
 DAMAGED = "It is truncated or damaged: copy or export it again"
+WITHHELD, SYNTHETIC = np.uint8(1), np.uint8(2)
+"""Marks of a point, ASPRS LAS 1.4 R15, tables 8 and 16; what they are kept as here."""
 GROUND_CLASS = 2
 """ASPRS LAS 1.4 R15, table 17."""
 LOOKED_AT = 500_000
@@ -24,32 +25,37 @@ LAS_HEADER_BYTES, RECORD_HEADER_BYTES, EXTENDED_HEADER_BYTES = 227, 54, 60
 """ASPRS LAS 1.4 R15, tables 3, 6 and 7."""
 COMPRESSED, NOT_KNOWN_YET = 0xC0, 2**64 - 1
 """Bits of the point format, and the place of the table of parts when it was written to a stream: LAZ specification."""
-AXIS_NAMES = (
-    ("x", "x_m", "easting", "east", "e", "x_coord", "//x"),
-    ("y", "y_m", "northing", "north", "n", "y_coord"),
-    ("z", "z_m", "height", "elevation", "altitude", "h", "z_coord"),
-)
 
 
 def read_las(path: Path, ground_only: bool | None) -> Source:
     """Read a LAS or LAZ cloud, its ground class (2) when it has one and ``ground_only`` is not False.
 
-    Points classified as noise (7 and 18) are left out.
+    Points marked as withheld (to be taken for deleted) or synthetic (not measured), and those classified as noise (7
+    and 18), are left out. Key points and points where flight strips overlap are measured points as any others.
 
     Raises
     ------
     InputError : not a LAS file, truncated, fewer points than its header promises; no ground class when it is asked for.
     """
     header, crs, geographic = _las_header(path)
-    points, classes, colours = _las_points(path, header)
+    points, classes, flags, colours = _las_points(path, header)
     if len(points) != header.point_count:
         raise _truncated(path, header.point_count, len(points))
-    ground = classes == GROUND_CLASS
-    notes = [f"Cloud of {len(points):,} points."]
-    kept = slice(None)
+    notes = [f"Cloud of {len(points):,} points.", *_copc_sentences(header, path)]
+    valid = flags == 0
+    if not valid.all():
+        notes.append(f"Left out {_flagged(flags)}.")
+        if not valid.any():
+            raise InputError(
+                f"All {len(points):,} points are marked as withheld or synthetic",
+                file=path,
+                advice="Export the cloud with the points that count",
+            )
+    ground = valid & (classes == GROUND_CLASS)
+    kept = valid
     if ground_only and not ground.any():
         raise InputError(
-            f"None of the {len(points)} points is classified as ground (class {GROUND_CLASS})",
+            f"None of the {int(valid.sum())} points is classified as ground (class {GROUND_CLASS})",
             file=path,
             advice="Use all points, or classify the cloud first",
         )
@@ -57,9 +63,9 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
         kept = ground
         notes.append(f"Used the {int(ground.sum()):,} points of the ground class ({GROUND_CLASS}).")
     else:
-        noise = (classes == 7) | (classes == 18)
+        noise = valid & ((classes == 7) | (classes == 18))
         if noise.any():
-            kept = ~noise
+            kept = valid & ~noise
             notes.append(f"Left out {int(noise.sum()):,} points classified as noise (7, 18).")
         notes.append(
             "Used all classes, as asked."
@@ -67,20 +73,31 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
             else "The cloud has no ground class: vegetation and buildings, if any, are part of the surface. "
             "The ground filter leaves them out (--ground-filter; in Blender “Points” in the import dialog)."
         )
+    if not kept.all():
+        points, colours = points[kept], None if colours is None else colours[kept]
     return Source(
-        points[kept], crs=crs, geographic=geographic, notes=tuple(notes),
-        colours=None if colours is None else colours[kept],
-    )  # fmt: skip
+        points, crs=crs, geographic=geographic, notes=tuple(notes), colours=colours, step=np.array(header.scales)
+    )
 
 
-def inspect_las(path: Path) -> tuple[Array, int, str, bool, tuple[str, ...]]:
-    """Box (2, 3), number of points, CRS and whether it is geographic, from the header alone; and sentences on the
-    points and, from the first ones, on their classes.
+def _flagged(flags: NDArray[np.uint8]) -> str:
+    """How many points are marked as what."""
+    withheld, synthetic = int((flags & WITHHELD > 0).sum()), int((flags == SYNTHETIC).sum())
+    parts = [
+        *([f"{withheld:,} points marked as withheld"] if withheld else []),
+        *([f"{synthetic:,} marked as synthetic (not measured)"] if synthetic else []),
+    ]
+    return " and ".join(parts)
+
+
+def inspect_las(path: Path) -> tuple[Array, int, Array, str, bool, tuple[str, ...]]:
+    """Box (2, 3), number of points, scales (3,), CRS and whether it is geographic, from the header alone; and sentences
+    on the points and, from the first ones, on their classes.
     """
     header, crs, geographic = _las_header(path)
     count = int(header.point_count)
     said = (f"Cloud of {count:,} points.", _ground_sentence(path, count))
-    return np.array([header.mins, header.maxs]), count, crs, geographic, said
+    return np.array([header.mins, header.maxs]), count, np.array(header.scales), crs, geographic, said
 
 
 def _ground_sentence(path: Path, count: int) -> str:
@@ -88,7 +105,16 @@ def _ground_sentence(path: Path, count: int) -> str:
     import laspy
 
     with reading(path, "cloud", DAMAGED), laspy.open(path) as opened:
-        some = np.asarray(opened.read_points(LOOKED_AT).classification)
+        looked_at = opened.read_points(LOOKED_AT)
+        some, flags = np.asarray(looked_at.classification), _flags(looked_at)
+    said = ""
+    if flags.any():
+        of_first = "" if count <= LOOKED_AT else f", of the first {LOOKED_AT:,}"
+        said = f" Left out: {_flagged(flags)}{of_first}."
+    return _class_sentence(some[flags == 0], count) + said
+
+
+def _class_sentence(some: NDArray[np.uint8], count: int) -> str:
     ground = int((some == GROUND_CLASS).sum())
     if not ground:
         known = "No point" if count <= LOOKED_AT else f"None of the first {LOOKED_AT:,} points"
@@ -177,11 +203,16 @@ def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
     return crs_beside(path)
 
 
-def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray, Colours | None]:
+def _flags(points: Any) -> NDArray[np.uint8]:
+    return WITHHELD * np.asarray(points.withheld, np.uint8) | SYNTHETIC * np.asarray(points.synthetic, np.uint8)
+
+
+def _las_points(path: Path, header: Any) -> tuple[Array, NDArray[np.uint8], NDArray[np.uint8], Colours | None]:
+    """Coordinates, classes, `WITHHELD` and `SYNTHETIC`, colours."""
     import laspy
 
     points = np.empty((header.point_count, 3))
-    classes = np.empty(header.point_count, np.uint8)
+    classes, flags = np.empty(header.point_count, np.uint8), np.empty(header.point_count, np.uint8)
     coloured = {"red", "green", "blue"} <= set(header.point_format.dimension_names)
     colours = np.empty((header.point_count if coloured else 0, 3), np.uint16)
     at = 0
@@ -190,12 +221,27 @@ def _las_points(path: Path, header: Any) -> tuple[Array, np.ndarray, Colours | N
             part = slice(at, at + len(chunk))
             for axis, name in enumerate("XYZ"):
                 points[part, axis] = np.asarray(chunk[name]) * header.scales[axis] + header.offsets[axis]
-            classes[part] = np.asarray(chunk.classification)
+            classes[part], flags[part] = np.asarray(chunk.classification), _flags(chunk)
             if coloured:
                 for channel, name in enumerate(("red", "green", "blue")):
                     colours[part, channel] = np.asarray(chunk[name])
             at += len(chunk)
-    return points[:at], classes[:at], colours_of(colours[:at])[0]
+    return points[:at], classes[:at], flags[:at], colours_of(colours[:at])[0]
+
+
+def _copc_sentences(header: Any, path: Path) -> tuple[str, ...]:
+    """What to say of a cloud-optimised file (COPC 1.0): its parts of all resolutions together are the cloud."""
+    from ..formats.copc import counted_points
+
+    record = next((r for r in header.vlrs if r.user_id == "copc" and r.record_id == 1), None)
+    if record is None:
+        return ()
+    counted = counted_points(path, record.hierarchy_root_offset, record.hierarchy_root_size)
+    if counted == header.point_count:
+        return ("A cloud-optimised file (COPC): all points of all its levels were read.",)
+    return (
+        f"A cloud-optimised file (COPC), whose levels count {counted:,} points: all {header.point_count:,} were read.",
+    )
 
 
 def _truncated(path: Path, promised: int, held: int | None) -> InputError:
@@ -205,79 +251,3 @@ def _truncated(path: Path, promised: int, held: int | None) -> InputError:
         file=path,
         advice="Copy or export it again",
     )
-
-
-def read_xyz(path: Path) -> Source:
-    """Read a table of coordinates: blanks, commas, semicolons or tabs between columns, a header row or none.
-
-    With a header the columns x, y, z (or easting, northing, elevation) are used, and red, green, blue (or r, g, b)
-    where there are such; else the first three, and the last three of six or more if they are whole and 255 at most.
-
-    Raises
-    ------
-    InputError : a row without three numbers, with its row.
-    """
-    text = read_text(path)
-    if _has_decimal_commas(text):
-        text = text.replace(b",", b".")
-    lines = re.sub(rb"[,;\t]", b" ", text).split(b"\n")
-    original = text.split(b"\n")
-    rows = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith((b"#", b"//"))]
-    columns, three = [0, 1, 2], [-3, -2, -1]
-    if rows and re.match(rb'[\s"]*[A-Za-z_]', lines[rows[0]]) and not re.match(rb"\s*(nan|inf)", lines[rows[0]], re.I):
-        names = _column_names(original[rows[0]])
-        columns, three = _named_columns(names, path, rows[0] + 1), colour_columns(names)
-        rows = rows[1:]
-    elif rows and len(lines[rows[0]].split()) == 1 and len(rows) > 1 and len(lines[rows[1]].split()) >= 3:
-        rows = rows[1:]  # some programs begin with the number of points
-    table = number_table([lines[i] for i in rows], [i + 1 for i in rows], path, "Coordinates")
-    if not len(table):
-        raise InputError("The table has no points", file=path, advice="Export it again")
-    if table.shape[1] <= max(columns):
-        raise InputError(
-            f"{table.shape[1]} columns, where x, y and z are needed",
-            file=path,
-            row=rows[0] + 1,
-            advice="Export x, y and z",
-        )
-    crs, geographic = crs_beside(path)
-    notes = [f"Cloud of {len(table):,} points."]
-    found = table[:, three] if three and table.shape[1] > max(three) else table[:, :0]
-    if three and three[0] < 0:  # without a header they have to look like colours
-        found = found if table.shape[1] >= 6 and _look_like_colours(found) else table[:, :0]
-    colours, said = colours_of(found)
-    notes += [said] if said else []
-    return Source(
-        np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=tuple(notes), colours=colours
-    )
-
-
-def _look_like_colours(found: Array) -> bool:
-    """Whole numbers from 0 to 255, not a normal or a class."""
-    return bool(((found >= 0) & (found <= 255) & (found % 1 == 0)).all()) and float(found.max()) > 1
-
-
-def _has_decimal_commas(text: bytes) -> bool:
-    """Commas inside of numbers that semicolons, tabs or blanks separate, and no points."""
-    number = rb"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?"
-    row = rb"^[ \t]*%s(?:(?:[ \t]*;[ \t]*|[ \t]+)%s)+[ \t;]*$" % (number, number)
-    beginning = text[:4096].rpartition(b"\n")[0] or text
-    rows = re.findall(row, beginning, re.MULTILINE)
-    return b"." not in b"".join(rows) and any(b"," in found for found in rows)
-
-
-def _column_names(line: bytes) -> list[str]:
-    text = line.decode("utf-8", "replace").lower()
-    return [name.strip(' "') for name in (re.split(r"[,;\t]", text) if re.search(r"[,;\t]", text) else text.split())]
-
-
-def _named_columns(names: list[str], path: Path, row: int) -> list[int]:
-    found = [next((names.index(n) for n in accepted if n in names), -1) for accepted in AXIS_NAMES]
-    if min(found) < 0:
-        raise InputError(
-            f'The header "{" ".join(names)[:80].strip()}" names no x, y and z',
-            file=path,
-            row=row,
-            advice="Name the columns x, y, z",
-        )
-    return found

@@ -54,6 +54,10 @@ def join(surfaces: Sequence[Surface]) -> Surface:
     vertices, faces, kept = _merged(vertices, faces, same)
     said = [f"{tile.name}: {sentence}" for tile in tiles for sentence in tile.summary]
     said.append(f"{len(tiles)} tiles are one surface of {len(faces):,} faces.")
+    if sewn := int((~kept).sum()):
+        said.append(f"Their borders share {sewn:,} points, which are one each.")
+    if lost_faces := sum(len(tile.faces) for tile in tiles) - len(faces):
+        said.append(f"Dropped {lost_faces:,} faces that were as narrow as the gap between the tiles.")
     said += [lost] if lost else []
     name, left_out = ", ".join(tile.name for tile in tiles), np.concatenate([tile.left_out for tile in tiles])
     return Surface(

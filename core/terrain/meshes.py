@@ -2,6 +2,7 @@
 """Meshes in Wavefront OBJ and STL."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -12,12 +13,19 @@ from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
 from .cleaning import merge_duplicates
+from .comments import comment_sentences
+from .coordinate_step import single_precision_step
+from .polygons import Triangles, triangles_of
 from .scan_colours import colours_of
 from .source import Source, check_face_indices, check_finite
 from .text import NumberRows, all_numbers, line_at, line_blocks, shown
 from .textures import texture_colours
 
-BLANK, NEWLINE = 32, 10
+LEFT_OUT = {
+    b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves on surfaces", b"surf": "free-form surfaces",
+}  # fmt: skip
+"""Elements of a Wavefront OBJ that are no faces, by the word that they begin with."""
+BLANK, NEWLINE, FIRST_ROWS = 32, 10, 200
 NO_VERTEX = np.iinfo(np.int32).max
 BLOCK_TRIANGLES = 1 << 16
 STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -32,9 +40,14 @@ def read_obj(path: Path) -> Source:
     InputError : no vertices or faces, something that is not a number, a vertex that does not exist; with its row.
     """
     vertices, corners = NumberRows(path, "Coordinates"), _Corners(path)
-    before, vertex_row, library = 0, 0, b""
-    for lines in line_blocks(path):
+    before, vertex_row, library, others, comments = 0, 0, b"", Counter[bytes](), list[str]()
+    for lines in _whole_lines(line_blocks(path)):
         library = library or next((line[7:].strip() for line in lines if line.startswith(b"mtllib ")), b"")
+        if not before:
+            comments = [line[1:].decode("utf-8", "replace") for line in lines[:FIRST_ROWS] if line.startswith(b"#")]
+        others.update(
+            line[: line.find(b" ")] for line in lines if line.startswith(tuple(b"%s " % key for key in LEFT_OUT))
+        )
         vertex_rows = [i for i, line in enumerate(lines) if line.startswith((b"v ", b"v\t"))]
         face_rows = [i for i, line in enumerate(lines) if line.startswith((b"f ", b"f\t"))]
         vertices.add([lines[i][2:] for i in vertex_rows], [before + i + 1 for i in vertex_rows])
@@ -48,31 +61,60 @@ def read_obj(path: Path) -> Source:
         before += len(lines)
     if not vertex_row:
         raise InputError("The OBJ file has no vertices", file=path, advice="Check its extension or export it again")
-    if not corners.faces:
+    if not corners.found:
         raise InputError("The mesh has no faces", file=path, advice="Export the surface with its faces (triangles)")
     points = vertices.table()
     if points.shape[1] < 3:
         raise InputError(f"{points.shape[1]} coordinates, where 3 are needed", file=path, row=vertex_row)
     colours, said = colours_of(points[:, -3:]) if points.shape[1] in (6, 7) else (None, "")
-    points, faces = np.ascontiguousarray(points[:, :3]), corners.triangles()
+    left = ", ".join(f"{LEFT_OUT[key]} ({many:,})" for key, many in sorted(others.items()))
+    notes = [f"Left out what is no face: {left}."] if left else []
+    if points.shape[1] == 4 and (points[:, 3] != 1.0).any():
+        many = int((points[:, 3] != 1.0).sum())
+        notes.append(f"{many:,} vertices have a fourth number, the weight in a curve: it moves no corner of a face.")
+    points = np.ascontiguousarray(points[:, :3])
+    made = corners.triangles(points)
+    notes += [*made.notes, *comment_sentences(comments)]
     if colours is None and not said and library:
         colours, said = texture_colours(path, library.decode("utf-8", "replace"), points)
-    return Source(points, faces, notes=(said,) if said else (), colours=colours)
+    notes += [said] if said else []
+    return Source(points, made.faces, notes=tuple(notes), colours=colours)
+
+
+def _whole_lines(blocks: Iterable[list[bytes]]) -> Iterator[list[bytes]]:
+    """Lines that end in a backslash go on in the next one; empty lines follow, so that rows keep their numbers."""
+    kept: list[bytes] = []
+    for block in blocks:
+        lines = [*kept, *block]
+        going_on = [i for i, line in enumerate(lines) if line.endswith(b"\\")]
+        end = len(lines)
+        while end and lines[end - 1].endswith(b"\\"):
+            end -= 1
+        kept = lines[end:]
+        for i in reversed(going_on):
+            if i < end:
+                lines[i : i + 2] = [lines[i][:-1] + b" " + lines[i + 1], b""]
+        yield lines[:end]
+    if kept:
+        yield [b" ".join(line[:-1] for line in kept), *[b""] * (len(kept) - 1)]
 
 
 class _Corners:
-    """The faces of a Wavefront OBJ, which come in blocks of lines: polygons as fans of triangles.
+    """The faces of a Wavefront OBJ, which come in blocks of lines.
 
     Attributes
     ----------
     vertices : how many there were before the block.
-    faces : (k, 3) of each block; −1 for a vertex before the first.
-    rows : (k,) of each block, in the file.
+    found : faces there are.
+    numbers : (sum of counts,) vertices of the faces of each block; −1 for a vertex before the first.
+    counts : (k,) corners of each face of each block.
+    rows : (k,) of each face, in the file.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path, self.vertices = path, 0
-        self.faces: list[NDArray[np.int32]] = []
+        self.path, self.vertices, self.found = path, 0, 0
+        self.numbers: list[NDArray[np.int32]] = []
+        self.counts: list[NDArray[np.int32]] = []
         self.rows: list[NDArray[np.int32]] = []
 
     def add(self, lines: list[bytes], face_rows: NDArray[np.intp], vertex_rows: NDArray[np.intp], before: int) -> None:
@@ -94,31 +136,32 @@ class _Corners:
         # Numbers count from 1; negative ones count back from the last vertex before the face.
         counted = (self.vertices + np.searchsorted(vertex_rows, face_rows)).repeat(corners)
         vertex = np.where(number > 0, number - 1, np.where(number < 0, counted + number, -1))
-        vertex = np.clip(vertex, -1, NO_VERTEX).astype(np.int32)
-        triangles = corners - 2
-        first = np.repeat(np.cumsum(corners) - corners, triangles)
-        turn = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
-        self.faces.append(vertex[first[:, None] + np.stack([0 * turn, turn + 1, turn + 2], axis=1)])
-        self.rows.append((before + 1 + face_rows).astype(np.int32).repeat(triangles))
+        self.numbers.append(np.clip(vertex, -1, NO_VERTEX).astype(np.int32))
+        self.counts.append(corners.astype(np.int32))
+        self.rows.append((before + 1 + face_rows).astype(np.int32))
+        self.found += len(corners)
 
-    def triangles(self) -> NDArray[np.int32]:
-        """(m, 3) all of them.
+    def triangles(self, points: Array) -> Triangles:
+        """All of them, of vertices (n, 3); polygons are cut. Afterwards there are none.
 
         Raises
         ------
         InputError : one names a vertex that there is not.
         """
-        for faces, rows in zip(self.faces, self.rows, strict=True):
-            outside = ((faces < 0) | (faces >= self.vertices)).any(axis=1)
+        for numbers, counts, rows in zip(self.numbers, self.counts, self.rows, strict=True):
+            outside = (numbers < 0) | (numbers >= self.vertices)
             if outside.any():
-                row = int(rows[np.argmax(outside)])
+                row = int(rows[np.searchsorted(np.cumsum(counts), np.argmax(outside), side="right")])
                 raise InputError(
                     f'"{shown(line_at(self.path, row))}" names a vertex that does not exist',
                     file=self.path,
                     row=row,
                     advice=f"The file has {self.vertices} vertices: export it again",
                 )
-        return np.concatenate(self.faces)
+        numbers, counts = np.concatenate(self.numbers), np.concatenate(self.counts)
+        self.numbers, self.counts, self.rows = [], [], []
+        check_finite(points, "mesh", self.path)
+        return triangles_of(points, numbers, counts)
 
 
 def _whole_numbers(text: bytes) -> Array | None:
@@ -140,7 +183,8 @@ def read_stl(path: Path) -> Source:
         beginning = file.read(84)
     promised = int.from_bytes(beginning[80:84], "little") if len(beginning) == 84 else -1
     # A binary header may begin with "solid" too: the size is what tells.
-    if size == 84 + promised * STL_TRIANGLE.itemsize:
+    is_binary = size == 84 + promised * STL_TRIANGLE.itemsize
+    if is_binary:
         corners: Iterator[Array] = (
             np.fromfile(path, STL_TRIANGLE, BLOCK_TRIANGLES, offset=84 + start * STL_TRIANGLE.itemsize)["corners"]
             for start in range(0, promised, BLOCK_TRIANGLES)
@@ -158,7 +202,19 @@ def read_stl(path: Path) -> Source:
     else:
         raise InputError("Not an STL file", file=path, advice="Check its extension or export it again")
     points, faces, merged = _merged(corners, path)
-    return Source(points, check_face_indices(faces, len(points), path), merged=merged)
+    step = single_precision_step(points) if is_binary else None
+    return Source(
+        points, check_face_indices(faces, len(points), path), notes=_unit_words(beginning), merged=merged, step=step
+    )
+
+
+def _unit_words(beginning: bytes) -> tuple[str, ...]:
+    """What to say where the first bytes name a unit: STL has none by its standard, and programs write one there."""
+    header = beginning[:80].split(b"\n")[0].decode("ascii", "replace")
+    found = re.search(r"\bunits?\s*[:=]?\s*([A-Za-z]{1,12})\b", header, re.IGNORECASE)
+    if found is None:
+        return ()
+    return (f'The header names a unit, "{found[0]}"; STL has none, and lengths are taken as asked: check the unit.',)
 
 
 def _merged(corners: Iterable[Array], path: Path) -> tuple[Array, NDArray[np.int32], int]:

@@ -13,7 +13,8 @@ from ..plausibility import GREATEST_M
 from ..progress import Progress, silent
 from ..reading import reader
 from ..vectors import Array, Mask
-from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, ptx
+from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, point_tables, ptx
+from .coordinate_step import coarse_sentence, spacing_in_box, spacing_of, stored_step
 from .crs import surely_different
 from .ground_filter import filter_ground
 from .scan_colours import joined_colours
@@ -28,9 +29,9 @@ READERS: dict[str, Callable[[Path], Source]] = {
     ".asc": grids.read_ascii_grid,
     ".tif": geotiff.read_geotiff,
     ".tiff": geotiff.read_geotiff,
-    ".xyz": clouds.read_xyz,
-    ".txt": clouds.read_xyz,
-    ".csv": clouds.read_xyz,
+    ".xyz": point_tables.read_xyz,
+    ".txt": point_tables.read_xyz,
+    ".csv": point_tables.read_xyz,
     ".ptx": ptx.read_ptx,
     ".e57": e57.read_e57,
 }
@@ -261,15 +262,19 @@ def placed(source: Source, how: HowToRead, path: Path) -> Source:
             advice="The file is damaged or in another unit: export it again, or give the length of its unit",
         )
     notes, turned = list(source.notes), False
+    steps = stored_step(source.points, source.step, source.kind) * unit_m
     if source.faces is not None:
         notes.append(f"Mesh of {len(points) + source.merged:,} vertices and {len(source.faces):,} faces.")
     if up == "y" or (up == "auto" and source.up == "y"):
-        points, turned = z_up(points), True
+        points, turned, steps = z_up(points), True, steps[[0, 2, 1]]
         notes.append(
             "Turned from Y up to Z up" + (", as the format's standard says." if up == "auto" else ", as asked.")
         )
     if unit_m != 1.0:
         notes.append(f"Multiplied by {unit_m:g} to metres, as asked.")
+    there = points[np.isfinite(points[:, 2])] if source.kind == "grid" else points
+    if said := coarse_sentence(steps, spacing_in_box(there, source.count) if source.count else spacing_of(there)):
+        notes.append(said)
     return replace(source, points=np.ascontiguousarray(points), up="z", turned=turned, notes=tuple(notes))
 
 

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..georeference import z_up
 from ..reading import reader
 from ..vectors import Array
-from .ply import FACE_LISTS, Element, list_counts, read_header, read_ply, row_type
+from .ply import FACE_LISTS, Element, list_counts, read_header, read_ply, row_type, walked
 from .text import number_table
 
 
@@ -105,10 +105,16 @@ def _binary_values(
     offset = start
     for one in (*before, element):
         dtype = row_type(data, offset, one, order)
-        rows = data[offset : offset + one.rows * dtype.itemsize].view(dtype)
-        if any((rows[count] != rows[count][:1]).any() for count in list_counts(dtype)):
-            raise _not_triangles(path)
-        offset += one.rows * dtype.itemsize
+        end = offset + one.rows * dtype.itemsize
+        rows = data[offset:end].view(dtype) if end <= data.size else np.empty(0, dtype)
+        if end > data.size or any((rows[count] != rows[count][:1]).any() for count in list_counts(dtype)):
+            if one.name == "face":
+                raise _not_triangles(path)
+            values, offset = walked(data, offset, one, order, path)
+            if one is element:
+                return np.asarray(values[name], dtype=np.float64)
+            continue
+        offset = end
     return rows[name].astype(np.float64)
 
 

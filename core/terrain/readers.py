@@ -175,9 +175,12 @@ def read_structure(
 
 def _cloud(opened: Opened) -> Cloud:
     points = opened.source.points
-    points = points[np.isfinite(points[:, 2])]
-    note = "Blocks meet the points themselves: there is no surface between them."
-    return Cloud(points, opened.shift, opened.name, (*opened.notes, note, *opened.advice))
+    there = np.isfinite(points[:, 2])
+    notes = [*opened.notes, "Blocks meet the points themselves: there is no surface between them."]
+    if not there.all():
+        points = points[there]
+        notes.append(f"{int((~there).sum()):,} cells without data have no point.")
+    return Cloud(points, opened.shift, opened.name, (*notes, *opened.advice))
 
 
 def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Surface:
@@ -216,8 +219,8 @@ def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) 
     path, how = Path(path), HowToRead(up, unit_m)
     if path.suffix.lower() in LAS_EXTENSIONS:
         check_path(path)
-        box, count, crs, geographic, said = clouds.inspect_las(path)
-        source = placed(Source(box, crs=crs, geographic=geographic, notes=said), how, path)
+        box, count, scales, crs, geographic, said = clouds.inspect_las(path)
+        source = placed(Source(box, crs=crs, geographic=geographic, notes=said, count=count, step=scales), how, path)
     else:
         source = read_placed(path, how)
         count = len(source.points) + source.merged

@@ -28,6 +28,8 @@ class Source:
     notes : sentences for the summary.
     merged : so many vertices more are in the file, at the places of others.
     colours : (n, 3) sRGB of the points; None when they have none.
+    count : of the points in the file, where `points` are only the corners of their box.
+    step : (3,) of which the coordinates are multiples by the file's own word, in its unit; None when it says none.
     """
 
     points: Array
@@ -41,6 +43,8 @@ class Source:
     vertical: str = ""
     merged: int = 0
     colours: NDArray[np.uint8] | None = None
+    count: int = 0
+    step: Array | None = None
 
     @property
     def kind(self) -> str:
@@ -84,9 +88,3 @@ def check_finite(points: Array, kind: str, path: Path, before: int = 0) -> None:
             file=path,
             advice=f"Remove {plural} with NaN or infinite coordinates and export again",
         )
-
-
-def triangulated(polygons: list[list[int]]) -> NDArray[np.int64]:
-    """Polygons as fans of triangles, (m, 3)."""
-    fan = [(p[0], p[i], p[i + 1]) for p in polygons for i in range(1, len(p) - 1)]
-    return np.array(fan, dtype=np.int64).reshape(-1, 3)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Numbers out of text files, quickly, with the row of anything that is not one."""
 
+import codecs
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..formats.number_words import UTF_16, as_utf8, why_no_number
 from ..vectors import Array
 
 BLOCK_BYTES = 1 << 20
@@ -21,7 +23,7 @@ def read_text(path: Path) -> bytes:
     ------
     InputError : the file is empty, or is not text.
     """
-    data = path.read_bytes()
+    data = as_utf8(path.read_bytes(), path, "Export it in UTF-8").removeprefix(codecs.BOM_UTF8)
     if not data.strip():
         raise _empty(path)
     _check_beginning(data, path)
@@ -39,6 +41,7 @@ def line_blocks(path: Path, size: int = BLOCK_BYTES) -> Iterator[list[bytes]]:
     with path.open("rb") as file:
         while data := file.read(size):
             if not read:
+                data = data.removeprefix(codecs.BOM_UTF8)
                 _check_beginning(data, path)
             read, blank = True, blank and not data.strip()
             data = rest + data
@@ -67,6 +70,8 @@ def _empty(path: Path) -> InputError:
 
 
 def _check_beginning(data: bytes, path: Path) -> None:
+    if data.startswith(UTF_16):
+        raise InputError("The text is in UTF-16", file=path, advice="Export it in UTF-8")
     if b"\0" in data[:4096]:
         raise InputError(
             "The file is not text", file=path, advice="Its extension promises a text format: check the export"
@@ -142,8 +147,12 @@ def number_table(lines: Sequence[bytes], rows: Sequence[int] | range, path: Path
         words = line.split()
         for word in words:
             if not _is_number(word):
+                why, advice = why_no_number(word.decode("utf-8", "replace"))
                 raise InputError(
-                    f'"{shown(word)}" is not a number', file=path, row=row, advice=f"{what} are needed in this row"
+                    f'"{shown(word)}" {why or "is not a number"}',
+                    file=path,
+                    row=row,
+                    advice=advice or f"{what} are needed in this row",
                 )
         if len(words) != columns:
             raise InputError(

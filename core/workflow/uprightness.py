@@ -10,6 +10,7 @@ from ..camera.pairs import Pairs
 from ..camera.path import CameraPath
 from ..georeference import Z_UP, GlobalShift, z_up
 from ..reconstruction.picks import Picks
+from ..terrain.coordinate_step import coarse_places_sentence
 from ..terrain.raycast import closest_points
 from ..terrain.surface import Surface
 from ..vectors import Array
@@ -21,9 +22,12 @@ LOOKED_AT = 2000
 
 
 def turned_picks(picks: Picks, surface: Surface | None) -> tuple[Picks, tuple[str, ...]]:
-    """Picks as they lie on the terrain: turned from Y up to Z up as it was, if only so they do; with what to say."""
+    """Picks as they lie on the terrain: turned from Y up to Z up as it was, if only so they do; with what to say, also
+    of places that are stored coarsely.
+    """
+    coarse = _coarse(picks.shift, picks.position)
     if surface is None or not _only_turned(surface, picks.shift, picks.position):
-        return picks, ()
+        return picks, coarse
     turned = replace(
         picks,
         position=_turned(picks.position, picks.shift, surface.shift),
@@ -31,15 +35,20 @@ def turned_picks(picks: Picks, surface: Surface | None) -> tuple[Picks, tuple[st
         angular_velocity=z_up(picks.angular_velocity),
         shift=surface.shift,
     )
-    return turned, ("The picks were turned from Y up to Z up with the terrain: only so they lie on it.",)
+    return turned, ("The picks were turned from Y up to Z up with the terrain: only so they lie on it.", *coarse)
 
 
 def turned_pairs(pairs: Pairs, surface: Surface | None) -> tuple[Pairs, tuple[str, ...]]:
     """The same of the pairs of a camera."""
+    coarse = _coarse(pairs.shift, pairs.point)
     if surface is None or not _only_turned(surface, pairs.shift, pairs.point):
-        return pairs, ()
+        return pairs, coarse
     turned = replace(pairs, point=_turned(pairs.point, pairs.shift, surface.shift), shift=surface.shift)
-    return turned, ("The pairs were turned from Y up to Z up with the terrain: only so they lie on it.",)
+    return turned, ("The pairs were turned from Y up to Z up with the terrain: only so they lie on it.", *coarse)
+
+
+def _coarse(shift: GlobalShift, places: Array) -> tuple[str, ...]:
+    return tuple(filter(None, [coarse_places_sentence(shift.to_survey(places))]))
 
 
 def turned_camera(camera: Camera) -> Camera:

@@ -247,6 +247,7 @@ def remarks(scene: bpy.types.Scene) -> list[str]:
         said.append(f"{100 * share:.0f} % of the area has thin data (bluish): the surface is guessed there.")
     if store.has_role(scene, store.LEFT_OUT_ROLE):
         said.append("The ground filter took points for vegetation; tops of boulders may be among them. Look at them:")
+    said += [f"{tile.name}: {sentence}" for tile in grounds for sentence in terrain_mesh.polygon_remarks(tile.data)]
     away = [tile for tile in grounds if tile.matrix_world != Matrix.Identity(4)]
     moved_by_hand = [tile.name for tile in away if not is_locked(tile)]
     if moved_by_hand:

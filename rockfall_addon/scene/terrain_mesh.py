@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
+from ...core.terrain.polygons import triangles_of
 from . import materials
 
 SHADING = ("hillshade", "eye_dome", "thin")
@@ -17,6 +18,7 @@ STAND_IN = "Coarse mesh"
 Contents = tuple[int, int, int, int]
 
 _contents: dict[int, Contents] = {}  # by the mesh's session_uid
+_polygons: dict[int, tuple[str, ...]] = {}  # likewise
 
 
 def new_mesh(name: str, vertices: np.ndarray, faces: np.ndarray, values: Mapping[str, np.ndarray]) -> bpy.types.Mesh:
@@ -61,6 +63,23 @@ def mesh_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     return vertices.reshape(-1, 3), faces.reshape(-1, 3)
 
 
+def polygon_remarks(mesh: bpy.types.Mesh) -> tuple[str, ...]:
+    """What to say of faces with more than three corners: those that are not flat, or cross themselves.
+
+    Kept until the mesh is mistrusted.
+    """
+    if len(mesh.loops) == 3 * len(mesh.polygons):
+        return ()
+    known = _polygons.get(mesh.session_uid)
+    if known is None:
+        corners, counts = np.empty(len(mesh.loops), np.int32), np.empty(len(mesh.polygons), np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        mesh.polygons.foreach_get("loop_total", counts)
+        vertices = mesh_arrays(mesh)[0].astype(np.float64)
+        known = _polygons[mesh.session_uid] = triangles_of(vertices, corners, counts).notes
+    return known
+
+
 def placed_vertices(obj: bpy.types.Object) -> np.ndarray:
     """(n, 3) vertices of an object's mesh where it stands, in double precision."""
     world = np.array(obj.matrix_world)
@@ -83,7 +102,9 @@ def mistrust(mesh: bpy.types.Mesh | None = None) -> None:
     """A mesh may have been edited; any mesh, after undo or loading."""
     if mesh is None:
         _contents.clear()
+        _polygons.clear()
     else:
+        _polygons.pop(mesh.session_uid, None)
         _contents.pop(mesh.session_uid, None)
 
 

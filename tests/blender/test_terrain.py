@@ -134,3 +134,52 @@ def test_survey_feet_far_from_the_origin_come_to_their_place(part, tmp_path: Pat
     found = np.array([vertex.co for vertex in tile.data.vertices]) + shift.vector
     known = np.array([[float(c * foot) for c in corner] for corner in corners])
     np.testing.assert_allclose(np.sort(found, axis=0), np.sort(known, axis=0), atol=0.002)
+
+
+FIELD_CASES = Path(__file__).parents[1] / "data" / "field_cases"
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("03-point-number-first/numid.txt", "The first column counts the points (1 to 441)"),
+        ("05-las-withheld/withheld.las", "2 points marked as withheld"),
+        ("07-coarse-coordinates/f32utm.ply", "Coordinates are stored in steps of 0.0312 m (x) and 0.5 m (y)"),
+        ("08-concave-polygon/ngon.obj", "Faces with more than three corners: 20."),
+        ("14-ply-vertex-list/be_list.ply", "Left out elements that are no vertices and no faces: edge (2)."),
+    ],
+)
+def test_the_dialog_and_what_was_read_say_what_the_file_says_of_its_numbers(part, file: str, words: str) -> None:
+    operators = part("rockfall_addon.steps.terrain.operators")
+    dialog = SimpleNamespace(filepath=str(FIELD_CASES / file), unit_m=1.0)
+    found = operators.ROCKFALL_OT_import_terrain._inspected(dialog)
+    assert any(words in sentence for sentence in found.summary)
+    assert bpy.ops.rockfall.import_terrain(filepath=str(FIELD_CASES / file)) == {"FINISHED"}
+    ((_, said),) = part("rockfall_addon.scene.terrain").readings(bpy.context.scene)
+    assert any(words in sentence for sentence in said)
+
+
+def test_faces_that_a_person_made_are_said_where_they_are_not_flat_or_cross_themselves(part, tmp_path: Path) -> None:
+    """A concave one has its own area, as Blender cuts it."""
+    wave(tmp_path / "wave.asc")
+    bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
+    terrain, terrain_mesh = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.terrain_mesh")
+    ground = terrain.active_terrain(bpy.context.scene)
+    assert not any("more than three corners" in said for said in terrain.remarks(bpy.context.scene))
+    corners = [(0, 0, 0), (20, 0, 12), (20, 20, 12), (10, 20, 6), (10, 10, 6), (0, 10, 0)]
+
+    def redraw(points: list, faces: list) -> list[str]:
+        ground.data.clear_geometry()
+        ground.data.from_pydata(points, [], faces)
+        terrain_mesh.mistrust(ground.data)
+        return [said for said in terrain.remarks(bpy.context.scene) if "corners" in said or "cross" in said]
+
+    assert len(redraw(corners, [range(6)])) == 1, "not convex"
+    vertices, faces = terrain_mesh.mesh_arrays(ground.data)
+    a, b, c = (vertices[faces[:, k], :2].astype(float) for k in range(3))
+    double = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    assert np.abs(double).sum() / 2 == pytest.approx(300.0)
+    bent = redraw([(0, 0, 0), (1, 0, 0), (1, 1, 0.4), (0, 1, 0)], [range(4)])
+    assert "not flat: 1 of 1" in bent[0]
+    crossing = redraw([(0, 0, 0), (2, 0, 0), (0, 1, 0), (2, 3, 0)], [range(4)])
+    assert any("cross themselves" in said for said in crossing)

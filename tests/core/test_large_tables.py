@@ -62,7 +62,7 @@ def test_a_table_of_any_number_of_blocks_is_read_whole(tmp_path, monkeypatch, ro
 
 MISTAKES = {
     "x,two": "row 9, trajectory x: 'two' in column a is not a number. Correct the cell.",
-    'x,"1,5"': "row 9, trajectory x: '1,5' in column a is not a number. Write decimals with a point.",
+    'x,"1,5"': "row 9, trajectory x: '1,5' in column a has a decimal comma. Write decimals with a point.",
     "x,inf": "row 9, trajectory x: 'inf' in column a is not finite. Correct the cell.",
     "x,1_0": "row 9, trajectory x: '1_0' in column a is not a number. Correct the cell.",
     "x,": "row 9, trajectory x: The cell of a is empty. Give a number.",

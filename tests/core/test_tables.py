@@ -318,7 +318,7 @@ def test_unknown_units_are_refused(tmp_path, case):
     ("data", "message"),
     [
         (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "binary"),
-        (GOOD.encode("utf-16"), "UTF-16"),
+        (GOOD.encode("utf-16")[:-1], "marked as UTF-16, and is not"),
         (GOOD.replace("a,1", "Bl\u00f6cke,1").encode("latin-1"), "not in UTF-8"),
     ],
 )

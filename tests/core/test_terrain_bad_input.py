@@ -96,12 +96,12 @@ def test_missing_file_folder_and_unknown_extension(tmp_path):
         (ONE_FACE.replace("vertex_indices", "corners") + SQUARE + "3 0 1 2\n", "The faces have no vertex_indices"),
         (ONE_FACE.replace("list uchar int", "int") + SQUARE + "3\n", "The faces have no vertex_indices"),
         (
-            ONE_FACE.replace("property list", f"{TEXTURE}property list") + SQUARE + "1 7 3 0 1 2\n",
-            "The list texture before the vertex indices is not supported",
+            ONE_FACE.replace("property list", f"{TEXTURE}property list") + SQUARE + "2 7 3 0 1 2\n",
+            'row 15: "2 7 3 0 1 2" is no face',
         ),
         (
             ONE_FACE.replace("element face", f"{TEXTURE}element face") + SQUARE,
-            "The vertices hold lists",
+            'row 11: "0 0 0" has not the numbers and lists',
         ),
         (ONE_FACE + SQUARE.replace("\n", " 7\n") + "3 0 1 2\n", "row 10: 4 values, where the header promises 3"),
         ("ply\nformat ascii 1.0\nelement face 1\nproperty float x\nend_header\n1\n", "no vertices"),

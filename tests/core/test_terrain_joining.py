@@ -45,6 +45,8 @@ def test_joined_tiles_are_the_whole(whole, tiles):
     assert len(joined.vertices) == len(whole.vertices)
     assert len(joined.faces) == len(whole.faces)
     assert (joined.neighbours == -1).sum() == (whole.neighbours == -1).sum(), "only the outer border is left"
+    shared = sum(len(tile.vertices) for tile in tiles) - len(whole.vertices)
+    assert f"Their borders share {shared:,} points, which are one each." in joined.summary
     points = np.random.default_rng(0).uniform([1, 1], [29, 19], (500, 2))
     points[:100, 0] = np.random.default_rng(1).uniform(10.5, 11.5, 100)  # around a seam
     above = np.column_stack([points, np.full(500, 100.0)])

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every terrain format: written by another program or by hand, read back, numbers compared; real lidar."""
 
+import json
 import re
+import struct
 from pathlib import Path
 
 import laspy
@@ -15,6 +17,7 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
 from rockfall.core.terrain.meshes import read_obj
 from rockfall.core.terrain.opening import READERS
+from rockfall.core.terrain.ply_attributes import read_ply_attribute
 from rockfall.core.terrain.readers import inspect_terrain, read_terrain
 from rockfall.core.terrain.text import BLOCK_BYTES, line_blocks
 from rockfall.core.terrain.writers import write_ply
@@ -154,7 +157,7 @@ def test_obj_of_several_objects_with_polygons_and_relative_numbers(tmp_path):
 
 def test_obj_that_is_read_in_several_blocks_counts_its_corners_and_rows_through(tmp_path):
     path, quads = tmp_path / "long.obj", 15_000
-    heights = np.random.default_rng(2).uniform(0, 9, 4 * quads)
+    heights = np.random.default_rng(2).uniform(0, 0.2, 4 * quads)
     corners = [f"v {i % 4 in (1, 2):d}.25 {i // 4 + (i % 4 > 1)}.5 {z:.9f}" for i, z in enumerate(heights)]
     lines = [line for i in range(quads) for line in (*corners[4 * i : 4 * i + 4], "f -4 -3 -2 -1")]
     path.write_bytes("\r\n".join(lines).encode())
@@ -182,8 +185,11 @@ def test_lines_in_blocks_are_those_of_the_whole_text(tmp_path, newline):
 
 def test_obj_of_polygons_as_trimesh_reads_it(tmp_path):
     rng = np.random.default_rng(4)
-    points = rng.normal(0, 1, (60, 3)) + LV95
-    corners = [rng.choice(60, count, replace=False) + 1 for count in rng.choice([3, 5, 6, 7], 300)]
+    counts = rng.choice([3, 5, 6, 7], 300)
+    on_circles = [np.sort(rng.choice(60, count, replace=False)) + 1 for count in counts]
+    angles = np.linspace(0, 2 * np.pi, 60, endpoint=False)  # polygons of points on a circle are convex
+    points = LV95 + np.stack([9 * np.cos(angles), 9 * np.sin(angles), 3 * np.cos(angles)], axis=1)
+    corners = [np.roll(face, k) for face, k in zip(on_circles, rng.integers(0, 7, 300), strict=True)]
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()] + ["vt 0 0", "vn 0 0 1"]
     lines += ["f " + " ".join(f"{corner}/1/1" for corner in face) for face in corners]
     path = write(tmp_path / "a.obj", "\n".join(lines))
@@ -587,3 +593,207 @@ def test_how_much_of_a_cloud_is_ground_is_said_before_it_is_read() -> None:
     )
     said = " ".join(inspect_terrain(data / "sample_lareunion_epsg2975.laz").summary)
     assert "No point is classified as ground" in said
+
+
+def test_ply_with_lists_at_its_vertices():
+    """Lists of other lengths from vertex to vertex, before and behind the faces, of either byte order."""
+    folder = DATA / "field_cases" / "14-ply-vertex-list"
+    expected = [(352_000, 5_130_000), (352_020, 5_130_020)]
+    for name in ("list_var.ply", "be_list.ply"):
+        source = READERS[".ply"](folder / name)
+        np.testing.assert_array_equal([source.points.min(axis=0)[:2], source.points.max(axis=0)[:2]], expected)
+        assert (len(source.points), len(source.faces)) == (441, 800)
+        assert np.unique(source.faces).size == 441
+    assert (
+        "Left out elements that are no vertices and no faces: edge (2)."
+        in READERS[".ply"](folder / "be_list.ply").notes
+    )
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+def test_ply_lists_anywhere_leave_coordinates_colours_and_faces_where_they_are(tmp_path, order):
+    form = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = f"ply\nformat {form} 1.0\nelement vertex 4\nproperty list uchar short tags\n"
+    head += "property double x\nproperty uchar red\n"
+    head += "property double y\nproperty uchar green\nproperty uchar blue\nproperty list int float weights\n"
+    head += "property double z\nelement face 2\nproperty list uchar float uv\nproperty list ushort uint vertex_index\n"
+    head += "property uchar kind\nend_header\n"
+    points = [(0.0, 0.0, 0.5), (2.0, 0.0, 0.25), (2.0, 3.0, 1.5), (0.0, 3.0, 1.0)]
+    faces = [(0, 1, 2), (0, 2, 3)]
+    text, data = "", b""
+    for i, (x, y, z) in enumerate(points):
+        tags, weights = list(range(i)), [0.5] * (3 - i)
+        text += " ".join(map(str, [i, *tags, x, 10 + i, y, 20 + i, 30 + i, 3 - i, *weights, z])) + "\n"
+        data += struct.pack(
+            f"{order or '<'}B{i}hdBdBBi{3 - i}fd", i, *tags, x, 10 + i, y, 20 + i, 30 + i, 3 - i, *weights, z
+        )
+    for i, face in enumerate(faces):
+        text += " ".join(map(str, [2 * i, *[0.5] * (2 * i), 3, *face, 7])) + "\n"
+        data += struct.pack(f"{order or '<'}B{2 * i}fH3IB", 2 * i, *[0.5] * (2 * i), 3, *face, 7)
+    source = READERS[".ply"](write(tmp_path / "a.ply", head.encode() + (data if order else text.encode())))
+    np.testing.assert_array_equal(source.points, points)
+    np.testing.assert_array_equal(source.faces, faces)
+    np.testing.assert_array_equal(source.colours, [[10 + i, 20 + i, 30 + i] for i in range(4)])
+
+
+@pytest.mark.parametrize("size", [1, 7, 30, BLOCK_BYTES])
+def test_obj_lines_go_on_behind_a_backslash(tmp_path, monkeypatch, size):
+    """A face over three lines, a vertex over two; rows of messages stay those of the file."""
+    text = "v 0 0 0\nv 2 0 \\\n0\nv 2 2 0\r\nv 0 2 0\nf 1 2 \\\n3 \\\n4\n"
+    monkeypatch.setattr("rockfall.core.terrain.meshes.line_blocks", lambda path: line_blocks(path, size))
+    source = read_obj(write(tmp_path / "a.obj", text))
+    np.testing.assert_array_equal(source.points, [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    np.testing.assert_array_equal(source.faces, [[0, 1, 2], [0, 2, 3]])
+    with pytest.raises(InputError, match="names a vertex that does not exist") as caught:
+        read_obj(write(tmp_path / "b.obj", text + "f 1 2 \\\n9\n"))
+    assert caught.value.row == 9
+
+
+def test_obj_weights_and_decimal_commas(tmp_path):
+    text = "v 0 0 0 1\nv 2 0 0 0.5\nv 2 2 0 1\nf 1 2 3\n"
+    source = read_obj(write(tmp_path / "a.obj", text))
+    np.testing.assert_array_equal(source.points, [[0, 0, 0], [2, 0, 0], [2, 2, 0]])
+    assert source.notes[0].startswith("1 vertices have a fourth number, the weight in a curve")
+    assert read_obj(write(tmp_path / "a.obj", text.replace("0.5", "1"))).notes == ()
+    comma = DATA / "field_cases" / "13-asc-headers" / "comma.obj"
+    with pytest.raises(InputError, match=r'"352000,000" has a decimal comma\. Write decimals with a point') as caught:
+        read_terrain(comma)
+    assert caught.value.row == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "named"), [("units=mm", "units=mm"), ("STL Unit: INCH", "Unit: INCH"), ("plain", "")]
+)
+@pytest.mark.parametrize("binary", [True, False])
+def test_an_stl_that_names_a_unit_is_said_to(tmp_path, header, named, binary):
+    mesh = hill()
+    mesh.apply_translation(-LV95)
+    if binary:
+        data = mesh.export(file_type="stl")
+        data = header.encode().ljust(80, b" ") + data[80:]
+    else:
+        data = re.sub("^solid.*", f"solid {header}", mesh.export(file_type="stl_ascii")).encode()
+    notes = READERS[".stl"](write(tmp_path / "a.stl", data)).notes
+    assert [f'names a unit, "{named}"' in note for note in notes] == ([True] if named else [])
+
+
+def gltf(tmp_path: Path, change) -> Path:
+    """A triangle, its document changed before it is written."""
+    data = np.array([[0, 0, 0], [4, 0, 0], [0, 0, -4]], "<f4").tobytes() + np.arange(3, dtype="<u4").tobytes()
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": 48, "uri": "a.bin"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 12}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": 3, "type": "SCALAR"},
+        ],
+    }  # fmt: skip
+    change(document)
+    (tmp_path / "a.bin").write_bytes(data)
+    return write(tmp_path / "a.gltf", json.dumps(document))
+
+
+def test_gltf_nodes_turn_scale_and_nest(tmp_path):
+    """Translation · rotation · scale of a node, within the matrix of another (glTF 2.0, 3.5.2); in metres."""
+
+    def nest(document: dict) -> None:
+        half = np.sqrt(0.5)
+        matrix = np.eye(4)
+        matrix[:3, 3] = [100, 10, 0]
+        document["nodes"] = [
+            {"children": [1], "matrix": matrix.T.ravel().tolist()},
+            {"mesh": 0, "translation": [1, 2, 3], "rotation": [0, half, 0, half], "scale": [2, 1, 1]},
+        ]
+
+    surface = read_terrain(gltf(tmp_path, nest))
+    # About y by 90°: (x, y, z) → (z, y, −x); the first two corners scaled by 2 along x before.
+    y_up = np.array([[101, 12, 3], [101, 12, 3 - 8], [101 - 4, 12, 3]], dtype=float)
+    expected = y_up[:, [0, 2, 1]] * [1, -1, 1]
+    np.testing.assert_allclose(surface.shift.to_survey(surface.vertices), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        (
+            lambda d: d.update(extensionsRequired=["KHR_draco_mesh_compression"]),
+            "KHR_draco_mesh_compression, which is not",
+        ),
+        (
+            lambda d: d.update(extensionsRequired=["EXT_meshopt_compression"]),
+            "EXT_meshopt_compression, which is not read",
+        ),
+        (lambda d: d["accessors"][0].update(sparse={"count": 1}), "A mesh has sparse numbers, which are not read"),
+        (lambda d: d["accessors"][0].update(normalized=True), "A mesh has normalised numbers, which are not read"),
+        (lambda d: d["accessors"][0].pop("bufferView"), "A mesh has no numbers for its vertices"),
+        (lambda d: d["meshes"][0]["primitives"][0].update(mode=6), "A mesh consists of triangle fans"),
+    ],
+)
+def test_gltf_that_means_other_numbers_is_refused(tmp_path, change, match):
+    with pytest.raises(InputError, match=match):
+        read_terrain(gltf(tmp_path, change))
+
+
+def test_gltf_whole_numbers_that_nodes_place_are_read(tmp_path):
+    """KHR_mesh_quantization without normalisation."""
+
+    def quantise(document: dict) -> None:
+        document["extensionsRequired"] = ["KHR_mesh_quantization"]
+        document["accessors"][0].update(componentType=5122)
+        document["bufferViews"][0].update(byteLength=24, byteStride=8)
+        document["nodes"][0]["scale"] = [0.5, 0.5, 0.5]
+
+    path = gltf(tmp_path, quantise)
+    corners = np.zeros((3, 4), "<i2")
+    corners[:, :3] = [[0, 0, 0], [9, 0, 0], [0, 3, -8]]
+    (tmp_path / "a.bin").write_bytes(corners.tobytes().ljust(36, b"\0") + np.arange(3, dtype="<u4").tobytes())
+    surface = read_terrain(path)
+    np.testing.assert_allclose(surface.vertices, [[0, 0, 0], [4.5, 0, 0], [0, 4, 1.5]])
+
+
+def test_what_is_left_out_of_gltf_is_said(tmp_path):
+    def add(document: dict) -> None:
+        one = document["meshes"][0]["primitives"][0]
+        document["meshes"].append({"primitives": [{**one, "mode": 0}, {**one, "mode": 1}]})
+        document["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": 0}]
+        document["scenes"].append({"nodes": [0]})
+
+    said_of = "Left out: points (1), lines (1), shape keys (1), scenes other than the first (1)."
+    assert said_of in read_terrain(gltf(tmp_path, add)).summary
+
+
+@pytest.mark.parametrize(
+    "comment", ["offset 352000 5130000 0", "Global shift: -2600000.0", "scale_x 0.001", "units: feet"]
+)
+def test_comments_that_change_what_numbers_mean_are_said(tmp_path, comment):
+    mesh = hill()
+    mesh.apply_translation(-LV95)
+    ply = ply_bytes(mesh, "binary_little_endian")
+    obj = mesh.export(file_type="obj", header=None)
+    xyz = "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in mesh.vertices.tolist())
+    for name, plain, marked in (
+        ("a.ply", ply, ply.replace(b"comment by hand", f"comment {comment}".encode())),
+        ("a.obj", f"# 81 vertices of a hill\n{obj}", f"# {comment}\n{obj}"),
+        ("a.xyz", f"# x y z\n{xyz}", f"# {comment}\n{xyz}"),
+    ):
+        read = READERS[Path(name).suffix]
+        assert not any("Comments in the file" in note for note in read(write(tmp_path / name, plain)).notes)
+        notes = read(write(tmp_path / name, marked)).notes
+        assert f'Comments in the file are not applied: "{comment}". Check shift, scale and unit.' in notes, name
+
+
+@pytest.mark.parametrize("of", ["vertex", "face"])
+def test_attributes_of_a_ply_with_lists_at_its_vertices(tmp_path, of):
+    """Of vertices that have lists themselves, and of faces behind such vertices."""
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty list uchar short tags\n"
+    head += "".join(f"property double {axis}\n" for axis in "xyz") + "property int soil\n" * (of == "vertex")
+    head += "element face 1\nproperty list uchar int vertex_indices\n"
+    head += "property int soil\n" * (of == "face") + "end_header\n"
+    data = b""
+    for i, place in enumerate(((0.0, 0.0, 0.5), (2.0, 0.0, 0.25), (2.0, 3.0, 1.5))):
+        data += struct.pack(f"<B{i}h3d", i, *range(i), *place) + (struct.pack("<i", 7 + i) if of == "vertex" else b"")
+    data += struct.pack("<B3i", 3, 0, 1, 2) + (struct.pack("<i", 5) if of == "face" else b"")
+    found = read_ply_attribute(write(tmp_path / "a.ply", head.encode() + data), "soil")
+    np.testing.assert_array_equal(found.values, [7, 8, 9] if of == "vertex" else [5])

@@ -118,3 +118,33 @@ def test_without_the_library_it_is_said_what_to_do(tmp_path, monkeypatch):
     monkeypatch.setattr(extras, "find_spec", lambda name: None)
     with pytest.raises(DependencyError, match=r'pip install "rockfall\[e57\]".*convert the file to LAZ'):
         read_points(tmp_path / "a.e57")
+
+
+def test_an_e57_of_distances_and_angles(tmp_path):
+    """Azimuth from x towards y, elevation from the horizontal: ASTM E2807, 8.4.4. The library writes x, y, z alone."""
+    pye57 = pytest.importorskip("pye57")
+    from pye57 import libe57
+
+    rng = np.random.default_rng(3)
+    distance, azimuth, elevation = rng.uniform(5, 50, 60), rng.uniform(-3, 3, 60), rng.uniform(-0.5, 1, 60)
+    file = pye57.E57(str(tmp_path / "a.e57"), mode="w")
+    image = file.image_file
+    scan, row = libe57.StructureNode(image), libe57.StructureNode(image)
+    scan.set("guid", libe57.StringNode(image, "{1}"))
+    fields = {"sphericalRange": distance, "sphericalAzimuth": azimuth, "sphericalElevation": elevation}
+    for name, values in fields.items():
+        row.set(name, libe57.FloatNode(image, values[0], libe57.E57_DOUBLE, values.min(), values.max()))
+    arrays, buffers = file.make_buffers(list(fields), 60)
+    points = libe57.CompressedVectorNode(image, row, libe57.VectorNode(image, True))
+    scan.set("points", points)
+    file.data3d.append(scan)
+    for name, values in fields.items():
+        arrays[name][:] = values
+    writer = points.writer(buffers)
+    writer.write(60)
+    writer.close()
+    file.close()
+    flat = distance * np.cos(elevation)
+    expected = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), distance * np.sin(elevation)], axis=1)
+    cloud = read_points(tmp_path / "a.e57")
+    np.testing.assert_allclose(cloud.shift.to_survey(cloud.points), expected, atol=1e-9)

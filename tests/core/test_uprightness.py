@@ -14,9 +14,10 @@ from rockfall.core.exchange.opening import open_project, read_project_camera
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_impacts, read_picks
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.terrain.opening import HowToRead
 from rockfall.core.terrain.readers import read_terrain, read_tiles
-from rockfall.core.workflow.uprightness import turned_camera, turned_pairs
+from rockfall.core.workflow.uprightness import turned_camera, turned_pairs, turned_picks
 
 EAST, NORTH, UP = 2_600_000.0, 1_200_000.0, 500.0
 
@@ -136,3 +137,13 @@ def test_a_project_reads_its_picks_and_cameras_as_upright_as_its_terrain(site, t
 def looking_west():
     """(3, 3) from the world to a camera that looks along −x, with z up in the picture."""
     return np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
+
+
+def test_picks_that_are_stored_coarsely_are_said_wherever_picks_are_read():
+    survey = np.array([352_000.0, 5_130_000.0, 1_200.0]) + np.random.default_rng(4).uniform(0, 90, (12, 3))
+    for places, expected in ((survey, ()), (survey.astype(np.float32).astype(float), ("steps of 0.5 m (y)",))):
+        shift = GlobalShift(352_000.0, 5_130_000.0, 0.0)
+        picks = make_picks(["a"] * 12, np.arange(12.0), shift.to_local(places), shift=shift)
+        said = turned_picks(picks, None)[1]
+        assert len(said) == len(expected)
+        assert all(words in sentence for words, sentence in zip(expected, said, strict=True))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..reading import AGAIN
+from .crs import named_system
 from .scan_colours import colour_columns, colours_of
 from .source import Source, check_face_indices, triangulated
 from .text import even_table, number_table, shown
@@ -60,7 +61,7 @@ def read_ply(path: Path) -> Source:
     notes = (said,) if said else ()
     if faces is not None:
         faces = check_face_indices(faces, len(points), path)
-    return Source(points, faces, crs=crs, notes=notes, colours=colours)
+    return Source(points, faces, system=named_system(crs), notes=notes, colours=colours)
 
 
 def read_header(data: NDArray[np.uint8], path: Path) -> tuple[str, list[Element], int, int, str]:

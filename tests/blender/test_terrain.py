@@ -121,7 +121,7 @@ def test_a_unit_is_chosen_by_its_name(part) -> None:
     unit.set_by_name(other, len(unit.ITEMS) - 1)
     assert (other.unit_m, unit.ITEMS[unit.get(other)][0]) == (1.0, "OTHER")
     assert unit.exact(float(np.float32(0.9144))) == 0.9144
-    assert unit.size([131.2336, 131.2336, 6.5617], 0.3048) == "Read so, it measures 40 × 40 × 2 m."
+    assert unit.size([131.2336, 131.2336, 6.5617], [0.3048] * 3) == "Read so, it measures 40 × 40 × 2 m."
 
 
 def test_survey_feet_far_from_the_origin_come_to_their_place(part, tmp_path: Path) -> None:

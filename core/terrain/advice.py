@@ -138,10 +138,11 @@ def _steep(points: Array) -> list[str]:
     median = float(np.degrees(np.arctan(np.median(slope))))
     if median < STEEPEST_DEG:
         return []
+    in_feet = np.degrees(np.arctan(np.median(slope) * FOOT_M))
     return [
         f"Half of the terrain is steeper than {median:.0f}° over {extent[0]:,.0f} × {extent[1]:,.0f} m, which hardly "
-        f"any slope is: are its heights in feet (then it would be {np.degrees(np.arctan(np.median(slope) * FOOT_M)):.0f}°), "
-        "or exaggerated? Give the unit of its heights."
+        f"any slope is: are its heights in feet (then it would be {in_feet:.0f}°), or "
+        "exaggerated? Give the unit of its heights."
     ]
 
 

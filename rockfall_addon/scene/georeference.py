@@ -4,6 +4,7 @@
 import bpy
 
 from ...core.georeference import GlobalShift
+from ...core.terrain.crs import IN_METRES
 from . import store
 
 

@@ -248,7 +248,8 @@ def _on_terrain(ground: Ground, points: Array) -> tuple[Array, Indices]:
 def _no_terrain(ground: Ground, point: Array) -> InputError:
     return InputError(
         f"There is no terrain at {_place_text(ground, point)}",
-        advice="Correct the coordinates, or give a terrain that reaches so far",
+        advice=unit_hint(point[None], ground.terrain)
+        or "Correct the coordinates, or give a terrain that reaches so far",
     )
 
 

@@ -63,7 +63,8 @@ READINGS: tuple[tuple[str, str, Reading], ...] = (
 """What else may have been written: in words, what to do, and how it is read.
 
 All but the units are reflections, so that cameras fit them equally well but for how they are held: the one that is
-held most upright is taken. A mirrored picture is the same as x and y exchanged, depths for heights the same as rows counted from below.
+held most upright is taken. A mirrored picture is the same as x and y exchanged, depths for heights the same as rows
+counted from below.
 """
 
 

@@ -16,7 +16,7 @@ HIGHEST_RELIEF_M = 9_000.0
 HIGHEST_M, LOWEST_M = 9_000.0, -500.0
 """Of the ground on the Earth: Mount Everest, and the shore of the Dead Sea."""
 NO_PLACE_M = 100_000.0
-"""Heights that are all beyond this are another coordinate, or in another unit."""
+"""Heights that are all beyond this are another coordinate. Of a relief that cannot be either, the unit is asked for."""
 FAR_M = 100_000.0
 FOOT_M = UNITS_M["ft"]
 STEEPEST_DEG, WIDE_M, ACROSS = 60.0, 100.0, 20
@@ -54,7 +54,7 @@ def refuse_impossible(source: Source, low: Array, high: Array, unit_m: float | N
             advice="Transform them to heights",
         )
     lowest = min(abs(low[2]), abs(high[2])) if low[2] * high[2] > 0 else 0.0
-    if lowest > NO_PLACE_M:
+    if lowest > NO_PLACE_M and high[2] - low[2] <= HIGHEST_RELIEF_M:
         raise InputError(
             f"Heights from {low[2]:,.0f} to {high[2]:,.0f} m are nowhere on the Earth",
             file=path,

@@ -143,11 +143,10 @@ def system_from_geokeys(keys: Mapping[int, float | str]) -> CoordinateSystem:
         text = str(keys.get(citation, ""))
         if not known.name and text.startswith(ESRI_TEXT):
             known = replace(system_from_wkt(text.removeprefix(ESRI_TEXT)), vertical=known.vertical)
-    unit: float | None = epsg_units.LENGTHS.get(number(LINEAR_UNIT))
+    unit, height = (_exact(epsg_units.LENGTHS.get(number(key), 0.0)) or None for key in (LINEAR_UNIT, VERTICAL_UNIT))
     size = keys.get(LINEAR_UNIT_SIZE)
     if number(LINEAR_UNIT) == USER_DEFINED and isinstance(size, float) and size > 0:
         unit = _exact(size)
-    height = epsg_units.LENGTHS.get(number(VERTICAL_UNIT))
     return replace(
         known,
         kind=kind if known.kind == "plane" else known.kind,

@@ -25,6 +25,9 @@ IN_METRES = " in metres"
 SAME = 1e-9
 """Relative difference of two lengths that are the same unit, written with more or fewer digits."""
 
+MOST_LETTERS = 1_000_000
+"""Of a file beside another one."""
+
 type Kind = Literal["plane", "geographic", "geocentric"]
 type Node = tuple[str, list["Node | str"]]
 
@@ -212,7 +215,8 @@ def system_beside(path: Path) -> CoordinateSystem:
     """The system in the ``.prj`` file beside a file, as far as there is one."""
     for sidecar in (path.with_suffix(".prj"), path.with_suffix(".PRJ"), path.with_name(path.name + ".prj")):
         if sidecar.is_file():
-            return system_from_wkt(sidecar.read_text("utf-8-sig", "replace"))
+            with sidecar.open(encoding="utf-8-sig", errors="replace") as file:
+                return system_from_wkt(file.read(MOST_LETTERS))
     return UNKNOWN
 
 

@@ -216,13 +216,15 @@ def _motion(followed: "FollowedCamera", mode: str) -> list[str]:
 
 def _on_terrain(pairs: "Pairs", surface: "Surface") -> list[str]:
     """How far the pairs' points are from the terrain."""
+    from ..terrain.misplaced import unit_hint
     from ..terrain.raycast import closest_points
 
     away = closest_points(surface, pairs.point).distance
     worst = int(np.argmax(away))
     return [
         f"The points lie {np.median(away):.2f} m off the terrain (median), {away[worst]:.2f} m at most "
-        f"({pairs.name[worst]})."
+        f"({pairs.name[worst]}).",
+        *(f"{hint}." for hint in [unit_hint(pairs.point, surface)] if hint),
     ]
 
 

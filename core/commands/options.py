@@ -151,9 +151,15 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--unit",
         type=unit,
-        default=1.0,
         metavar="UNIT",
-        help=f"of the file's coordinates: {', '.join(UNITS_M)}, or its length in metres (default m)",
+        help=f"of the file's coordinates: {', '.join(UNITS_M)}, or its length in metres (default: as the file's "
+        "coordinate system says, else m)",
+    )
+    group.add_argument(
+        "--height-unit",
+        type=unit,
+        metavar="UNIT",
+        help="of the file's heights, where it is another one (default: as --unit, or as the file says)",
     )
     group.add_argument(
         "--max-edge",
@@ -197,7 +203,13 @@ def reading_as_asked(arguments: argparse.Namespace) -> "HowToRead":
     """What the options of `add_terrain_options` say of any file, for the readers."""
     from ..terrain.opening import HowToRead
 
-    return HowToRead(arguments.up, arguments.unit, arguments.ground_only, arguments.ground_filter)
+    return HowToRead(
+        arguments.up,
+        arguments.unit,
+        arguments.ground_only,
+        arguments.ground_filter,
+        height_unit_m=arguments.height_unit,
+    )
 
 
 def add_incident_options(parser: argparse.ArgumentParser) -> None:

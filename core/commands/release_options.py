@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..constants import ROCK_DENSITY_KGPM3
 from ..errors import InputError
-from .options import naming, whole
+from .options import naming, reading_as_asked, whole
 
 if TYPE_CHECKING:
     from ..simulation.blocks import Blocks
@@ -167,7 +167,7 @@ def zones_as_asked(
         return None, {}
     zones = open_zones(
         arguments.zones, arguments.zone_attribute or "", terrain, models,
-        terrain_files=arguments.terrain, up=arguments.up, unit_m=arguments.unit,
+        terrain_files=arguments.terrain, how=reading_as_asked(arguments),
     )  # fmt: skip
     return zones, {"zones": Path(arguments.zones)}
 

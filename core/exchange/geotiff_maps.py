@@ -15,6 +15,7 @@ from ..georeference import GlobalShift
 from ..hazard.cells import Cells
 from ..hazard.maps import Layer
 from ..output import output_file
+from ..terrain.crs import IN_METRES
 from ..vectors import Array
 
 NODATA = -9999.0
@@ -30,7 +31,7 @@ VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099
 
 
 def epsg_code(crs: str) -> int | None:
-    """2056 of "EPSG:2056"; None for a system of which only a name is known, or nothing."""
+    """2056 of "EPSG:2056"; None for a system of which only a name is known, or nothing, or in another unit."""
     found = re.fullmatch(r"\s*EPSG\s*:\s*(\d+)\s*", crs, re.IGNORECASE)
     return int(found[1]) if found else None
 
@@ -100,10 +101,10 @@ def _place(cells: Cells, shift: GlobalShift, path: Path) -> list[tuple[int, int,
         (PIXEL_SCALE, DOUBLE, 3, (cells.size_m, cells.size_m, 0.0), True),
         (TIE_POINT, DOUBLE, 6, tie, True),
     ]
-    code = epsg_code(shift.crs)
+    code = epsg_code(shift.crs.removesuffix(IN_METRES))  # the unit that is stated goes before the system's own
     if code is not None:  # without one any key would make readers invent a system
         keys = [(MODEL_TYPE, PROJECTED), (RASTER_TYPE, AREA), (PROJECTED_CRS, code), (LINEAR_UNIT, METRE)]
-        vertical = epsg_code(shift.vertical)
+        vertical = epsg_code(shift.vertical.removesuffix(IN_METRES))
         if vertical is not None:
             keys += [(VERTICAL_CRS, vertical), (VERTICAL_UNIT, METRE)]
         directory = [1, 1, 0, len(keys)] + [number for key, value in keys for number in (key, 0, 1, value)]

@@ -23,7 +23,7 @@ from ..georeference import GlobalShift
 from ..plausibility import GREATEST_M
 from ..reading import reader, reading
 from ..simulation.polygons import Polygon
-from ..terrain.crs import surely_different
+from ..terrain.crs import named_system, surely_different
 from ..vectors import Array
 from .csv_text import read_table
 from .geopackage_shapes import read_features
@@ -141,6 +141,7 @@ def _shapes(
     kind: Kind,
     shift: GlobalShift,
 ) -> tuple[MapShape, ...]:
+    known = named_system(crs)
     if surely_different(crs, shift.crs):
         raise InputError(
             f"The file is in {crs}, the terrain in {shift.crs}", file=path, advice="Export it in the terrain's system"
@@ -159,7 +160,7 @@ def _shapes(
         groups: list[Any] = [coordinates] if type_ in ("LineString", "Polygon") else _listed(coordinates, where, path)
         for group in groups:
             parts = [group] if kind == "line" else _listed(group, where, path)
-            arrays = tuple(_places(part, where, path, shift) for part in parts)
+            arrays = tuple(_places(part, where, path, shift, known.unit_m or 1.0) for part in parts)
             if kind == "polygon":
                 arrays = tuple(
                     ring[:-1] if len(ring) > 1 and (ring[0, :2] == ring[-1, :2]).all() else ring for ring in arrays
@@ -215,8 +216,8 @@ def _listed(value: object, what: str, path: Path) -> list[Any]:
     return value
 
 
-def _places(value: object, what: str, path: Path, shift: GlobalShift) -> Array:
-    """(k, 3) local points; NaN for heights that are not there."""
+def _places(value: object, what: str, path: Path, shift: GlobalShift, unit_m: float) -> Array:
+    """(k, 3) local points [m] of some in the unit of the file's system; NaN for heights that are not there."""
     rows = _listed(value, what, path)
     try:
         places = np.array([[float(row[0]), float(row[1]), float(row[2]) if len(row) > 2 else np.nan] for row in rows])
@@ -235,4 +236,4 @@ def _places(value: object, what: str, path: Path, shift: GlobalShift) -> Array:
             file=path,
             advice="Export it in the terrain's coordinate system",
         )
-    return shift.to_local(places)
+    return shift.to_local(places * unit_m)

@@ -15,12 +15,16 @@ from ..reconstruction.drag import Drag
 from ..reconstruction.picks import Picks
 from ..reconstruction.trajectory import Reconstruction, reconstruct
 from ..remarks import Remark
+from ..terrain.misplaced import unit_hint
 from ..terrain.readers import read_tiles
 from ..terrain.surface import Surface
 from ..workflow.uprightness import turned_path, turned_picks
 from .cameras import CameraFile, read_camera
 from .project import Project
 from .tables import read_picks
+
+FAR_CAMERA_M = 1000.0
+"""A camera may be so far beside and above its terrain, and half as far again as this is large."""
 
 
 def open_project(project: Project) -> tuple[Surface | None, Reconstruction]:
@@ -61,8 +65,11 @@ def read_project_camera(
     """
     read = read_camera(file, shift if surface is None else surface.shift)
     path, notes = turned_path(read.path, surface)
-    if not notes:
-        return read, ()
+    hint = "" if surface is None else unit_hint(path.position, surface, FAR_CAMERA_M)
+    if hint:
+        notes = (*notes, f"The camera {file.name} is far from the terrain. {hint}.")
+    if path is read.path:
+        return read, notes
     turn = np.eye(6)
     turn[3:, 3:] = Z_UP
     own, with_lens = (

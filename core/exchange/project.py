@@ -17,6 +17,7 @@ from ..output import final_path, write_text
 from ..reading import reader
 from ..reconstruction.block import SHAPES
 from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
+from ..terrain.crs import metric_name
 from ..terrain.opening import HowToRead
 from .saved_blend import BLEND, project_of
 from .simulation_entry import SimulationEntry, read_simulation, simulation_content
@@ -54,7 +55,9 @@ class TerrainSource:
     crs : coordinate reference system as the survey states it ("EPSG:2154"), empty when unknown.
     vertical_datum : the system of the heights, likewise ("EPSG:5720").
     up : the axis that points up in the files, one of `UP_AXES`.
-    unit_m : length of the files' unit [m].
+    unit_m : length of the files' unit [m]; None: as the files or `crs` say, else a metre.
+    height_unit_m : that of their heights, where it is another one; None: as `unit_m`, or as the files or
+        `vertical_datum` say.
     sigma_m : accuracy of the terrain, as a standard deviation of its height [m]; None: by its point spacing.
     """
 
@@ -63,8 +66,9 @@ class TerrainSource:
     crs: str = ""
     vertical_datum: str = ""
     up: str = "auto"
-    unit_m: float = 1.0
+    unit_m: float | None = None
     sigma_m: float | None = None
+    height_unit_m: float | None = None
     extra: Extra = field(default_factory=dict)
 
     @property
@@ -75,12 +79,14 @@ class TerrainSource:
     @property
     def how(self) -> HowToRead:
         """How to read the files."""
-        return HowToRead(self.up, self.unit_m, crs=self.crs, vertical=self.vertical_datum)
+        return HowToRead(
+            self.up, self.unit_m, crs=self.crs, vertical=self.vertical_datum, height_unit_m=self.height_unit_m
+        )
 
     @property
     def global_shift(self) -> GlobalShift | None:
         """The shift as the terrain and table readers take it; None when the project leaves it to the reader."""
-        return None if self.shift is None else GlobalShift(*self.shift, self.crs, self.vertical_datum)
+        return None if self.shift is None else GlobalShift(*self.shift, metric_name(self.crs), self.vertical_datum)
 
 
 @dataclass(frozen=True)
@@ -362,7 +368,8 @@ def _terrain(table: TomlTable) -> TerrainSource:
         crs=table.text("crs", ""),
         vertical_datum=table.text("vertical_datum", ""),
         up=table.choice("up", UP_AXES, "auto"),
-        unit_m=table.number("unit_m", 1.0),
+        unit_m=table.optional_number("unit_m"),
+        height_unit_m=table.optional_number("height_unit_m"),
         sigma_m=table.optional_number("sigma_m"),
         extra=table.rest(),
     )

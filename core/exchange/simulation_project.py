@@ -98,7 +98,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         inputs["zones"] = entry.zones.file
         zones = open_zones(
             entry.zones.file, entry.zones.attribute, met, models,
-            terrain_files=source.files, up=source.up, unit_m=source.unit_m,
+            terrain_files=source.files, how=source.how,
         )  # fmt: skip
     trees = None
     if entry.trees is not None:

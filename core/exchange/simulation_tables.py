@@ -35,6 +35,7 @@ from ..simulation.results import fell_through, release_names, run_figures
 from ..simulation.tree_hits import tree_hits_of
 from ..simulation.trees import LAW, NOT_KNOWN, Trees
 from ..terrain.cloud import Cloud
+from ..terrain.misplaced import unit_hint
 from ..vectors import Array, Mask, norm
 from .csv_text import read_table
 from .decimal_tables import DecimalColumns, Words, write_decimal_table
@@ -102,8 +103,11 @@ def read_releases(path: str | Path, ground: Ground, blocks: Blocks, number: int 
     if placed.any():
         position[placed] = placed_on(ground, position[placed, :2], diameter[placed])
         for i in np.flatnonzero(np.isnan(position[:, 2]))[:1].tolist():
+            beside = unit_hint(shift.to_local(survey)[:, :2], ground.terrain)
             raise table.error(
-                int(row[i]), "There is no terrain under this release", "Correct it, or give a larger terrain"
+                int(row[i]),
+                "There is no terrain under this release",
+                beside or "Correct it, or give a larger terrain",
             )
     velocity, spin = table.vectors(VELOCITY), table.vectors(SPIN)
     releases = make_releases(

@@ -6,10 +6,17 @@ from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 
+from ..constants import UNITS_M
 from ..errors import InputError
 
 FACTORS: Mapping[str, Mapping[str, float]] = {
-    "m": {"mm": 0.001, "cm": 0.01, "km": 1000.0, "ft": 0.3048},
+    "m": {
+        "mm": 0.001,
+        "cm": 0.01,
+        "km": 1000.0,
+        "ft": UNITS_M["ft"],
+        **dict.fromkeys(("usft", "us-ft", "ftus"), UNITS_M["us-ft"]),
+    },
     "cm": {"mm": 0.1, "m": 100.0, "in": 2.54},
     "s": {"us": 1e-6, "ms": 0.001, "min": 60.0},
     "kg": {"g": 0.001, "t": 1000.0, "lb": 0.45359237},

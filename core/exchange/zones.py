@@ -21,6 +21,7 @@ from ..remarks import Remark
 from ..simulation.ground import element_places
 from ..simulation.zones import ZoneCover, face_values, nearest_values, zones_of_values, zones_within
 from ..terrain.cloud import Cloud
+from ..terrain.opening import HowToRead
 from ..terrain.ply_attributes import PlyAttribute, read_ply_attributes
 from ..terrain.surface import Surface
 from ..vectors import Array
@@ -150,14 +151,13 @@ def open_zones(
     models: Sequence[str],
     *,
     terrain_files: Sequence[str | Path],
-    up: str,
-    unit_m: float,
+    how: HowToRead,
 ) -> Zones:
     """Zones of polygons, or of an attribute of the terrain's file where one is named.
 
     Parameters
     ----------
-    terrain_files, up, unit_m : what the terrain was read from, and how.
+    terrain_files, how : what the terrain was read from, and how.
 
     Raises
     ------
@@ -165,9 +165,8 @@ def open_zones(
     """
     if not attribute:
         return read_zones(path, terrain, models)
-    values = read_ply_attributes(terrain_files, attribute)
-    places = terrain.shift.to_local(values.in_metres(up, unit_m))
-    return read_attribute_zones(path, terrain, values, places, models)
+    values = read_ply_attributes(terrain_files, attribute, how)
+    return read_attribute_zones(path, terrain, values, terrain.shift.to_local(values.places), models)
 
 
 def _zones(cover: ZoneCover, found: _Properties, models: Sequence[str]) -> Zones:

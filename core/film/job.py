@@ -51,7 +51,7 @@ class FilmJob:
     preset: str = "preview"
     frames: tuple[int, int] | None = None
     up: str = "auto"
-    unit_m: float = 1.0
+    unit_m: float | None = None
     title: str = ""
     scene: str = ""
     graphs: GraphKind | None = None

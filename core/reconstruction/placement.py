@@ -38,6 +38,7 @@ def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tupl
     ------
     InputError : picks and terrain do not overlap at all (other coordinates), or a pick lies far off the terrain.
     """
+    from ..terrain.misplaced import unit_hint
     from ..terrain.raycast import closest_points
 
     if not len(picks):
@@ -53,7 +54,8 @@ def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tupl
         raise picks.error(
             worst,
             f"The pick is {distance[worst]:.1f} m from the terrain{others}",
-            "Correct its coordinates, or discard it (status discarded); a point in the air is of kind pass",
+            unit_hint(picks.position, surface)
+            or "Correct its coordinates, or discard it (status discarded); a point in the air is of kind pass",
         )
     off = grounded & (distance > np.maximum(NOTICEABLE_M, NOTICEABLE_DIAMETERS * diameter_m))
     remarks = []
@@ -65,6 +67,8 @@ def check_placement(picks: Picks, surface: "Surface", diameter_m: Array) -> tupl
 
 
 def _check_overlap(picks: Picks, surface: "Surface") -> None:
+    from ..terrain.misplaced import unit_hint
+
     low, high = surface.shift.to_survey(surface.bounds)
     position = picks.shift.to_survey(picks.position)
     first, last = position.min(axis=0), position.max(axis=0)
@@ -81,8 +85,8 @@ def _check_overlap(picks: Picks, surface: "Surface") -> None:
         advice = "The terrain seems to have another axis up: give it with --up"
     elif fits(surface.shift.to_survey(position)):
         advice = "The picks look like local coordinates: add the terrain's shift to them"
-    elif fits(position * 0.3048):
-        advice = "The picks look like feet: convert them to metres"
+    elif hint := unit_hint(surface.shift.to_local(position), surface):
+        advice = hint
     elif fits(position * 0.001):
         advice = "The picks look like millimetres: convert them to metres"
     elif nearby:

@@ -14,9 +14,13 @@ from ..impact_models.machinery.parameters import suggestion
 from ..reconstruction.drag import Drag
 from ..remarks import Remark
 from ..terrain.cloud import Cloud
+from ..terrain.misplaced import unit_hint
 from ..vectors import Array, Indices, Mask, Names
 from .block_shapes import ROUND, SHAPES, Shape, mean_inertia, principal_moments, volumes
 from .ground import Ground
+
+FAR_ABOVE_M = 100.0
+"""A release higher above the terrain than this may be in another unit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,15 +216,20 @@ def overlapping(ground: Ground, releases: Releases) -> Array:
 
     Raises
     ------
-    InputError : a release is beside the terrain, in plan.
+    InputError : a release is beside the terrain, in plan, or far above it and at it in another unit.
     """
     height = ground.heights_above(releases.position)
     for i in np.flatnonzero(np.isnan(height))[:1].tolist():
         x, y, z = ground.terrain.shift.to_survey(releases.position[i : i + 1])[0]
         raise InputError(
             f"The release at {x:.2f}, {y:.2f}, {z:.2f} is beside the terrain",
-            advice="Correct its place, or give a terrain that reaches so far",
+            advice=unit_hint(releases.position, ground.terrain)
+            or "Correct its place, or give a terrain that reaches so far",
         )
+    if (height > FAR_ABOVE_M).any():
+        hint = unit_hint(releases.position[height > FAR_ABOVE_M], ground.terrain)
+        if hint:
+            raise InputError(f"A release is {np.nanmax(height):,.0f} m above the terrain", advice=hint)
     away = ground.distance(releases.position)
     depth: Array = np.where(height < 0, releases.radius_m + away, np.maximum(releases.radius_m - away, 0.0))
     return depth

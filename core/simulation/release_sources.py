@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..reconstruction.placement import FAR_M
 from ..remarks import Remark
 from ..terrain.cloud import Cloud, local_planes
+from ..terrain.misplaced import unit_hint
 from ..terrain.raycast import cast_rays, closest_points
 from ..terrain.surface import face_cross_products
 from ..vectors import Array, Indices, Mask, Names, norm, unit
@@ -128,7 +129,8 @@ def in_polygon(
         steep_too = "" if steeper_than is None else f" that is steeper than {np.degrees(steeper_than):g}°"
         raise InputError(
             f"There is no terrain within the polygon{steep_too}",
-            advice="Check its coordinates" if steeper_than is None else "Give a smaller angle, or another polygon",
+            advice=unit_hint(np.concatenate([ring for one in polygons for ring in one.rings]), ground.terrain)
+            or ("Check its coordinates" if steeper_than is None else "Give a smaller angle, or another polygon"),
         )
     name = np.array([polygon.name for polygon in polygons], dtype=np.str_)[which]
     return _anywhere(ground, pieces, areas, normals, name, blocks, number, seed)
@@ -231,7 +233,8 @@ def _on_terrain(ground: Ground, points: Array) -> tuple[Array, Indices]:
         for i in np.flatnonzero(far > FAR_M)[:1].tolist():
             raise InputError(
                 f"{_place_text(ground, points[i])} is {far[i]:.1f} m from the terrain",
-                advice="Correct its coordinates, or leave out the height to take the terrain's",
+                advice=unit_hint(points, terrain)
+                or "Correct its coordinates, or leave out the height to take the terrain's",
             )
     if not given.all():
         above = np.column_stack([points[~given, :2], np.full(int((~given).sum()), terrain.bounds[1, 2] + 1.0)])
@@ -245,7 +248,8 @@ def _on_terrain(ground: Ground, points: Array) -> tuple[Array, Indices]:
 def _no_terrain(ground: Ground, point: Array) -> InputError:
     return InputError(
         f"There is no terrain at {_place_text(ground, point)}",
-        advice="Correct the coordinates, or give a terrain that reaches so far",
+        advice=unit_hint(point[None], ground.terrain)
+        or "Correct the coordinates, or give a terrain that reaches so far",
     )
 
 

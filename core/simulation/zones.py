@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..remarks import Remark
 from ..terrain.cloud import Cloud
+from ..terrain.misplaced import unit_hint
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask
 from .ground import element_places
@@ -50,7 +51,8 @@ def zones_within(terrain: Surface | Cloud, polygons: Sequence[Polygon]) -> ZoneC
     return zones_of_parts(
         terrain,
         [(polygon.name, polygon.contains(middles)) for polygon in polygons],
-        "Check the coordinates of the polygons",
+        unit_hint(np.concatenate([ring for polygon in polygons for ring in polygon.rings]), terrain)
+        or "Check the coordinates of the polygons",
     )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..reading import check_promise, reading
 from ..vectors import Array
-from .crs import crs_beside, crs_from_geokeys, crs_from_wkt
+from .crs import CoordinateSystem, geokeys, system_beside, system_from_geokeys, system_from_wkt
 from .scan_colours import Colours, colours_of
 from .source import Source
 
@@ -37,7 +37,7 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
     ------
     InputError : not a LAS file, truncated, fewer points than its header promises; no ground class when it is asked for.
     """
-    header, crs, geographic = _las_header(path)
+    header, system = _las_header(path)
     points, classes, flags, colours = _las_points(path, header)
     if len(points) != header.point_count:
         raise _truncated(path, header.point_count, len(points))
@@ -75,9 +75,7 @@ def read_las(path: Path, ground_only: bool | None) -> Source:
         )
     if not kept.all():
         points, colours = points[kept], None if colours is None else colours[kept]
-    return Source(
-        points, crs=crs, geographic=geographic, notes=tuple(notes), colours=colours, step=np.array(header.scales)
-    )
+    return Source(points, system=system, notes=tuple(notes), colours=colours, step=np.array(header.scales))
 
 
 def _flagged(flags: NDArray[np.uint8]) -> str:
@@ -90,14 +88,14 @@ def _flagged(flags: NDArray[np.uint8]) -> str:
     return " and ".join(parts)
 
 
-def inspect_las(path: Path) -> tuple[Array, int, Array, str, bool, tuple[str, ...]]:
-    """Box (2, 3), number of points, scales (3,), CRS and whether it is geographic, from the header alone; and sentences
-    on the points and, from the first ones, on their classes.
+def inspect_las(path: Path) -> tuple[Array, int, Array, CoordinateSystem, tuple[str, ...]]:
+    """Box (2, 3), number of points, scales (3,) and coordinate system, from the header alone; and sentences on the
+    points and, from the first ones, on their classes.
     """
-    header, crs, geographic = _las_header(path)
+    header, system = _las_header(path)
     count = int(header.point_count)
     said = (f"Cloud of {count:,} points.", _ground_sentence(path, count))
-    return np.array([header.mins, header.maxs]), count, np.array(header.scales), crs, geographic, said
+    return np.array([header.mins, header.maxs]), count, np.array(header.scales), system, said
 
 
 def _ground_sentence(path: Path, count: int) -> str:
@@ -125,7 +123,7 @@ def _class_sentence(some: NDArray[np.uint8], count: int) -> str:
     return f"{of} are classified as ground; only these are used unless others are asked for."
 
 
-def _las_header(path: Path) -> tuple[Any, str, bool]:
+def _las_header(path: Path) -> tuple[Any, CoordinateSystem]:
     import laspy
 
     size = path.stat().st_size
@@ -153,7 +151,7 @@ def _las_header(path: Path) -> tuple[Any, str, bool]:
         raise _truncated(path, header.point_count, None if compressed else max(held, 0))
     if not header.point_count:
         raise InputError("The cloud has no points", file=path, advice="Export it again")
-    return header, *_las_crs(header, path)
+    return header, _las_system(header, path)
 
 
 def _check_items(header: Any, path: Path) -> None:
@@ -192,15 +190,19 @@ def _check_promises(path: Path, size: int) -> None:
             check_promise(f"{chunks} parts", chunks, size, path)
 
 
-def _las_crs(header: Any, path: Path) -> tuple[str, bool]:
+def _las_system(header: Any, path: Path) -> CoordinateSystem:
+    """Of the record with well-known text, else of that with GeoTIFF keys, else of the ``.prj`` beside the file."""
     records = [*header.vlrs, *(header.evlrs or [])]
     for record in records:
         if text := getattr(record, "string", ""):
-            return crs_from_wkt(text)
+            return system_from_wkt(text)
+    doubles = [float(one.value) for record in records for one in getattr(record, "doubles", ())]
+    texts = [text for record in records for text in getattr(record, "strings", ())]
     for record in records:
         if keys := getattr(record, "geo_keys", None):
-            return crs_from_geokeys([(k.id, k.value_offset) for k in keys if k.tiff_tag_location == 0])
-    return crs_beside(path)
+            entries = [(key.id, key.tiff_tag_location, key.count, key.value_offset) for key in keys]
+            return system_from_geokeys(geokeys(entries, doubles, "\0".join(texts)))
+    return system_beside(path)
 
 
 def _flags(points: Any) -> NDArray[np.uint8]:

@@ -10,7 +10,7 @@ from ..errors import DependencyError, InputError
 from ..extras import E57, install_command, is_there
 from ..reading import check_promise
 from ..vectors import Array
-from .crs import crs_beside, crs_from_wkt
+from .crs import system_beside, system_from_wkt
 from .scan_colours import Colours, colours_of, joined_colours
 from .source import Source
 
@@ -56,9 +56,9 @@ def read_e57(path: Path) -> Source:
     if invalid := sum(counts) - len(points):
         note += f" Left out {invalid:,} that the scanner marked as invalid."
     colours, said = joined_colours([(found, f"scan {i}") for i, (_, found) in enumerate(scans_of, start=1)])
-    crs, geographic = crs_from_wkt(system) if system else crs_beside(path)
+    known = system_from_wkt(system) if system else system_beside(path)
     notes = (note, said) if said else (note,)
-    return Source(points, crs=crs, geographic=geographic, notes=notes, colours=colours)
+    return Source(points, system=known, notes=notes, colours=colours)
 
 
 def _scan(opened: Any, number: int) -> tuple[Array, Colours | None]:

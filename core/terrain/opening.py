@@ -15,7 +15,7 @@ from ..reading import reader
 from ..vectors import Array, Mask
 from . import advice, clouds, e57, geotiff, gltf, grids, meshes, ply, point_tables, ptx
 from .coordinate_step import coarse_sentence, spacing_in_box, spacing_of, stored_step
-from .crs import surely_different
+from .crs import CoordinateSystem, metric_name, named_system, surely_different, unit_words
 from .ground_filter import filter_ground
 from .scan_colours import joined_colours
 from .source import Source, check_finite
@@ -47,19 +47,26 @@ class HowToRead:
     Attributes
     ----------
     up : axis that points up in the file: "z", "y", or "auto" (y in glTF, as its standard says, else z).
-    unit_m : length of the file's unit [m], 0.001 for millimetres.
+    unit_m : length of the file's unit [m], 0.001 for millimetres; None: as the file's coordinate system says, else a
+        metre.
     ground_only : use the ground class of LAS and LAZ: None if there is one, True always, False never.
     ground_filter_m : cell of a filter that takes vegetation out of a cloud, whatever its classes say [m]; none when
         None. See `filter_ground`.
-    crs, vertical : coordinate system, and that of the heights, where the file does not state them.
+    crs, vertical : coordinate system, and that of the heights, where the file does not state them; their units count.
+    height_unit_m : length of the unit of the heights where it is another one; None: as `unit_m`, or as the file says.
     """
 
     up: str = "auto"
-    unit_m: float = 1.0
+    unit_m: float | None = None
     ground_only: bool | None = None
     ground_filter_m: float | None = None
     crs: str = ""
     vertical: str = ""
+    height_unit_m: float | None = None
+
+
+AS_IT_IS = HowToRead()
+"""Nothing is said of the file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,27 +131,24 @@ def _read_one(path: Path, how: HowToRead) -> Source:
 
 
 def _one_cloud(paths: Sequence[Path], sources: Sequence[Source]) -> tuple[Path, str, Source]:
-    crs = ""
+    system = sources[0].system
     for path, source in zip(paths, sources, strict=True):
-        if surely_different(source.crs, crs):
-            raise _two_systems(source.crs, f"the files before it in {crs}", path)
-        crs = crs or source.crs
+        if surely_different(source.crs, system.name):
+            raise _two_systems(source.crs, f"the files before it in {system.name}", path)
+        system = system.filled(source.system)
     notes = [f"{path.name}: {note}" for path, source in zip(paths, sources, strict=True) for note in source.notes]
     notes.append(f"The {len(paths)} clouds are read as one.")
     points = np.concatenate([source.points for source in sources])
     colours, said = joined_colours([(source.colours, path.name) for path, source in zip(paths, sources, strict=True)])
     notes += [said] if said else []
-    vertical = next((source.vertical for source in sources if source.vertical), "")
-    geographic, turned = (any(getattr(source, what) for source in sources) for what in ("geographic", "turned"))
+    turned = any(source.turned for source in sources)
     name = ", ".join(path.name for path in paths)
     return (
         paths[0],
         name,
         Source(
             points,
-            crs=crs,
-            vertical=vertical,
-            geographic=geographic,
+            system=system,
             turned=turned,
             notes=tuple(notes),
             colours=colours,
@@ -165,15 +169,15 @@ def _localised(
         notes += filtered
     heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
     low, high = box_of(points[heights], path)
-    advice.refuse_degrees(source, low, high, how.unit_m, path)
+    advice.refuse_impossible(source, low, high, how.unit_m, path)
     for theirs, stated in ((source.crs, how.crs), (source.vertical, how.vertical)):
         if surely_different(theirs, stated):
             raise _two_systems(theirs, f"and {stated} is stated", path)
-    shift = _shift(shift, low, high, how.crs or source.crs, path)
-    vertical = how.vertical or source.vertical
+    shift = _shift(shift, low, high, metric_name(how.crs) or source.crs, path)
+    vertical = named_system("", how.vertical).metric().vertical or source.vertical
     if vertical and not shift.vertical:
         shift = replace(shift, vertical=vertical)
-    said = [*advice.sentences(low, high, shift)]
+    said = [*advice.sentences(low, high, shift), *advice.of_heights(points)]
     if source.kind == "cloud" and advice.faces_along_y(points):
         said.append(advice.Y_UP)
     if shift.vector.any():
@@ -243,17 +247,23 @@ def placed(source: Source, how: HowToRead, path: Path) -> Source:
     ------
     InputError : an axis or a unit that there is not, a coordinate that cannot be.
     """
-    up, unit_m = how.up, how.unit_m
+    up = how.up
     if up not in UP_AXES:
         raise InputError(f'The up axis "{up}" is unknown', file=path, advice=f"Choose one of {', '.join(UP_AXES)}")
-    if not (np.isfinite(unit_m) and unit_m > 0):
-        raise InputError(f"The unit of {unit_m} m is no length", file=path, advice="Give 0.001 for millimetres")
+    for unit in (how.unit_m, how.height_unit_m):
+        if unit is not None and not (np.isfinite(unit) and unit > 0):
+            raise InputError(f"The unit of {unit} m is no length", file=path, advice="Give 0.001 for millimetres")
+    y_up = up == "y" or (up == "auto" and source.up == "y")
+    system = source.system.filled(named_system(how.crs, how.vertical))
+    flat, height, said = units(system, how)
+    stated = units(system, replace(how, unit_m=None, height_unit_m=None))[:2]
     points = source.points
     if source.kind == "grid" and np.isinf(points[:, 2]).any():
         points = np.column_stack([points[:, :2], np.where(np.isinf(points[:, 2]), np.nan, points[:, 2])])
     check_finite(points, source.kind, path)
-    if unit_m != 1.0:
-        points = points * unit_m
+    lengths = np.array([flat, height, flat] if y_up else [flat, flat, height])
+    if (flat, height) != (1.0, 1.0):
+        points = points * lengths
     reach = float(np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0))
     if reach >= GREATEST_M:
         raise InputError(
@@ -262,20 +272,60 @@ def placed(source: Source, how: HowToRead, path: Path) -> Source:
             advice="The file is damaged or in another unit: export it again, or give the length of its unit",
         )
     notes, turned = list(source.notes), False
-    steps = stored_step(source.points, source.step, source.kind) * unit_m
+    steps = stored_step(source.points, source.step, source.kind) * lengths
     if source.faces is not None:
         notes.append(f"Mesh of {len(points) + source.merged:,} vertices and {len(source.faces):,} faces.")
-    if up == "y" or (up == "auto" and source.up == "y"):
+    if y_up:
         points, turned, steps = z_up(points), True, steps[[0, 2, 1]]
         notes.append(
             "Turned from Y up to Z up" + (", as the format's standard says." if up == "auto" else ", as asked.")
         )
-    if unit_m != 1.0:
-        notes.append(f"Multiplied by {unit_m:g} to metres, as asked.")
     there = points[np.isfinite(points[:, 2])] if source.kind == "grid" else points
-    if said := coarse_sentence(steps, spacing_in_box(there, source.count) if source.count else spacing_of(there)):
-        notes.append(said)
-    return replace(source, points=np.ascontiguousarray(points), up="z", turned=turned, notes=tuple(notes))
+    coarse = coarse_sentence(steps, spacing_in_box(there, source.count) if source.count else spacing_of(there))
+    return replace(
+        source,
+        points=np.ascontiguousarray(points),
+        system=system.metric(),
+        up="z",
+        turned=turned,
+        notes=(*notes, *said, *([coarse] if coarse else [])),
+        units_m=(flat, height),
+        stated_units_m=stated,
+    )
+
+
+def units(system: CoordinateSystem, how: HowToRead) -> tuple[float, float, tuple[str, ...]]:
+    """Length of the unit of x and y, and of that of the heights [m], as asked, as the file says, else a metre; and
+    sentences on them.
+    """
+    if how.unit_m is not None:
+        flat, height = how.unit_m, how.unit_m if how.height_unit_m is None else how.height_unit_m
+        said = []
+        if (flat, height) != (1.0, 1.0):
+            both = f"{flat:g}" if flat == height else f"{flat:g}, heights by {height:g},"
+            said.append(f"Multiplied by {both} to metres, as asked.")
+        if system.unit_m not in (None, flat):
+            said.append(f"The file's system is in {unit_words(system.unit_m or 1.0)}: what was asked goes before it.")
+        return flat, height, tuple(said)
+    flat = 1.0 if system.unit_m is None else system.unit_m
+    says = f", as {system.name} says" if system.name else ", as the file says"
+    said = [f"Coordinates are in {unit_words(flat)}{says}: multiplied by {flat:.10g} to metres."] if flat != 1.0 else []
+    if how.height_unit_m is not None:
+        height, says = how.height_unit_m, ", as asked"
+    elif system.height_unit_m is not None:
+        height, says = system.height_unit_m, f", as {system.vertical or 'the file'} says"
+    elif flat != 1.0:
+        said.append(
+            f"Nothing says the unit of its heights: they are taken in {unit_words(flat)}, too. Give their unit if they "
+            "are in another one (--height-unit m)."
+        )
+        return flat, flat, tuple(said)
+    else:
+        height = 1.0
+    if (flat, height) != (1.0, 1.0):
+        multiplied = "" if height == 1.0 else f": multiplied by {height:.10g} to metres"
+        said.append(f"Heights are in {unit_words(height)}{says}{multiplied}.")
+    return flat, height, tuple(said)
 
 
 def box_of(points: Array, path: Path, count: int | None = None) -> tuple[Array, Array]:
@@ -298,7 +348,7 @@ def _shift(given: GlobalShift | None, low: Array, high: Array, crs: str, path: P
         return GlobalShift.proposed(low, high, crs)
     if surely_different(crs, given.crs):
         raise _two_systems(crs, f"the project in {given.crs}", path)
-    return given if given.crs or not crs else replace(given, crs=crs)
+    return replace(given, crs=metric_name(given.crs) or crs)
 
 
 def _two_systems(crs: str, other: str, path: Path) -> InputError:

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..reading import AGAIN
 from .comments import comment_sentences
 from .coordinate_step import single_precision_step
+from .crs import named_system
 from .polygons import triangles_of
 from .scan_colours import colour_columns, colours_of
 from .source import Source, check_face_indices, check_finite
@@ -92,7 +93,7 @@ def read_ply(path: Path) -> Source:
         made = triangles_of(contents.points, corners, counts)
         faces, notes = check_face_indices(made.faces, len(contents.points), path), [*made.notes, *notes]
     step = _step(elements, contents.points, bool(order))
-    return Source(contents.points, faces, crs=crs, notes=tuple(notes), colours=colours, step=step)
+    return Source(contents.points, faces, system=named_system(crs), notes=tuple(notes), colours=colours, step=step)
 
 
 def _step(elements: Sequence[Element], points: NDArray[np.float64], binary: bool) -> NDArray[np.float64] | None:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..georeference import z_up
 from ..reading import reader
 from ..vectors import Array
+from .opening import AS_IT_IS, HowToRead, placed
 from .ply import FACE_LISTS, Element, list_counts, read_header, read_ply, row_type, walked
 from .text import number_table
 
@@ -23,7 +23,7 @@ class PlyAttribute:
 
     Attributes
     ----------
-    places : (k, 3) of the vertices, or the middles of the faces, as in the file.
+    places : (k, 3) of the vertices, or the middles of the faces, in metres with z up, in survey coordinates.
     values : (k,).
     of_faces : else of vertices.
     """
@@ -32,20 +32,15 @@ class PlyAttribute:
     values: Array
     of_faces: bool
 
-    def in_metres(self, up: str, unit_m: float) -> Array:
-        """(k, 3) the places as `read_terrain` puts them, with its arguments, in survey coordinates."""
-        places = self.places * unit_m
-        return z_up(places) if up == "y" else places
 
-
-def read_ply_attributes(paths: Sequence[str | Path], name: str) -> PlyAttribute:
+def read_ply_attributes(paths: Sequence[str | Path], name: str, how: HowToRead) -> PlyAttribute:
     """The attribute of a name in several files as one.
 
     Raises
     ------
     InputError : see `read_ply_attribute`; one file has it of its faces, another of its vertices.
     """
-    parts = [read_ply_attribute(path, name) for path in paths]
+    parts = [read_ply_attribute(path, name, how) for path in paths]
     for path, part in zip(paths, parts, strict=True):
         if part.of_faces != parts[0].of_faces:
             of, other = ("faces", "vertices") if part.of_faces else ("vertices", "faces")
@@ -59,7 +54,7 @@ def read_ply_attributes(paths: Sequence[str | Path], name: str) -> PlyAttribute:
 
 
 @reader("terrain")
-def read_ply_attribute(path: str | Path, name: str) -> PlyAttribute:
+def read_ply_attribute(path: str | Path, name: str, how: HowToRead = AS_IT_IS) -> PlyAttribute:
     """The attribute of a name; of the faces where both have it.
 
     Raises
@@ -69,7 +64,7 @@ def read_ply_attribute(path: str | Path, name: str) -> PlyAttribute:
     path = Path(path)
     if path.suffix.lower() != ".ply":
         raise InputError("Only PLY files have attributes", file=path, advice="Export the terrain as PLY")
-    source = read_ply(path)
+    source = placed(read_ply(path), how, path)
     data = np.memmap(path, dtype=np.uint8, mode="r")
     order, elements, start, header_rows, _ = read_header(data, path)
     for element in sorted(elements, key=lambda one: one.name != "face"):

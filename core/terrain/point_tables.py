@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..formats.number_words import has_thousands_marks, stated_separator, why_no_number, without_groups
 from ..vectors import Array
 from .comments import comment_sentences
-from .crs import crs_beside
+from .crs import system_beside
 from .scan_colours import colour_columns, colours_of
 from .source import Source
 from .text import number_table, read_text, shown
@@ -76,7 +76,6 @@ def read_xyz(path: Path) -> Source:
             row=rows[0] + 1,
             advice="Export x, y and z",
         )
-    crs, geographic = crs_beside(path)
     notes = [f"Cloud of {len(table):,} points.", *notes]
     found = table[:, three] if three and table.shape[1] > max(three) else table[:, :0]
     if three and three[0] < 0:  # without a header they have to look like colours
@@ -87,7 +86,7 @@ def read_xyz(path: Path) -> Source:
     comments = [line.lstrip(b"#/ ") for line in original[:FIRST_ROWS] if line.lstrip().startswith(COMMENTS)]
     notes += comment_sentences(line.decode("utf-8", "replace") for line in comments)
     return Source(
-        np.ascontiguousarray(table[:, columns]), crs=crs, geographic=geographic, notes=tuple(notes), colours=colours
+        np.ascontiguousarray(table[:, columns]), system=system_beside(path), notes=tuple(notes), colours=colours
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..reading import AGAIN
 from ..vectors import Array
-from .crs import crs_beside
+from .crs import system_beside
 from .scan_colours import colours_of
 from .source import Source
 from .text import number_table, read_text, shown
@@ -63,9 +63,8 @@ def read_ptx(path: Path) -> Source:
     note = f"Cloud of {len(points):,} points in {scans}; {empty:,} directions without a point."
     numbers = np.concatenate(colours)
     found, said = colours_of(numbers) if len(numbers) == len(points) else (None, SOME if len(numbers) else "")
-    crs, geographic = crs_beside(path)
     notes = (note, said) if said else (note,)
-    return Source(points, crs=crs, geographic=geographic, notes=notes, colours=found)
+    return Source(points, system=system_beside(path), notes=notes, colours=found)
 
 
 def _header(lines: Sequence[bytes], at: int, path: Path) -> tuple[int, Array]:

@@ -47,6 +47,7 @@ class TerrainInfo:
     shift : proposed.
     summary : sentences, advice included.
     y_up : it looks as if y pointed up.
+    units_m, stated_units_m : lengths of the units of x and y and of heights, as it was read, and as the file says [m].
     """
 
     name: str
@@ -59,6 +60,8 @@ class TerrainInfo:
     shift: GlobalShift
     summary: tuple[str, ...]
     y_up: bool = False
+    units_m: tuple[float, float] = (1.0, 1.0)
+    stated_units_m: tuple[float, float] = (1.0, 1.0)
 
 
 @reader("terrain")
@@ -67,7 +70,8 @@ def read_terrain(
     *,
     shift: GlobalShift | None = None,
     up: str = "auto",
-    unit_m: float = 1.0,
+    unit_m: float | None = None,
+    height_unit_m: float | None = None,
     max_edge_m: float | None = None,
     ground_only: bool | None = None,
     ground_filter_m: float | None = None,
@@ -80,7 +84,8 @@ def read_terrain(
     path : PLY, OBJ, STL, glTF, GLB; ASC, TIF; LAS, LAZ, XYZ, TXT, CSV, PTX, E57.
     shift : the project's; one is proposed from the data when None.
     up : axis that points up in the file: "z", "y", or "auto" (y in glTF, as its standard says, else z).
-    unit_m : length of the file's unit [m], 0.001 for millimetres.
+    unit_m, height_unit_m : length of the file's unit [m], 0.001 for millimetres, and of that of its heights; see
+        `HowToRead`.
     max_edge_m : longest edge of a meshed cloud, in plan [m]; from the point spacing when None.
     ground_only : use the ground class of LAS and LAZ: None if there is one, True always, False never.
     ground_filter_m : cell of a filter that takes vegetation out of a cloud, whatever its classes say [m]; none when
@@ -92,7 +97,7 @@ def read_terrain(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 2)
-    how = HowToRead(up, unit_m, ground_only, ground_filter_m)
+    how = HowToRead(up, unit_m, ground_only, ground_filter_m, height_unit_m=height_unit_m)
     return _surface(open_terrain_file(path, how, shift, progress), max_edge_m, progress)
 
 
@@ -145,7 +150,8 @@ def read_points(
     *,
     shift: GlobalShift | None = None,
     up: str = "auto",
-    unit_m: float = 1.0,
+    unit_m: float | None = None,
+    height_unit_m: float | None = None,
     ground_only: bool | None = None,
     ground_filter_m: float | None = None,
     progress: Progress = silent,
@@ -156,7 +162,8 @@ def read_points(
     """
     path = Path(path)
     progress(f"Reading {path.name}", 0, 1)
-    return _cloud(open_terrain_file(path, HowToRead(up, unit_m, ground_only, ground_filter_m), shift, progress))
+    how = HowToRead(up, unit_m, ground_only, ground_filter_m, height_unit_m=height_unit_m)
+    return _cloud(open_terrain_file(path, how, shift, progress))
 
 
 @reader("terrain")
@@ -209,34 +216,40 @@ def _surface(opened: Opened, max_edge_m: float | None, progress: Progress) -> Su
 
 
 @reader("terrain")
-def inspect_terrain(path: str | Path, *, up: str = "auto", unit_m: float = 1.0) -> TerrainInfo:
+def inspect_terrain(
+    path: str | Path, *, up: str = "auto", unit_m: float | None = None, height_unit_m: float | None = None
+) -> TerrainInfo:
     """Box, counts, CRS and proposed shift, without meshing; from the header where it tells (LAS, LAZ).
 
     Raises
     ------
     InputError : anything wrong with the file, with what to do about it.
     """
-    path, how = Path(path), HowToRead(up, unit_m)
+    path, how = Path(path), HowToRead(up, unit_m, height_unit_m=height_unit_m)
     if path.suffix.lower() in LAS_EXTENSIONS:
         check_path(path)
-        box, count, scales, crs, geographic, said = clouds.inspect_las(path)
-        source = placed(Source(box, crs=crs, geographic=geographic, notes=said, count=count, step=scales), how, path)
+        box, count, scales, system, said = clouds.inspect_las(path)
+        source = placed(Source(box, system=system, notes=said, count=count, step=scales), how, path)
     else:
         source = read_placed(path, how)
         count = len(source.points) + source.merged
     points = source.points
     heights = np.isfinite(points[:, 2]) if source.kind == "grid" else slice(None)
     low, high = box_of(points[heights], path, count)
-    advice.refuse_degrees(source, low, high, unit_m, path)
+    advice.refuse_impossible(source, low, high, unit_m, path)
     shift = GlobalShift.proposed(low, high, source.crs)
-    notes = (*source.notes, *advice.sentences(low, high, shift))
+    whole = advice.of_heights(points) if len(points) + source.merged == count else []  # of LAS the box alone is read
+    notes = (*source.notes, *advice.sentences(low, high, shift), *whole)
     y_up = False
     if source.faces is not None:
         y_up = advice.mesh_faces_along_y(cleaning.examine_faces(points, source.faces)[1])
     elif source.kind == "cloud" and len(points) == count:
         y_up = advice.faces_along_y(points)
     faces = 0 if source.faces is None else len(source.faces)
-    return TerrainInfo(path.name, source.kind, low, high, count, faces, source.crs, shift, notes, y_up)
+    return TerrainInfo(
+        path.name, source.kind, low, high, count, faces, source.crs, shift, notes, y_up,
+        source.units_m, source.stated_units_m,
+    )  # fmt: skip
 
 
 def _cleaned(meshed: triangulation.Meshed, kind: str, already: int) -> tuple[Array, NDArray[np.int32], list[str]]:

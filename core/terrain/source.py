@@ -7,8 +7,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..constants import UNITS_M
 from ..errors import InputError
 from ..vectors import Array
+from .crs import UNKNOWN, CoordinateSystem
+
+UNIT_NAMES = {
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters", "[m]"), UNITS_M["m"]),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot", "international feet"), UNITS_M["ft"]),
+    **dict.fromkeys(
+        ("us-ft", "ftus", "usft", "us survey foot", "us survey feet", "us_survey_foot", "foot_us", "survey foot"),
+        UNITS_M["us-ft"],
+    ),
+    **{name: UNITS_M[name] for name in ("mm", "cm", "km")},
+    "millimetre": UNITS_M["mm"],
+    "centimetre": UNITS_M["cm"],
+    "decimetre": 0.1,
+    "dm": 0.1,
+    "kilometre": UNITS_M["km"],
+}
+"""Names of units of a band, in lower case → their lengths [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,9 +38,7 @@ class Source:
     points : (n, 3) as in the file; in a grid row by row, NaN height where there are no data.
     faces : (m, 3) of a mesh.
     grid_shape : (rows, columns) of a grid.
-    crs : "EPSG:2056", another name that the file gives, or empty.
-    vertical : the system of the heights, likewise.
-    geographic : the file says that its coordinates are degrees.
+    system : of the coordinates, as far as the file says it.
     up : axis that points up by the format's standard.
     turned : y was up, and the points were turned.
     notes : sentences for the summary.
@@ -30,26 +46,56 @@ class Source:
     colours : (n, 3) sRGB of the points; None when they have none.
     count : of the points in the file, where `points` are only the corners of their box.
     step : (3,) of which the coordinates are multiples by the file's own word, in its unit; None when it says none.
+    units_m, stated_units_m : lengths of the units of x and y and of heights with which the points became metres, and
+        those that the file itself says.
     """
 
     points: Array
     faces: NDArray[np.int32] | None = None
     grid_shape: tuple[int, int] | None = None
-    crs: str = ""
-    geographic: bool = False
+    system: CoordinateSystem = UNKNOWN
     up: str = "z"
     turned: bool = False
     notes: tuple[str, ...] = ()
-    vertical: str = ""
     merged: int = 0
     colours: NDArray[np.uint8] | None = None
     count: int = 0
     step: Array | None = None
+    units_m: tuple[float, float] = (1.0, 1.0)
+    stated_units_m: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def crs(self) -> str:
+        """ "EPSG:2056", another name that the file gives, or empty."""
+        return self.system.name
+
+    @property
+    def vertical(self) -> str:
+        """The system of the heights, likewise."""
+        return self.system.vertical
 
     @property
     def kind(self) -> str:
         """ "mesh", "grid" or "cloud"."""
         return "mesh" if self.faces is not None else "grid" if self.grid_shape is not None else "cloud"
+
+
+def unit_of_band(name: str, path: Path) -> float | None:
+    """The length of a unit [m] that a grid names for its numbers; None when it names none.
+
+    Raises
+    ------
+    InputError : it is no unit of length: the grid has something else than heights.
+    """
+    if not name:
+        return None
+    if name.lower() not in UNIT_NAMES:
+        raise InputError(
+            f'The grid is in "{name[:40]}", which is no unit of heights that is known',
+            file=path,
+            advice="Choose the elevation model, or export it in metres",
+        )
+    return UNIT_NAMES[name.lower()]
 
 
 def check_face_indices(faces: NDArray[np.integer], vertex_count: int, path: Path) -> NDArray[np.int32]:

@@ -9,6 +9,7 @@ import numpy as np
 from ..camera.model import Camera
 from ..camera.pairs import Pairs
 from ..camera.resection.resect import Resection
+from ..constants import UNITS_M
 from ..errors import InputError, RockfallError
 from ..vectors import Array, norm
 
@@ -48,11 +49,22 @@ READINGS: tuple[tuple[str, str, Reading], ...] = (
         "Exchange the columns y_m and z_m",
         lambda pixel, point, _: (pixel, point[:, [0, 2, 1]]),
     ),
+    (
+        "z_m in feet",
+        "Multiply z_m by 0.3048, or name the column z_ft",
+        lambda pixel, point, _: (pixel, point * [1.0, 1.0, UNITS_M["ft"]]),
+    ),
+    (
+        "x_m and y_m in feet",
+        "Multiply x_m and y_m by 0.3048, or name the columns x_ft and y_ft",
+        lambda pixel, point, _: (pixel, point * [UNITS_M["ft"], UNITS_M["ft"], 1.0]),
+    ),
 )
 """What else may have been written: in words, what to do, and how it is read.
 
-All are reflections, so that cameras fit them equally well but for how they are held: the one that is held most upright
-is taken. A mirrored picture is the same as x and y exchanged, depths for heights the same as rows counted from below.
+All but the units are reflections, so that cameras fit them equally well but for how they are held: the one that is
+held most upright is taken. A mirrored picture is the same as x and y exchanged, depths for heights the same as rows
+counted from below.
 """
 
 

@@ -4,6 +4,7 @@
 import bpy
 
 from ...core.georeference import GlobalShift
+from ...core.terrain.crs import IN_METRES
 from . import store
 
 
@@ -33,5 +34,5 @@ def write_shift(scene: bpy.types.Scene, shift: GlobalShift) -> None:
     scene[store.SHIFT] = [shift.x, shift.y, shift.z]
     scene[store.CRS], scene[store.VERTICAL] = shift.crs, shift.vertical
     scene["crs x"], scene["crs y"] = shift.x, shift.y
-    if shift.crs:
+    if shift.crs and not shift.crs.endswith(IN_METRES):
         scene["SRID"] = shift.crs

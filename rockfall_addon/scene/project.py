@@ -223,7 +223,7 @@ def _zones(project: Project, surface: Surface | None) -> Zones | None:
         return None
     return open_zones(
         entry.zones.file, entry.zones.attribute, surface, entry.models or COMPARED,
-        terrain_files=source.files, up=source.up, unit_m=source.unit_m,
+        terrain_files=source.files, how=source.how,
     )  # fmt: skip
 
 

@@ -170,6 +170,7 @@ def readers() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
     from rockfall.core.exchange.simulation_tables import read_releases
     from rockfall.core.simulation.blocks import Blocks
     from rockfall.core.simulation.ground import Ground, make_ground
+    from rockfall.core.terrain.opening import HowToRead
     from rockfall.core.terrain.readers import read_terrain
 
     def ground(at: Path) -> Ground:
@@ -185,7 +186,7 @@ def readers() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
     def attribute_zones(at: Path) -> object:
         return zones.open_zones(
             at / "zone_table.csv", "zone", read_terrain(at / "terrain.ply"), [MODEL],
-            terrain_files=[at / "terrain.ply"], up="auto", unit_m=1.0,
+            terrain_files=[at / "terrain.ply"], how=HowToRead(),
         )  # fmt: skip
 
     return {

@@ -183,7 +183,7 @@ def test_the_probe_tells_the_numbers_of_the_face(mapped: bpy.types.Scene, part) 
 
 
 def test_maps_mean_the_same_with_and_without_barriers(mapped: bpy.types.Scene, part) -> None:
-    """A drawn barrier changes no map by itself; with *With Barriers* fewer blocks come below it, and the maps are old."""
+    """A drawn barrier changes no map by itself; with *With Barriers* fewer blocks come below it."""
     maps, screens = part("rockfall_addon.scene.hazard_maps"), part("rockfall_addon.scene.screens")
     plain = np.nan_to_num(kept(part, mapped).layers["Nr_blocks"]).copy()
     surface = part("rockfall_addon.scene.reconstruction").ground(mapped)

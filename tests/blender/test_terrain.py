@@ -121,7 +121,31 @@ def test_a_unit_is_chosen_by_its_name(part) -> None:
     unit.set_by_name(other, len(unit.ITEMS) - 1)
     assert (other.unit_m, unit.ITEMS[unit.get(other)][0]) == (1.0, "OTHER")
     assert unit.exact(float(np.float32(0.9144))) == 0.9144
-    assert unit.size([131.2336, 131.2336, 6.5617], 0.3048) == "Read so, it measures 40 × 40 × 2 m."
+    assert unit.size([131.2336, 131.2336, 6.5617], [0.3048] * 3) == "Read so, it measures 40 × 40 × 2 m."
+
+
+def test_a_file_in_survey_feet_says_so_and_can_be_overruled(part) -> None:
+    """The dialog reads it with the same function, and shows what that says."""
+    file = Path(__file__).parents[1] / "data" / "field_cases" / "02-crs-in-feet" / "ftUS.tif"
+    terrain, scene = part("rockfall_addon.scene.terrain"), bpy.context.scene
+    foot = 1200 / 3937
+    for told, flat, height in (
+        ({}, 1.0, 1.0),
+        ({"unit_m": 1.0}, 1 / foot, 1 / foot),
+        ({"height_unit": "METRE"}, 1.0, 1 / foot),
+        ({"unit_m": 1.0, "height_unit": "US_FOOT"}, 1 / foot, 1.0),
+    ):
+        for tile in terrain.tiles(scene):
+            terrain.remove(scene, [tile])
+        part("rockfall_addon.scene.georeference").forget_shift(scene)
+        assert bpy.ops.rockfall.import_terrain(filepath=str(file), **told) == {"FINISHED"}
+        (tile,) = terrain.tiles(scene)
+        extent = np.ptp(np.array(tile.bound_box), axis=0)
+        np.testing.assert_allclose(extent, [20 * flat, 20 * flat, 13 * height], rtol=1e-3)
+    found = part("core.terrain.readers").inspect_terrain(file)
+    assert (found.units_m, found.stated_units_m) == ((foot, foot), (foot, foot))
+    assert any("US survey feet, as EPSG:2229 says" in sentence for sentence in found.summary)
+    assert "SRID" not in scene, "other add-ons would take it for the system in feet"
 
 
 def test_survey_feet_far_from_the_origin_come_to_their_place(part, tmp_path: Path) -> None:

@@ -228,7 +228,7 @@ def test_attributes_of_a_ply_file_are_zones(tmp_path: Path, form: str, of: str) 
 
     table = tmp_path / "soil.csv"
     table.write_text("value,name,friction\n3,scree,0.7\n1,meadow,0.4\n", encoding="utf-8")
-    places = read.shift.to_local(attribute.in_metres("auto", 1.0))
+    places = read.shift.to_local(attribute.places)
     zones = read_attribute_zones(table, read, attribute, places, ["noel_2017"])
     found = read.vertices[read.faces].mean(axis=1)[:, 0] + read.shift.x - EAST
     assert zones.names == ("terrain", "scree", "meadow")

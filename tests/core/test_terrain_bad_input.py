@@ -206,7 +206,7 @@ def test_bad_stl_and_glb(tmp_path):
         (("cellsize 2", "cell 2"), "row 5.*no header line"),
         (("4 5 6", "4 5"), "5 heights, where 2 rows of 3 need 6"),
         (("4 5 6", "4 5 6 7"), "7 heights"),
-        (("4 5 6", "4 5,5 6"), 'row 8: "5,5"'),
+        (("4 5 6", "4.0 5,5 6"), 'row 8: "5,5"'),
         (("1 2 3\n4 5 6\n", ""), "no heights"),
         (("1 2 3\n4 5 6\n", "-9999 -9999 -9999 -9999 1 2"), "2 points"),
     ],

@@ -14,7 +14,7 @@ import tifffile
 import trimesh
 from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
-from rockfall.core.terrain.crs import crs_from_geokeys, crs_from_wkt
+from rockfall.core.terrain.crs import CoordinateSystem, system_from_geokeys, system_from_wkt
 from rockfall.core.terrain.meshes import read_obj
 from rockfall.core.terrain.opening import READERS
 from rockfall.core.terrain.ply_attributes import read_ply_attribute
@@ -506,17 +506,20 @@ def test_a_given_shift_is_used_and_a_far_one_said(tmp_path):
 
 
 def test_crs_names():
-    assert crs_from_geokeys([(1024, 1), (3072, 2056)]) == ("EPSG:2056", False)
-    assert crs_from_geokeys([(1024, 2), (2048, 4326)]) == ("EPSG:4326", True)
-    assert crs_from_geokeys([(1024, 1), (2048, 4150), (3072, 32767)]) == ("", False)
-    assert crs_from_geokeys([]) == ("", False)
+    def name_and_kind(system: CoordinateSystem) -> tuple[str, str]:
+        return system.name, system.kind
+
+    assert name_and_kind(system_from_geokeys({1024: 1, 3072: 2056})) == ("EPSG:2056", "plane")
+    assert name_and_kind(system_from_geokeys({1024: 2, 2048: 4326})) == ("EPSG:4326", "geographic")
+    assert name_and_kind(system_from_geokeys({1024: 1, 2048: 4150, 3072: 32767})) == ("", "plane")
+    assert system_from_geokeys({}) == CoordinateSystem()
     lv95 = 'PROJCS["CH1903+ / LV95",GEOGCS["CH1903+",AUTHORITY["EPSG","4150"]],AUTHORITY["EPSG","2056"]]'
-    assert crs_from_wkt(lv95) == ("EPSG:2056", False)
+    assert name_and_kind(system_from_wkt(lv95)) == ("EPSG:2056", "plane")
     compound = f'COMPD_CS["LV95 + LN02",{lv95},VERT_CS["LN02",AUTHORITY["EPSG","5728"]],AUTHORITY["EPSG","6790"]]'
-    assert crs_from_wkt(compound) == ("EPSG:2056", False)
-    assert crs_from_wkt('PROJCS["Local grid",GEOGCS["x"]]') == ("Local grid", False)
-    assert crs_from_wkt('GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]') == ("EPSG:4326", True)
-    assert crs_from_wkt('PROJCRS["a",BASEGEOGCRS["b"],ID["EPSG",2975]]') == ("EPSG:2975", False)
+    assert name_and_kind(system_from_wkt(compound)) == ("EPSG:2056", "plane")
+    assert name_and_kind(system_from_wkt('PROJCS["Local grid",GEOGCS["x"]]')) == ("Local grid", "plane")
+    assert name_and_kind(system_from_wkt('GEOGCS["WGS 84",AUTHORITY["EPSG","4326"]]')) == ("EPSG:4326", "geographic")
+    assert name_and_kind(system_from_wkt('PROJCRS["a",BASEGEOGCRS["b"],ID["EPSG",2975]]')) == ("EPSG:2975", "plane")
 
 
 def test_real_vegetated_tile_of_la_reunion():

@@ -7,7 +7,8 @@ import bpy
 
 from ....core.constants import UNITS_M
 
-UNITS = (  # identifier, name, what it is, its length [m]; the last one is any other
+UNITS = (  # identifier, name, what it is, its length [m]; 0 leaves it to the file; the last one is any other
+    ("FILE", "As the file says", "That of its coordinate system; metres where it says nothing", 0.0),
     ("METRE", "Metres", "As nearly all surveys are", UNITS_M["m"]),
     ("FOOT", "Feet", "International feet of 0.3048 m", UNITS_M["ft"]),
     ("US_FOOT", "US survey feet", "Of 1200/3937 m, as in plane coordinates of the United States", UNITS_M["us-ft"]),
@@ -16,6 +17,11 @@ UNITS = (  # identifier, name, what it is, its length [m]; the last one is any o
 )
 OTHER = ("OTHER", "Other", "Give its length in metres")
 ITEMS = [(*words, "", number) for number, (*words, _) in enumerate(UNITS)] + [(*OTHER, "", len(UNITS))]
+HEIGHT_ITEMS = [
+    ("SAME", "As the file unit", "That of its coordinates, or as the file says of its heights", "", 0),
+    *((*words, "", number) for number, (*words, length) in enumerate(UNITS) if length),
+]
+"""Units of heights, which may differ from that of the coordinates in plan."""
 SAME = 1e-7
 """Relative difference that single precision leaves; the two feet are 2e-6 apart."""
 
@@ -44,9 +50,14 @@ def set_by_name(self: bpy.types.Operator, value: int) -> None:
         self.unit_m = UNITS[value][3]
 
 
-def size(extent_m: Sequence[float], factor: float) -> str:
-    """The sides of a box, to see whether a unit can be right; `factor` is what they are multiplied by."""
-    sides = " × ".join(_metres(factor * side) for side in extent_m)
+def height_m(identifier: str) -> float | None:
+    """The length of a unit of heights [m]; None when nothing is said of it."""
+    return next((length for name, *_, length in UNITS if name == identifier), None)
+
+
+def size(extent_m: Sequence[float], factors: Sequence[float]) -> str:
+    """The sides of a box, to see whether a unit can be right; `factors` are what they are multiplied by."""
+    sides = " × ".join(_metres(factor * side) for side, factor in zip(extent_m, factors, strict=True))
     return f"Read so, it measures {sides} m."
 
 

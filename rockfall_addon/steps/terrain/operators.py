@@ -57,12 +57,17 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         items=[("auto", "Automatic", "Z, but Y for glTF"), ("z", "Z", ""), ("y", "Y", "")],
     )  # fmt: skip
     unit_m: FloatProperty(
-        name="Its length [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres",
-        default=1.0, min=1e-6, precision=4,
+        name="Its length [m]", description="Length of the file's unit in metres: 0.001 when it is in millimetres. "
+        "0: as the file says, else metres",
+        default=0.0, min=0.0, precision=4,
     )  # fmt: skip
     unit: EnumProperty(
         name="File unit", description="The unit of the file's coordinates; all becomes metres",
         items=file_unit.ITEMS, get=file_unit.get, set=file_unit.set_by_name, options={"SKIP_SAVE"},
+    )  # fmt: skip
+    height_unit: EnumProperty(
+        name="Height unit", description="The unit of the file's heights, where it is another one",
+        items=file_unit.HEIGHT_ITEMS, default="SAME",
     )  # fmt: skip
     types_unit: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     source: EnumProperty(
@@ -96,7 +101,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     asked: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     y_up: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     proposed: StringProperty(options={"HIDDEN", "SKIP_SAVE"})
-    asked_unit_m: FloatProperty(default=1.0, options={"HIDDEN", "SKIP_SAVE"})
+    asked_unit_m: FloatProperty(default=0.0, options={"HIDDEN", "SKIP_SAVE"})
+    asked_height_unit: StringProperty(default="SAME", options={"HIDDEN", "SKIP_SAVE"})
     browsing: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
     is_cloud: BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
 
@@ -121,7 +127,10 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         self.proposed = " ".join((self.shift_x, self.shift_y, self.shift_z))
         self.asked, self.y_up, self.asked_unit_m = True, found.y_up, self.unit_m
         self.is_cloud = found.kind == "cloud"
-        self.extent_m = (found.maximum - found.minimum).tolist()
+        self.asked_height_unit = self.height_unit
+        extent, (flat, height) = (found.maximum - found.minimum).tolist(), found.units_m
+        self.extent = [extent[0] / flat, extent[1] / flat, extent[2] / height]
+        self.stated_units_m = found.stated_units_m
         self.facts = [found.name, *found.summary]
         self.facts += [said for said in sentences(found.minimum, found.maximum, shift) if said not in self.facts]
         return context.window_manager.invoke_props_dialog(
@@ -131,14 +140,21 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     def _inspected(self) -> TerrainInfo:
         """What the file holds; where that cannot be metres, millimetres are proposed, and can be changed."""
         try:
-            return inspect_terrain(self.filepath, unit_m=file_unit.exact(self.unit_m))
+            return inspect_terrain(self.filepath, **self._units())
         except InputError:
-            if self.unit_m != 1.0:
+            if self.unit_m not in (0.0, 1.0):
                 raise
             found = inspect_terrain(self.filepath, unit_m=MILLIMETRE_M)
         self.unit_m = MILLIMETRE_M
         said = "In metres it would be beyond every survey: millimetres are proposed."
         return replace(found, summary=(said, *found.summary))
+
+    def _units(self) -> dict[str, float | None]:
+        """The units of the file that were asked for, as `read_terrain` takes them."""
+        return {
+            "unit_m": file_unit.exact(self.unit_m) or None,
+            "height_unit_m": file_unit.height_m(self.height_unit),
+        }
 
     def draw(self, context: bpy.types.Context) -> None:
         if not self.asked:
@@ -165,7 +181,10 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
             row.prop(self, "up", expand=True)
         for name in (*(() if self.y_up else ("up",)), "unit", *(("unit_m",) if self.unit == "OTHER" else ())):
             layout.prop(self, name)
-        layout.column().label(text=file_unit.size(self.extent_m, self.unit_m / self.asked_unit_m))
+        layout.prop(self, "height_unit")
+        flat = file_unit.exact(self.unit_m) or self.stated_units_m[0]
+        height = file_unit.height_m(self.height_unit) or (flat if self.unit_m else self.stated_units_m[1])
+        layout.column().label(text=file_unit.size(self.extent, (flat, flat, height)))
         layout.prop(self, "source")
         if self.is_cloud:
             self._draw_meshing(layout)
@@ -202,7 +221,7 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         told = {
             "shift": None if self._changed_since(context.scene) else self._shift(context.scene),
             "up": self.up,
-            "unit_m": file_unit.exact(self.unit_m),
+            **self._units(),
             "max_edge_m": self.max_edge_m or None,
             "ground_only": {"AUTO": None, "GROUND": True, "ALL": False, "FILTER": None}[self.ground],
             "ground_filter_m": self.filter_m if self.ground == "FILTER" else None,
@@ -257,7 +276,8 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
     def _changed_since(self, scene: bpy.types.Scene) -> bool:
         """Whether the shift was proposed for z up and another unit than the file is read with: then it is of no use."""
         texts = " ".join((self.shift_x, self.shift_y, self.shift_z))
-        otherwise = self.up == "y" or self.unit_m != self.asked_unit_m
+        read_as, asked_as = (self.unit_m, self.height_unit), (self.asked_unit_m, self.asked_height_unit)
+        otherwise = self.up == "y" or read_as != asked_as
         return self.asked and otherwise and texts == self.proposed and not self._is_bound(scene)
 
     def _shift(self, scene: bpy.types.Scene) -> GlobalShift | None:

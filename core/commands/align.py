@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..vectors import Array, Mask, norm
 from .options import (
+    add_fps,
     add_out,
     add_terrain_files,
     add_terrain_options,
@@ -42,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     image = parser.add_mutually_exclusive_group(required=True)
     image.add_argument("--size", metavar="WxH", help="width and height of the image [px], such as 1920x1080")
     image.add_argument("--video", metavar="FILE", help="the video: its size, and a frame to check the camera on")
+    add_fps(parser)
     parser.add_argument("--frame", type=whole, metavar="N", help="of the video that was picked on (default 0)")
     lens = parser.add_argument_group("the lens")
     lens.add_argument(
@@ -103,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
         pairs, turned = turned_pairs(read_pairs(arguments.pairs, None if surface is None else surface.shift), surface)
-        video = open_video(arguments.video, progress) if arguments.video else None
+        video = open_video(arguments.video, progress, rate_hz=arguments.fps) if arguments.video else None
         _check_frames(arguments, pairs, video)
         progress("Solving the camera")
         options = _options(arguments, pairs, video)

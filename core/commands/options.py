@@ -104,6 +104,13 @@ def add_out(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the output; made when it is missing")
 
 
+def add_fps(parser: Any) -> None:
+    """``--fps HZ``."""
+    parser.add_argument(
+        "--fps", type=positive, metavar="HZ", help="pictures a second of a sequence of pictures; a video has its own"
+    )
+
+
 @contextmanager
 def naming(file: str) -> Iterator[None]:
     """Errors about what was read from a file name it."""

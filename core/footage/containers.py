@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from .mp4_index import file_boxes
+from ..formats.mp4 import file_boxes
 
 HEAD_BYTES = 4096
 MAGIC = (

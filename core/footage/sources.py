@@ -8,8 +8,10 @@ import numpy as np
 
 from ..memory import available_bytes
 from ..opencv import opencv
-from ..vectors import Array
+from ..progress import Progress, silent
+from ..vectors import Array, Indices
 from .ahead import ahead
+from .repeats import ChangeMeter, repeated_pictures
 from .video import Video, read_frames
 
 CHUNK, CHUNK_BYTES = (12, 48), 300_000_000
@@ -188,6 +190,17 @@ def frames(source: Source, indices: Sequence[int], *, as_decoded: bool = False) 
             yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]), False, as_decoded)))
     else:
         yield from _ascending(source, indices, True, as_decoded)
+
+
+def repeated_in(source: Source, first: int, last: int, progress: Progress = silent) -> Indices:
+    """(r,) frames from first to last that show the picture of the one before."""
+    if isinstance(source, Video) and source.decoded:
+        return source.repeated[(source.repeated > first) & (source.repeated <= last)]
+    meter = ChangeMeter()
+    for done, (_, picture) in enumerate(frames(source, range(first, last + 1))):
+        progress("Looking for repeated pictures", done, last - first + 1)
+        meter.add(picture)
+    return repeated_pictures(meter.changes) + first
 
 
 def _ascending(

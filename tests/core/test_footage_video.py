@@ -13,7 +13,7 @@ import pytest
 import rockfall.core.footage.video as module
 from rockfall.core.errors import InputError
 from rockfall.core.footage.containers import container_of
-from rockfall.core.footage.mp4_index import indexed_frames
+from rockfall.core.formats.mp4 import indexed_frames
 from rockfall.core.footage.video import frame_at, open_video, read_frame, read_frames
 from rockfall.core.opencv import FFMPEG_QUIET
 

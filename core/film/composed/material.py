@@ -11,10 +11,9 @@ import numpy as np
 from ...analysis.comparison import compare
 from ...analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...errors import InputError
-from ...exchange.footage import UNREFINED, clock_of, measured_in
+from ...exchange.footage import UNREFINED, clock_of, measured_in, open_entry
 from ...exchange.opening import blocks_of, open_terrain, read_project_camera
 from ...exchange.project import Project, VideoEntry, read_project
-from ...footage.video import open_video
 from ...impact_models.registry import COMPARED, find_model
 from ...progress import Progress, silent
 from ...reconstruction.trajectory import Reconstruction
@@ -277,9 +276,8 @@ def _footage(project: Project, surface: Surface | None, asked: str, progress: Pr
     if not entries:
         return None
     entry: VideoEntry = entries[0]
-    assert entry.file is not None
     assert entry.camera is not None
-    video = open_video(entry.file, progress)
+    video = open_entry(entry, progress)
     camera, _ = read_project_camera(entry.camera, surface)
     if (camera.path.reference.width, camera.path.reference.height) != (video.width, video.height):
         ours = camera.path.reference

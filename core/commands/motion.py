@@ -85,7 +85,7 @@ def _chosen(picks: "Picks", names: list[str] | None) -> "Picks":
     known = list(dict.fromkeys(picks.trajectory.tolist()))
     for name in names:
         if name not in known:
-            raise InputError(f"There is no trajectory {name!r}", advice=f"The picks have: {', '.join(known)}")
+            raise unknown_trajectory(name, picks)
     return take(picks, np.isin(picks.trajectory, names))
 
 

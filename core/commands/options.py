@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..constants import UNITS_M
-from ..errors import DependencyError, InputError, RockfallError
+from ..errors import MOST_OF_PATH, DependencyError, InputError, RockfallError, readable
 
 if TYPE_CHECKING:
     from ..exchange.database import Database
@@ -125,7 +125,7 @@ def naming(file: str) -> Iterator[None]:
     except DependencyError:
         raise
     except RockfallError as error:
-        raise RockfallError(f"{file}: {error}") from error
+        raise RockfallError(f"{readable(file, MOST_OF_PATH)}: {error}") from error
 
 
 def add_motion_options(group: "argparse._ArgumentGroup") -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .options import add_fps, add_out, positive, whole
+from .options import add_fps, add_out, naming, positive, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..footage.kinks import Kinks
     from ..footage.tracking import BlockTrack
     from ..footage.video import Video
+    from ..vectors import Names
     from ..workflow.tracking import Click
 
 
@@ -70,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     from ..workflow.tracking import follow_block
 
     clicks, name = _clicks(arguments)
-    with PrintedProgress() as progress:
+    with PrintedProgress() as progress, naming(arguments.video):
         video = open_video(arguments.video, progress, rate_hz=arguments.fps)
         first = arguments.first or 0
         last = video.frames - 1 if arguments.last is None else arguments.last
@@ -138,9 +139,19 @@ def _clicks(arguments: argparse.Namespace) -> "tuple[list[Click], str]":
         clicks += [(int(f), u, v) for f, (u, v) in zip(table.frame[chosen], pixels, strict=True)]
     if not clicks:
         raise InputError(
-            "There is no click on the block", file=arguments.clicks, advice="Give --click FRAME,U,V or --clicks FILE"
+            "There is no click on the block",
+            file=arguments.clicks or arguments.video,
+            trajectory=arguments.trajectory,
+            advice="Give --click FRAME,U,V or --clicks FILE"
+            + (_named_in(table.trajectory) if arguments.clicks else ""),
         )
     return sorted(clicks), next(iter(names), "")
+
+
+def _named_in(trajectories: "Names") -> str:
+    """Which trajectories a table has clicks on, to be added to an advice."""
+    names = sorted({name for name in trajectories.tolist() if name})
+    return f"; the table has clicks on {', '.join(names[:8])}" if names else ""
 
 
 def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None:
@@ -156,7 +167,11 @@ def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None
                 f"There is no frame {frame}: the video has the frames 0 to {video.frames - 1}", file=video.path
             )
     if first > last:
-        raise InputError(f"The first frame, {first}, comes after the last, {last}", advice="Exchange --from and --to")
+        raise InputError(
+            f"The first frame, {first}, comes after the last, {last}",
+            file=video.path,
+            advice="Exchange --from and --to",
+        )
     for frame, u, v in clicks:
         if not (0 <= u <= video.width and 0 <= v <= video.height):
             raise InputError(
@@ -166,7 +181,9 @@ def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None
             )
         if not first <= frame <= last:
             raise InputError(
-                f"The click in frame {frame} is outside the frames {first} to {last}", advice="Change --from or --to"
+                f"The click in frame {frame} is outside the frames {first} to {last}",
+                file=video.path,
+                advice="Change --from or --to",
             )
 
 

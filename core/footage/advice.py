@@ -5,7 +5,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from ..vectors import Array, Indices
+from ..vectors import Array, Indices, Mask
 from .background import BackgroundMotion, layers_px
 from .file_facts import FileFacts, chapters_remark, streams_remark
 from .repeats import rhythm
@@ -52,10 +52,10 @@ def with_repeats(sigma_s: Array, time_s: Array, video: Video, repeated: Indices)
     if not repeated.size:
         return sigma_s
     step = video.usual_step_s
-    touched = np.ones(time_s.shape, np.bool_)
+    touched: Mask = np.ones(time_s.size, np.bool_)
     if not any(rhythm(repeated)):
         late = video.time_s[repeated]
-        touched = (np.abs(time_s[:, None] - late) <= REPEAT_TOUCHES * step).any(axis=1)
+        touched = np.asarray((np.abs(time_s[:, None] - late) <= REPEAT_TOUCHES * step).any(axis=1))
     return np.where(touched, np.hypot(sigma_s, repeat_sigma_s(step)), sigma_s)
 
 
@@ -94,8 +94,8 @@ def capture_rate_sentence(facts: FileFacts, rate_hz: float, how: str) -> str:
     times = named / rate_hz
     kind = f"{times:.4g} times slower than life" if times > 1 else f"{1 / times:.4g} times faster than life"
     return (
-        f"By {facts.capture_rate_name} of the file {named:.5g} pictures a second were taken, and it plays {rate_hz:.5g}: "
-        f"it would be {kind}. {how}"
+        f"By {facts.capture_rate_name} of the file {named:.5g} pictures a second were taken, and it plays "
+        f"{rate_hz:.5g}: it would be {kind}. {how}"
     )
 
 

@@ -68,7 +68,7 @@ def sequence_of(path: Path) -> PictureSequence:
         numbers = {one: int(found[1]) for one, found in found_files if found is not None}
     if len(numbers) < 2:
         raise InputError(
-            f"{'One picture is' if numbers else 'No picture is'} there, and a sequence has two or more",
+            f"{_kind(path)} {'a single picture' if numbers else 'no pictures'}, and a sequence has two or more",
             file=path,
             advice=f"Give a folder of pictures, or a name such as img_%04d.png; known are {', '.join(PICTURES)}",
         )
@@ -81,6 +81,10 @@ def sequence_of(path: Path) -> PictureSequence:
             f"{one.name} and {other.name} have the same number", file=path, advice="Take one of them out of the folder"
         )
     return PictureSequence(tuple(ordered), number)
+
+
+def _kind(path: Path) -> str:
+    return "This is a folder with" if path.is_dir() else "By this name there is"
 
 
 def sequence_beside(picture: Path) -> Path:

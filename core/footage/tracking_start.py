@@ -23,7 +23,7 @@ SLOWER = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Footage:
-    """A video, the motion of its background, the background without what moves, and frames that repeat the one before."""
+    """A video, the motion of its background, the background without what moves, and frames that repeat another."""
 
     video: Source
     motion: BackgroundMotion

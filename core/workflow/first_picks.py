@@ -162,7 +162,7 @@ def find_events(view: View, sightings: Sightings, surface: Surface) -> Events:
 
 
 def _late_s(sightings: Sightings) -> float:
-    """What is to be added to the error of times where a track leaves out frames in a rhythm: those that repeat one [s]."""
+    """What the error of times gets more where a track leaves out frames in a rhythm: repeated pictures [s]."""
     frame = sightings.frame
     if frame.size < 2 or frame.min() < 0:
         return 0.0

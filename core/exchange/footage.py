@@ -10,7 +10,7 @@ from ..errors import InputError, RockfallError
 from ..footage.advice import capture_rate_sentence
 from ..footage.clock import Clock
 from ..footage.file_facts import file_facts
-from ..footage.sequences import names_sequence
+from ..footage.sequences import is_there
 from ..footage.video import Video, open_video
 from ..georeference import GlobalShift
 from ..progress import Progress, silent
@@ -113,13 +113,6 @@ def open_entry(entry: VideoEntry, progress: Progress = silent, *, thorough: bool
     if entry.file is None:
         raise InputError(f"Video {entry.name} names no file", advice='Add file = "…" to it in the project')
     return open_video(entry.file, progress, thorough=thorough, rate_hz=entry.rate_hz)
-
-
-def is_there(entry: VideoEntry) -> bool:
-    """Whether the video of an entry is where the project says, or the folder of its pictures."""
-    if entry.file is None:
-        return False
-    return entry.file.is_file() or (names_sequence(entry.file) and entry.file.parent.is_dir())
 
 
 def capture_rate_notes(entry: VideoEntry) -> tuple[str, ...]:
@@ -251,7 +244,7 @@ def _read(
 
 def _file_rate(entry: VideoEntry, frame: Indices, time_s: Array) -> float:
     """Frames per second of the file."""
-    if is_there(entry):
+    if entry.file is not None and is_there(entry.file):
         return open_entry(entry).rate_hz
     known = np.flatnonzero(frame >= 0)
     if known.size > 1 and np.ptp(frame[known]) > 0:

@@ -8,7 +8,7 @@ import numpy as np
 from ..vectors import Array, Indices, Mask
 from .background import BackgroundMotion, layers_px
 from .file_facts import FileFacts, chapters_remark, streams_remark
-from .repeats import rhythm
+from .repeats import repeat_sigma_s, repeats_sentence, rhythm
 from .video import Video
 
 FRAMES_PER_TURN = 5.0
@@ -33,14 +33,6 @@ def time_sigma_s(rate_hz: float) -> float:
     return 1 / (rate_hz * sqrt(12))
 
 
-def repeat_sigma_s(step_s: float) -> float:
-    """What repeated pictures add to the error of a time: one is shown up to a step after it was taken [s].
-
-    A conversion that fills up a rate shows each picture at the next of the new times: late by 0 to a step, uniformly.
-    """
-    return step_s / sqrt(12)
-
-
 def with_repeats(sigma_s: Array, time_s: Array, video: Video, repeated: Indices) -> Array:
     """(n,) standard deviations of times (n,) [s], of those that pictures shown twice touch widened.
 
@@ -57,26 +49,6 @@ def with_repeats(sigma_s: Array, time_s: Array, video: Video, repeated: Indices)
         late = video.time_s[repeated]
         touched = np.asarray((np.abs(time_s[:, None] - late) <= REPEAT_TOUCHES * step).any(axis=1))
     return np.where(touched, np.hypot(sigma_s, repeat_sigma_s(step)), sigma_s)
-
-
-def repeats_sentence(repeated: Indices, frames: int, rate_hz: float) -> str:
-    """That so many of the frames repeat the one before, and in which rhythm, a sentence; empty where none does."""
-    if not repeated.size:
-        return ""
-    some, every = rhythm(repeated)
-    count = f"{repeated.size} of {frames} frames {'repeats' if repeated.size == 1 else 'repeat'} the picture before"
-    if every:
-        kept = rate_hz * (1 - repeated.size / frames)
-        which = f"every {every}{_ordinal(every)}" if some == 1 else f"{some} of every {every}"
-        count += f", {which}: about {kept:.3g} pictures a second are stored as {rate_hz:.4g}"
-    return (
-        f"{count}. They are no new positions, and times get a further ± {1000 * repeat_sigma_s(1 / rate_hz):.0f} ms. "
-        "The original of the camera is better than a converted copy."
-    )
-
-
-def _ordinal(number: int) -> str:
-    return "th" if 10 < number % 100 < 14 else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
 def proposed_capture_rate(facts: FileFacts, rate_hz: float) -> float | None:

@@ -2,6 +2,7 @@
 """Pictures that a film shows twice, as after its conversion to another rate: found although compression alters them."""
 
 from dataclasses import dataclass
+from math import sqrt
 
 import numpy as np
 
@@ -113,6 +114,34 @@ def rhythm(repeated: Indices) -> tuple[int, int]:
         if often.any() and not often.all() and (share[~often] <= 1 - IN_STEP).all() and repeated.size > often.sum():
             return int(often.sum()), period
     return 0, 0
+
+
+def repeat_sigma_s(step_s: float) -> float:
+    """What repeated pictures add to the error of a time: one is shown up to a step after it was taken [s].
+
+    A conversion that fills up a rate shows each picture at the next of the new times: late by 0 to a step, uniformly.
+    """
+    return step_s / sqrt(12)
+
+
+def repeats_sentence(repeated: Indices, frames: int, rate_hz: float) -> str:
+    """That so many of the frames repeat the one before, and in which rhythm, a sentence; empty where none does."""
+    if not repeated.size:
+        return ""
+    some, every = rhythm(repeated)
+    count = f"{repeated.size} of {frames} frames {'repeats' if repeated.size == 1 else 'repeat'} the picture before"
+    if every:
+        kept = rate_hz * (1 - repeated.size / frames)
+        which = f"every {every}{_ordinal(every)}" if some == 1 else f"{some} of every {every}"
+        count += f", {which}: about {kept:.3g} pictures a second are stored as {rate_hz:.4g}"
+    return (
+        f"{count}. They are no new positions, and times get a further ± {1000 * repeat_sigma_s(1 / rate_hz):.0f} ms. "
+        "The original of the camera is better than a converted copy."
+    )
+
+
+def _ordinal(number: int) -> str:
+    return "th" if 10 < number % 100 < 14 else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
 def _in_rhythm(part: Array) -> Mask:

@@ -14,7 +14,10 @@ from ..vectors import Indices
 PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp")
 PATTERN = re.compile(r"%(0?)(\d*)d")
 NUMBERED = re.compile(r"(.*?)(\d+)(\D*)")
-RATE = "Say how many were taken a second: --fps 25, or rate_hz = 25 in the project's [[videos]]"
+RATE = (
+    "Say how many were taken a second: --fps 25, rate_hz = 25 in the project's [[videos]], or Pictures per Second in "
+    "Blender's file window"
+)
 
 
 class PictureSequence(NamedTuple):
@@ -93,6 +96,11 @@ def sequence_beside(picture: Path) -> Path:
     if found is None:
         return picture
     return picture.with_name(f"{found[1]}%0{len(found[2])}d{found[3]}{picture.suffix}")
+
+
+def is_there(path: Path) -> bool:
+    """Whether a video file, or at least the folder of a sequence of pictures, is where a path says."""
+    return path.is_file() or (names_sequence(path) and path.parent.is_dir())
 
 
 def load_picture(file: Path) -> np.ndarray:

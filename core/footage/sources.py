@@ -11,7 +11,7 @@ from ..opencv import opencv
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
 from .ahead import ahead
-from .repeats import ChangeMeter, repeated_pictures
+from .repeats import ChangeMeter, repeated_pictures, repeats_sentence
 from .video import Video, read_frames
 
 CHUNK, CHUNK_BYTES = (12, 48), 300_000_000
@@ -22,6 +22,8 @@ SPREAD, SPREAD_FRAMES = 20, 30
 """So many of the frames that are kept are evenly spaced, or one in so many of a long film if these are more."""
 LARGEST = 2_300_000
 """Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
+GLANCES, GLANCE, FEWEST_REPEATS = (0.25, 0.5, 0.75), 24, 3
+"""Where a video is looked at for repeated pictures, over how many frames, and how many of them are enough to say so."""
 SMALLEST = 5.0
 """A block is not made smaller than this by reducing pictures [px]; at 5 its places are a fifth less exact at most."""
 
@@ -201,6 +203,20 @@ def repeated_in(source: Source, first: int, last: int, progress: Progress = sile
         progress("Looking for repeated pictures", done, last - first + 1)
         meter.add(picture)
     return repeated_pictures(meter.changes) + first
+
+
+def repeats_at_a_glance(video: Video) -> str:
+    """That pictures of a video repeat the one before, a sentence, as a few stretches of it tell; else empty."""
+    found = []
+    for part in GLANCES:
+        middle = int(part * video.frames)
+        first, last = max(middle - GLANCE // 2, 0), min(middle + GLANCE // 2, video.frames - 1)
+        if last - first >= GLANCE // 2:
+            found.append((repeated_in(video, first, last), last - first + 1))
+    best = max(found, key=lambda one: one[0].size, default=None)
+    if best is None or best[0].size < FEWEST_REPEATS:
+        return ""
+    return f"As a glance at {best[1]} of its frames tells: {repeats_sentence(*best, video.rate_hz)}"
 
 
 def _ascending(

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..camera.model import project, rays
-from ..footage.advice import repeat_sigma_s
 from ..footage.kinks import find_kinks
-from ..footage.repeats import rhythm
+from ..footage.repeats import repeat_sigma_s, rhythm
 from ..reconstruction.block import Block, per_pick
 from ..reconstruction.motion import GROUNDED
 from ..reconstruction.picks import Picks, make_picks, take

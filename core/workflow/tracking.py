@@ -4,8 +4,9 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..footage.advice import layered_background, repeats_sentence
+from ..footage.advice import layered_background
 from ..footage.background import BackgroundMotion, background_motion, no_motion
+from ..footage.repeats import repeats_sentence
 from ..footage.sources import kept, repeated_in
 from ..footage.tracking import BlockTrack, track_block
 from ..footage.video import Video

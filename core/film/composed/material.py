@@ -79,6 +79,11 @@ class Material:
         return self.project.site.name or self.request.project.absolute().parent.name
 
     @property
+    def is_unrefined(self) -> bool:
+        """Whether the paths join impacts as they were seen in the videos, so that numbers are approximate."""
+        return UNREFINED in self.remarks
+
+    @property
     def credit_lines(self) -> list[str]:
         """Who is to be named, as the project says."""
         extra = self.project.site.extra
@@ -224,11 +229,12 @@ def open_material(request: FilmRequest, progress: Progress = silent) -> Material
     RockfallError : the project, a file of it or the request is bad; there is nothing measured to show.
     """
     progress("Reading the project", 0, 0)
-    words = texts(request.language)
     project = read_project(request.project)
     surface = open_terrain(project)
     result = measured_in(project, surface)
-    remarks = [UNREFINED] if any(remark.text == UNREFINED for remark in result.remarks) else []
+    unrefined = any(remark.text == UNREFINED for remark in result.remarks)
+    remarks = [UNREFINED] if unrefined else []
+    words = texts(request.language).measured_roughly() if unrefined else texts(request.language)
     footage = _footage(project, surface, request.video, progress)
     known = list(dict.fromkeys(result.picks.trajectory.tolist()))
     wrong = [name for name in request.trajectories if name not in known]

@@ -8,7 +8,7 @@ import numpy as np
 from ..vectors import Array, Indices, Mask
 from .background import BackgroundMotion, layers_px
 from .file_facts import FileFacts, chapters_remark, streams_remark
-from .repeats import repeat_sigma_s, repeats_sentence, rhythm
+from .repeats import picture_rate, repeat_sigma_s, repeats_sentence, rhythm
 from .video import Video
 
 FRAMES_PER_TURN = 5.0
@@ -115,7 +115,7 @@ def rate_advice(
     stored = capture_rate_hz or video.rate_hz
     if not np.isfinite(stored):
         return ["One frame is no film: nothing can be timed with it."]
-    rate = stored * (1 - video.repeated.size / video.frames)
+    rate = picture_rate(video.repeated, video.frames, stored)
     sigma_s = time_sigma_s(rate)
     if video.repeated.size:
         sigma_s = float(np.hypot(sigma_s, repeat_sigma_s(1 / stored)))

@@ -11,6 +11,8 @@ from ..vectors import Array, Indices, Mask
 
 LONGEST_PX = 960
 """Pictures are compared at this width or height at most."""
+PART = 8
+"""Width of the parts of a picture of which half are taken to show nothing that moves [px]."""
 AROUND = 5
 """Pairs on either side with which one is compared: 12 pictures a second stored as 60 repeat four times."""
 UNLIKE, LIKE = 0.2, 0.5
@@ -65,7 +67,8 @@ class ChangeMeter:
         if self._before is not None and self._before.shape == grey.shape:
             apart = cv2.blur(cv2.absdiff(grey, self._before).astype(np.float32), (3, 3))
             strongest = float(apart.max())
-            parts = cv2.resize(apart, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
+            height, width = apart.shape
+            parts = cv2.resize(apart, (max(width // PART, 1), max(height // PART, 1)), interpolation=cv2.INTER_AREA)
             usual = float(np.sort(parts, axis=None)[: max(parts.size // 2, 1)].mean())
         self._strongest.append(strongest)
         self._usual.append(usual)
@@ -95,7 +98,11 @@ def repeated_pictures(changes: Changes) -> Indices:
     moving[0] = False
     part = np.where(moving, strongest / np.maximum(level, LEAST_CHANGE), np.nan)
     found = calm & (part < UNLIKE)
-    found |= _in_rhythm(part) & (part < LIKE)
+    found |= (in_step := _in_rhythm(part)) & (part < LIKE)
+    if in_step.any():  # also where the film begins or ends, with pictures on one side alone
+        ends = _lower_of_sides(strongest, np.inf)
+        ends[0] = 0.0
+        found |= in_step & (ends > LEAST_CHANGE) & (strongest < LIKE * ends)
     found |= _dips_in_rhythm(strongest, moving)
     if found.sum() > MOST_OF_A_FILM * max(int(moving.sum()), 1):
         return np.empty(0, np.intp)
@@ -124,14 +131,20 @@ def repeat_sigma_s(step_s: float) -> float:
     return step_s / sqrt(12)
 
 
+def picture_rate(repeated: Indices, frames: int, rate_hz: float) -> float:
+    """Pictures of their own a second, of so many frames at a rate of which some repeat the one before [Hz]."""
+    some, every = rhythm(repeated)
+    return rate_hz * (1 - some / every if every else 1 - repeated.size / frames)
+
+
 def repeats_sentence(repeated: Indices, frames: int, rate_hz: float) -> str:
     """That so many of the frames repeat the one before, and in which rhythm, a sentence; empty where none does."""
     if not repeated.size:
         return ""
     some, every = rhythm(repeated)
+    kept = picture_rate(repeated, frames, rate_hz)
     count = f"{repeated.size} of {frames} frames {'repeats' if repeated.size == 1 else 'repeat'} the picture before"
     if every:
-        kept = rate_hz * (1 - repeated.size / frames)
         which = f"every {every}{_ordinal(every)}" if some == 1 else f"{some} of every {every}"
         count += f", {which}: about {kept:.3g} pictures a second are stored as {rate_hz:.4g}"
     return (
@@ -176,9 +189,9 @@ def _dips_in_rhythm(strongest: Array, moving: Mask) -> Mask:
     return np.zeros(strongest.size, np.bool_)
 
 
-def _lower_of_sides(values: Array) -> Array:
-    """(p,) the greatest value of the few before and of the few after each, the lower of the two."""
-    padded = np.pad(values, AROUND)
+def _lower_of_sides(values: Array, beyond: float = 0.0) -> Array:
+    """(p,) the greatest value of the few before and of the few after each, the lower of the two; `beyond` both ends."""
+    padded = np.pad(values[1:], (AROUND + 1, AROUND), constant_values=beyond)
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND + 1)
     lower: Array = np.minimum(windows[:, :AROUND].max(axis=1), windows[:, AROUND + 1 :].max(axis=1))
     return lower

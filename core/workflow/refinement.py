@@ -138,10 +138,9 @@ def unknown_trajectory(name: str, picks: Picks) -> InputError:
     known = list(dict.fromkeys(picks.trajectory.tolist()))
     more = f" and {len(known) - NAMED} more" if len(known) > NAMED else ""
     return InputError(
-        "The picks have no such trajectory",
+        f"There is no trajectory {name!r}",
         file=picks.source or None,
-        trajectory=name,
-        advice=f"They have {', '.join(known[:NAMED])}{more}",
+        advice=f"The picks have: {', '.join(known[:NAMED])}{more}",
     )
 
 

@@ -126,7 +126,9 @@ def test_align_and_track_take_a_sequence(tmp_path: Path, capsys: pytest.CaptureF
     (tmp_path / "s").mkdir()
     for number in range(40):
         image = np.where(np.hypot(u + 0.5 - 20 - 4 * number, v + 0.5 - 40 - number) < 6, 220.0, ground)
-        cv2.imwrite(str(tmp_path / "s" / f"a{number:03d}.png"), np.repeat(image.astype(np.uint8)[:, :, None], 3, axis=2))
+        cv2.imwrite(
+            str(tmp_path / "s" / f"a{number:03d}.png"), np.repeat(image.astype(np.uint8)[:, :, None], 3, axis=2)
+        )
     given = [str(tmp_path / "s" / "a%03d.png"), "--fps", "25"]
     out = tmp_path / "o"
     assert main(["track", *given, "--click", "10,60,50", "--still", "--out", str(out)]) == 0

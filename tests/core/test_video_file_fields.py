@@ -229,7 +229,9 @@ def test_ten_bits_are_said_and_a_full_range_is_read() -> None:
 
 def timecode_track(number: int, place: int) -> bytes:
     entry = box(b"tmcd", bytes(6) + struct.pack(">H", 1) + bytes(4) + struct.pack(">III", 0, 30000, 1000) + b"\x1e\0")
-    table = box(b"stbl", box(b"stsd", struct.pack(">II", 0, 1) + entry) + box(b"stco", struct.pack(">III", 0, 1, place)))
+    table = box(
+        b"stbl", box(b"stsd", struct.pack(">II", 0, 1) + entry) + box(b"stco", struct.pack(">III", 0, 1, place))
+    )
     media = box(b"hdlr", bytes(8) + b"tmcd" + bytes(13)) + box(b"minf", table)
     return box(b"trak", box(b"mdia", media))
 

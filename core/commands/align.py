@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..vectors import Array, Mask, norm
 from .options import (
+    add_fps,
     add_out,
     add_terrain_files,
     add_terrain_options,
@@ -42,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     image = parser.add_mutually_exclusive_group(required=True)
     image.add_argument("--size", metavar="WxH", help="width and height of the image [px], such as 1920x1080")
     image.add_argument("--video", metavar="FILE", help="the video: its size, and a frame to check the camera on")
+    add_fps(parser)
     parser.add_argument("--frame", type=whole, metavar="N", help="of the video that was picked on (default 0)")
     lens = parser.add_argument_group("the lens")
     lens.add_argument(
@@ -103,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")
         pairs, turned = turned_pairs(read_pairs(arguments.pairs, None if surface is None else surface.shift), surface)
-        video = open_video(arguments.video, progress) if arguments.video else None
+        video = open_video(arguments.video, progress, rate_hz=arguments.fps) if arguments.video else None
         _check_frames(arguments, pairs, video)
         progress("Solving the camera")
         options = _options(arguments, pairs, video)
@@ -151,11 +153,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None") -> "AlignmentOptions":
     """What is asked for and what is known of the camera."""
-    from ..camera.model import focal_of_view, pinhole
+    from ..camera.model import focal_of_view
     from ..camera.resection.problem import FREE_LENS
     from ..exchange.cameras import read_camera
+    from ..footage.advice import uneven_pixels
     from ..plausibility import check_plausible
-    from ..workflow.alignment import AlignmentOptions
+    from ..workflow.alignment import AlignmentOptions, with_aspect
 
     size = (video.width, video.height) if video is not None else _size(arguments.size)
     free: tuple[str, ...] = ("f",)
@@ -165,9 +168,12 @@ def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None
             advice = "Give the horizontal angle, below 180°"
             raise InputError(f"--fov {arguments.fov:g} is no angle of view", advice=advice)
         focal = focal_of_view(size[0], arguments.fov)
+    aspect = 1.0 if video is None else video.pixel_aspect
+    if uneven_pixels(aspect):
+        start = with_aspect(size, None, aspect, pairs.shift)
     if focal is not None:
         check_plausible("fx", focal, "focal length")
-        free, start = (), pinhole(*size, focal, pairs.shift)
+        free, start = (), with_aspect(size, focal, aspect if uneven_pixels(aspect) else 1.0, pairs.shift)
     if arguments.camera:
         start = read_camera(arguments.camera, pairs.shift).path.reference
     return AlignmentOptions(
@@ -176,6 +182,7 @@ def _options(arguments: argparse.Namespace, pairs: "Pairs", video: "Video | None
         start=start,
         moves=bool(arguments.moving),
         frame=arguments.frame,
+        pixel_aspect=aspect,
         robust=not arguments.no_robust,
         sigma_px=arguments.sigma_px,
         sigma_m=arguments.sigma_m,
@@ -248,7 +255,7 @@ def _summary(aligned: "Alignment", pairs: "Pairs", residual_px: Array) -> list[s
     found, used = aligned.found, aligned.used
     camera, sigma = found.camera, found.sigma
     left_out = len(found.wrong)
-    total, where = (found.used.size, " of the reference frame") if aligned.remarks else (len(pairs), "")
+    total, where = (found.used.size, " of the reference frame") if _other_frames(aligned) else (len(pairs), "")
     spare = f", {found.redundancy} observations more than unknowns" if found.redundancy else ""
     sentences = [
         f"{int(found.used.sum())} of {total} pairs{where} fit to {found.rmse_px:.2f} px (root mean square){spare}."
@@ -282,6 +289,11 @@ def _summary(aligned: "Alignment", pairs: "Pairs", residual_px: Array) -> list[s
         off = [f"{pairs.name[i]} {_in_view(size[i])}" for i in np.flatnonzero(checked)]
         sentences.append(f"Not used, to check: {', '.join(off)}.")
     return [*sentences, *map(str, aligned.remarks), *map(str, found.remarks)]
+
+
+def _other_frames(aligned: "Alignment") -> bool:
+    """Whether pairs of other frames than the reference were looked at."""
+    return any(remark.about.startswith("frame ") for remark in aligned.remarks)
 
 
 def _same(one: float, other: float) -> bool:

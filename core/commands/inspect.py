@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..output import write_text
-from .options import positive
+from .options import add_fps, positive
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -20,7 +20,13 @@ FEW_GAPS = 5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("video", metavar="VIDEO", help="MP4, MOV, MKV, WebM, AVI, … as the camera wrote it")
+    parser.add_argument(
+        "video",
+        metavar="VIDEO",
+        help="MP4, MOV, MKV, WebM, AVI, … as the camera wrote it; or a folder of numbered pictures, or their name, as "
+        "img_%%04d.png",
+    )
+    add_fps(parser)
     parser.add_argument(
         "--capture-rate",
         type=positive,
@@ -36,18 +42,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Decode all frames, print what there is, and write their times where asked to."""
-    from ..footage.advice import content_advice, rate_advice
+    from ..footage.advice import capture_rate_sentence, content_advice, rate_advice
     from ..footage.video import open_video
     from ..output import output_folder
 
     speed = _fastest(arguments.picks) if arguments.picks else arguments.speed
     with PrintedProgress() as progress:
-        video = open_video(arguments.video, progress, thorough=True)
-    advice = content_advice(video) + rate_advice(
-        video,
-        capture_rate_hz=arguments.capture_rate,
-        speed_mps=speed,
-        radius_m=arguments.diameter / 2 if arguments.diameter else None,
+        video = open_video(arguments.video, progress, thorough=True, rate_hz=arguments.fps)
+    how = "If so, give --capture-rate here and in track, and capture_rate_hz in the project."
+    named = "" if arguments.capture_rate else capture_rate_sentence(video.facts, video.rate_hz, how)
+    advice = (
+        content_advice(video)
+        + ([named] if named else [])
+        + rate_advice(
+            video,
+            capture_rate_hz=arguments.capture_rate,
+            speed_mps=speed,
+            radius_m=arguments.diameter / 2 if arguments.diameter else None,
+        )
     )
     if arguments.out:
         with output_folder(arguments.out) as folder:
@@ -69,11 +81,19 @@ def _contents(video: "Video", capture_rate_hz: float | None) -> list[tuple[str, 
         ("file", str(video.path)),
         ("picture", f"{video.width} × {video.height} px{turned}"),
         ("codec", f"{video.codec} in {video.container}"),
-        ("frames", f"{video.frames} can be decoded, {video.header_frames or 'no number'} announced"),
+        ("frames", f"{video.frames} pictures, {_names(video)}")
+        if video.pictures
+        else ("frames", f"{video.frames} can be decoded, {video.header_frames or 'no number'} announced"),
     ]
+    if video.facts.timecode:
+        rows.append(("timecode", f"{video.facts.timecode} at the first picture; times here count from it"))
     if video.frames > 1:
         rows += _timing(video, capture_rate_hz)
     return rows
+
+
+def _names(video: "Video") -> str:
+    return f"{video.pictures[0].name} to {video.pictures[-1].name}"
 
 
 def _timing(video: "Video", capture_rate_hz: float | None) -> list[tuple[str, str]]:

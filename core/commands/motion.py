@@ -83,13 +83,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _chosen(picks: "Picks", names: list[str] | None) -> "Picks":
     from ..reconstruction.picks import take
+    from ..workflow.refinement import unknown_trajectory
 
     if names is None:
         return picks
-    known = list(dict.fromkeys(picks.trajectory.tolist()))
     for name in names:
-        if name not in known:
-            raise InputError(f"There is no trajectory {name!r}", advice=f"The picks have: {', '.join(known)}")
+        if name not in picks.trajectory:
+            raise unknown_trajectory(name, picks)
     return take(picks, np.isin(picks.trajectory, names))
 
 

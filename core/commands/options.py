@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..constants import UNITS_M
-from ..errors import DependencyError, InputError, RockfallError
+from ..errors import MOST_OF_PATH, DependencyError, InputError, RockfallError, readable
 
 if TYPE_CHECKING:
     from ..exchange.database import Database
@@ -104,6 +104,13 @@ def add_out(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the output; made when it is missing")
 
 
+def add_fps(parser: Any) -> None:
+    """``--fps HZ``."""
+    parser.add_argument(
+        "--fps", type=positive, metavar="HZ", help="pictures a second of a sequence of pictures; a video has its own"
+    )
+
+
 @contextmanager
 def naming(file: str) -> Iterator[None]:
     """Errors about what was read from a file name it."""
@@ -118,7 +125,7 @@ def naming(file: str) -> Iterator[None]:
     except DependencyError:
         raise
     except RockfallError as error:
-        raise RockfallError(f"{file}: {error}") from error
+        raise RockfallError(f"{readable(file, MOST_OF_PATH)}: {error}") from error
 
 
 def add_motion_options(group: "argparse._ArgumentGroup") -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from .options import add_out, positive, whole
+from .options import add_fps, add_out, naming, positive, whole
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ..footage.kinks import Kinks
     from ..footage.tracking import BlockTrack
     from ..footage.video import Video
+    from ..vectors import Names
     from ..workflow.tracking import Click
 
 
@@ -30,7 +31,10 @@ def click(text: str) -> "Click":
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("video", metavar="VIDEO", help="video file")
+    parser.add_argument(
+        "video", metavar="VIDEO", help="video file, or a folder of numbered pictures, or their name, img_%%04d.png"
+    )
+    add_fps(parser)
     parser.add_argument(
         "--click",
         type=click,
@@ -67,8 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..workflow.tracking import follow_block
 
     clicks, name = _clicks(arguments)
-    with PrintedProgress() as progress:
-        video = open_video(arguments.video, progress)
+    with PrintedProgress() as progress, naming(arguments.video):
+        video = open_video(arguments.video, progress, rate_hz=arguments.fps)
         first = arguments.first or 0
         last = video.frames - 1 if arguments.last is None else arguments.last
         _check(video, clicks, first, last)
@@ -83,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         time_s = track.time_s if arguments.capture_rate is None else track.frame / arguments.capture_rate
         kinks = find_kinks(time_s, track.stable, track.sigma_px)
-        events = _events(video, motion, kinks, name, arguments.capture_rate)
+        events = _events(video, motion, track, kinks, name, arguments.capture_rate)
         with output_folder(arguments.out) as folder:
             write_track(_table(track, name), folder / "track.csv")
             write_events(events, folder / "events.csv")
@@ -92,9 +96,20 @@ def run(arguments: argparse.Namespace) -> int:
             picture = draw_track(video, track, motion, kinks, labels, clicks[0][0])
             write_picture(folder / "track.png", picture)
     _print_summary(arguments, track, motion, kinks, events)
-    if said:
-        print(said)
+    for sentence in (said, *_of_file(video, arguments.capture_rate)):
+        if sentence:
+            print(sentence)
     return 0
+
+
+def _of_file(video: "Video", capture_rate_hz: float | None) -> list[str]:
+    """What the file says of itself that a track rests on."""
+    from ..footage.advice import capture_rate_sentence
+    from ..footage.file_facts import chapters_remark, streams_remark
+
+    how = "If so, give --capture-rate, and capture_rate_hz in the project."
+    named = "" if capture_rate_hz else capture_rate_sentence(video.facts, video.rate_hz, how)
+    return [streams_remark(video.facts), chapters_remark(video.path), named]
 
 
 def _clicks(arguments: argparse.Namespace) -> "tuple[list[Click], str]":
@@ -124,9 +139,19 @@ def _clicks(arguments: argparse.Namespace) -> "tuple[list[Click], str]":
         clicks += [(int(f), u, v) for f, (u, v) in zip(table.frame[chosen], pixels, strict=True)]
     if not clicks:
         raise InputError(
-            "There is no click on the block", file=arguments.clicks, advice="Give --click FRAME,U,V or --clicks FILE"
+            "There is no click on the block",
+            file=arguments.clicks or arguments.video,
+            trajectory=arguments.trajectory,
+            advice="Give --click FRAME,U,V or --clicks FILE"
+            + (_named_in(table.trajectory) if arguments.clicks else ""),
         )
     return sorted(clicks), next(iter(names), "")
+
+
+def _named_in(trajectories: "Names") -> str:
+    """Which trajectories a table has clicks on, to be added to an advice."""
+    names = sorted({name for name in trajectories.tolist() if name})
+    return f"; the table has clicks on {', '.join(names[:8])}" if names else ""
 
 
 def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None:
@@ -142,7 +167,11 @@ def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None
                 f"There is no frame {frame}: the video has the frames 0 to {video.frames - 1}", file=video.path
             )
     if first > last:
-        raise InputError(f"The first frame, {first}, comes after the last, {last}", advice="Exchange --from and --to")
+        raise InputError(
+            f"The first frame, {first}, comes after the last, {last}",
+            file=video.path,
+            advice="Exchange --from and --to",
+        )
     for frame, u, v in clicks:
         if not (0 <= u <= video.width and 0 <= v <= video.height):
             raise InputError(
@@ -152,7 +181,9 @@ def _check(video: "Video", clicks: "list[Click]", first: int, last: int) -> None
             )
         if not first <= frame <= last:
             raise InputError(
-                f"The click in frame {frame} is outside the frames {first} to {last}", advice="Change --from or --to"
+                f"The click in frame {frame} is outside the frames {first} to {last}",
+                file=video.path,
+                advice="Change --from or --to",
             )
 
 
@@ -171,10 +202,16 @@ def _table(track: "BlockTrack", name: str) -> "Track":
 
 
 def _events(
-    video: "Video", motion: "BackgroundMotion", kinks: "Kinks", name: str, capture_rate_hz: float | None
+    video: "Video",
+    motion: "BackgroundMotion",
+    track: "BlockTrack",
+    kinks: "Kinks",
+    name: str,
+    capture_rate_hz: float | None,
 ) -> "EventTable":
     """Proposed impacts at video times, their pixels in the nearest frame."""
     from ..exchange.footage_tables import EventTable
+    from ..footage.advice import with_repeats
     from ..footage.background import destabilise
 
     number = np.arange(video.frames, dtype=np.float64)
@@ -184,6 +221,7 @@ def _events(
         place = kinks.time_s * capture_rate_hz
         time = np.interp(place, number, video.time_s)
         sigma = kinks.sigma_time_s * capture_rate_hz * video.usual_step_s
+    sigma = with_repeats(sigma, time, video, track.repeated)
     frame = np.clip(np.round(place).astype(np.intp), motion.frames[0], motion.frames[-1])
     return EventTable(
         trajectory=np.full(len(kinks), name),
@@ -205,8 +243,10 @@ def _print_summary(
     events: "EventTable",
 ) -> None:
     first, last = int(track.frame[0]), int(track.frame[-1])
-    gaps = last - first + 1 - track.frame.size
+    twice = np.setdiff1d(track.repeated[(track.repeated > first) & (track.repeated < last)], track.frame).size
+    gaps = last - first + 1 - track.frame.size - twice
     hidden = f", not seen in {gaps} between" if gaps else ""
+    hidden += f"; {twice} that repeat the one before are left out" if twice else ""
     print(f"The block is followed through {track.frame.size} frames, {first} to {last}{hidden}.")
     print(f"  before: {track.stopped[0]}. After: {track.stopped[1]}.")
     size, sigma = np.median(track.diameter_px), np.median(track.sigma_px)
@@ -222,8 +262,9 @@ def _print_summary(
     print(f"{len(kinks)} impacts are proposed{clock}{':' if len(kinks) else '.'}")
     for i in range(len(kinks)):
         u, v = events.pixel[i]
+        speed = kinks.time_s[i] / events.time_s[i] if arguments.capture_rate and events.time_s[i] else 1.0
         print(
-            f"  {kinks.time_s[i]:9.4f} s ± {1000 * kinks.sigma_time_s[i]:.1f} ms  frame {events.frame[i]}  "
+            f"  {kinks.time_s[i]:9.4f} s ± {1000 * speed * events.sigma_time_s[i]:.1f} ms  frame {events.frame[i]}  "
             f"({u:.1f}, {v:.1f})  velocity changes by {kinks.score[i]:.0f} sigmas"
         )
     print(f"Written to {arguments.out}: track.csv, events.csv, track.png")

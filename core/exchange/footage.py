@@ -7,8 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, RockfallError
+from ..footage.advice import capture_rate_sentence
 from ..footage.clock import Clock
+from ..footage.file_facts import file_facts
+from ..footage.sequences import is_there
+from ..footage.video import Video, open_video
 from ..georeference import GlobalShift
+from ..progress import Progress, silent
 from ..reconstruction.picks import Picks
 from ..reconstruction.refinement.views import View
 from ..reconstruction.trajectory import Reconstruction
@@ -90,11 +95,37 @@ def open_footage(
     )
     videos: list[ReadVideo] = []
     for entry in entries:
+        notes += capture_rate_notes(entry)
         video, turned = _read(entry, surface, shift, name, with_events=False)
         videos.append(video)
         notes += turned
         shift = videos[0].camera.path.reference.shift
     return Footage(tuple(videos), notes)
+
+
+def open_entry(entry: VideoEntry, progress: Progress = silent, *, thorough: bool = False) -> Video:
+    """The video of a project's entry, or its sequence of pictures.
+
+    Raises
+    ------
+    InputError : the entry names no file; see `open_video`.
+    """
+    if entry.file is None:
+        raise InputError(f"Video {entry.name} names no file", advice='Add file = "…" to it in the project')
+    return open_video(entry.file, progress, thorough=thorough, rate_hz=entry.rate_hz)
+
+
+def capture_rate_notes(entry: VideoEntry) -> tuple[str, ...]:
+    """A sentence where a video's file names a capture rate, and the project none."""
+    if entry.file is None or entry.capture_rate_hz is not None or not entry.file.is_file():
+        return ()
+    facts = file_facts(entry.file)
+    if not facts.streams:
+        return ()
+    rate = facts.streams[facts.used].rate_hz
+    how = f"If so, add capture_rate_hz = {facts.capture_rate_hz:.6g} to the project's video; else {rate:.6g}"
+    said = capture_rate_sentence(facts, rate, f"{how}, the rate of the file.")
+    return (f"{entry.name}: {said}",) if said else ()
 
 
 def name_trajectory(footage: Footage, picks: Picks) -> Footage:
@@ -213,10 +244,8 @@ def _read(
 
 def _file_rate(entry: VideoEntry, frame: Indices, time_s: Array) -> float:
     """Frames per second of the file."""
-    if entry.file is not None and entry.file.is_file():
-        from ..footage.video import open_video
-
-        return open_video(entry.file).rate_hz
+    if entry.file is not None and is_there(entry.file):
+        return open_entry(entry).rate_hz
     known = np.flatnonzero(frame >= 0)
     if known.size > 1 and np.ptp(frame[known]) > 0:
         return 1.0 / float(np.polyfit(frame[known], time_s[known], 1)[0])

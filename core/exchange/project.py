@@ -137,6 +137,7 @@ class VideoEntry:
     spin_marks : spin_marks.csv, one point of the block in two frames or more of a flight, for its spin.
     offset_s, drift, origin_s : of the `Clock`: common time = offset + (1 + drift) · rate · (video time − origin).
     capture_rate_hz : pictures per second when filming; None when the file plays at the speed of the fall.
+    rate_hz : pictures per second of a sequence of pictures, which has no times of its own; None for a video file.
     row_time_s : readout time of one row of the image [s]: rolling shutter, 0 for a global one; None when not known.
     """
 
@@ -150,6 +151,7 @@ class VideoEntry:
     drift: float = 0.0
     origin_s: float = 0.0
     capture_rate_hz: float | None = None
+    rate_hz: float | None = None
     row_time_s: float | None = None
     extra: Extra = field(default_factory=dict)
 
@@ -412,6 +414,7 @@ def _video(table: TomlTable) -> VideoEntry:
         drift=table.signed("drift", 0.0),
         origin_s=table.signed("origin_s", 0.0),
         capture_rate_hz=table.optional_number("capture_rate_hz"),
+        rate_hz=table.optional_number("rate_hz"),
         row_time_s=table.optional_number("row_time_s", zero_allowed=True),
         extra=table.rest(),
     )

@@ -5,15 +5,22 @@ from math import pi, sqrt
 
 import numpy as np
 
+from ..vectors import Array, Indices, Mask
 from .background import BackgroundMotion, layers_px
+from .file_facts import FileFacts, chapters_remark, streams_remark
+from .repeats import picture_rate, repeat_sigma_s, repeats_sentence, rhythm
 from .video import Video
 
 FRAMES_PER_TURN = 5.0
 """To follow a block's rotation (Noël et al. 2018)."""
+REPEAT_TOUCHES = 2
+"""Frames on either side of a single repeated picture whose times may be wrong."""
 LOWEST_RATE_HZ = 30.0
 """For rockfalls in general (Noël et al. 2018)."""
 TELEVISION = 0.998
 """29.97 frames a second are the 30 of television."""
+OTHER_CAPTURE_RATE = 0.02
+"""A capture rate that is nearer to that of the file, relatively, is the same."""
 
 
 def rolling_turns_hz(speed_mps: float, radius_m: float) -> float:
@@ -24,6 +31,44 @@ def rolling_turns_hz(speed_mps: float, radius_m: float) -> float:
 def time_sigma_s(rate_hz: float) -> float:
     """Standard deviation of a moment that is known to one frame: uniform over 1 / rate [s]."""
     return 1 / (rate_hz * sqrt(12))
+
+
+def with_repeats(sigma_s: Array, time_s: Array, video: Video, repeated: Indices) -> Array:
+    """(n,) standard deviations of times (n,) [s], of those that pictures shown twice touch widened.
+
+    Notes
+    -----
+    Pictures that are repeated in a rhythm are those of a conversion, after which no time is right; single ones are of a
+    camera that was late, which touches the times beside them.
+    """
+    if not repeated.size:
+        return sigma_s
+    step = video.usual_step_s
+    touched: Mask = np.ones(time_s.size, np.bool_)
+    if not any(rhythm(repeated)):
+        late = video.time_s[repeated]
+        touched = np.asarray((np.abs(time_s[:, None] - late) <= REPEAT_TOUCHES * step).any(axis=1))
+    return np.where(touched, np.hypot(sigma_s, repeat_sigma_s(step)), sigma_s)
+
+
+def proposed_capture_rate(facts: FileFacts, rate_hz: float) -> float | None:
+    """The capture rate [Hz] that a file names, where it is not that at which it plays; None where it names none."""
+    named = facts.capture_rate_hz
+    differs = np.isfinite(named) and rate_hz > 0 and abs(named / rate_hz - 1) > OTHER_CAPTURE_RATE
+    return named if differs else None
+
+
+def capture_rate_sentence(facts: FileFacts, rate_hz: float, how: str) -> str:
+    """That a file names another capture rate, and `how` it is taken over, a sentence; empty where it names none."""
+    named = proposed_capture_rate(facts, rate_hz)
+    if named is None:
+        return ""
+    times = named / rate_hz
+    kind = f"{times:.4g} times slower than life" if times > 1 else f"{1 / times:.4g} times faster than life"
+    return (
+        f"By {facts.capture_rate_name} of the file {named:.5g} pictures a second were taken, and it plays "
+        f"{rate_hz:.5g}: it would be {kind}. {how}"
+    )
 
 
 def pixel_size_m(distance_m: float, focal_px: float) -> float:
@@ -67,9 +112,13 @@ def rate_advice(
     speed_mps, radius_m : the fastest speed and the radius of the block; together they tell the spin of rolling.
     spin_radps : the fastest spin, where it is known.
     """
-    rate = capture_rate_hz or video.rate_hz
-    if not np.isfinite(rate):
+    stored = capture_rate_hz or video.rate_hz
+    if not np.isfinite(stored):
         return ["One frame is no film: nothing can be timed with it."]
+    rate = picture_rate(video.repeated, video.frames, stored)
+    sigma_s = time_sigma_s(rate)
+    if video.repeated.size:
+        sigma_s = float(np.hypot(sigma_s, repeat_sigma_s(1 / stored)))
     sentences = []
     if spin_radps is not None:
         sentences.append(turn_advice(rate, abs(spin_radps) / (2 * pi)))
@@ -84,15 +133,16 @@ def rate_advice(
         if rate < LOWEST_RATE_HZ * TELEVISION:
             sentences.append(f"Rockfalls are better filmed at {LOWEST_RATE_HZ:.0f} frames a second or more.")
     sentences.append(
-        f"An impact marked on its frame is known to ± {1000 * time_sigma_s(rate):.1f} ms (one frame / √12)"
-        + (f", in which the block moves {speed_mps * time_sigma_s(rate):.2g} m." if speed_mps is not None else ".")
+        f"An impact marked on its frame is known to ± {1000 * sigma_s:.1f} ms "
+        + ("(one picture / √12, and the repeated ones)" if video.repeated.size else "(one frame / √12)")
+        + (f", in which the block moves {speed_mps * sigma_s:.2g} m." if speed_mps is not None else ".")
     )
     return sentences
 
 
 def content_advice(video: Video) -> list[str]:
     """What is wrong with the file itself, sentences; empty when nothing is."""
-    sentences = []
+    sentences = [text for text in (streams_remark(video.facts), chapters_remark(video.path)) if text]
     if video.header_frames > video.frames:
         sentences.append(
             f"By its header the file should have {video.header_frames} frames, and {video.frames} can be decoded: "
@@ -109,15 +159,20 @@ def content_advice(video: Video) -> list[str]:
     if video.duplicates.size:
         sentences.append(f"{video.duplicates.size} frames have the timestamp of the frame before.")
     if video.repeated.size:
+        sentences.append(repeats_sentence(video.repeated, video.frames, video.rate_hz))
+    if uneven_pixels(video.pixel_aspect):
         sentences.append(
-            f"{video.repeated.size} frames repeat the picture before: the camera took fewer frames than it wrote, "
-            "or the video was converted to another rate."
+            f"Pixels are {video.pixel_aspect:.3f} times as wide as high: solve the camera with fx and fy apart "
+            "(align --free fx,fy)."
         )
-    if abs(video.pixel_aspect - 1) > 1e-3:
-        sentences.append(
-            f"Pixels are {video.pixel_aspect:.3f} times as wide as high: solve the camera with fx and fy apart."
-        )
-    return sentences
+    if video.bits > 8:
+        sentences.append(f"The pictures have {video.bits} bits, reduced to 8 here. Places and times are not touched.")
+    return [*sentences, *video.facts.remarks]
+
+
+def uneven_pixels(aspect: float) -> bool:
+    """Whether pixels are not square: width / height differs from 1."""
+    return abs(aspect - 1) > 1e-3
 
 
 def layered_background(motion: BackgroundMotion, width: int) -> str:

@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from .mp4_index import file_boxes
+from ..formats.mp4 import file_boxes
 
 HEAD_BYTES = 4096
 MAGIC = (
@@ -67,6 +67,10 @@ CODECS = {
 }
 
 
+UNKNOWN_CODEC = 0xFFFFFFFF
+"""What OpenCV has for a codec that it does not know."""
+
+
 def container_of(path: Path) -> str:
     """Name of the container: "MP4", "MOV", "Matroska", "WebM", "AVI", …; "… picture" or "… sound"; empty if unknown."""
     head = _head(path)
@@ -82,9 +86,12 @@ def container_of(path: Path) -> str:
 
 def codec_name(fourcc: int) -> str:
     """Readable name of a codec from its four-character code, with the code: "H.264 (avc1)"."""
-    code = (fourcc & 0xFFFFFFFF).to_bytes(4, "little").decode("latin-1").strip("\0 ")
-    if not (code and code.isprintable()):
+    value = fourcc & 0xFFFFFFFF
+    code = value.to_bytes(4, "little").decode("latin-1").strip("\0 ")
+    if not code or value == UNKNOWN_CODEC:
         return "an unnamed codec"
+    if not (code.isascii() and code.isprintable()):
+        return f"a codec with the code 0x{value.to_bytes(4, 'little').hex()}"
     return CODECS.get(code.lower(), code)
 
 

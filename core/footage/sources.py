@@ -8,8 +8,10 @@ import numpy as np
 
 from ..memory import available_bytes
 from ..opencv import opencv
-from ..vectors import Array
+from ..progress import Progress, silent
+from ..vectors import Array, Indices
 from .ahead import ahead
+from .repeats import ChangeMeter, repeated_pictures, repeats_sentence
 from .video import Video, read_frames
 
 CHUNK, CHUNK_BYTES = (12, 48), 300_000_000
@@ -20,6 +22,8 @@ SPREAD, SPREAD_FRAMES = 20, 30
 """So many of the frames that are kept are evenly spaced, or one in so many of a long film if these are more."""
 LARGEST = 2_300_000
 """Pictures of more pixels are followed at half their size, or a quarter, …: 4K as 1080p."""
+GLANCES, GLANCE, FEWEST_REPEATS = (0.25, 0.5, 0.75), 24, 3
+"""Where a video is looked at for repeated pictures, over how many frames, and how many of them are enough to say so."""
 SMALLEST = 5.0
 """A block is not made smaller than this by reducing pictures [px]; at 5 its places are a fifth less exact at most."""
 
@@ -188,6 +192,31 @@ def frames(source: Source, indices: Sequence[int], *, as_decoded: bool = False) 
             yield from reversed(list(_ascending(source, sorted(indices[start : start + chunk]), False, as_decoded)))
     else:
         yield from _ascending(source, indices, True, as_decoded)
+
+
+def repeated_in(source: Source, first: int, last: int, progress: Progress = silent) -> Indices:
+    """(r,) frames from first to last that show the picture of the one before."""
+    if isinstance(source, Video) and source.decoded:
+        return source.repeated[(source.repeated > first) & (source.repeated <= last)]
+    meter = ChangeMeter()
+    for done, (_, picture) in enumerate(frames(source, range(first, last + 1))):
+        progress("Looking for repeated pictures", done, last - first + 1)
+        meter.add(picture)
+    return repeated_pictures(meter.changes) + first
+
+
+def repeats_at_a_glance(video: Video) -> str:
+    """That pictures of a video repeat the one before, a sentence, as a few stretches of it tell; else empty."""
+    found = []
+    for part in GLANCES:
+        middle = int(part * video.frames)
+        first, last = max(middle - GLANCE // 2, 0), min(middle + GLANCE // 2, video.frames - 1)
+        if last - first >= GLANCE // 2:
+            found.append((repeated_in(video, first, last), last - first + 1))
+    best = max(found, key=lambda one: one[0].size, default=None)
+    if best is None or best[0].size < FEWEST_REPEATS:
+        return ""
+    return f"As a glance at {best[1]} of its frames tells: {repeats_sentence(*best, video.rate_hz)}"
 
 
 def _ascending(

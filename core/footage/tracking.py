@@ -2,7 +2,7 @@
 """Assisted tracking: from one click the block is followed through the video, until it is lost."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..vectors import Array, Indices
 from .background import BackgroundMotion, background_motion, reduced_motion, stabilise
 from .plates import Plates
 from .silhouette import outline_offsets
-from .sources import SMALLEST, Kept, Source, kept
+from .sources import SMALLEST, Kept, Source, kept, repeated_in
 from .track_scatter import scatter_sigma
 from .tracking_start import Footage, Start, start_at
 from .tracking_steps import Row, follow
@@ -36,6 +36,7 @@ class BlockTrack:
     stable : (m, 2) `pixel` in the reference frame of the background.
     diameter_px : (m,) fitted size.
     stopped : sentences: why the track begins where it does, and why it ends.
+    repeated : (r,) frames that were looked at and show the picture of the one before; they are no positions.
     """
 
     frame: Indices
@@ -46,6 +47,7 @@ class BlockTrack:
     stable: Array
     diameter_px: Array
     stopped: tuple[str, str]
+    repeated: Indices = field(default_factory=lambda: np.empty(0, np.intp))
 
 
 def track_block(
@@ -58,6 +60,7 @@ def track_block(
     background: BackgroundMotion | None = None,
     first: int | None = None,
     last: int | None = None,
+    repeated: Indices | None = None,
     progress: Progress = silent,
 ) -> BlockTrack:
     """Follow the block forwards and backwards from a click.
@@ -69,6 +72,7 @@ def track_block(
     diameter_px : of the block; measured at the click when it is not given.
     background : its motion; found when it is not given.
     first, last : frames beyond which is not looked.
+    repeated : frames that show the picture of the one before, see `repeated_in`; found when not given.
 
     Raises
     ------
@@ -94,7 +98,8 @@ def track_block(
     motion = (
         background_motion(source, first=first, last=last, progress=progress)[0] if background is None else background
     )
-    footage, starts, scale = _begun(source, motion, marks, diameter_px, progress)
+    repeated = repeated_in(source, first, last, progress) if repeated is None else repeated
+    footage, starts, scale = _begun(source, motion, marks, diameter_px, frozenset(repeated.tolist()), progress)
     backwards, before = follow(footage, starts[0], first, progress)
     rows = list(backwards[::-1])
     for start, other in pairwise(starts):
@@ -102,11 +107,16 @@ def track_block(
         back, _ = follow(footage, other, start.frame, progress)
         rows += _joined(there, back[::-1])[1:]
     forwards, after = follow(footage, starts[-1], last, progress)
-    return _assembled(motion, [*rows, *forwards[1:]], (before, after), footage.plates.spacing, scale)
+    return _assembled(motion, [*rows, *forwards[1:]], (before, after), footage.plates.spacing, scale, repeated)
 
 
 def _begun(
-    source: Source, motion: BackgroundMotion, marks: Sequence[Mark], diameter_px: float | None, progress: Progress
+    source: Source,
+    motion: BackgroundMotion,
+    marks: Sequence[Mark],
+    diameter_px: float | None,
+    repeated: frozenset[int],
+    progress: Progress,
 ) -> tuple[Footage, list[Start], int]:
     """The footage in which the block is followed, what it is where it was clicked, and by how much both are reduced.
 
@@ -115,7 +125,7 @@ def _begun(
 
     def begun(pictures: Source, scale: int) -> tuple[Footage, list[Start], int]:
         moved = reduced_motion(motion, scale)
-        footage = Footage(pictures, moved, Plates(pictures, moved, progress))
+        footage = Footage(pictures, moved, Plates(pictures, moved, progress), repeated)
         size = None if diameter_px is None else diameter_px / scale
         return footage, [start_at(footage, at, np.array(place) / scale, size) for at, place in marks], scale
 
@@ -162,7 +172,12 @@ def _joined(there: Sequence[Row], back: Sequence[Row]) -> list[Row]:
 
 
 def _assembled(
-    motion: BackgroundMotion, rows: Sequence[Row], stopped: tuple[str, str], spacing: float, scale: int
+    motion: BackgroundMotion,
+    rows: Sequence[Row],
+    stopped: tuple[str, str],
+    spacing: float,
+    scale: int,
+    repeated: Indices,
 ) -> BlockTrack:
     """The track in whole pictures, of rows in reduced ones."""
     time_s, frame = np.array([row.time_s for row in rows]), np.array([row.frame for row in rows], dtype=np.intp)
@@ -182,5 +197,6 @@ def _assembled(
         score=score,
         stable=scale * stable,
         diameter_px=scale * diameter,
+        repeated=repeated,
         stopped=stopped,
     )

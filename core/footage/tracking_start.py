@@ -23,11 +23,12 @@ SLOWER = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Footage:
-    """A video, the motion of its background, and the background without what moves."""
+    """A video, the motion of its background, the background without what moves, and frames that repeat another."""
 
     video: Source
     motion: BackgroundMotion
     plates: Plates
+    repeated: frozenset[int] = frozenset()
 
     def stable(self, frame: int, pixel: Array) -> Array:
         """(2,) a pixel of a frame, in the reference frame of the background [px]."""

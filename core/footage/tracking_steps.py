@@ -176,7 +176,7 @@ def _row(footage: Footage, frame: int, picture: np.ndarray, seen: Sighting, stab
 def _next(footage: Footage, state: State, frame: int, picture: np.ndarray) -> tuple[State, str]:
     """The state after one more frame, and why the block is given up, empty while it is not."""
     time_s = float(footage.video.time_s[frame])
-    if time_s == state.past[-1].time_s:
+    if time_s == state.past[-1].time_s or frame in footage.repeated:
         return state, ""
     state, expected = _expected(footage, state, frame, time_s)
     before, state = state.picture, replace(state, picture=picture)

@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 from ..constants import SAME_TIME_S
 from ..errors import InputError
+from ..formats.mp4 import indexed_frames
 from ..opencv import opencv, quiet_opencv
 from ..progress import Progress, silent
 from ..reading import reader
 from ..vectors import Array, Indices
 from .containers import codec_name, container_of, holds_sound, lacks_index
-from .mp4_index import indexed_frames
+from .file_facts import FileFacts, file_facts
+from .patched import PatchedFile
+from .repeats import ChangeMeter, repeated_pictures
+from .sequences import RATE, load_picture, names_sequence, sequence_of
 
 type Image = NDArray[np.uint8]
 
@@ -40,8 +44,6 @@ FAR_FRAMES = 40
 MOST_REORDERED = 16
 SEEKS = 5
 DAMAGED = 30
-SAMPLE = 4
-"""Pictures are compared at every fourth pixel."""
 CONVERT = (
     "Convert it with ffmpeg -i {name} -c:v libx264 -crf 16 -fps_mode passthrough -an {stem}_h264.mp4: "
     "H.264 of constant quality, and the timestamps stay as they are"
@@ -73,6 +75,9 @@ class Video:
     counted : a frame is found by counting from the first, since timestamps are missing or repeated.
     decoded : every frame has been decoded to know this; otherwise those at both ends.
     repeated : (r,) frames that show the picture of the frame before; known only when `decoded`.
+    facts : what the file says of itself beside its pictures.
+    pictures : the files of a sequence of pictures; empty for a video file.
+    bits : of a channel as it is stored; all are read as 8.
     """
 
     path: Path
@@ -89,6 +94,9 @@ class Video:
     counted: bool = False
     decoded: bool = False
     repeated: Indices = field(default_factory=_none)
+    facts: FileFacts = field(default_factory=FileFacts)
+    pictures: tuple[Path, ...] = ()
+    bits: int = 8
 
     @property
     def frames(self) -> int:
@@ -170,8 +178,10 @@ class Video:
 
 
 @reader("video")
-def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool = False) -> Video:
-    """Find the frames of a video file and their timestamps.
+def open_video(
+    path: str | Path, progress: Progress = silent, *, thorough: bool = False, rate_hz: float | None = None
+) -> Video:
+    """Find the frames of a video file and their timestamps, or the pictures of a sequence.
 
     The timestamps come from the packets, without decoding, where decoding the first frames finds the same, and those at
     the end as well unless the index of an MP4 or MOV file says that they are there; otherwise, and when `thorough`,
@@ -179,18 +189,29 @@ def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool 
 
     Parameters
     ----------
+    path : a video file, a folder of numbered pictures, or their name with %d in place of the number.
     thorough : decode every frame, and compare each picture with the one before.
+    rate_hz : of a sequence of pictures, which has no times of its own.
 
     Raises
     ------
     InputError : a file that is missing, no video, cut short before its first frame, in a codec that cannot be decoded,
-        without timestamps, or interlaced.
+        without timestamps, or interlaced; a sequence without a rate, or of several sizes; a rate for a video file.
     """
     path = Path(path)
+    if names_sequence(path) and not path.is_file():
+        return _open_pictures(path, rate_hz, progress, thorough=thorough)
+    if rate_hz is not None and path.is_file():
+        raise InputError(
+            "A video file has its own times, so that no rate can be given to it",
+            file=path,
+            advice="Leave the rate out; for slow motion give the capture rate",
+        )
     _refuse_other_files(path)
     progress(f"Reading the timestamps of {path.name}", 0, 0)
-    packet_times, keyframes = _packets(path)
-    video, head_s, changing = _begun(path)
+    facts = file_facts(path)
+    packet_times, keyframes = _packets(path, facts)
+    video, head_s, changing = _begun(path, facts)
     video = replace(video, time_s=packet_times, keyframe_s=keyframes)
     if thorough or not (_is_indexed(video, head_s) or _decodes_as_declared(video)):
         video = _decoded(video, progress)
@@ -203,6 +224,61 @@ def open_video(path: str | Path, progress: Progress = silent, *, thorough: bool 
     if not changing:
         _refuse_still(video)
     return video
+
+
+def _open_pictures(path: Path, rate_hz: float | None, progress: Progress, *, thorough: bool) -> Video:
+    """A sequence of pictures as a video: a number that is missing is a gap in its times."""
+    found = sequence_of(path)
+    if rate_hz is None:
+        raise InputError("A sequence of pictures has no times of its own", file=path, advice=RATE)
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"The rate {rate_hz:g} is not above 0", file=path, advice=RATE)
+    first = load_picture(found.files[0])
+    video = Video(
+        path=path,
+        width=first.shape[1],
+        height=first.shape[0],
+        rotation_deg=0,
+        codec=found.files[0].suffix[1:].upper().replace("JPG", "JPEG"),
+        container="a sequence of pictures",
+        header_rate_hz=float(rate_hz),
+        header_frames=0,
+        time_s=(found.number - found.number[0]) / rate_hz,
+        keyframe_s=np.empty(0),
+        pictures=found.files,
+    )
+    if not thorough:
+        for _ in _pictures(video, np.unique([0, video.frames // 2, video.frames - 1])):
+            pass
+        return video
+    meter = ChangeMeter()
+    for index, picture in _pictures(video, np.arange(video.frames)):
+        progress(f"Reading {path.name}", index, video.frames)
+        meter.add(picture)
+    return replace(video, decoded=True, repeated=repeated_pictures(meter.changes))
+
+
+def _pictures(video: Video, indices: Indices) -> Iterator[tuple[int, Image]]:
+    """Pictures of a sequence.
+
+    Raises
+    ------
+    InputError : one cannot be read, or has another size.
+    """
+    for index in indices.tolist():
+        picture = load_picture(video.pictures[index])
+        _check_size(video, index, picture, video.pictures[index])
+        yield index, picture
+
+
+def _check_size(video: Video, index: int, picture: Image, file: Path) -> None:
+    height, width = picture.shape[:2]
+    if (width, height) != (video.width, video.height):
+        raise InputError(
+            f"Frame {index} has {width} × {height} px, and the first has {video.width} × {video.height}",
+            file=file,
+            advice="Pixels of pictures of several sizes are not those of one camera: use those of one size",
+        )
 
 
 def frame_at(video: Video, time_s: float) -> int:
@@ -225,11 +301,16 @@ def read_frames(
     ------
     InputError : indices that are not ascending or beyond the video, a frame that cannot be decoded.
     """
-    cv2 = opencv()
-    for index, capture in _grabbed(video, _checked(video, indices)):
+    cv2, wanted = opencv(), _checked(video, indices)
+    if video.pictures:
+        for index, picture in _pictures(video, wanted):
+            yield index, cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if grey else picture
+        return
+    for index, capture in _grabbed(video, wanted):
         there, picture = capture.retrieve()
         if not there:
             raise _undecodable(video, index)
+        _check_size(video, index, picture, video.path)
         yield index, cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if grey else picture
 
 
@@ -240,7 +321,7 @@ def read_frame(video: Video, index: int, *, grey: bool = False) -> Image:
 
 def _grabbed(video: Video, indices: Indices) -> Iterator[tuple[int, Any]]:
     """The capture, standing at each of the frames in turn."""
-    capture, frame = _capture(video.path), -1
+    capture, frame = _capture(video.path, video.facts), -1
     for index in indices.tolist():
         if not video.counted and _keyframes_about(video, index)[0] > frame + FAR_FRAMES:
             capture, frame = _seek(video, capture, index)
@@ -284,7 +365,7 @@ def _seek(video: Video, capture: Any, index: int) -> tuple[Any, int]:
                 return capture, frame
             late_s = max(_time_s(capture) - float(video.time_s[index]), 0.0)
         back += MOST_REORDERED + 2 * late_s * video.header_rate_hz
-    return _capture(video.path), -1
+    return _capture(video.path, video.facts), -1
 
 
 def _frame_of(video: Video, capture: Any) -> int:
@@ -306,18 +387,18 @@ def _checked(video: Video, indices: Sequence[int] | Indices | None) -> Indices:
     return wanted
 
 
-def _begun(path: Path) -> tuple[Video, Array, bool]:
+def _begun(path: Path, facts: FileFacts) -> tuple[Video, Array, bool]:
     """The video without its frames, the timestamps of the first few, and whether their pictures differ.
 
     Raises
     ------
     InputError : there is no picture.
     """
-    capture = _capture(path)
+    capture = _capture(path, facts)
     picture: Any = capture.retrieve()[1] if _grab(capture) else None
     if picture is None:
-        raise _no_picture(path)
-    video = _described(path, capture, picture)
+        raise _no_picture(path, facts)
+    video = replace(_described(path, capture, picture), facts=facts)
     few = int(np.clip(FEW_PIXELS / (picture.size / 3), FEWEST_FRAMES, FEW_FRAMES))
     times, changing = [_time_s(capture)], False
     while len(times) < few and _grab(capture):
@@ -347,13 +428,22 @@ def _described(path: Path, capture: Any, picture: Image) -> Video:
         time_s=np.empty(0),
         keyframe_s=np.empty(0),
         pixel_aspect=1 / aspect if rotation % 180 else aspect,
+        bits=_bits(int(capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT))),
     )
 
 
-def _packets(path: Path) -> tuple[Array, Array]:
+def _bits(pixel_format: int) -> int:
+    """Bits of a channel, from FFmpeg's code of a planar format, such as Y3 with 11 and 10 for 10 bits."""
+    code = (pixel_format & 0xFFFFFFFF).to_bytes(4, "little")
+    if code[:2] in (b"Y3", b"Y1", b"G3") and 8 < code[3] <= 16:
+        return code[3]
+    return 10 if code[:3] == b"P01" else 8
+
+
+def _packets(path: Path, facts: FileFacts) -> tuple[Array, Array]:
     """Timestamps of all packets and of those of keyframes, ascending; nothing is decoded."""
     cv2 = opencv()
-    capture = _opened(path, [cv2.CAP_PROP_FORMAT, -1])
+    capture = _opened(path, facts, [cv2.CAP_PROP_FORMAT, -1])
     times, keys = [], []
     while _grab(capture):
         times.append(_time_s(capture))
@@ -389,19 +479,16 @@ def _decodes_as_declared(video: Video) -> bool:
 
 def _decoded(video: Video, progress: Progress) -> Video:
     """The frames as decoding them all finds them."""
-    capture, before = _capture(video.path), None
+    capture, meter = _capture(video.path, video.facts), ChangeMeter()
     times: list[float] = []
-    repeated: list[int] = []
     while _grab(capture):
         there, picture = capture.retrieve()
         if not there:
             continue
         progress(f"Decoding {video.path.name}", len(times), max(video.frames, len(times)))
-        sample = picture[::SAMPLE, ::SAMPLE].copy()
-        if before is not None and np.array_equal(sample, before):
-            repeated.append(len(times))
+        _check_size(video, len(times), picture, video.path)
+        meter.add(picture)
         times.append(_time_s(capture))
-        before = sample
     time_s, whole = _without_holes(np.array(times))
     if (np.diff(time_s) < -SAME_TIME_S).any():
         raise InputError("The timestamps run backwards", file=video.path, advice=_convert(video.path))
@@ -412,7 +499,7 @@ def _decoded(video: Video, progress: Progress) -> Video:
         keyframe_s=video.keyframe_s if known else np.empty(0),
         counted=not whole or bool((np.diff(time_s) < SAME_TIME_S).any()),
         decoded=True,
-        repeated=np.array(repeated, np.intp),
+        repeated=repeated_pictures(meter.changes),
     )
 
 
@@ -445,29 +532,29 @@ def _time_s(capture: Any) -> float:
     return float(capture.get(opencv().CAP_PROP_POS_MSEC)) / 1000
 
 
-def _capture(path: Path) -> Any:
+def _capture(path: Path, facts: FileFacts) -> Any:
     """A capture that decodes.
 
     Raises
     ------
     InputError : the file cannot be opened as a video.
     """
-    capture = _opened(path, [])
+    capture = _opened(path, facts, [])
     if not capture.isOpened():
         _refuse_other_files(path)
-        raise _no_picture(path)
+        raise _no_picture(path, facts)
     return capture
 
 
-def _opened(path: Path, settings: list[int]) -> Any:
+def _opened(path: Path, facts: FileFacts, settings: list[int]) -> Any:
     """OpenCV's capture, by FFmpeg alone: other backends take a name with digits for a series of pictures."""
     with quiet_opencv() as cv2:
+        if facts.hidden:
+            return cv2.VideoCapture(PatchedFile(path, facts.hidden), cv2.CAP_FFMPEG, settings)
         return cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, settings)
 
 
 def _refuse_other_files(path: Path) -> None:
-    if path.is_dir():
-        raise InputError("This is a folder", file=path, advice="Give the video file itself")
     if not path.is_file():
         raise InputError("There is no such file", file=path, advice="Check the path")
     if path.stat().st_size == 0:
@@ -478,10 +565,10 @@ def _refuse_other_files(path: Path) -> None:
         raise InputError(f"This is a {what} file ({kind}), not a video", file=path, advice="Give the video itself")
 
 
-def _no_picture(path: Path) -> InputError:
+def _no_picture(path: Path, facts: FileFacts) -> InputError:
     """Why no picture of the file can be had."""
     container = container_of(path)
-    packets = _opened(path, [opencv().CAP_PROP_FORMAT, -1])
+    packets = _opened(path, facts, [opencv().CAP_PROP_FORMAT, -1])
     if packets.isOpened():
         codec = codec_name(int(packets.get(opencv().CAP_PROP_FOURCC)))
         return InputError(

@@ -24,11 +24,12 @@ MOST_VIDEOS = 4
 
 @dataclass(frozen=True, eq=False)
 class Filmed:
-    """A video of the slope, and its camera, in the terrain's local coordinates."""
+    """A video of the slope, or pictures of a rate, and its camera, in the terrain's local coordinates."""
 
     name: str
     file: Path
     path: CameraPath
+    rate_hz: float | None = None
 
 
 def project_videos(project: Project, surface: Surface | None) -> tuple[tuple[Filmed, ...], tuple[str, ...]]:
@@ -38,7 +39,7 @@ def project_videos(project: Project, surface: Surface | None) -> tuple[tuple[Fil
         if entry.file is None or entry.camera is None:
             continue
         try:
-            found.append(Filmed(entry.name, entry.file, read_project_camera(entry.camera, surface)[0].path))
+            found.append(Filmed(entry.name, entry.file, _path_of(entry.camera, surface), entry.rate_hz))
         except RockfallError as error:
             said.append(_without(entry.name, error))
     return tuple(found), tuple(said)
@@ -63,13 +64,17 @@ def photographs_of(
     return tuple(found), tuple(said)
 
 
+def _path_of(camera: Path, surface: Surface | None) -> CameraPath:
+    return read_project_camera(camera, surface)[0].path
+
+
 def _without(name: str, error: RockfallError) -> str:
     return f"The terrain is shown without the colours of the video {name}: {error}"
 
 
 def _frames(filmed: Filmed, centre: Array, progress: Progress) -> list[Photograph]:
     path = filmed.path
-    video = open_video(filmed.file, progress)
+    video = open_video(filmed.file, progress, rate_hz=filmed.rate_hz)
     size = path.reference.width, path.reference.height
     if size != (video.width, video.height):
         raise RockfallError(

@@ -1,19 +1,33 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Aligning a camera: its lens and pose from the pairs of one frame, and the poses of other frames with enough pairs."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..camera.model import SIGMA_PX, Camera
+from ..camera.model import GUESSED_FOCAL, SIGMA_PX, Camera, pinhole
 from ..camera.pairs import Pairs
 from ..camera.resection.problem import POSE_PAIRS
 from ..camera.resection.resect import POSE, Resection, resect
 from ..errors import InputError, RockfallError
+from ..footage.advice import uneven_pixels
+from ..georeference import GlobalShift
 from ..remarks import Remark
 from ..vectors import Array, Indices, Mask
 from .misread_pairs import check_reading
+
+FREES = (("fx", "fy"), ("c",), ("k1",))
+"""What of a lens is freed to see whether it explains pairs that do not fit."""
+POOR, REDUNDANT = 2.0, 8
+"""Residuals of so many times what was stated, with so many observations to spare: other lenses are tried."""
+BOTH = ("fx", "fy", "c")
+STILL_POOR = 1.5
+EXPLAINS = 0.6
+"""One that leaves less than this part of the residuals explains them."""
+ALIKE = 1.1
+"""Lenses whose residuals differ by less than this factor explain the pairs as well."""
+ASPECT_AGREES = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +41,7 @@ class AlignmentOptions:
     start : what is known of the camera, and where to begin; None when nothing is.
     moves : the camera moves, so that each frame has its own pose.
     frame : the reference frame, which gives the lens; None for that with most pairs.
+    pixel_aspect : width / height of a pixel as the video says.
     robust : leave out pairs that do not fit the others.
     sigma_px, sigma_m : standard deviations of the coordinates of pairs that have none of their own.
     """
@@ -36,6 +51,7 @@ class AlignmentOptions:
     start: Camera | None = None
     moves: bool = False
     frame: int | None = None
+    pixel_aspect: float = 1.0
     robust: bool = True
     sigma_px: float = SIGMA_PX
     sigma_m: float = 0.0
@@ -67,7 +83,8 @@ class Alignment:
     keys : other frames that were solved, with its lens.
     used : (n,) the pairs that counted.
     wrong : (n,) the pairs that were left out because they do not fit the others.
-    remarks : on the other frames; those on the reference frame are `found.remarks`.
+    remarks : on the shape of pixels, the lens, and the other frames; others on the reference frame are
+        `found.remarks`.
     """
 
     frame: int
@@ -133,7 +150,7 @@ def align(pairs: Pairs, options: AlignmentOptions) -> Alignment:
     found = _believed(pairs, np.flatnonzero(here), options)
     used[here], wrong[here] = found.used, ~found.used
     keys: dict[int, Resection] = {}
-    remarks: list[Remark] = []
+    remarks = [*_aspect_remarks(options, found), *_lens_remarks(pairs, np.flatnonzero(here), options, found)]
     for other in np.unique(pairs.frame[pairs.used & ~here]).tolist():
         rows = np.flatnonzero(pairs.used & (pairs.frame == other))
         if rows.size < POSE_PAIRS:
@@ -143,6 +160,94 @@ def align(pairs: Pairs, options: AlignmentOptions) -> Alignment:
             text = f"Frame {other}: {rows.size} pairs fit to {keys[other].rmse_px:.2f} px."
         remarks.append(Remark(text, "note", f"frame {other}"))
     return Alignment(frame, found, keys, used, wrong, tuple(remarks))
+
+
+def with_aspect(size: tuple[int, int], focal_px: float | None, aspect: float, shift: GlobalShift) -> Camera:
+    """A lens without distortion whose pixels have an aspect, for `start`; of a guessed focal length for None."""
+    focal = GUESSED_FOCAL * size[0] if focal_px is None else focal_px
+    return replace(pinhole(*size, focal, shift), fy=focal * aspect)
+
+
+def _aspect_remarks(options: AlignmentOptions, found: Resection) -> Iterator[Remark]:
+    """How the shape of the pixels that the video names was used."""
+    said, solved = options.pixel_aspect, found.camera.fy / found.camera.fx
+    if not uneven_pixels(said) and not uneven_pixels(solved):
+        return
+    if {"fx", "fy"} & set(options.free):
+        if abs(solved / said - 1) > ASPECT_AGREES:
+            text = f"Pixels are {solved:.3f} times as wide as high by the pairs, and {said:.3f} times by the video."
+            yield Remark(text, "note", "focal")
+    elif abs(solved / said - 1) > ASPECT_AGREES:
+        text = (
+            f"The camera that was given has pixels {solved:.3f} times as wide as high, the video {said:.3f} times: "
+            "free fx,fy, or correct fy."
+        )
+        yield Remark(text, "warning", "focal")
+    else:
+        text = f"The video says that pixels are {said:.3f} times as wide as high: fy is {said:.3f} times fx."
+        yield Remark(text, "note", "focal")
+
+
+def _lens_remarks(pairs: Pairs, rows: Indices, options: AlignmentOptions, found: Resection) -> Iterator[Remark]:
+    """What of the lens, if it were free, would explain pairs that do not fit."""
+    if not (found.redundancy >= REDUNDANT and found.scatter > POOR):
+        return
+    tried = _better(pairs, rows, options, found, found.scatter, FREES)
+    least = min((one[0] for one in tried), default=found.scatter)
+    if least > STILL_POOR and (both := _better(pairs, rows, options, found, least, (BOTH,))):
+        tried, least = both, both[0][0]
+    alike = [(more, other) for scatter, more, other in tried if scatter < ALIKE * least]
+    for more, other in alike:
+        yield Remark(_freed(more, other), "advice", "lens")
+    if len(alike) > 1:
+        text = "More than one of these explains the pairs: see what rockfall inspect says of the video, or add pairs."
+        yield Remark(text, "advice", "lens")
+
+
+def _better(
+    pairs: Pairs,
+    rows: Indices,
+    options: AlignmentOptions,
+    found: Resection,
+    scatter: float,
+    frees: Iterable[tuple[str, ...]],
+) -> list[tuple[float, tuple[str, ...], Resection]]:
+    """Scatter, what is freed, and camera of lenses whose residuals are far below those of a scatter."""
+    tried: list[tuple[float, tuple[str, ...], Resection]] = []
+    for more in frees:
+        if set(more) & set(options.free) or ("c" in more and {"cx", "cy"} & set(options.free)):
+            continue
+        kept = tuple(name for name in options.free if not (name == "f" and "fx" in more))
+        try:
+            other = _resected(pairs, rows, options, (*kept, *more), options.start)
+        except RockfallError:
+            continue
+        if other.scatter < EXPLAINS * scatter and other.used.sum() >= found.used.sum():
+            tried.append((other.scatter, more, other))
+    return tried
+
+
+def _freed(more: tuple[str, ...], other: Resection) -> str:
+    """What freeing a part of the lens does."""
+    camera, fit = other.camera, f"they fit to {other.rmse_px:.2g} px"
+    if more == BOTH:
+        return (
+            f"With fx and fy apart and the centre of the lens free {fit}: pixels are {camera.fy / camera.fx:.3f} times "
+            f"as wide as high, the centre is at ({camera.cx:.0f}, {camera.cy:.0f}). Free fx,fy,c."
+        )
+    if "fx" in more:
+        return (
+            f"With fx and fy apart {fit}: pixels are {camera.fy / camera.fx:.3f} times as wide as high, as in a video "
+            "that was stored narrower than it is shown. Free fx,fy."
+        )
+    if "c" in more:
+        across, down = camera.cx - camera.width / 2, camera.cy - camera.height / 2
+        return (
+            f"With the centre of the lens free {fit}: it lies {abs(across):.0f} px to the "
+            f"{'right' if across > 0 else 'left'} of the image's middle and {abs(down):.0f} px "
+            f"{'below' if down > 0 else 'above'} it, as in a video that was cropped or stabilised. Free c."
+        )
+    return f"With the distortion k1 free {fit}. Free k1."
 
 
 def _believed(pairs: Pairs, rows: Indices, options: AlignmentOptions) -> Resection:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..camera.model import project, rays
 from ..footage.kinks import find_kinks
+from ..footage.repeats import repeat_sigma_s, rhythm
 from ..reconstruction.block import Block, per_pick
 from ..reconstruction.motion import GROUNDED
 from ..reconstruction.picks import Picks, make_picks, take
@@ -154,9 +155,20 @@ def find_events(view: View, sightings: Sightings, surface: Surface) -> Events:
         frame=np.where(sightings.frame.min() < 0, -1, frame),
         time_s=kinks.time_s,
         pixel=project(steady, at + far * away, position=place, rotation=turn),
-        sigma_time_s=kinks.sigma_time_s,
+        sigma_time_s=np.hypot(kinks.sigma_time_s, _late_s(sightings)),
         kind=np.full(len(kinks), "impact"),
     )
+
+
+def _late_s(sightings: Sightings) -> float:
+    """What the error of times gets more where a track leaves out frames in a rhythm: repeated pictures [s]."""
+    frame = sightings.frame
+    if frame.size < 2 or frame.min() < 0:
+        return 0.0
+    left_out = np.setdiff1d(np.arange(frame.min(), frame.max() + 1), frame)
+    if not any(rhythm(left_out)):
+        return 0.0
+    return repeat_sigma_s(float(np.ptp(sightings.time_s)) / float(np.ptp(frame)))
 
 
 def _with_kinks(video: SeenVideo, given: set[str], surface: Surface) -> Events:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import RockfallError
+from ..errors import InputError
 from ..progress import Progress, silent
 from ..reconstruction.block import Block
 from ..reconstruction.choices import SIGMA_AIM, Loss
@@ -20,6 +20,8 @@ from ..terrain.surface import Surface
 from ..vectors import Array, Indices, norm
 from .sightings import SeenVideo, Sightings, joined, some
 
+NAMED = 8
+"""Trajectories that a message lists, at most."""
 LEAST_DRAG = 1e-9
 """A fitted drag of zero is none: settings keep a coefficient above zero."""
 
@@ -89,13 +91,13 @@ def refine_picks(
 
     Raises
     ------
-    RockfallError : a trajectory without picks; whatever `refine` refuses.
+    InputError : a trajectory without picks.
+    RockfallError : whatever `refine` refuses.
     """
     if names is not None:
-        known = list(dict.fromkeys(picks.trajectory.tolist()))
         for name in names:
-            if name not in known:
-                raise RockfallError(f"There is no trajectory {name!r}. The picks have: {', '.join(known)}.")
+            if name not in picks.trajectory:
+                raise unknown_trajectory(name, picks)
         picks = take(picks, np.isin(picks.trajectory, list(names)))
         videos = [_only(video, names) for video in videos]
     seen, frame = pixels_of(videos)
@@ -128,6 +130,17 @@ def refine_picks(
         later_s=fit.picks.time_s - before.time_s,
         pose_covariance=tuple(view.pose_covariance if "camera" in free else None for view in fit.views),
         remarks=tuple(gravest_first([*((Remark(text, "note", "pixels"),) if lost else ()), *fit.remarks])),
+    )
+
+
+def unknown_trajectory(name: str, picks: Picks) -> InputError:
+    """That the picks have no trajectory of this name."""
+    known = list(dict.fromkeys(picks.trajectory.tolist()))
+    more = f" and {len(known) - NAMED} more" if len(known) > NAMED else ""
+    return InputError(
+        f"There is no trajectory {name!r}",
+        file=picks.source or None,
+        advice=f"The picks have: {', '.join(known[:NAMED])}{more}",
     )
 
 

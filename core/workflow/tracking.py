@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from ..footage.advice import layered_background
 from ..footage.background import BackgroundMotion, background_motion, no_motion
-from ..footage.sources import kept
+from ..footage.repeats import repeats_sentence
+from ..footage.sources import kept, repeated_in
 from ..footage.tracking import BlockTrack, track_block
 from ..footage.video import Video
 from ..progress import Progress, silent
@@ -18,7 +19,7 @@ type Click = tuple[int, float, float]
 class FollowedBlock(NamedTuple):
     """The block's track, the motion of the background before which it was found, and what a user should know of it.
 
-    said : a sentence, empty where there is nothing to say.
+    said : sentences, empty where there is nothing to say.
     """
 
     track: BlockTrack
@@ -54,6 +55,7 @@ def follow_block(
         background = no_motion(first, last)
     else:
         background, _ = background_motion(source, first=first, last=last, progress=progress)
+    repeated = repeated_in(source, first, last, progress)
     track = track_block(
         source,
         frame,
@@ -63,6 +65,11 @@ def follow_block(
         background=background,
         first=first,
         last=last,
+        repeated=repeated,
         progress=progress,
     )
-    return FollowedBlock(track, background, layered_background(background, video.width))
+    said = [
+        layered_background(background, video.width),
+        repeats_sentence(repeated, last - first + 1, video.rate_hz),
+    ]
+    return FollowedBlock(track, background, " ".join(text for text in said if text))

@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.footage.sequences import sequence_beside
 from ...core.footage.video import Image
 from ...core.vectors import Array
 from . import camera_paths, clocks, migration, store, video_files, videos
@@ -60,7 +61,8 @@ def show_pictures(scene: bpy.types.Scene, cameras: list[bpy.types.Object]) -> No
         times = videos.times_of(camera)
         slack = clocks.tolerance_s(times)
         index = clocks.index_at(times, clocks.video_time(scene, camera), slack)
-        position, exact = clip_position(times, index, clip.fps, clip.frame_duration, slack)
+        position, exact = clip_position(times, index, *_counting(camera, clip, times), slack)
+        exact = exact and shows_pictures(camera, clip)
         offset = position - int(clocks.current_frame(scene)) + clip.frame_start
         if clip.frame_offset != offset:
             clip.frame_offset = offset
@@ -91,10 +93,25 @@ def hidden(camera: bpy.types.Object) -> int:
     if clip is None or not clip.fps > 0:
         return 0
     times = videos.times_of(camera)
+    if not shows_pictures(camera, clip):
+        return times.size
     slack = clocks.tolerance_s(times)
     position = np.ceil((times - slack) * clip.fps - 1e-9)
     seen = (position / clip.fps < np.append(times[1:], np.inf) - slack) & (position < clip.frame_duration)
     return int((~seen).sum())
+
+
+def shows_pictures(camera: bpy.types.Object, clip: bpy.types.MovieClip) -> bool:
+    """Whether Blender's clip shows the pictures that are used: it knows the first stream of a file alone."""
+    return not videos.facts_of(camera).get("other_stream", False)
+
+
+def _counting(camera: bpy.types.Object, clip: bpy.types.MovieClip, times: Array) -> tuple[float, int]:
+    """Rate [Hz] and length by which a clip counts: the numbers of files in a sequence, of which some may be missing."""
+    rate = video_files.sequence_rate_of(camera)
+    if rate is None:
+        return clip.fps, clip.frame_duration
+    return rate, round(float(times[-1] - times[0]) * rate) + 1
 
 
 def remove(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
@@ -125,7 +142,8 @@ def relink(camera: bpy.types.Object, path: str | Path) -> list[str]:
     RockfallError : the file is no video, or one of another size: its pixels would be others.
     """
     old, (width, height) = videos.times_of(camera), videos.size_of(camera)
-    video = video_files.opened(path)
+    rate = video_files.sequence_rate_of(camera)
+    video = video_files.opened(path if rate is None else sequence_beside(Path(path)), rate)
     if (video.width, video.height) != (width, height):
         raise RockfallError(
             f"{video.path.name} has {video.width} × {video.height} px, the video of {camera.name} has {width} × "
@@ -158,7 +176,8 @@ def _show_still(scene: bpy.types.Scene, camera: bpy.types.Object, index: int | N
     """Show a picture in front of the clip, or, for None, the clip."""
     clip, still = (_background(camera, source) for source in ("MOVIE_CLIP", "IMAGE"))
     screen = bpy.context.screen
-    if index is not None and (screen is None or not screen.is_animation_playing):
+    playing = screen is not None and screen.is_animation_playing
+    if index is not None and (not playing or not shows_pictures(camera, video_files.clip_of(camera))):
         try:
             still = still or camera.data.background_images.new()
             still.source, still.frame_method = "IMAGE", "STRETCH"

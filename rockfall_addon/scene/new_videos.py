@@ -16,18 +16,21 @@ from . import camera_paths, clocks, migration, store, video_files, videos
 FAR_M, NEAR_M = 20_000.0, 0.1
 
 
-def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None = None) -> bpy.types.Object:
+def add_video(
+    scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None = None, rate_hz: float | None = None
+) -> bpy.types.Object:
     """Read a video's timestamps and make its camera; the first video gives the scene its frame rate and its range.
 
     Parameters
     ----------
     matrix : where the camera stands until it is aligned; at the origin, towards +y, without.
+    rate_hz : of a sequence of pictures.
 
     Raises
     ------
     RockfallError : the file is no video that can be used. The scene is as it was.
     """
-    video = video_files.opened(path)
+    video = video_files.opened(path, rate_hz)
     others = videos.cameras(scene)
     camera = add_camera(scene, video)
     if others:  # until they are synchronised, they begin together
@@ -42,7 +45,7 @@ def add_video(scene: bpy.types.Scene, path: str | Path, *, matrix: Matrix | None
 
 def add_camera(scene: bpy.types.Scene, video: Video) -> bpy.types.Object:
     """The camera of a video that was opened, looking towards +y."""
-    name = video.path.stem
+    name = video.pictures[0].stem if video.pictures else video.path.stem
     data = bpy.data.cameras.new(name)
     data.clip_start, data.clip_end, data.passepartout_alpha = NEAR_M, FAR_M, 0.7
     data.show_background_images = True

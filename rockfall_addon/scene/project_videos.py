@@ -11,12 +11,14 @@ import numpy as np
 
 from ...core.camera.model import SIGMA_PX
 from ...core.exchange.cameras import CameraFile, write_camera
+from ...core.exchange.footage import open_entry
 from ...core.exchange.footage_tables import Track, read_track, write_track
 from ...core.exchange.opening import read_project_camera
 from ...core.exchange.project import Project, VideoEntry
 from ...core.exchange.spin_tables import read_spin_marks, write_spin_marks
 from ...core.footage.clock import Clock, clock_for
-from ...core.footage.video import Video, open_video
+from ...core.footage.sequences import is_there
+from ...core.footage.video import Video
 from ...core.georeference import GlobalShift
 from ...core.terrain.surface import Surface
 from ...core.workflow.spin_marks import SpinMarks
@@ -156,6 +158,7 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
                 drift=clock.drift,
                 origin_s=clock.origin_s,
                 capture_rate_hz=videos.capture_rate_of(camera),
+                rate_hz=video_files.sequence_rate_of(camera),
                 row_time_s=videos.row_time_of(camera),
                 **files,
             )
@@ -165,8 +168,8 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
 
 def _video(entry: VideoEntry, camera: CameraFile | None, track: Track | None) -> Video | None:
     """The file, or, where it has moved, what the camera and the track tell of it; None when that is nothing."""
-    if entry.file is not None and entry.file.is_file():
-        return open_video(entry.file)
+    if entry.file is not None and is_there(entry.file):
+        return open_entry(entry)
     times = camera.path.time_s if camera is not None and not camera.path.is_fixed else None
     if times is None and track is not None and len(track):
         times = np.unique(track.time_s)

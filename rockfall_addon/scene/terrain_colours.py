@@ -7,6 +7,7 @@ import json
 import bpy
 import numpy as np
 
+from ...core.footage.sequences import is_there
 from ...core.outreach.photographs import Filmed
 from ...core.terrain.surface import Surface
 from . import camera_paths, materials, store, terrain_mesh, video_files, videos
@@ -54,9 +55,14 @@ def have(scene: bpy.types.Scene, name: str) -> bool:
 def filmed(scene: bpy.types.Scene) -> tuple[Filmed, ...]:
     """The scene's videos whose cameras are solved and whose files are there."""
     return tuple(
-        Filmed(camera.name, video_files.file_of(camera), camera_paths.camera_path(camera))
+        Filmed(
+            camera.name,
+            video_files.file_of(camera),
+            camera_paths.camera_path(camera),
+            video_files.sequence_rate_of(camera),
+        )
         for camera in _solved(scene)
-        if video_files.file_of(camera).is_file()
+        if is_there(video_files.file_of(camera))
     )
 
 

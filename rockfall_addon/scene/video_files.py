@@ -9,13 +9,15 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
-from ...core.footage.advice import content_advice, rate_advice
+from ...core.footage.advice import content_advice, proposed_capture_rate, rate_advice
+from ...core.footage.sequences import is_there, sequence_beside
+from ...core.footage.sources import repeats_at_a_glance
 from ...core.footage.video import Image, Video, open_video, read_frame
 from . import store, videos
 
 KEPT_PICTURES = 6
 
-_videos: dict[tuple[str, float], Video] = {}
+_videos: dict[tuple[str, float, float | None], Video] = {}
 _pictures: OrderedDict[tuple[str, float, int], Image] = OrderedDict()
 
 
@@ -32,6 +34,10 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
         "header_frames": video.header_frames,
         "pixel_aspect": video.pixel_aspect,
         "rate_hz": video.rate_hz if np.isfinite(video.rate_hz) else 0.0,
+        "named_capture_rate_hz": proposed_capture_rate(video.facts, video.rate_hz) or 0.0,
+        "named_capture_rate_in": video.facts.capture_rate_name,
+        "sequence_rate_hz": video.header_rate_hz if video.pictures else 0.0,
+        "other_stream": video.facts.used != 0,
         "remarks": content_advice(video),
         "advice": rate_advice(video, capture_rate_hz=videos.capture_rate_of(camera)),
     }
@@ -39,14 +45,22 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
     for old in list(camera.data.background_images):
         old.clip = old.image = None  # removing does not count down their users
         camera.data.background_images.remove(old)
-    if not video.path.is_file():  # of a project whose video has moved
+    if not is_there(video.path):  # of a project whose video has moved
         return
-    clip = bpy.data.movieclips.load(camera[store.VIDEO_FILE])
+    clip = bpy.data.movieclips.load(str(video.pictures[0].resolve()) if video.pictures else camera[store.VIDEO_FILE])
     clip.name = camera.name
     background = camera.data.background_images.new()
     background.source, background.clip = "MOVIE_CLIP", clip
     background.frame_method = "STRETCH"  # fills the frame to the pixel; fitting could leave a seam
     background.alpha = 1.0
+
+
+def note_repeats(camera: bpy.types.Object) -> None:
+    """Add to what is said of a video that its pictures repeat, as a glance at it tells."""
+    text = repeats_at_a_glance(video_of(camera))
+    if text:
+        facts = videos.facts_of(camera)
+        camera[store.VIDEO_FACTS] = json.dumps(facts | {"remarks": [*facts.get("remarks", ()), text]})
 
 
 def clip_of(camera: bpy.types.Object) -> bpy.types.MovieClip | None:
@@ -59,11 +73,16 @@ def file_of(camera: bpy.types.Object) -> Path:
     """The video file, which may have moved; where Blender was told of another place, that."""
     stored = Path(bpy.path.abspath(str(camera.get(store.VIDEO_FILE, ""))))
     clip = clip_of(camera)
-    if not stored.is_file() and clip is not None:
+    if not is_there(stored) and clip is not None:
         elsewhere = Path(bpy.path.abspath(clip.filepath))
         if elsewhere.is_file():
-            return elsewhere
+            return sequence_beside(elsewhere) if clip.source == "SEQUENCE" else elsewhere
     return stored
+
+
+def sequence_rate_of(camera: bpy.types.Object) -> float | None:
+    """Pictures per second of a sequence of pictures; None for a video file."""
+    return float(videos.facts_of(camera).get("sequence_rate_hz", 0.0)) or None
 
 
 def stored_video(camera: bpy.types.Object) -> Video:
@@ -93,12 +112,12 @@ def video_of(camera: bpy.types.Object) -> Video:
     RockfallError : the file has moved, or is none any more.
     """
     path = file_of(camera)
-    if not path.is_file():
+    if not is_there(path):
         raise RockfallError(
             f"The video {path.name} is not at {path.parent} any more. Nothing is lost: use Find the File in the "
             "Videos panel."
         )
-    return opened(path)
+    return opened(path, sequence_rate_of(camera))
 
 
 def picture(camera: bpy.types.Object, index: int) -> Image:
@@ -109,7 +128,8 @@ def picture(camera: bpy.types.Object, index: int) -> Image:
     RockfallError : the file has moved, or the frame cannot be decoded.
     """
     video = video_of(camera)
-    key = (str(video.path), video.path.stat().st_mtime, int(index))
+    file = video.pictures[index] if video.pictures else video.path
+    key = (str(file), file.stat().st_mtime, int(index))
     if key not in _pictures:
         _pictures[key] = np.ascontiguousarray(read_frame(video, int(index))[:, :, ::-1])
         while len(_pictures) > KEPT_PICTURES:
@@ -118,17 +138,18 @@ def picture(camera: bpy.types.Object, index: int) -> Image:
     return _pictures[key]
 
 
-def opened(path: str | Path) -> Video:
-    """A video file, opened; it is opened once.
+def opened(path: str | Path, rate_hz: float | None = None) -> Video:
+    """A video file, or a sequence of pictures of a rate, opened; it is opened once.
 
     Raises
     ------
     RockfallError : the file is no video that can be used.
     """
     path = Path(path)
-    key = (str(path), path.stat().st_mtime if path.is_file() else 0.0)
+    there = next((one for one in (path, path.parent) if one.exists()), None)
+    key = (str(path), 0.0 if there is None else there.stat().st_mtime, rate_hz)
     if key not in _videos:
-        _videos[key] = open_video(path)
+        _videos[key] = open_video(path, rate_hz=rate_hz)
     return _videos[key]
 
 

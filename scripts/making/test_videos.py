@@ -47,6 +47,51 @@ def make(name, codec, times, base, *, rate=30, pixels="yuv420p", numbers=None, o
             container.mux(packet)
 
 
+def two_streams(name: str) -> None:
+    """Write a small stream of 10 pictures a second before one of the usual size and 30: both show their numbers."""
+    with av.open(str(FOLDER / name), "w", options={"fflags": "+bitexact"}) as container:
+        streams = []
+        for rate, size in ((10, (WIDTH // 2, HEIGHT // 2)), (30, (WIDTH, HEIGHT))):
+            stream = container.add_stream("libx264", rate=rate, options=H264 | {"bf": "0", "g": "12"})
+            stream.width, stream.height = size
+            stream.pix_fmt = "yuv420p"
+            streams.append((stream, rate, size))
+        for stream, rate, (width, height) in streams:
+            for number in range(rate):
+                frame = picture(number).reformat(width, height)
+                frame.pts, frame.time_base = number, Fraction(1, rate)
+                for packet in stream.encode(frame):
+                    container.mux(packet)
+            for packet in stream.encode():
+                container.mux(packet)
+
+
+def disc(number: int, rng: np.random.Generator, ground: np.ndarray) -> av.VideoFrame:
+    """A disc on its way over noisy ground, as it is at a number."""
+    v, u = np.mgrid[: ground.shape[0], : ground.shape[1]]
+    image = np.where(np.hypot(u - 12 - 3 * number, v - 20 - number) < 5, 215.0, ground)
+    image = np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+    return av.VideoFrame.from_ndarray(np.repeat(image[:, :, None], 3, axis=2), format="rgb24")
+
+
+def repeated(name: str, each: int, quality: int) -> None:
+    """Write 40 frames of which each picture is stored so many times."""
+    rng = np.random.default_rng(7)
+    ground = np.kron(110 + 18 * rng.normal(size=(24, 40)), np.ones((4, 4)))
+    with av.open(str(FOLDER / name), "w", options={"fflags": "+bitexact"}) as container:
+        stream = container.add_stream("libx264", rate=30, options={"crf": str(quality)})
+        stream.height, stream.width = ground.shape
+        stream.pix_fmt = "yuv420p"
+        taken = [disc(number, rng, ground).to_ndarray(format="rgb24") for number in range(40 // each)]
+        for number in range(40):
+            frame = av.VideoFrame.from_ndarray(taken[number // each], format="rgb24")
+            frame.pts, frame.time_base = number, Fraction(1, 30)
+            for packet in stream.encode(frame):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
+
+
 def sound(name: str) -> None:
     with av.open(str(FOLDER / name), "w") as container:
         stream = container.add_stream("aac", rate=8000)
@@ -118,6 +163,12 @@ def main() -> None:
     make("single.mp4", "libx264", even[:1], FINE, options=H264)
     make("no_times.h264", "libx264", even[:12], Fraction(1, 30), options=H264 | {"bf": "0"})
     make("interlaced.mp4", "libx264", even[:12], FINE, options=H264 | {"flags": "+ildct+ilme"})
+    make("ten_bits.mp4", "libx264", even[:12], FINE, pixels="yuv420p10le", options=H264 | {"bf": "0"})
+    make("full_range.mp4", "libx264", even[:12], FINE, pixels="yuvj420p", options=H264 | {"bf": "0"})
+    two_streams("two_streams.mp4")
+    repeated("halves_crf20.mp4", 2, 20)
+    repeated("halves_crf34.mp4", 2, 34)
+    repeated("none_crf34.mp4", 1, 34)
     sound("sound.mp4")
     shorten("cut.mp4", "constant.mp4", 0.6)
     shorten("cut.mkv", "variable.mkv", 0.6)

@@ -56,7 +56,7 @@ def camera(part, scene, monkeypatch):
         one = video.open_video(FOOTAGE / "footage.mp4")
         _opened.update({field.name: getattr(one, field.name) for field in fields(one)})
     kept = video.Video(**_opened)
-    monkeypatch.setattr(part("rockfall_addon.scene.video_files"), "open_video", lambda path: kept)
+    monkeypatch.setattr(part("rockfall_addon.scene.video_files"), "open_video", lambda path, **_: kept)
     part("rockfall_addon.scene.georeference").write_shift(
         scene, part("core.georeference").GlobalShift(988400, 6375600, 0)
     )

@@ -2,6 +2,7 @@
 """Aligning once, for the command line and Blender: which pairs count, which frames are solved, where the path goes."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from rockfall.core.camera.path import CameraPath, bent_through, camera_at, fixed
 from rockfall.core.camera.resection.problem import needed_pairs
 from rockfall.core.camera.resection.resect import resect
 from rockfall.core.errors import InputError
+from rockfall.core.exchange.cameras import read_pairs
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.vectors import norm
-from rockfall.core.workflow.alignment import AlignmentOptions, align, counting_pairs, reference_frame
+from rockfall.core.workflow.alignment import AlignmentOptions, align, counting_pairs, reference_frame, with_aspect
 
 SIZE = (1920, 1080)
 START = look_at(*SIZE, (-40.0, -55.0, 12.0), (0.0, 0.0, 20.0), focal_px=1500)
@@ -130,3 +132,60 @@ def test_a_bent_path_goes_through_the_solved_frames() -> None:
     assert bent.reference is START
     turn = bent.rotation[4] @ path.rotation[4].T
     assert np.arccos((np.trace(turn) - 1) / 2) == pytest.approx(norm(np.array([0.0, 0.2, 0.02])) / 2, rel=1e-6)
+
+
+FIELD = Path(__file__).parent.parent / "data" / "field_cases" / "10-nonsquare-camera"
+
+
+def lens_remarks(name: str, options: AlignmentOptions) -> list[str]:
+    found = align(read_pairs(FIELD / f"{name}.csv"), options)
+    return [remark.text for remark in found.remarks if remark.about in ("lens", "focal")]
+
+
+def test_pixels_that_are_not_square_are_found_and_the_lens_to_free_is_named() -> None:
+    """The pairs were made with pixels 10 / 11 as wide as high, fx 1980 px, and 0.4 px of noise."""
+    (said,) = lens_remarks("nonsq", AlignmentOptions(SIZE))
+    assert said.startswith("With fx and fy apart they fit to 0.36 px: pixels are 0.911 times as wide as high")
+    assert said.endswith("Free fx,fy.")
+    assert lens_remarks("nonsq", AlignmentOptions(SIZE, free=("fx", "fy"), pixel_aspect=0.911)) == []
+
+
+def test_the_pixels_that_the_video_names_are_held() -> None:
+    pairs = read_pairs(FIELD / "nonsq.csv")
+    start = with_aspect(SIZE, None, 10 / 11, pairs.shift)
+    found = align(pairs, AlignmentOptions(SIZE, start=start, pixel_aspect=10 / 11))
+    camera = found.found.camera
+    assert camera.fy / camera.fx == pytest.approx(10 / 11)
+    assert camera.fx == pytest.approx(1980, rel=0.01)
+    assert found.found.rmse_px < 0.5
+    assert [remark.text for remark in found.remarks] == [
+        "The video says that pixels are 0.909 times as wide as high: fy is 0.909 times fx."
+    ]
+    square = AlignmentOptions(SIZE, start=with_aspect(SIZE, None, 1.0, pairs.shift), pixel_aspect=10 / 11)
+    assert "the video 0.909 times: free fx,fy" in align(pairs, square).remarks[0].text
+    free = AlignmentOptions(SIZE, free=("fx", "fy"), pixel_aspect=1.2)
+    assert (
+        "0.911 times as wide as high by the pairs, and 1.200 times by the video" in align(pairs, free).remarks[0].text
+    )
+
+
+def test_a_centre_of_the_lens_off_the_middle_is_found() -> None:
+    """The pairs were made with the principal point at (1100, 473) of 1920 × 1080 px."""
+    (said,) = lens_remarks("pp", AlignmentOptions(SIZE))
+    assert "it lies 140 px to the right of the image's middle and 67 px above it" in said
+    assert said.endswith("cropped or stabilised. Free c.")
+    pairs = read_pairs(FIELD / "pp.csv")
+    both = AlignmentOptions(SIZE, start=with_aspect(SIZE, None, 10 / 11, pairs.shift), pixel_aspect=10 / 11)
+    assert any(remark.text.endswith("Free fx,fy,c.") for remark in align(pairs, both).remarks)
+
+
+def test_pairs_that_fit_are_given_no_other_lens() -> None:
+    pairs = marked({0: (START, 20)})
+    assert align(pairs, AlignmentOptions(SIZE)).remarks == ()
+
+
+def test_distortion_is_named_where_it_explains_the_pairs() -> None:
+    bent = replace(START, k1=-0.2)
+    (remark,) = align(marked({0: (bent, 30)}), AlignmentOptions(SIZE)).remarks
+    assert remark.text.startswith("With the distortion k1 free they fit to")
+    assert remark.text.endswith("Free k1.")

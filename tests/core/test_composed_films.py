@@ -4,6 +4,7 @@
 import csv
 import errno
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -15,7 +16,7 @@ from rockfall.core.film.composed.blocks import Pose, draw_block, draw_shadow, su
 from rockfall.core.film.composed.canvas import Canvas, text_width
 from rockfall.core.film.composed.catalogue import FILMS, PICTURES, compose
 from rockfall.core.film.composed.envelope import envelope
-from rockfall.core.film.composed.falls import Fall
+from rockfall.core.film.composed.falls import Fall, Hits
 from rockfall.core.film.composed.frame_store import frame_store
 from rockfall.core.film.composed.ground import ground_picture, lit_ground
 from rockfall.core.film.composed.kinds import KINDS, NAMES, find_kind
@@ -27,9 +28,13 @@ from rockfall.core.film.composed.scenery import Scene, draw_paths, keys_of
 from rockfall.core.film.composed.shots import ComposedFilm, Shot
 from rockfall.core.film.composed.sight import whole
 from rockfall.core.film.composed.solids import SOLIDS, solid
+from rockfall.core.film.composed.stage import Plate, slope_camera
+from rockfall.core.film.composed.templates import story
+from rockfall.core.film.composed.templates.cards import restitution_of, speeds_of
 from rockfall.core.film.composed.templates.stills import median_picture
 from rockfall.core.film.composed.texts import languages, texts
 from rockfall.core.georeference import GlobalShift
+from rockfall.core.impact_models.registry import find_model
 from rockfall.core.terrain.surface import Surface
 
 DEMO = Path(__file__).parents[2] / "assets" / "demo" / "footage"
@@ -44,8 +49,6 @@ def plane(z: float = 0.0, half: float = 60.0) -> Surface:
 
 def bent_camera() -> Camera:
     """With a lens that bends by some 12 px at the border, looking at the origin from 20 m."""
-    from dataclasses import replace
-
     seen = look_at(*SIZE, [2.0, -20.0, 9.0], [0.5, 0.3, 0.0], focal_px=700.0)
     return replace(seen, k1=-0.18, k2=0.05, p1=1.5e-3, p2=-8e-4, cx=331.0, cy=172.5)
 
@@ -236,6 +239,59 @@ def test_the_corridor_holds_95_percent_of_straight_paths() -> None:
     near = outline[np.abs(outline[:, 0] - 30.0) < 1.0]
     assert np.abs(near[:, 1]) == pytest.approx(np.abs(near[:, 0] * np.tan(1.96 * np.radians(5.0))), rel=0.08)
     assert envelope(falls[:5], plane()) is None
+
+
+def test_numbers_of_unknown_error_are_approximate_and_others_have_theirs() -> None:
+    said = texts("en")
+    assert said.about(16.62, 0.7) == "16.6 ± 0.7"
+    assert said.about(12.246, 0.081) == "12.25 ± 0.08"
+    assert said.about(12.246, np.nan) == "≈ 12"
+    assert texts("de").about_energy(3220.0, 90.0) == "3,22 ± 0,09 kJ"
+    one = np.ones(1)
+    hits = Hits(np.ones(1, np.intp), one, np.zeros((1, 3)), 8 * one, 5 * one, one, one, 0.51 * one,
+                0.1 * one, 0.2 * one, one, one, np.array([[0.44, 0.59]]))  # fmt: skip
+    assert speeds_of(hits, 0, said) == "8.0 ± 0.1 → 5.0 ± 0.2 m/s"
+    assert restitution_of(hits, 0, said) == "R_N 0.51 (0.44–0.59, 95 %)"
+    unknown = replace(
+        hits, speed1_sigma_mps=np.nan * one, speed2_sigma_mps=np.nan * one, rn_ends=np.full((1, 2), np.nan)
+    )
+    assert speeds_of(unknown, 0, said) == "≈ 8.0 → ≈ 5.0 m/s"
+    assert restitution_of(unknown, 0, said) == "R_N ≈ 0.51"
+
+
+def test_a_film_of_impacts_that_were_not_refined_calls_them_approximate() -> None:
+    """The demo's footage has no picks: its errors are those of times alone, and are not shown."""
+    material = open_material(FilmRequest("overlay", DEMO / "project.toml"))
+    assert material.is_unrefined
+    assert material.words.say("measured") == "Measured approximately, not refined"
+    assert [key.text for key in keys_of(material.scene(material.falls), material.words)] == [
+        "Measured approximately, not refined"
+    ]
+    hits = material.falls[0].hits
+    assert hits is not None
+    assert np.isnan(hits.speed1_sigma_mps).all()
+    assert np.isnan(hits.rn_ends).all()
+
+
+def test_each_model_with_chance_has_its_own_corridor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None is drawn about the blocks of several models, or about those of a model without chance."""
+    models = ("azimi_desvarreux_1977", "dorren_2015", "noel_2017")
+    material = open_material(FilmRequest("story", DEMO / "project.toml", width=320, height=180, models=models))
+    time, groups = np.linspace(0, 1, 5), []
+    start = material.falls[0].position[0]
+    falls = tuple(
+        Fall(f"B {i}", name, (0, 0, 0), time, start + time[:, None] * [i % 7, -9.0, -1.0], np.zeros((5, 3)),
+             np.zeros(5, np.intp), np.ones(3), 1.0)
+        for name in ("Azimi & Desvarreux 1977, without chance", *(find_model(one).title for one in models[1:]))
+        for i in range(25)
+    )  # fmt: skip
+    kept = story.envelope
+    monkeypatch.setattr(
+        story, "envelope", lambda own, surface: groups.append({fall.group for fall in own}) or kept(own, surface)
+    )
+    plate = Plate(material.ground, slope_camera(material, material.falls, material.size, story.ABOVE_LEGEND))
+    story.all_traces(material, plate, (*material.falls, *falls))
+    assert groups == [{find_model(name).title} for name in models[1:]]
 
 
 def test_texts_say_the_same_in_every_language() -> None:

@@ -13,8 +13,8 @@ import pytest
 import rockfall.core.footage.video as module
 from rockfall.core.errors import InputError
 from rockfall.core.footage.containers import container_of
-from rockfall.core.footage.mp4_index import indexed_frames
 from rockfall.core.footage.video import frame_at, open_video, read_frame, read_frames
+from rockfall.core.formats.mp4 import indexed_frames
 from rockfall.core.opencv import FFMPEG_QUIET
 
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", FFMPEG_QUIET)  # read once a process, by whoever is first

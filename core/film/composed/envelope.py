@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The corridor that holds 95 % of simulated paths."""
+"""The corridor that holds 95 % of the paths that a model with chance simulates."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ ABOVE_M = 200.0
 
 
 def envelope(falls: Sequence[Fall], surface: Surface, share: float = SHARE) -> Array | None:
-    """Outline of the corridor, on the terrain.
+    """Outline of the corridor of the blocks of one model, on the terrain.
 
     Returns
     -------

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...analysis.predicted_flights import PredictedFlights
 from ...camera.model import rotation_from_vector
+from ...exchange.footage import UNREFINED
 from ...reconstruction.block import Block
 from ...reconstruction.sampling import TrajectorySamples, sample_trajectories
 from ...reconstruction.trajectory import Reconstruction
@@ -37,6 +38,8 @@ class Hits:
     speed1_mps, speed2_mps : (k,) before and after [m/s]; NaN where undefined.
     energy1_j, energy2_j : (k,) translational [J].
     rn : (k,) [-].
+    speed1_sigma_mps, speed2_sigma_mps, energy1_sigma_j, energy2_sigma_j : (k,) standard deviations, NaN where unknown.
+    rn_ends : (k, 2) 95 % interval, NaN where unknown.
     """
 
     number: Indices
@@ -47,6 +50,11 @@ class Hits:
     energy1_j: Array
     energy2_j: Array
     rn: Array
+    speed1_sigma_mps: Array
+    speed2_sigma_mps: Array
+    energy1_sigma_j: Array
+    energy2_sigma_j: Array
+    rn_ends: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,11 +305,20 @@ def _with_hits(fall: Fall, result: Reconstruction) -> Fall:
     rows = np.flatnonzero(impacts.trajectory == fall.name)
     places = [fall.state(float(time)) for time in impacts.time_s[rows]]
     position = np.array([impacts.position[row] if at is None else at[0] for row, at in zip(rows, places, strict=True)])
+    before, after = norm(impacts.v1[rows]), norm(impacts.v2[rows])
+    unknown, ends = np.full(len(impacts), np.nan), np.full((len(impacts), 2), np.nan)
+    refined = all(remark.text != UNREFINED for remark in result.remarks)  # else the errors are those of times alone
+    sigma, intervals = (impacts.sigma, impacts.intervals) if refined else ({}, {})
+    energy1, energy2 = (sigma.get(name, unknown)[rows] for name in ("kinetic1_j", "kinetic2_j"))
+    mass = np.broadcast_to(impacts.mass_kg, unknown.shape)[rows]
+    with np.errstate(invalid="ignore", divide="ignore"):  # of ½mv²
+        speed1, speed2 = energy1 / (mass * before), energy2 / (mass * after)
     return replace(
         fall,
         hits=Hits(
-            impacts.impact[rows], impacts.time_s[rows], position.reshape(-1, 3), norm(impacts.v1[rows]),
-            norm(impacts.v2[rows]),
+            impacts.impact[rows], impacts.time_s[rows], position.reshape(-1, 3), before, after,
             impacts.kinetic1_j[rows], impacts.kinetic2_j[rows], impacts.rn[rows],
+            speed1, speed2, energy1, energy2,
+            intervals.get("rn", ends)[rows],
         ),
     )  # fmt: skip

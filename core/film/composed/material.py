@@ -11,10 +11,9 @@ import numpy as np
 from ...analysis.comparison import compare
 from ...analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...errors import InputError
-from ...exchange.footage import UNREFINED, clock_of, measured_in
+from ...exchange.footage import UNREFINED, clock_of, measured_in, open_entry
 from ...exchange.opening import blocks_of, open_terrain, read_project_camera
 from ...exchange.project import Project, VideoEntry, read_project
-from ...footage.video import open_video
 from ...impact_models.registry import COMPARED, find_model
 from ...progress import Progress, silent
 from ...reconstruction.trajectory import Reconstruction
@@ -78,6 +77,11 @@ class Material:
     def title(self) -> str:
         """The site's name, or the project's."""
         return self.project.site.name or self.request.project.absolute().parent.name
+
+    @property
+    def is_unrefined(self) -> bool:
+        """Whether the paths join impacts as they were seen in the videos, so that numbers are approximate."""
+        return UNREFINED in self.remarks
 
     @property
     def credit_lines(self) -> list[str]:
@@ -225,11 +229,12 @@ def open_material(request: FilmRequest, progress: Progress = silent) -> Material
     RockfallError : the project, a file of it or the request is bad; there is nothing measured to show.
     """
     progress("Reading the project", 0, 0)
-    words = texts(request.language)
     project = read_project(request.project)
     surface = open_terrain(project)
     result = measured_in(project, surface)
-    remarks = [UNREFINED] if any(remark.text == UNREFINED for remark in result.remarks) else []
+    unrefined = any(remark.text == UNREFINED for remark in result.remarks)
+    remarks = [UNREFINED] if unrefined else []
+    words = texts(request.language).measured_roughly() if unrefined else texts(request.language)
     footage = _footage(project, surface, request.video, progress)
     known = list(dict.fromkeys(result.picks.trajectory.tolist()))
     wrong = [name for name in request.trajectories if name not in known]
@@ -277,9 +282,8 @@ def _footage(project: Project, surface: Surface | None, asked: str, progress: Pr
     if not entries:
         return None
     entry: VideoEntry = entries[0]
-    assert entry.file is not None
     assert entry.camera is not None
-    video = open_video(entry.file, progress)
+    video = open_entry(entry, progress)
     camera, _ = read_project_camera(entry.camera, surface)
     if (camera.path.reference.width, camera.path.reference.height) != (video.width, video.height):
         ours = camera.path.reference

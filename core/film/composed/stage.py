@@ -247,13 +247,14 @@ class Stage:
             return []
         fall, (place, velocity) = max(known, key=lambda one: float(norm(one[1][1])))
         speed = float(norm(velocity))
-        lines = [f"{words.say('speed')} {words.number(speed, 2)} m/s"]
+        about = "≈ " if self.material.is_unrefined else ""
+        lines = [f"{words.say('speed')} {about}{words.number(speed, 2)} m/s"]
         if speed > 0:
-            lines.append(f"{words.say('energy')} {words.energy(0.5 * fall.mass_kg * speed**2)}")
+            lines.append(f"{words.say('energy')} {about}{words.energy(0.5 * fall.mass_kg * speed**2)}")
         if self.scene.terrain is not None:
             height = float(heights_above(self.scene.terrain, place[None])[0]) - fall.radius_m
             if np.isfinite(height) and height > HEIGHT_SAID_M:
-                lines.append(f"{words.say('height')} {words.number(height, 2)} m")
+                lines.append(f"{words.say('height')} {about}{words.number(height, 2)} m")
         return lines
 
     def draw_size(self, canvas: Canvas, camera: Camera) -> None:

@@ -4,7 +4,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from math import floor, log10
 from pathlib import Path
+
+import numpy as np
 
 from ...errors import InputError
 from ...exchange.toml_text import read_toml
@@ -40,12 +43,19 @@ class Texts:
         """A number with so many significant digits, never in powers of ten, thousands apart."""
         if value == 0 or value != value:
             return "0" if value == 0 else "–"
-        from math import floor, log10
-
         rounded = float(f"{value:.{digits - 1}e}")
         decimals = max(digits - 1 - floor(log10(abs(rounded))), 0)
         whole, _, part = f"{rounded:,.{decimals}f}".replace(",", THIN_SPACE).partition(".")
         return f"{whole}{self.words['decimal']}{part}" if part else whole
+
+    def about(self, value: float, sigma: float, digits: int = 2) -> str:
+        """A number with its standard deviation, to the last digit that means something; "≈" where that is not known."""
+        if not (np.isfinite(value) and np.isfinite(sigma) and sigma > 0):
+            return f"≈ {self.number(value, digits)}"
+        decimals = max(-floor(log10(sigma)), 0)
+        return f"{value:,.{decimals}f} ± {sigma:,.{decimals}f}".replace(",", THIN_SPACE).replace(
+            ".", self.words["decimal"]
+        )
 
     def mass(self, mass_kg: float) -> str:
         """kg, or t from a tonne on."""
@@ -53,10 +63,17 @@ class Texts:
 
     def energy(self, joule: float) -> str:
         """J, kJ or MJ."""
-        for size, unit in ((1e6, "MJ"), (1e3, "kJ")):
-            if joule >= size:
-                return f"{self.number(joule / size, 2)} {unit}"
-        return f"{self.number(joule, 2)} J"
+        size, unit = _energy_unit(joule)
+        return f"{self.number(joule / size, 2)} {unit}"
+
+    def about_energy(self, joule: float, sigma_j: float) -> str:
+        """J, kJ or MJ, with the standard deviation."""
+        size, unit = _energy_unit(joule)
+        return f"{self.about(joule / size, sigma_j / size)} {unit}"
+
+    def measured_roughly(self) -> "Texts":
+        """The same words, in which what is measured is called approximate."""
+        return Texts(self.language, {**self.words, "measured": self.words["measured_roughly"]})
 
     def pace(self, rate: float) -> str:
         """How fast the film runs against the fall, always said: real time, so many times slower or faster, or still."""
@@ -68,6 +85,10 @@ class Texts:
         if factor == "1":
             return self.say("nearly_real_time")
         return self.say("slower" if rate < 1 else "faster", factor=factor)
+
+
+def _energy_unit(joule: float) -> tuple[float, str]:
+    return next(((size, unit) for size, unit in ((1e6, "MJ"), (1e3, "kJ")) if joule >= size), (1.0, "J"))
 
 
 @lru_cache

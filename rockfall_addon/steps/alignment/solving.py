@@ -56,7 +56,13 @@ def _options(scene: bpy.types.Scene, camera: bpy.types.Object) -> AlignmentOptio
     if "f" in free:
         lens[:2] = now.intrinsics[:2]
     start = with_intrinsics(replace(now, shift=georeference.read_shift(scene)), lens)
-    return AlignmentOptions(size=videos.size_of(camera), free=free, start=start, moves=alignment.moves(camera))
+    return AlignmentOptions(
+        size=videos.size_of(camera),
+        free=free,
+        start=start,
+        moves=alignment.moves(camera),
+        pixel_aspect=float(videos.facts_of(camera).get("pixel_aspect", 1.0)),
+    )
 
 
 def _path(camera: bpy.types.Object, solved: SolvedFrames) -> CameraPath:

@@ -5,18 +5,19 @@ from contextlib import suppress
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from mathutils import Matrix
 
 from ....core.errors import RockfallError
 from ....core.footage.background import glance
-from ...scene import alignment, footage, new_videos, start_up, store, video_files, video_times, videos
+from ....core.footage.sequences import PICTURES, sequence_beside
+from ...scene import alignment, clocks, footage, new_videos, start_up, store, video_files, video_times, videos
 from ...view import workspace
 from ...view.first_import import FirstImport, begin_file
 from ...view.from_file import FromFile, remember_folder
 from ...view.of_video import OfVideo, has_video
 from ...view.reporting import reported
-from . import proxies
+from . import proxies, wording
 
 EXTENSIONS = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v")
 
@@ -36,13 +37,18 @@ _keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
 
 
 class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
-    """Add videos of the fall: each gets a camera with its footage behind it, and keeps its own timestamps"""
+    """Add videos of the fall: each gets a camera with its footage behind it, and keeps its own timestamps. Of numbered
+    pictures, choose one: all of its sequence are taken"""
 
     bl_idname = "rockfall.add_video"
     bl_label = "Add Video"
     bl_options = {"REGISTER", "UNDO"}
 
-    filter_glob: StringProperty(default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"})
+    filter_glob: StringProperty(default=";".join(f"*{e}" for e in (*EXTENSIONS, *PICTURES)), options={"HIDDEN"})
+    pictures_per_second: FloatProperty(
+        name="Pictures per Second", description="Of numbered pictures, which have no times of their own. Videos have",
+        default=0.0, min=0.0, max=100_000.0, precision=3, options={"SKIP_SAVE"},
+    )  # fmt: skip
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
@@ -52,6 +58,7 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
         return self.execute(context) if given else super().invoke(context, event)
 
     def draw(self, context: bpy.types.Context) -> None:
+        self.layout.prop(self, "pictures_per_second")
         self.draw_offer(context, self.layout)
 
     @reported
@@ -60,9 +67,12 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
         remember_folder(context, paths[0].parent)
         first = start_up.is_untouched(context.scene)
         added, errors = [], []
-        for path in paths:
+        rate = store.double(self.pictures_per_second) or None
+        sequences = {path: sequence_beside(path) for path in paths if path.suffix.lower() in PICTURES}
+        for path in dict.fromkeys(sequences.get(path, path) for path in paths):
             try:
-                added.append(new_videos.add_video(context.scene, path, matrix=_present_matrix(context)))
+                own = rate if path in sequences.values() else None
+                added.append(new_videos.add_video(context.scene, path, matrix=_present_matrix(context), rate_hz=own))
             except RockfallError as error:
                 errors.append(str(error))
         if not added:
@@ -70,6 +80,7 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
         for camera in added:
             with suppress(RockfallError):  # it is a look, no more
                 alignment.look_at_background(camera, glance(video_files.video_of(camera)))
+                video_files.note_repeats(camera)
         _look_through(context, added[0])
         if first:
             begin_file(context, opens_workspace=self.opens_workspace)
@@ -240,6 +251,24 @@ class ROCKFALL_OT_use_video_rate(OfVideo, bpy.types.Operator):
         return {"FINISHED"}
 
 
+class ROCKFALL_OT_use_named_capture_rate(OfVideo, bpy.types.Operator):
+    """Take over the rate at which the file says that its pictures were taken: slow motion becomes the true motion"""
+
+    bl_idname = "rockfall.use_named_capture_rate"
+    bl_label = "Use the File's Capture Rate"
+
+    @reported
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        camera = videos.active_camera(context.scene)
+        rate = wording.named_capture_rate(camera)
+        if not rate:
+            raise RockfallError(f"{camera.name} names no other capture rate than that of its file, or one is set.")
+        clocks.set_capture_rate(camera, rate)
+        video_times.clock_changed(context.scene, camera)
+        self.report({"INFO"}, f"{camera.name} was taken at {rate:.5g} pictures a second.")
+        return {"FINISHED"}
+
+
 class ROCKFALL_OT_use_video_size(OfVideo, bpy.types.Operator):
     """Render at the size of the active video, so that footage and terrain fit"""
 
@@ -358,6 +387,7 @@ CLASSES = (
     ROCKFALL_OT_synchronise_videos,
     ROCKFALL_OT_reference_video,
     ROCKFALL_OT_use_video_rate,
+    ROCKFALL_OT_use_named_capture_rate,
     ROCKFALL_OT_use_video_size,
     ROCKFALL_OT_build_proxy,
     ROCKFALL_FH_video,

@@ -45,6 +45,8 @@ class ROCKFALL_PT_videos(RockfallPanel, bpy.types.Panel):
             layout.operator("rockfall.use_video_size", icon="FULLSCREEN_ENTER")
         facts(layout, wording.facts(camera))
         show_remarks(context, layout, wording.remarks(camera))
+        if wording.named_capture_rate(camera):
+            layout.operator("rockfall.use_named_capture_rate", icon="TIME")
         self._proxies(camera)
 
     def _list(self, scene: bpy.types.Scene, active: bpy.types.Object) -> None:

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ....core.footage.sequences import is_there
 from ....core.remarks import Remark, from_plain, from_text
 from ...scene import camera_paths, clocks, footage, proposal, store, timing, video_files, video_times, videos
 from ...view import image_view
@@ -30,6 +31,12 @@ def remarks(camera: bpy.types.Object) -> list[Remark]:
     """What deserves a look in the file, and what its frame rate is good for."""
     known = videos.facts_of(camera)
     said = [*from_plain(known.get("remarks", ())), *from_plain(known.get("advice", ()))]
+    if rate := named_capture_rate(camera):
+        text = (
+            f"By {known.get('named_capture_rate_in')} of the file {rate:.5g} pictures a second were taken, and it "
+            f"plays {known['rate_hz']:.5g}. Take that over, unless the file plays at the speed of the fall."
+        )
+        said.insert(0, Remark(text, "advice", "capture rate"))
     count = footage.hidden(camera)
     if count:
         text = (
@@ -40,9 +47,14 @@ def remarks(camera: bpy.types.Object) -> list[Remark]:
     return said
 
 
+def named_capture_rate(camera: bpy.types.Object) -> float:
+    """The capture rate [Hz] that the file names, where none was chosen and it is not that of the file; else 0."""
+    return 0.0 if videos.capture_rate_of(camera) else float(videos.facts_of(camera).get("named_capture_rate_hz", 0.0))
+
+
 def is_missing(camera: bpy.types.Object) -> bool:
     """Whether the file has moved."""
-    return not video_files.file_of(camera).is_file() or video_files.clip_of(camera) is None
+    return not is_there(video_files.file_of(camera)) or video_files.clip_of(camera) is None
 
 
 def missing(camera: bpy.types.Object) -> str:

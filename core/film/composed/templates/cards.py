@@ -6,12 +6,13 @@ import numpy as np
 from ....opencv import opencv
 from ....vectors import Array
 from ..canvas import Box, Canvas, Picture, fitting_size, text_width, wrapped
-from ..falls import Fall
+from ..falls import Fall, Hits
 from ..look import INK, PAPER, QUIET, STRONG
 from ..material import Material
 from ..shots import Shot
 from ..sight import pixels
 from ..stage import Seen
+from ..texts import Texts
 
 DARK = 0.55
 TITLE_S, END_S = 2.6, 3.6
@@ -82,14 +83,35 @@ def draw_hit_card(seen: Seen, material: Material, fall: Fall, row: int) -> Box |
     if not np.isfinite(at).all() or not (0 <= at[0] < look.width and 0 <= at[1] < look.height):
         return None
     lines = [words.say("impact", number=int(hits.number[row]))]
-    before, after = float(hits.speed1_mps[row]), float(hits.speed2_mps[row])
-    if np.isfinite([before, after]).all():
-        lines.append(f"{words.number(before, 2)} → {words.number(after, 2)} m/s")
+    if speeds := speeds_of(hits, row, words):
+        lines.append(speeds)
     if np.isfinite([hits.energy1_j[row], hits.energy2_j[row]]).all():
-        lines.append(f"{words.energy(float(hits.energy1_j[row]))} → {words.energy(float(hits.energy2_j[row]))}")
-    if np.isfinite(hits.rn[row]):
-        lines.append(f"R_N {words.number(float(hits.rn[row]), 2)}")
+        first = words.about_energy(float(hits.energy1_j[row]), float(hits.energy1_sigma_j[row]))
+        second = words.about_energy(float(hits.energy2_j[row]), float(hits.energy2_sigma_j[row]))
+        lines.append(f"{first} → {second}")
+    if restitution := restitution_of(hits, row, words):
+        lines.append(restitution)
     return beside(canvas, at, lines)
+
+
+def speeds_of(hits: Hits, row: int, words: Texts) -> str:
+    """The speeds before and after an impact, with their standard deviations; empty where they are not known."""
+    before, after = float(hits.speed1_mps[row]), float(hits.speed2_mps[row])
+    if not np.isfinite([before, after]).all():
+        return ""
+    first = words.about(before, float(hits.speed1_sigma_mps[row]))
+    return f"{first} → {words.about(after, float(hits.speed2_sigma_mps[row]))} m/s"
+
+
+def restitution_of(hits: Hits, row: int, words: Texts) -> str:
+    """R_N of an impact with its 95 % interval; empty where it is not known."""
+    value, (low, high) = float(hits.rn[row]), hits.rn_ends[row].tolist()
+    if not np.isfinite(value):
+        return ""
+    if not np.isfinite(low):
+        return f"R_N ≈ {words.number(value, 2)}"
+    ends = f"{words.number(low, 2)}–{words.number(high, 2) if np.isfinite(high) else '∞'}"
+    return f"R_N {words.number(value, 2)} ({ends}, 95 %)"
 
 
 def beside(canvas: Canvas, at: Array, lines: list[str]) -> Box:

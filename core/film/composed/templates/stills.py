@@ -9,7 +9,7 @@ from ....errors import InputError
 from ....opencv import opencv
 from ....vectors import Array
 from ..blocks import block_pixels
-from ..canvas import Box, Canvas, Picture
+from ..canvas import Box, Canvas, Picture, fitting_size
 from ..falls import Fall
 from ..filmed import Footage, warped
 from ..ground import ground_picture
@@ -18,6 +18,7 @@ from ..material import Material
 from ..scenery import draw_heading, draw_impacts, draw_keys, draw_paths, keys_of
 from ..sight import Window, centred, whole
 from ..stage import Stage
+from .cards import restitution_of, speeds_of
 
 STEPS_S = (0.02, 0.04, 0.05, 0.1, 0.2, 0.25, 0.5, 1.0)
 MOST_BLOCKS, APART = 60, 1.6
@@ -30,7 +31,7 @@ ROUND = 1.7
 """How much of the frame about the block is taken, in its radii."""
 SKY_M = 1e5
 COARSE, FAR_PX = 4, -1e4
-MOST_CELLS, LEAST_CELL_PX = 12, 16
+MOST_CELLS, LEAST_CELL_PX, LEAST_SMALL = 12, 16, 8
 CELL_PX_OF_BLOCK = 7.0
 """Width of a picture of the contact sheet, in diameters of the block, at least."""
 
@@ -128,7 +129,7 @@ def contact_sheet(material: Material) -> Canvas:
                look.margin + look.heading + 1.5 * look.body, look.body, QUIET)  # fmt: skip
     columns, lines = _grid(len(rows), width / max(height - top, 1))
     gap = 2 * look.gap
-    caption = round(2 * 1.4 * look.small + look.gap)
+    caption = round(3 * 1.4 * look.small + look.gap)
     cell = (
         (width - 2 * look.margin - (columns - 1) * gap) // columns,
         (height - top - look.margin - (lines - 1) * gap) // lines,
@@ -165,16 +166,18 @@ def _cell(material: Material, sheet: Canvas, fall: Fall, row: int, box: Box, cap
     look = sheet.look
     y = box.top + size[1] + 1.2 * look.small
     name = words.say("impact", number=int(hits.number[row]))
-    before, after = float(hits.speed1_mps[row]), float(hits.speed2_mps[row])
     sheet.text(name, box.left, y, look.small, PAPER, weight=STRONG)
-    if np.isfinite([before, after]).all():
-        sheet.text(
-            f"{words.number(before, 2)} → {words.number(after, 2)} m/s", box.right, y, look.small, PAPER, anchor="right"
-        )
-    second = words.energy(float(hits.energy1_j[row])) if np.isfinite(hits.energy1_j[row]) else ""
-    restitution = f"R_N {words.number(float(hits.rn[row]), 2)}" if np.isfinite(hits.rn[row]) else ""
-    sheet.text(second, box.left, y + 1.4 * look.small, look.small, QUIET)
-    sheet.text(restitution, box.right, y + 1.4 * look.small, look.small, QUIET, anchor="right")
+    energy = float(hits.energy1_j[row])
+    lines = [
+        speeds_of(hits, row, words),
+        restitution_of(hits, row, words),
+    ]
+    if np.isfinite(energy):
+        said = words.about_energy(energy, float(hits.energy1_sigma_j[row]))
+        sheet.text(said, box.right, y, look.small, PAPER, anchor="right")
+    for i, line in enumerate(filter(None, lines)):
+        small = fitting_size(line, look.small, box.width, LEAST_SMALL)
+        sheet.text(line, box.left, y + (i + 1) * 1.4 * look.small, small, QUIET)
 
 
 class Mosaic:

@@ -4,6 +4,7 @@
 import numpy as np
 
 from ....errors import InputError
+from ....impact_models.registry import find_model
 from ....vectors import Array, norm
 from ...framing import Margins
 from ..canvas import Canvas
@@ -20,11 +21,12 @@ from .cards import beside, draw_hit_card, end_card, title_card
 from .footage import STANDS, path_shot
 from .timing import hardest, lasting_clock, nice_rate
 
+ENVELOPE = (0.86, 0.87, 0.88)
+"""Of the legend's line, which stands for those of all models."""
 FOOTAGE_S, PATH_S, MODELS_S, FALLS_S, ALL_S = 8.0, 12.0, 6.5, 8.0, 4.5
 STOPS = 3
 ABOVE_LEGEND = Margins(0.06, 0.06, 0.27, 0.14)
 MODELS_STAND_S = 2.0
-ENVELOPE = (0.86, 0.87, 0.88)
 LATEST = 0.98
 """The falls' chapter ends when this part of the simulated blocks has come to its end."""
 
@@ -199,19 +201,25 @@ def _falls(material: Material) -> list[Shot]:
 
 
 def all_traces(material: Material, plate: Plate, falls: tuple[Fall, ...]) -> Canvas:
-    """All that was measured and simulated, with the corridor of 95 % of the simulated."""
+    """All that was measured and simulated, with the corridor of 95 % of the paths of each model with chance."""
     words = material.words
     canvas, camera = plate.at(0.0)
     look = canvas.look
     scene = material.scene(falls)
-    outline = envelope([fall for fall in falls if not fall.is_measured], material.terrain)
-    keys = list(keys_of(scene, words))
-    if outline is not None:
+    keys, outlined = list(keys_of(scene, words)), False
+    for model in [find_model(name) for name in material.models]:
+        own = [fall for fall in falls if fall.group == model.title]
+        outline = envelope(own, material.terrain) if model.is_random else None
+        if outline is None:
+            continue
         where = pixels(camera, outline)
         where = where[np.isfinite(where).all(axis=1)]
-        canvas.area([where], ENVELOPE, 0.16)
+        colour = own[0].colour
+        canvas.area([where], colour, 0.12)
         canvas.lines([np.vstack([where, where[:1]])], INK, look.line + look.thin, 0.4)
-        canvas.dashes(np.vstack([where, where[:1]]), ENVELOPE, look.line, 5.0 * look.line)
+        canvas.dashes(np.vstack([where, where[:1]]), colour, look.line, 5.0 * look.line)
+        outlined = True
+    if outlined:
         keys.append(Key(ENVELOPE, words.say("envelope")))
     draw_paths(canvas, camera, scene, np.inf)
     stage = Stage(material, scene, solids=True)

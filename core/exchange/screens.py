@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..hazard.design import DesignValues, design_of
 from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import OUTCOMES, Screen
 from ..output import output_stream
@@ -25,7 +26,7 @@ HEIGHT, CAPACITY = "height_m", "capacity_kJ"
 COLUMNS = (
     "screen", "model", "barriers", "height_m", "capacity_kJ", "length_m", "blocks", "reach", "share", "hits",
     *OUTCOMES[1:], "quantity", "unit", "mean", "median", "q95", "q95_low", "q95_high", "q99", "q99_low", "q99_high",
-    "greatest",
+    "greatest", "worth", "factors", "verdict", "more_blocks",
 )  # fmt: skip
 """Those of screens.csv."""
 QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1e-3), ("height", "m", "height_m", 1.0))
@@ -84,23 +85,32 @@ def entry_of(screen: Screen, shift: GlobalShift) -> ScreenEntry:
     return ScreenEntry(screen.name, None, points, height_m, capacity_kj)
 
 
-def write_screens(tallies: Mapping[str, ScreenTally], path: str | Path) -> None:
+def write_screens(
+    tallies: Mapping[str, ScreenTally],
+    path: str | Path,
+    values: Mapping[str, Mapping[str, DesignValues]] | None = None,
+) -> None:
     """Write screens.csv: a row for each screen, model and quantity, without barriers and, where there are any, with.
 
     Parameters
     ----------
     tallies : model → what passes the screens.
+    values : model → screen → what a barrier there must have, with the verdict on the one that stands there; None for
+        that of the 95 % values without partial factors.
     """
+    if values is None:
+        values = {model: design_of(tally) for model, tally in tallies.items()}
     with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
         for model, tally in tallies.items():
             for barriers in (False, True) if any(screen.holds for screen in tally.screens) else (False,):
                 for figures in tally.figures(with_barriers=barriers):
-                    writer.writerows(_rows(model, barriers, figures))
+                    own = values.get(model, {}).get(figures.screen.name) if barriers else None
+                    writer.writerows(_rows(model, barriers, figures, own))
 
 
-def _rows(model: str, barriers: bool, figures: ScreenFigures) -> Iterable[list[object]]:
+def _rows(model: str, barriers: bool, figures: ScreenFigures, values: DesignValues | None) -> Iterable[list[object]]:
     screen = figures.screen
     outcomes = [figures.outcomes[name] if screen.holds else "" for name in OUTCOMES[1:]]
     capacity = "" if screen.capacity_j is None else screen.capacity_j / 1000
@@ -112,13 +122,22 @@ def _rows(model: str, barriers: bool, figures: ScreenFigures) -> Iterable[list[o
     for name, unit, attribute, factor in QUANTITIES:
         known: Known | None = getattr(figures, attribute)
         if known is None:
-            yield [*first, name, unit, *[""] * 9]
+            yield [*first, name, unit, *[""] * 10, *_verdict(values)]
             continue
         median, q95, q99 = known.quantiles
-        values = (
+        cells = (
             known.mean, median.value, q95.value, q95.low, q95.high, q99.value, q99.low, q99.high, known.greatest,
         )  # fmt: skip
-        yield [*first, name, unit, *("" if value != value else f"{factor * value:.6f}" for value in values)]
+        numbers = ("" if value != value else f"{factor * value:.6f}" for value in cells)
+        yield [*first, name, unit, *numbers, f"{q95.effective:.1f}", *_verdict(values)]
+
+
+def _verdict(values: DesignValues | None) -> list[object]:
+    """The table of partial factors, the verdict on a barrier with them, and how many more blocks would tell."""
+    if values is None or values.verdict is None:
+        return ["", "", ""]
+    more = values.more
+    return [values.factors.title, values.verdict, "" if more is None else more.blocks]
 
 
 def _number(shape: MapShape, name: str, key: str, path: Path) -> float | None:

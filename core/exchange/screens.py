@@ -7,6 +7,7 @@ barrier, which holds blocks; else it measures.
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -19,10 +20,12 @@ from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import OUTCOMES, Screen
 from ..output import output_stream
 from ..reading import reader
-from .map_shapes import MapShape, read_lines
+from .map_shapes import GEOJSON, GEOPACKAGE, MapShape, read_lines, read_polygons
 from .simulation_entry import ScreenEntry
 
 HEIGHT, CAPACITY = "height_m", "capacity_kJ"
+AREAS = (*GEOJSON, *GEOPACKAGE)
+"""Files that may have polygons."""
 COLUMNS = (
     "screen", "model", "barriers", "height_m", "capacity_kJ", "length_m", "blocks", "reach", "share", "hits",
     *OUTCOMES[1:], "quantity", "unit", "mean", "median", "q95", "q95_low", "q95_high", "q99", "q99_low", "q99_high",
@@ -34,13 +37,15 @@ QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1
 
 @reader("map of screens")
 def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
-    """The lines of a file as screens; those without a name have the file's.
+    """The lines of a file as screens, and the outlines of its polygons; those without a name have the file's.
 
     Raises
     ------
-    InputError : see `read_lines` and `Screen`; a capacity without a height, a value that is no number.
+    InputError : see `read_lines` and `Screen`; a polygon with a hole, a capacity without a height, a value that is no
+        number.
     """
-    path, shapes = Path(path), read_lines(path, shift)
+    path = Path(path)
+    shapes = _lines_of(path, shift)
     found = []
     for number, shape in enumerate(shapes, start=1):
         name = shape.name or (path.stem if len(shapes) == 1 else f"{path.stem} {number}")
@@ -55,6 +60,28 @@ def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
         except InputError as error:
             raise InputError(error.problem, file=path, advice=error.advice) from error
     return tuple(found)
+
+
+def _lines_of(path: Path, shift: GlobalShift) -> tuple[MapShape, ...]:
+    """The lines of a file; of one with polygons their outlines, closed."""
+    try:
+        return read_lines(path, shift)
+    except InputError as error:
+        if path.suffix.lower() not in AREAS:
+            raise
+        try:
+            polygons = read_polygons(path, shift)
+        except InputError:
+            raise error from None
+    for number, shape in enumerate(polygons, start=1):
+        if len(shape.parts) > 1:
+            raise InputError(
+                f"The polygon {shape.name or number} has a hole, and a screen is one line",
+                file=path,
+                advice="Give its outline alone, or the hole as a polygon of its own",
+            )
+    closed = (np.vstack([shape.parts[0], shape.parts[0][:1]]) for shape in polygons)
+    return tuple(replace(shape, parts=(line,)) for shape, line in zip(polygons, closed, strict=True))
 
 
 def screens_of(entries: Sequence[ScreenEntry], shift: GlobalShift) -> tuple[Screen, ...]:

@@ -108,20 +108,20 @@ def tables_of(sheet: DesignSheet) -> Iterator[Table]:
     )
     yield Table(
         "What a barrier must have",
-        ("screen", "model", f"energy, {percent} [kJ]", "of it translation", "design [kJ]", "needed [kJ]", "class",
-         f"height, {percent} [m]", "design [m]", "needed [m]", "verdict"),
+        ("screen", "model", "verdict", f"energy, {percent} [kJ]", "of it translation", "design [kJ]", "needed [kJ]",
+         "class", f"height, {percent} [m]", "design [m]", "needed [m]"),
         tuple(
             (
-                screen, _title(one), _known(values.energy_j, KJ), _number(values.translation_j.value * KJ),
-                _asked(values.design_energy_j * KJ, on_energy),
+                screen, _title(one), VERDICTS[values.verdict], _known(values.energy_j, KJ),
+                _number(values.translation_j.value * KJ), _asked(values.design_energy_j * KJ, on_energy),
                 _asked(values.needed_energy_j * KJ, (*on_energy, *on_needed)), _level(values, (*on_energy, *on_needed)),
                 _known(values.height_m), _asked(values.design_height_m, on_height),
-                _asked(values.needed_height_m, on_height), _verdict(values),
+                _asked(values.needed_height_m, on_height),
             )
             for screen, one, values in asked
         ),
         note,
-        words=(10,),
+        words=(2,),
     )  # fmt: skip
     yield Table(
         "What comes to each screen",
@@ -480,10 +480,6 @@ def _unverified_sentence(sheet: DesignSheet) -> str:
         return ""
     names = ", ".join(f"{one.symbol} = {one.value:g}" for one in found)
     return f"‡: with factors that are not verified against the standard, {names}. "
-
-
-def _verdict(values: DesignValues) -> str:
-    return VERDICTS[values.verdict]
 
 
 def _more(values: DesignValues) -> str:

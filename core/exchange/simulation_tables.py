@@ -341,8 +341,8 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
         **({} if settings.trees is None else {"tree_hits": int(simulation.tree_hits.sum())}),
         "seconds": round(simulation.seconds, 3),
         "blocks_per_s": round(n / simulation.seconds, 1),
-        "run_out_m": _known(convergence(run_out)),
-        "v_max_mps": _known(convergence(simulation.v_max_mps)),
+        "run_out_m": _known(convergence(run_out, simulation.releases.place)),
+        "v_max_mps": _known(convergence(simulation.v_max_mps, simulation.releases.place)),
     }
 
 

@@ -18,7 +18,7 @@ class Convergence:
 
     Attributes
     ----------
-    mean, standard_error : s/√n; the latter is NaN for one value.
+    mean, standard_error : s/√n, or over clusters; the latter is NaN for one value.
     q95 : the value that 95 % do not exceed (Hyndman and Fan 1996, type 7).
     q95_low, q95_high : its interval, see `Quantile`.
     """
@@ -145,8 +145,16 @@ def values_needed(known: Quantile, times: float) -> float:
     return times * (most - 1) / (most - times) if most > times else inf
 
 
-def convergence(values: Array) -> Convergence:
-    """What (n,) values say of the distribution that they were drawn from, n ≥ 1."""
-    n, q95 = values.size, quantile(values, 0.95)
-    error = float(values.std(ddof=1) / np.sqrt(n)) if n > 1 else np.nan
-    return Convergence(float(values.mean()), error, q95.value, q95.low, q95.high)
+def convergence(values: Array, cluster: Indices | None = None) -> Convergence:
+    """What (n,) values say of the distribution that they were drawn from, n ≥ 1.
+
+    cluster : see `quantile`.
+    """
+    n, q95, mean = values.size, quantile(values, 0.95, cluster), float(values.mean())
+    own = np.arange(n) if cluster is None else np.unique(cluster, return_inverse=True)[1].ravel()
+    k = int(own.max()) + 1
+    if k == 1:
+        own, k = np.arange(n), n
+    apart = np.bincount(own, values - mean, minlength=k)
+    error = float(np.sqrt(k / (k - 1) * (apart**2).sum()) / n) if k > 1 else np.nan
+    return Convergence(mean, error, q95.value, q95.low, q95.high)

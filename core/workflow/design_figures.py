@@ -56,8 +56,9 @@ def figures_of(sheet: DesignSheet) -> "Iterator[tuple[str, str, Figure]]":
         if any(screen.name in one.values for one in sheet.models):
             yield (
                 f"screen {screen.name}",
-                f"What comes to {screen.name}: the share of the blocks that is not above a value, of each its greatest. "
-                "Marked is the characteristic value with its 95 % interval, where it has one, and dashed the design value.",
+                f"What comes to {screen.name}: the share of the blocks that is not above a value, of each its "
+                "greatest. Marked is the characteristic value with its 95 % interval, where it has one; dashed is the "
+                "design value.",
                 screen_figure(sheet, screen),
             )
 

@@ -5,7 +5,7 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
-from rockfall.core.simulation.convergence import Quantile, fewest, quantile, values_needed
+from rockfall.core.simulation.convergence import Quantile, convergence, fewest, quantile, values_needed
 from scipy import stats
 
 
@@ -67,3 +67,14 @@ def test_how_many_more_values_it_takes_follows_from_how_alike_they_are() -> None
         assert effective(m * values_needed(known, times)) == pytest.approx(times * effective(m))
     assert values_needed(known, 1.01 * k / rho / effective(m)) == inf
     assert values_needed(Quantile(0.95, 1.0, 0.9, 1.1, 100, 100.0), 3.0) == 3.0
+
+
+def test_the_error_of_a_mean_is_that_of_the_means_of_equal_clusters() -> None:
+    """With clusters of one size it is the standard error of their means; copies tell nothing."""
+    rng = np.random.default_rng(6)
+    values, cluster = rng.normal(size=(30, 12)) + rng.normal(size=(30, 1)), np.repeat(np.arange(30), 12)
+    found = convergence(values.ravel(), cluster)
+    assert found.standard_error == pytest.approx(values.mean(axis=1).std(ddof=1) / np.sqrt(30))
+    assert found.standard_error > 2 * convergence(values.ravel()).standard_error
+    of_one = convergence(values[0], np.zeros(12, np.intp))
+    assert of_one.standard_error == pytest.approx(convergence(values[0]).standard_error)

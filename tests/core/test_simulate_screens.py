@@ -189,7 +189,8 @@ def test_a_design_without_a_screen_or_with_unknown_factors_says_what_to_do(
 def test_it_ends_when_the_values_are_known_and_says_how_many_it_took(
     tmp_path: Path, barriers: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rockfall.core.workflow.enough.KNOWN_TO", 0.5)
+    barriers.write_text("\n".join(BARRIERS.splitlines()[:4]), encoding="utf-8")
+    monkeypatch.setattr("rockfall.core.workflow.enough.KNOWN_TO", 0.6)
     monkeypatch.setattr("rockfall.core.workflow.hazard.ROUND", 200)
     arguments = ["simulate", str(SITE / "project.toml"), "--model", "noel_2017", "--number", "60", "--record", "none"]
     out = tmp_path / "out"

@@ -75,7 +75,8 @@ def page(_: Path) -> str:
             for alike in ALIKE:
                 held, low, there, plain = _coverage(law, places, each, alike)
                 lines.append(
-                    f"| {law} | {places} | {each} | {alike:g} | {held:.1%} | {low:.1%} | {there:.0%} | {plain:.1%} |"
+                    f"| {law} | {places} | {each} | {alike:g} | {100 * held:.1f} % | {100 * low:.1f} % | "
+                    f"{100 * there:.0f} % | {100 * plain:.1f} % |"
                 )
     lines += [
         "",
@@ -100,7 +101,7 @@ def page(_: Path) -> str:
     for law in LAWS:
         for places, alike in ((15, 0.0), (15, 0.3), (100, 0.1), (100, 0.3), (0, 0.0)):
             wrong, blocks = _stopped(law, places, alike)
-            lines.append(f"| {law} | {places or 'each its own'} | {alike:g} | {wrong:.1%} | {blocks:.0f} |")
+            lines.append(f"| {law} | {places or 'each its own'} | {alike:g} | {100 * wrong:.1f} % | {blocks:.0f} |")
     lines += ["", *paragraph("Written by `scripts/verification/intervals.py`; the same seeds give the same draws.")]
     return "\n".join(lines) + "\n"
 

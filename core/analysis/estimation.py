@@ -287,7 +287,7 @@ def _choice(question: Question, spec: ParameterSpec, fits: Sequence[Fit], best: 
     others = [i for i, settings in enumerate(question.combinations) if settings[spec.name] != value]
     rival = min(others, key=lambda i: float(fits[i].sums.sum()))
     gain, error = paired_gain(fits[rival].sums, fits[best].sums, counts)
-    remark = about_choice(spec.name, str(value), str(question.combinations[rival][spec.name]), gain, error)
+    remark = about_choice(spec.name, str(value), str(question.combinations[rival][spec.name]), gain, error, counts.size)
     return Estimate(spec.name, spec.unit, question.combinations[0][spec.name], value, nan, nan, (remark,))
 
 

@@ -2,6 +2,7 @@
 """What the numbers of a fit mean, in plain words; above all when the data cannot tell."""
 
 from collections.abc import Iterator, Sequence
+from math import inf
 
 from ..impact_models.machinery.parameters import ParameterSpec
 from ..remarks import Remark
@@ -16,8 +17,8 @@ TOGETHER = 0.9
 """Correlation from which two parameters cannot be told apart."""
 EXACT = 1e-5
 """Of the range: an interval that is narrower is no more than the rounding of the descent."""
-CLEAR = 2.0
-"""Standard errors from which a difference counts."""
+CLEAR = 0.95
+"""Level of the interval of a difference that must not hold zero, for the difference to count."""
 
 
 def about_number(
@@ -80,11 +81,22 @@ def _width(value: float, ends: tuple[float, float], exact: bool) -> str:
     return f"Only roughly determined: anything from {ends[0]:.3g} to {ends[1]:.3g} fits about as well."
 
 
-def about_choice(name: str, value: str, rival: str, gain: float, error: float) -> Remark:
-    """About the choice that won over the best of the others by a mean score, with its standard error."""
+def clear_errors(clusters: int) -> float:
+    """Standard errors from which a difference counts: Student's t of clusters − 1; infinite with one.
+
+    >>> round(clear_errors(5), 2), round(clear_errors(60), 2)
+    (2.78, 2.0)
+    """
+    from scipy import stats
+
+    return float(stats.t.ppf((1 + CLEAR) / 2, clusters - 1)) if clusters > 1 else inf
+
+
+def about_choice(name: str, value: str, rival: str, gain: float, error: float, clusters: int) -> Remark:
+    """About the choice that won over the best of the others by a mean score, with its standard error over clusters."""
     if abs(gain) < 1e-12:
         return Remark(f"The data cannot tell: {rival} fits exactly as well.", "problem", name)
-    if gain < CLEAR * error:
+    if not gain >= clear_errors(clusters) * error:
         text = f"The data cannot tell: {rival} fits about as well (score {gain:.3f} ± {error:.3f} more)."
         return Remark(text, "problem", name)
     return Remark(f"{value} fits clearly better than {rival} (score {gain:.3f} ± {error:.3f} less).", "note", name)
@@ -96,9 +108,9 @@ def about_holdout(default: float, held_out: float, gain: float, error: float, be
         return Remark("The defaults already agree exactly.", "note", "hold-out")
     where, share = f"better in {better} of {clusters}", f"{100 * abs(gain) / default:.0f} %"
     seen = "On impacts it was not fitted to, the"
-    if gain > CLEAR * error:
+    if gain > clear_errors(clusters) * error:
         return Remark(f"{seen} model is {share} nearer than with its defaults ({where}).", "note", "hold-out")
-    if gain < -CLEAR * error:
+    if gain < -clear_errors(clusters) * error:
         text = f"{seen} model is {share} farther than with its defaults: keep the defaults."
         return Remark(text, "warning", "hold-out")
     text = f"{seen} fit is not clearly better than the defaults (score {held_out:.3f} against {default:.3f}, {where})."

@@ -132,7 +132,11 @@ def whole_run_remarks(comparison: WholeRuns) -> tuple[Remark, ...]:
         if differ:
             text = f"{title} differs from what was observed in {differ} of {len(known)} tests, most in {what}."
         else:
-            text = f"{title}: no difference seen in {len(known)} tests; the least probable is {what}."
+            few = min(one.test.n if one.test else one.n for one in known)
+            text = (
+                f"{title}: no difference seen in {len(known)} tests, of {few} runs and more: a difference that is "
+                f"small beside their scatter would not show. The least probable is {what}."
+            )
         remarks.append(Remark(text, "note", model))
     return tuple(remarks)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..simulation.ground import Ground
 
 CELL_M = 2.0
+MOST_BLOCKS = 50_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,11 +51,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--share",
         type=share,
         metavar="P",
-        help="of the hits that do not exceed the characteristic values, 0.95 or 0.99 (default: that of the factors)",
+        help="of the blocks that do not exceed the characteristic values, 0.95 or 0.99 (default: that of the factors)",
     )
     add_model_option(parser, "models to design with (default: the project's, else noel_2017)")
     add_parameter_options(parser)
-    parser.add_argument("--number", type=whole, metavar="N", help="blocks from each release (default: the project's)")
+    parser.add_argument(
+        "--number",
+        type=whole,
+        metavar="N",
+        help="blocks from each release; with --until-known at most so many (default: as many as make up --most; with "
+        "--no-until-known the project's)",
+    )
+    parser.add_argument(
+        "--most",
+        type=whole,
+        metavar="N",
+        help=f"blocks that fall at most with each model until the values are known (default {MOST_BLOCKS})",
+    )
     parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default: the project's)")
     parser.add_argument(
         "--cell",
@@ -65,8 +78,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--until-known",
-        action="store_true",
-        help="end as soon as energy and height at the screens are known to 5 %%; --number is then the most",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="blocks fall until energy and height at the screens are known to 5 %%, or as well as more of them would "
+        "tell (default); else those of --number, all of them",
     )
     parser.add_argument("--no-holdout", action="store_true", help="no prediction of trajectories that are left out")
     parser.add_argument("--no-pdf", action="store_true", help="no PDF")
@@ -83,7 +98,11 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.simulation_project import open_simulation
     from ..output import output_folder
     from ..workflow.design_sheet import design_sheet
+    from ..workflow.enough import as_many_as
     from ..workflow.simulation import ground_of
+
+    if arguments.most is not None and (arguments.number is not None or not arguments.until_known):
+        raise InputError("--most and --number both say how many blocks fall", advice="Leave out one of the two")
 
     factors = open_factors(arguments.factors or USUAL)
     file = Path(arguments.project)
@@ -107,11 +126,12 @@ def run(arguments: argparse.Namespace) -> int:
         screens, screen_files = _screens(arguments.screen, ground, scenario.screens)
         progress("Reconstructing what was measured", 0, 0)
         measured = None
+        fixed = arguments.number is not None or not arguments.until_known
         if project.picks is not None and len(read_project_picks(project, None)[0]):
             measured = reconstruct_project(project, ground.surface)
         sheet = design_sheet(
             ground,
-            scenario.releases(ground),
+            scenario.releases(ground) if fixed else as_many_as(scenario, ground, arguments.most or MOST_BLOCKS),
             scenario.settings,
             screens,
             factors,
@@ -127,12 +147,16 @@ def run(arguments: argparse.Namespace) -> int:
         videos = {f"video {video.name}": video.file for video in project.videos if video.file is not None}
         inputs = inputs | screen_files | videos
         written = write_design(sheet, folder, inputs, pdf=not arguments.no_pdf, progress=progress)
-        write_screens({one.settings.model: one.tally for one in sheet.models}, folder / "screens.csv")
+        tallies = {one.settings.model: one.tally for one in sheet.models}
+        write_screens(tallies, folder / "screens.csv", {one.settings.model: one.values for one in sheet.models})
     for remark in sheet.remarks:
         print(remark)
     for one in sheet.models:
         for name, values in one.values.items():
-            needed = f"{values.needed_energy_j / 1000:.3g} kJ (class {values.level}), {values.needed_height_m:.2f} m"
+            needed = "not known yet"
+            if values.is_known:
+                energy, height = f"{values.needed_energy_j / 1000:.3g} kJ", f"{values.needed_height_m:.2f} m"
+                needed = f"{energy} (class {values.level}), {height}"
             print(f"{name}, {one.settings.model}: needed {needed}; {values.reach} of {values.blocks} blocks come.")
     print(f"Written: {', '.join([*written, 'screens.csv'])} in {arguments.out}")
     return 0

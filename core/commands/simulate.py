@@ -108,7 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--until-known",
         type=share,
         metavar="P",
-        help="end as soon as the energy and height that this share of the hits of a screen does not exceed are known "
+        help="end as soon as the energy and height that this share of the blocks at a screen does not exceed are known "
         "to 5 %%, 0.95 for example; --number is then the most",
     )
     parser.add_argument(

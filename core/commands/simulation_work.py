@@ -54,7 +54,7 @@ class Work:
     releases, first_run : of the runs that were asked for, and the place of the first among all.
     record : tables beside runs.csv.
     cell_m, faces : maps; None and False for none.
-    until_known : share of the hits of a screen whose energy and height are to be known; None lets all blocks fall.
+    until_known : share of the blocks at a screen whose energy and height are to be known; None lets all blocks fall.
     measured : what the project has measured, where that is to be written beside it.
     inputs : what it is → the file that decides it.
     """

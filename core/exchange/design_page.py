@@ -19,18 +19,17 @@ import numpy as np
 from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.scores import Score
 from ..analysis.variables import find_variable
-from ..hazard.design import LEVELS_KJ, DesignValues
-from ..hazard.screens import OUTCOMES
+from ..hazard.design import KNOWN_TO, LEVELS_KJ, ON, DesignValues, Factor
+from ..hazard.screens import OUTCOMES, Screen
 from ..impact_models.registry import find_model
 from ..output import write_text
 from ..progress import Progress, silent
 from ..remarks import to_plain
-from ..simulation.convergence import Quantile
+from ..simulation.convergence import Quantile, fewest
 from ..simulation.parameter_draws import FRICTION_NAME
 from ..simulation.trees import LAW, NOT_KNOWN
 from ..workflow.design_figures import figures_of
 from ..workflow.design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
-from ..workflow.enough import KNOWN_TO
 from .pdf_pages import STYLES, Drawing, Element, Rows, Words, write_pdf
 from .simulation_tables import inputs_with_digests
 
@@ -94,39 +93,53 @@ def write_design(
 def tables_of(sheet: DesignSheet) -> Iterator[Table]:
     """What the page tells in tables, in its order."""
     percent = f"{100 * sheet.share:g} %"
-    rows = [(screen, one, values) for one in sheet.models for screen, values in one.values.items()]
+    asked = [(screen, one, values) for one in sheet.models for screen, values in one.values.items()]
+    on_energy = sheet.factors.unverified("speed", "mass", "energy")
+    on_needed, on_height = sheet.factors.unverified("capacity"), sheet.factors.unverified("height")
+    note = (
+        f"{percent} of the blocks that come do not exceed the first value; behind it is its 95 % interval. It is of "
+        "blocks, of each its greatest hit, and blocks from one place of release are not taken as independent. Design "
+        f"values are the upper end of that interval times the partial factors of {sheet.factors.title}; without an "
+        f"upper end, which takes {fewest(sheet.share)} independent blocks, nothing is designed. The needed energy is "
+        "times the factor on the capacity, the needed height is with the free height above the block. "
+        f"{_unverified_sentence(sheet)}Energy is of translation and rotation; height is that of the block's centre, "
+        "vertically above the terrain. Class: of maximum energy level (MEL) of EAD 340059-00-0106, whose test blocks "
+        "do not turn, so that it counts ½mv² alone; rotation is counted here as well, which is on the safe side."
+    )
     yield Table(
         "What a barrier must have",
-        ("screen", "model", f"energy, {percent} [kJ]", "design [kJ]", "needed [kJ]", "class", f"height, {percent} [m]",
-         "design [m]", "needed [m]"),
+        ("screen", "model", "verdict", f"energy, {percent} [kJ]", "of it translation", "design [kJ]", "needed [kJ]",
+         "class", f"height, {percent} [m]", "design [m]", "needed [m]"),
         tuple(
             (
-                screen, _title(one), _known(values.energy_j, KJ), _number(values.design_energy_j * KJ),
-                _number(values.needed_energy_j * KJ), _level(values), _known(values.height_m),
-                _number(values.design_height_m), _number(values.needed_height_m),
+                screen, _title(one), VERDICTS[values.verdict], _known(values.energy_j, KJ),
+                _number(values.translation_j.value * KJ), _asked(values.design_energy_j * KJ, on_energy),
+                _asked(values.needed_energy_j * KJ, (*on_energy, *on_needed)), _level(values, (*on_energy, *on_needed)),
+                _known(values.height_m), _asked(values.design_height_m, on_height),
+                _asked(values.needed_height_m, on_height),
             )
-            for screen, one, values in rows
+            for screen, one, values in asked
         ),
-        f"{percent} of the hits do not exceed the first value; behind it is its 95 % interval for that number of hits. "
-        f"Design values are these times the partial factors of {sheet.factors.title}. The needed energy is times the "
-        "factor on the capacity, the needed height is with the free height above the block. Energy is of translation "
-        "and rotation; height is that of the block's centre, vertically above the terrain. Class: of maximum energy "
-        "level (MEL) of EAD 340059-00-0106.",
+        note,
+        words=(2,),
     )  # fmt: skip
     yield Table(
         "What comes to each screen",
-        ("screen", "model", "blocks", "reach it", "share [%]", "hits", f"speed, {percent} [m/s]", "design [m/s]",
-         "energy known to", "height known to"),
+        ("screen", "model", "blocks", "reach it", "share [%]", "places of release", "worth independent blocks", "hits",
+         f"speed, {percent} [m/s]", "design [m/s]", "energy known to", "height known to", "more blocks to tell"),
         tuple(
             (
                 screen, _title(one), str(values.blocks), str(values.reach),
-                f"{100 * values.reach / values.blocks:.3g}", str(values.hits), _known(values.speed_mps),
-                _number(values.design_speed_mps), _to(values.energy_j), _to(values.height_m),
+                f"{100 * values.reach / values.blocks:.3g}", f"{values.places} of {values.released_from}",
+                f"{min(values.energy_j.effective, values.height_m.effective):.0f}", str(values.hits),
+                _known(values.speed_mps), _asked(values.design_speed_mps, sheet.factors.unverified("speed")),
+                _to(values.energy_j), _to(values.height_m), _more(values),
             )
-            for screen, one, values in rows
+            for screen, one, values in asked
         ),
         "Conditional on the release: these are shares of the blocks that were released, not how often blocks fall. "
-        f"Values are known to half the width of their interval; {100 * KNOWN_TO:g} % or less is usual.",
+        f"Values are known to half the width of their interval; {100 * KNOWN_TO:g} % or less is usual. Blocks from one "
+        "place of release are alike: they tell as much as the fewer independent ones that they are worth.",
     )  # fmt: skip
     barriers = [screen for screen in sheet.screens if screen.holds]
     if barriers:
@@ -143,8 +156,8 @@ def tables_of(sheet: DesignSheet) -> Iterator[Table]:
             "Before and after the barriers",
             ("screen", "model", "blocks without barriers", "with barriers", "held", "over", "through"),
             tuple(held),
-            f"The same runs, with and without. {names}. A barrier holds a block that hits it with all of it below its "
-            "top, up to its capacity; what it does not hold goes on as it came.",
+            f"The same runs, with and without: counts, and no verdict. {names}. A barrier holds a block that hits it "
+            "with all of it below its top, up to its capacity; what it does not hold goes on as it came.",
         )
     yield from _evidence_tables(sheet)
     yield from _drawn_tables(sheet)
@@ -163,12 +176,17 @@ def tables_of(sheet: DesignSheet) -> Iterator[Table]:
         f"The angle below the horizontal from the release to the end, of {max(len(one.drawn) for one in sheet.models)} "
         "runs. Observed rockfalls seldom end below 28.5° to 33.5°: many that do ask for a reason.",
     )
+    rows = [
+        (one.symbol, one.on, _asked(one.value, () if one.verified else (one,)), one.meaning, one.source)
+        for one in sheet.factors.factors
+    ]
     yield Table(
         f"Partial factors: {sheet.factors.title}",
         ("factor", "on", "value", "meaning", "source"),
-        tuple((f.symbol, f.on, f"{f.value:g}", f.meaning, f.source) for f in sheet.factors.factors),
-        f"{sheet.factors.note} The energy is multiplied by the factors of the mass, of the energy and, squared, of the "
-        f"speed. Free height: {sheet.factors.clearance_m:g} m, or the radius of the block where that is more.",
+        tuple(rows),
+        f"{sheet.factors.note} {_unverified_sentence(sheet)}The energy is multiplied by the factors of the mass, of "
+        f"the energy and, squared, of the speed. Free height: {sheet.factors.clearance_m:g} m, or the radius of the "
+        "block where that is more.",
         words=(3, 4),
     )
 
@@ -282,21 +300,38 @@ def plain(sheet: DesignSheet, facts: Mapping[str, str]) -> dict[str, Any]:
     """The same for programs."""
 
     def quantile(one: Quantile) -> dict[str, float | None]:
-        return {name: _finite(getattr(one, name)) for name in ("share", "value", "low", "high")}
+        return {name: _finite(getattr(one, name)) for name in ("share", "value", "low", "high", "effective")}
 
     def values(one: DesignValues) -> dict[str, Any]:
         names = (
-            "blocks", "reach", "hits", "radius_m", "design_speed_mps", "design_energy_j", "design_height_m",
-            "clearance_m", "needed_energy_j", "needed_height_m", "level", "different",
+            "blocks", "released_from", "places", "reach", "hits", "radius_m", "design_speed_mps", "design_energy_j",
+            "design_height_m", "clearance_m", "needed_energy_j", "needed_height_m", "level", "different", "verdict",
         )  # fmt: skip
-        known = {name: quantile(getattr(one, name)) for name in ("speed_mps", "energy_j", "height_m")}
-        return known | {name: getattr(one, name) for name in names} | {"faults": list(one.faults)}
+        known = {name: quantile(getattr(one, name)) for name in ("speed_mps", "energy_j", "translation_j", "height_m")}
+        more = one.more
+        return (
+            known
+            | {name: _finite(getattr(one, name)) for name in names}
+            | {"faults": list(one.faults)}
+            | {"more_blocks": 0 if more is None and one.is_sample else None if more is None else more.blocks}
+            | {"more_from_other_places": more is not None and more.elsewhere}
+        )
+
+    def nothing(screen: Screen, blocks: int) -> dict[str, Any]:
+        return {"blocks": blocks, "reach": 0, "verdict": "not_known" if screen.holds else None, "more_blocks": None}
 
     return {
         "title": sheet.title,
         "factors": sheet.factors.title,
+        "unverified_factors": {one.symbol: one.value for one in sheet.factors.unverified(*ON)},
         "models": {
-            one.settings.model: {name: values(found) for name, found in one.values.items()} for one in sheet.models
+            one.settings.model: {
+                screen.name: values(one.values[screen.name])
+                if screen.name in one.values
+                else nothing(screen, one.counted.blocks)
+                for screen in sheet.screens
+            }
+            for one in sheet.models
         },
         "remarks": to_plain(sheet.remarks),
         "provenance": dict(facts),
@@ -310,7 +345,7 @@ def page(
     figures: "Sequence[tuple[str, str, Figure]]",
 ) -> str:
     """The page as one HTML text, pictures included."""
-    remarks = "".join(f'<li class="{remark.severity}">{escape(remark.text)}</li>' for remark in sheet.remarks)
+    remarks = "".join(f'<li class="{kind}">{escape(text)}</li>' for kind, text in _first_said(sheet))
     pictures = "".join(
         f'<figure id="{escape(name, quote=True)}"><img alt="{escape(caption, quote=True)}" src="{_picture(figure)}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
@@ -352,7 +387,8 @@ def _summary(sheet: DesignSheet) -> str:
     names = ", ".join(screen.name for screen in sheet.screens)
     models = ", ".join(_title(one) for one in sheet.models)
     blocks = max(one.counted.blocks for one in sheet.models)
-    return f"{blocks} simulated blocks with each of: {models}. Screens: {names}."
+    known = "" if sheet.limit is None else f", until the values were known or {sheet.limit} had fallen"
+    return f"{blocks} simulated blocks with each of: {models}{known}. Screens: {names}."
 
 
 def _html(table: Table) -> str:
@@ -384,8 +420,8 @@ def _elements(
     """The PDF in the reading order of the HTML page."""
     yield Words("h1", _heading(sheet))
     yield Words("text", _summary(sheet))
-    for remark in sheet.remarks:
-        yield Words(remark.severity if remark.severity in STYLES else "text", remark.text)
+    for kind, text in _first_said(sheet):
+        yield Words(kind if kind in STYLES and kind != "note" else "text", text)
     yield from _on_paper(tables[0])
     for _, caption, figure in figures:
         yield Drawing(figure, caption)
@@ -418,10 +454,48 @@ def _to(one: Quantile) -> str:
     return f"{100 * one.known_to:.1f} %" if np.isfinite(one.known_to) else "?"
 
 
-def _level(values: DesignValues) -> str:
+def _first_said(sheet: DesignSheet) -> Iterator[tuple[str, str]]:
+    """The kind and text of what stands above all tables: the verdicts, the bad ones first, then what else to know."""
+    worst = ("not_enough", "not_known", "enough")
+    verdicts = sorted(sheet.verdicts, key=lambda one: worst.index(one[0]))
+    yield from ((verdict, remark.text) for verdict, remark in verdicts)
+    said = {remark for _, remark in verdicts}
+    yield from ((remark.severity, remark.text) for remark in sheet.remarks if remark not in said)
+
+
+def _asked(value: float, unverified: Sequence[Factor]) -> str:
+    """A value that something must have; marked where factors that are not verified are in it."""
+    if not np.isfinite(value):
+        return "not known"
+    return f"{_number(value)}{UNVERIFIED if unverified else ''}"
+
+
+UNVERIFIED = " ‡"
+VERDICTS = {"enough": "enough", "not_enough": "NOT ENOUGH", "not_known": "not known yet", None: "no barrier"}
+
+
+def _unverified_sentence(sheet: DesignSheet) -> str:
+    found = sheet.factors.unverified(*ON)
+    if not found:
+        return ""
+    names = ", ".join(f"{one.symbol} = {one.value:g}" for one in found)
+    return f"‡: with factors that are not verified against the standard, {names}. "
+
+
+def _more(values: DesignValues) -> str:
+    more = values.more
+    if more is None:
+        return "–" if values.is_sample else "none would"
+    return f"{more.blocks}{' from other places' if more.elsewhere else ''}"
+
+
+def _level(values: DesignValues, unverified: Sequence[Factor]) -> str:
+    mark = UNVERIFIED if unverified else ""
+    if values.level is None:
+        return "not known"
     if values.level == len(LEVELS_KJ):
-        return f"8 (above {LEVELS_KJ[-1]:.0f} kJ)"
-    return f"{values.level} (MEL {values.level_kj:.0f} kJ)"
+        return f"8 (above {LEVELS_KJ[-1]:.0f} kJ){mark}"
+    return f"{values.level} (MEL {values.level_kj:.0f} kJ){mark}"
 
 
 def _number(value: float, digits: int = 3) -> str:
@@ -434,5 +508,6 @@ def _plain(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+def _finite(value: Any) -> Any:
+    """The same, None for a number that is not finite."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -2,7 +2,7 @@
 """Tables of partial factors: those that are shipped, and a person's own, as TOML.
 
 title = "Our office"
-share = 0.95                 # of the hits that do not exceed the characteristic values
+share = 0.95                 # of the blocks that do not exceed the characteristic values
 clearance_m = 0.5            # least free height above the design height
 
 [[factor]]
@@ -11,6 +11,7 @@ on = "speed"                 # mass, energy, height, capacity
 value = 1.02
 meaning = "reliability of the simulation"
 source = "where it is from"
+verified = true              # false: compared with no standard, which stands beside each number that it is in
 """
 
 from difflib import get_close_matches
@@ -85,10 +86,11 @@ def _factor(table: TomlTable) -> Factor:
         table.number("value", 1.0) if table.has("value") else nan,
         table.text("meaning", ""),
         table.text("source", ""),
+        table.flag("verified", True),
     )
     if not factor.on:
         raise table.wrong("on", "is missing", f"Give one of {', '.join(ON)}")
     unknown = sorted(table.rest())
     if unknown:
-        raise table.wrong(unknown[0], "is not known here", "symbol, on, value, meaning and source are")
+        raise table.wrong(unknown[0], "is not known here", "symbol, on, value, meaning, source and verified are")
     return factor

@@ -23,6 +23,9 @@ STYLES: dict[str, dict[str, Any]] = {
     "note": {"fontsize": 7.0, "color": MUTED},
     "problem": {"fontsize": 8.5, "fontweight": "bold", "color": "#9b1c1c"},
     "warning": {"fontsize": 8.5, "color": "#8f4a00"},
+    "enough": {"fontsize": 8.5, "fontweight": "bold", "color": "#1d6b3a"},
+    "not_enough": {"fontsize": 8.5, "fontweight": "bold", "color": "#9b1c1c"},
+    "not_known": {"fontsize": 8.5, "fontweight": "bold", "color": "#8f4a00"},
     "head": {"fontsize": 7.0, "fontweight": "bold"},
     "cell": {"fontsize": 7.0},
 }

@@ -7,6 +7,7 @@ barrier, which holds blocks; else it measures.
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -14,18 +15,21 @@ import numpy as np
 
 from ..errors import InputError
 from ..georeference import GlobalShift
+from ..hazard.design import DesignValues, design_of
 from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import OUTCOMES, Screen
 from ..output import output_stream
 from ..reading import reader
-from .map_shapes import MapShape, read_lines
+from .map_shapes import GEOJSON, GEOPACKAGE, MapShape, read_lines, read_polygons
 from .simulation_entry import ScreenEntry
 
 HEIGHT, CAPACITY = "height_m", "capacity_kJ"
+AREAS = (*GEOJSON, *GEOPACKAGE)
+"""Files that may have polygons."""
 COLUMNS = (
     "screen", "model", "barriers", "height_m", "capacity_kJ", "length_m", "blocks", "reach", "share", "hits",
     *OUTCOMES[1:], "quantity", "unit", "mean", "median", "q95", "q95_low", "q95_high", "q99", "q99_low", "q99_high",
-    "greatest",
+    "greatest", "worth", "factors", "verdict", "more_blocks",
 )  # fmt: skip
 """Those of screens.csv."""
 QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1e-3), ("height", "m", "height_m", 1.0))
@@ -33,13 +37,15 @@ QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1
 
 @reader("map of screens")
 def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
-    """The lines of a file as screens; those without a name have the file's.
+    """The lines of a file as screens, and the outlines of its polygons; those without a name have the file's.
 
     Raises
     ------
-    InputError : see `read_lines` and `Screen`; a capacity without a height, a value that is no number.
+    InputError : see `read_lines` and `Screen`; a polygon with a hole, a capacity without a height, a value that is no
+        number.
     """
-    path, shapes = Path(path), read_lines(path, shift)
+    path = Path(path)
+    shapes = _lines_of(path, shift)
     found = []
     for number, shape in enumerate(shapes, start=1):
         name = shape.name or (path.stem if len(shapes) == 1 else f"{path.stem} {number}")
@@ -54,6 +60,28 @@ def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
         except InputError as error:
             raise InputError(error.problem, file=path, advice=error.advice) from error
     return tuple(found)
+
+
+def _lines_of(path: Path, shift: GlobalShift) -> tuple[MapShape, ...]:
+    """The lines of a file; of one with polygons their outlines, closed."""
+    try:
+        return read_lines(path, shift)
+    except InputError as error:
+        if path.suffix.lower() not in AREAS:
+            raise
+        try:
+            polygons = read_polygons(path, shift)
+        except InputError:
+            raise error from None
+    for number, shape in enumerate(polygons, start=1):
+        if len(shape.parts) > 1:
+            raise InputError(
+                f"The polygon {shape.name or number} has a hole, and a screen is one line",
+                file=path,
+                advice="Give its outline alone, or the hole as a polygon of its own",
+            )
+    closed = (np.vstack([shape.parts[0], shape.parts[0][:1]]) for shape in polygons)
+    return tuple(replace(shape, parts=(line,)) for shape, line in zip(polygons, closed, strict=True))
 
 
 def screens_of(entries: Sequence[ScreenEntry], shift: GlobalShift) -> tuple[Screen, ...]:
@@ -84,23 +112,32 @@ def entry_of(screen: Screen, shift: GlobalShift) -> ScreenEntry:
     return ScreenEntry(screen.name, None, points, height_m, capacity_kj)
 
 
-def write_screens(tallies: Mapping[str, ScreenTally], path: str | Path) -> None:
+def write_screens(
+    tallies: Mapping[str, ScreenTally],
+    path: str | Path,
+    values: Mapping[str, Mapping[str, DesignValues]] | None = None,
+) -> None:
     """Write screens.csv: a row for each screen, model and quantity, without barriers and, where there are any, with.
 
     Parameters
     ----------
     tallies : model → what passes the screens.
+    values : model → screen → what a barrier there must have, with the verdict on the one that stands there; None for
+        that of the 95 % values without partial factors.
     """
+    if values is None:
+        values = {model: design_of(tally) for model, tally in tallies.items()}
     with output_stream(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(COLUMNS)
         for model, tally in tallies.items():
             for barriers in (False, True) if any(screen.holds for screen in tally.screens) else (False,):
                 for figures in tally.figures(with_barriers=barriers):
-                    writer.writerows(_rows(model, barriers, figures))
+                    own = values.get(model, {}).get(figures.screen.name) if barriers else None
+                    writer.writerows(_rows(model, barriers, figures, own))
 
 
-def _rows(model: str, barriers: bool, figures: ScreenFigures) -> Iterable[list[object]]:
+def _rows(model: str, barriers: bool, figures: ScreenFigures, values: DesignValues | None) -> Iterable[list[object]]:
     screen = figures.screen
     outcomes = [figures.outcomes[name] if screen.holds else "" for name in OUTCOMES[1:]]
     capacity = "" if screen.capacity_j is None else screen.capacity_j / 1000
@@ -112,13 +149,22 @@ def _rows(model: str, barriers: bool, figures: ScreenFigures) -> Iterable[list[o
     for name, unit, attribute, factor in QUANTITIES:
         known: Known | None = getattr(figures, attribute)
         if known is None:
-            yield [*first, name, unit, *[""] * 9]
+            yield [*first, name, unit, *[""] * 10, *_verdict(values)]
             continue
         median, q95, q99 = known.quantiles
-        values = (
+        cells = (
             known.mean, median.value, q95.value, q95.low, q95.high, q99.value, q99.low, q99.high, known.greatest,
         )  # fmt: skip
-        yield [*first, name, unit, *("" if value != value else f"{factor * value:.6f}" for value in values)]
+        numbers = ("" if value != value else f"{factor * value:.6f}" for value in cells)
+        yield [*first, name, unit, *numbers, f"{q95.effective:.1f}", *_verdict(values)]
+
+
+def _verdict(values: DesignValues | None) -> list[object]:
+    """The table of partial factors, the verdict on a barrier with them, and how many more blocks would tell."""
+    if values is None or values.verdict is None:
+        return ["", "", ""]
+    more = values.more
+    return [values.factors.title, values.verdict, "" if more is None else more.blocks]
 
 
 def _number(shape: MapShape, name: str, key: str, path: Path) -> float | None:

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -121,8 +122,14 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         seed=entry.seed,
         record="all" if entry.record is None else recorded_for(entry.record, bool(structures), bool(entry.screens)),
         draws=draws,
+        more_releases=lambda times: _named_source(project, terrain, times_as_many(entry, times), file),
     )
     return scenario, inputs
+
+
+def times_as_many(entry: SimulationEntry, times: int) -> SimulationEntry:
+    """The same with so many times as many blocks, as far as no table says how many."""
+    return replace(entry, releases=replace(entry.releases, number=times * entry.releases.number))
 
 
 def _drawn_from(project: Project, terrain: Surface, entry: SimulationEntry) -> MeasuredRebounds:

@@ -29,7 +29,7 @@ from ..simulation.engine import Settings, Simulation
 from ..simulation.ground import Ground
 from ..simulation.hits import hits_of
 from ..simulation.parameter_draws import ParameterDraws
-from ..simulation.release import Releases, make_releases, overlapping, placed_on
+from ..simulation.release import Releases, make_releases, overlapping, placed_on, stated_places
 from ..simulation.release_sources import check_number, check_size
 from ..simulation.results import fell_through, release_names, run_figures
 from ..simulation.tree_hits import tree_hits_of
@@ -118,6 +118,7 @@ def read_releases(path: str | Path, ground: Ground, blocks: Blocks, number: int 
         axes_m=axes,
         shape=np.where(given & (blocks.shape == "sphere"), "ellipsoid", blocks.shape),
         density_kgpm3=density,
+        place=stated_places(survey)[row],
     )
     depth = overlapping(ground, releases)
     for i in np.flatnonzero(depth > DEEP * releases.radius_m)[:1].tolist():
@@ -344,8 +345,8 @@ def _model_summary(simulation: Simulation) -> dict[str, Any]:
         **({} if settings.trees is None else {"tree_hits": int(simulation.tree_hits.sum())}),
         "seconds": round(simulation.seconds, 3),
         "blocks_per_s": round(n / simulation.seconds, 1),
-        "run_out_m": _known(convergence(run_out)),
-        "v_max_mps": _known(convergence(simulation.v_max_mps)),
+        "run_out_m": _known(convergence(run_out, simulation.releases.place)),
+        "v_max_mps": _known(convergence(simulation.v_max_mps, simulation.releases.place)),
     }
 
 

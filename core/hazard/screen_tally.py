@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..simulation.convergence import Quantile, quantile
 from ..simulation.engine import Simulation
-from ..vectors import Array, Mask, norm
-from .screens import HELD, OUTCOMES, Screen, ScreenHits, hits_at
+from ..vectors import Array, Indices, Mask
+from .screens import HELD, OUTCOMES, Screen, ScreenHits, blocks_at, hits_at
 from .tally import Arrays
 
 MOST_KEPT = 2_000_000
@@ -50,8 +50,10 @@ class ScreenFigures:
     hits : crossings, those of a block that comes again included.
     outcomes : outcome → how many hits.
     along : (PLACES,) hits by place along the screen.
-    speed_mps, energy_j, height_m, angle_deg : of the hits; None where there is none. The energy is that of translation
-        and rotation, the height that of the centre vertically above the terrain, the angle that to the screen's normal.
+    speed_mps, energy_j, height_m : of the blocks that come, of each its greatest; None where there is none. The energy
+        is that of translation and rotation, the height that of the centre vertically above the terrain. The intervals
+        are of blocks, and those from one place of release are not taken as independent.
+    angle_deg : of the hits, to the screen's normal.
     sample : the hits that these are known from: all of them, unless they are more than are kept.
     """
 
@@ -164,6 +166,7 @@ class ScreenTally:
         found = []
         for place, screen in enumerate(self.screens):
             at, counts = hits.take(hits.screen == place), self._counts[which, place].tolist()
+            blocks = blocks_at(at)
             found.append(
                 ScreenFigures(
                     screen,
@@ -172,9 +175,9 @@ class ScreenTally:
                     counts[1],
                     dict(zip(OUTCOMES, counts[2:], strict=True)),
                     self._along[which, place],
-                    _known(norm(at.velocity)),
-                    _known(at.energy_j),
-                    _known(at.up_m),
+                    _known(blocks.speed_mps, blocks.place),
+                    _known(blocks.energy_j, blocks.place),
+                    _known(blocks.up_m, blocks.place),
                     _known(np.degrees(at.angle)),
                     at,
                 )
@@ -201,7 +204,7 @@ def _joined(parts: Sequence[ScreenHits]) -> ScreenHits:
         none, three = np.zeros(0), np.zeros((0, 3))
         return ScreenHits(
             np.zeros(0, np.int16), np.zeros(0, np.int64), none, three, three, none, none, none, none, none, none,
-            np.zeros(0, np.int8), np.zeros(0, np.bool_),
+            np.zeros(0, np.int8), np.zeros(0, np.bool_), np.zeros(0, np.intp),
         )  # fmt: skip
     return ScreenHits(
         **{name: np.concatenate([getattr(one, name) for one in parts]) for name in ScreenHits.__dataclass_fields__}
@@ -230,8 +233,11 @@ def held(hits: ScreenHits) -> Mask:
     return (hits.outcome == HELD) & hits.reaches
 
 
-def _known(values: Array) -> Known | None:
-    values = values[np.isfinite(values)]
+def _known(values: Array, place: Indices | None = None) -> Known | None:
+    there = np.isfinite(values)
+    values = values[there]
     if not values.size:
         return None
-    return Known(float(values.mean()), float(values.max()), tuple(quantile(values, share) for share in SHARES))
+    cluster = None if place is None else place[there]
+    quantiles = tuple(quantile(values, share, cluster) for share in SHARES)
+    return Known(float(values.mean()), float(values.max()), quantiles)

@@ -73,6 +73,11 @@ class Screen:
         """Whether it is a barrier."""
         return self.capacity_j is not None
 
+    @property
+    def closed(self) -> bool:
+        """Whether it is the outline of an area: what counts is that a block enters."""
+        return len(self.line) > 3 and bool(np.array_equal(self.line[0], self.line[-1]))
+
 
 @dataclass(frozen=True, eq=False)
 class ScreenHits:
@@ -91,6 +96,7 @@ class ScreenHits:
     kinetic_j, rotational_j : (h,) of translation and of rotation [J].
     outcome : (h,) place in `OUTCOMES`: at a barrier, whether it holds the block.
     reaches : (h,) whether the block gets there where the barriers hold others before.
+    place : (h,) where the block was released, see `Releases`.
     """
 
     screen: NDArray[np.int16]
@@ -106,6 +112,7 @@ class ScreenHits:
     rotational_j: Array
     outcome: NDArray[np.int8]
     reaches: Mask
+    place: Indices
 
     def __len__(self) -> int:
         return self.screen.size
@@ -118,6 +125,40 @@ class ScreenHits:
     def take(self, which: Indices | Mask) -> "ScreenHits":
         """Some of them."""
         return ScreenHits(**{name: getattr(self, name)[which] for name in ScreenHits.__dataclass_fields__})
+
+
+@dataclass(frozen=True, eq=False)
+class BlocksAt:
+    """The n blocks that come to one screen, in the order of their runs: a block that passes again is still one.
+
+    Attributes
+    ----------
+    number, place : (n,) of the run, from 1; where it was released, see `Releases`.
+    speed_mps, energy_j, kinetic_j, up_m, radius_m : (n,) the greatest of the block's hits: the energy of translation
+        and rotation, then of translation alone; the height is NaN where there is no terrain at any of them.
+    """
+
+    number: NDArray[np.int64]
+    place: Indices
+    speed_mps: Array
+    energy_j: Array
+    kinetic_j: Array
+    up_m: Array
+    radius_m: Array
+
+    def __len__(self) -> int:
+        return self.number.size
+
+
+def blocks_at(hits: ScreenHits) -> BlocksAt:
+    """The blocks of the hits of one screen."""
+    number, first = np.unique(hits.number, return_index=True)
+    if not number.size:
+        none = np.zeros(0)
+        return BlocksAt(number, hits.place[first], none, none, none, none, none)
+    columns = (norm(hits.velocity), hits.energy_j, hits.kinetic_j, hits.up_m, hits.radius_m)
+    greatest = [np.fmax.reduceat(one, first) for one in columns]
+    return BlocksAt(number, hits.place[first], *greatest)
 
 
 def check_screens(screens: Sequence[Screen], ground: Ground) -> None:
@@ -151,7 +192,10 @@ def points_along(screen: Screen, spacing_m: float) -> Array:
 
 
 def hits_at(simulation: Simulation, screens: Sequence[Screen]) -> ScreenHits:
-    """All crossings of screens, on the exact paths of runs all of whose moments were recorded."""
+    """All crossings of screens, on the exact paths of runs all of whose moments were recorded.
+
+    Of a closed screen, the outline of an area, only the first time that a block comes in is a hit.
+    """
     ways = _near(simulation, screens)
     pieces = parabolas_of(_only(simulation, ways))
     ends = _ends(pieces, simulation.records.position[ways + 1])
@@ -169,6 +213,10 @@ def hits_at(simulation: Simulation, screens: Sequence[Screen]) -> ScreenHits:
         part[order] for part in (piece, elapsed, place, along, angle_normal, run, time)
     )
     position, velocity = pieces.states(piece, elapsed)
+    counted = _first_entries(screens, place, run, dot(velocity[:, :2], normal))
+    piece, place, along, normal, run, time, position, velocity = (
+        part[counted] for part in (piece, place, along, normal, run, time, position, velocity)
+    )
     releases = simulation.releases
     radius, mass = releases.radius_m[run], releases.mass_kg[run]
     speed, spin = norm(velocity), pieces.spin[piece]
@@ -185,10 +233,33 @@ def hits_at(simulation: Simulation, screens: Sequence[Screen]) -> ScreenHits:
         angle=np.arccos(np.clip(np.divide(head_on, speed, out=np.ones_like(speed), where=speed > 0), 0.0, 1.0)),
         kinetic_j=0.5 * mass * speed**2,
         rotational_j=0.5 * releases.inertia[run] * mass * radius**2 * dot(spin, spin),
-        outcome=np.zeros(order.size, np.int8),
-        reaches=np.ones(order.size, np.bool_),
+        outcome=np.zeros(run.size, np.int8),
+        reaches=np.ones(run.size, np.bool_),
+        place=releases.place[run],
     )
     return _with_outcomes(hits, screens)
+
+
+def _first_entries(screens: Sequence[Screen], place: NDArray[np.int16], run: Indices, across: Array) -> Mask:
+    """(h,) which crossings count: all of an open screen; of a closed one the first of each run that leads inward.
+
+    Parameters
+    ----------
+    place, run, across : (h,) screen, run, and speed along the screen's normal, in the order of the runs and of time.
+    """
+    counted = np.ones(run.size, np.bool_)
+    for number, screen in enumerate(screens):
+        if screen.closed:
+            inward = np.flatnonzero((place == number) & (across * _turn(screen.line) > 0))
+            counted[place == number] = False
+            counted[inward[np.unique(run[inward], return_index=True)[1]]] = True
+    return counted
+
+
+def _turn(line: Array) -> float:
+    """Above zero where a closed line goes round its area to the left, so that its normals point into it."""
+    a, b = line[:-1] - line[0], line[1:] - line[0]
+    return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
 
 
 def _with_outcomes(hits: ScreenHits, screens: Sequence[Screen]) -> ScreenHits:

@@ -297,6 +297,7 @@ def _released(
         shape=shape,
         axes_m=axes,
         density_kgpm3=density,
+        place=which,
     )
 
 

@@ -2,7 +2,7 @@
 """Where blocks start, and as what: n releases, one a block."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,9 @@ class Releases:
     axes_m : (n, 3) the diameters d1, d2, d3 of the solid.
     mass_kg : (n,).
     remarks : what a user should know of how they were placed.
+    place : (n,) of the places that were stated or measured, which one it starts at: blocks of one place are not
+        independent of one another. Where chance chose each block's place, as in an area, it is the block's own, and
+        where nothing is said.
 
     Raises
     ------
@@ -56,8 +59,11 @@ class Releases:
     axes_m: Array
     mass_kg: Array
     remarks: tuple[Remark, ...] = ()
+    place: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
 
     def __post_init__(self) -> None:
+        if not self.place.size:
+            object.__setattr__(self, "place", np.arange(len(self.position)))
         for what, values in (("position", self.position), ("velocity", self.velocity), ("spin", self.angular_velocity)):
             self._refuse(np.asarray(~np.isfinite(values).all(axis=1)), f"The {what} is not a finite number")
         for what, sizes in (("diameter", self.axes_m), ("mass", self.mass_kg[:, None])):
@@ -112,9 +118,16 @@ class Releases:
 
 def join_releases(parts: Sequence[Releases]) -> Releases:
     """All blocks of several releases, in their order."""
-    columns = [field.name for field in fields(Releases) if field.name != "remarks"]
+    columns = [one.name for one in fields(Releases) if one.name != "remarks"]
     joined = {name: np.concatenate([getattr(one, name) for one in parts]) for name in columns}
+    before = np.cumsum([0, *(int(one.place.max(initial=-1)) + 1 for one in parts)])
+    joined["place"] = np.concatenate([one.place + k for one, k in zip(parts, before[:-1], strict=True)])
     return Releases(**joined, remarks=tuple(dict.fromkeys(remark for one in parts for remark in one.remarks)))
+
+
+def stated_places(points: Array) -> Indices:
+    """(n,) which of the different places in plan each of the points (n, 2 or 3) is at."""
+    return np.unique(points[:, :2], axis=0, return_inverse=True)[1].ravel()
 
 
 def make_releases(
@@ -128,12 +141,14 @@ def make_releases(
     shape: Names | Shape = "sphere",
     density_kgpm3: Array | float = ROCK_DENSITY_KGPM3,
     number: int = 1,
+    place: Indices | None = None,
 ) -> Releases:
     """Releases, each `number` times.
 
     Parameters
     ----------
     diameter_m : (n,) or a number, of blocks without `axes_m` (n, 3). A sphere and a cube take the mean of three.
+    place : (n,) see `Releases`; None for one each.
 
     Raises
     ------
@@ -159,6 +174,7 @@ def make_releases(
         shapes,
         axes,
         np.broadcast_to(np.asarray(density_kgpm3, dtype=np.float64), n) * volumes(shapes, axes),
+        place=np.arange(n) if place is None else place,
     )
     return releases if number == 1 else releases.take(np.repeat(np.arange(n), number))
 

@@ -7,6 +7,7 @@ and densities are functions of the seed and of the run alone: one more block cha
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from .blocks import Blocks, draw_blocks
 from .ground import Ground
 from .memory import check_blocks
 from .polygons import Polygon
-from .release import Releases, make_releases, placed_on, standing_on
+from .release import Releases, make_releases, placed_on, standing_on, stated_places
 
 ATTEMPTS = 64
 """So many places are drawn for a block before it is taken as too large for all."""
@@ -50,7 +51,7 @@ def on_points(
     check_number(number, len(points))
     which = np.repeat(np.arange(len(points)), number)
     name = np.full(len(points), "") if names is None else names
-    return _fixed(ground, points[which], name[which], blocks, seed)
+    return replace(_fixed(ground, points[which], name[which], blocks, seed), place=stated_places(points)[which])
 
 
 def on_line(

@@ -10,7 +10,7 @@ from ..analysis.figures import MEASURED, MUTED, PAGE_IN, STYLE
 from ..analysis.whole_run_figures import model_colour
 from ..extras import FIGURES, demand
 from ..hazard.maps import LAYERS
-from ..hazard.screens import Screen, points_along
+from ..hazard.screens import Screen, blocks_at, points_along
 from ..impact_models.registry import find_model
 from ..reconstruction.sampling import STEP_S, sample_trajectories
 from ..simulation.parabolas import parabolas_of, polylines_of
@@ -56,8 +56,9 @@ def figures_of(sheet: DesignSheet) -> "Iterator[tuple[str, str, Figure]]":
         if any(screen.name in one.values for one in sheet.models):
             yield (
                 f"screen {screen.name}",
-                f"What comes to {screen.name}: the share of the hits that is not above a value. Marked is the "
-                "characteristic value with its 95 % interval, and the design value.",
+                f"What comes to {screen.name}: the share of the blocks that is not above a value, of each its "
+                "greatest. Marked is the characteristic value with its 95 % interval, where it has one; dashed is the "
+                "design value.",
                 screen_figure(sheet, screen),
             )
 
@@ -162,11 +163,11 @@ def screen_figure(sheet: DesignSheet, screen: Screen) -> "Figure":
                 continue
             values, colour = one.values[screen.name], _colour(one)
             hits = one.tally.hits
-            hits = hits.take(hits.reaches & (hits.screen == place))
+            each = blocks_at(hits.take(hits.reaches & (hits.screen == place)))
             for axes, data, known, design, factor in (
-                (speed, np.sqrt((hits.velocity**2).sum(axis=1)), values.speed_mps, values.design_speed_mps, 1.0),
-                (energy, hits.energy_j, values.energy_j, values.design_energy_j, 1e-3),
-                (height, hits.up_m[np.isfinite(hits.up_m)], values.height_m, values.design_height_m, 1.0),
+                (speed, each.speed_mps, values.speed_mps, values.design_speed_mps, 1.0),
+                (energy, each.energy_j, values.energy_j, values.design_energy_j, 1e-3),
+                (height, each.up_m[np.isfinite(each.up_m)], values.height_m, values.design_height_m, 1.0),
             ):
                 ordered = np.sort(data) * factor
                 axes.step(ordered, 100 * np.arange(1, ordered.size + 1) / ordered.size, color=colour, linewidth=1.2)
@@ -176,7 +177,8 @@ def screen_figure(sheet: DesignSheet, screen: Screen) -> "Figure":
                         ends, [100 * known.share] * 2, color=colour, linewidth=4, alpha=0.45, solid_capstyle="butt"
                     )
                 axes.plot(known.value * factor, 100 * known.share, "o", color=colour, markersize=3.2)
-                axes.axvline(design * factor, color=colour, linewidth=0.8, linestyle=(0, (4, 2)))
+                if np.isfinite(design):
+                    axes.axvline(design * factor, color=colour, linewidth=0.8, linestyle=(0, (4, 2)))
             figures = one.tally.figures(with_barriers=True)[place]
             edges = np.linspace(0, screen.length_m, figures.along.size + 1)
             along.stairs(100 * figures.along / max(figures.hits, 1), edges, color=colour, linewidth=1.0)
@@ -189,7 +191,7 @@ def screen_figure(sheet: DesignSheet, screen: Screen) -> "Figure":
         if screen.capacity_j is not None:
             energy.axvline(screen.capacity_j / 1000, color=SCREEN_INK, linewidth=1.4)
             height.axvline(screen.height_m, color=SCREEN_INK, linewidth=1.4)
-        speed.set_ylabel("hits that are not above [%]")
+        speed.set_ylabel("blocks that are not above [%]")
         along.set(xlabel=f"place along {screen.name} [m]", ylabel="hits [%]", xlim=(0, screen.length_m), ylim=(0, None))
     return figure
 

@@ -4,8 +4,9 @@
 The numbers behind the page that an engineer hands over; `exchange.design_page` writes it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..analysis.scores import Score, scores
 from ..errors import InputError
 from ..hazard.cell_tally import CellTally
 from ..hazard.cells import cells_over
-from ..hazard.design import DesignValues, PartialFactors, design_values
+from ..hazard.design import KNOWN_TO, ON, DesignValues, PartialFactors, Verdict, design_of
 from ..hazard.maps import Maps
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import HELD, OUTCOMES, Screen, check_screens
@@ -25,13 +26,15 @@ from ..progress import CancelledError, Progress, silent
 from ..reconstruction.impact import Impacts
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark, gravest_first
+from ..simulation.convergence import fewest
 from ..simulation.engine import Settings, Simulation, simulate
 from ..simulation.ground import Ground
 from ..simulation.parameter_draws import FRICTION_NAME
 from ..simulation.release import Releases
 from ..simulation.results import run_figures
 from ..vectors import Array
-from .enough import KNOWN_TO, in_chance_order, is_known
+from .barrier_verdicts import evidence_sentence, more_words, verdict_remark
+from .enough import in_chance_order, is_known
 from .hazard import Counted, run_chunks
 
 DRAWN = 250
@@ -73,7 +76,7 @@ class ModelDesign:
     values : screen → what a barrier there must have; no entry where no block comes.
     evidence : None where nothing was measured here.
     maps : of all runs, without barriers; None where they were not asked for.
-    drawn : some of the runs, for figures.
+    drawn : some of the runs that were counted, for figures.
     energy_lines_deg : (n,) of those of them that come to rest, from the release to the stop.
     """
 
@@ -97,7 +100,9 @@ class DesignSheet:
     ground, screens, factors : for which.
     models : one for each.
     measured : the trajectories that were filmed here; None without.
-    remarks : what must be known, gravest first.
+    limit : blocks that were to fall at most with each model, where they fell until the values were known; else None.
+    remarks : what must be known, gravest first; those of `verdicts` are among them.
+    verdicts : on each barrier and model, whether it is enough, with the evidence.
     """
 
     title: str
@@ -107,7 +112,9 @@ class DesignSheet:
     share: float
     models: tuple[ModelDesign, ...]
     measured: Reconstruction | None
-    remarks: tuple[Remark, ...]
+    limit: int | None
+    remarks: tuple[Remark, ...] = ()
+    verdicts: tuple[tuple[Verdict, Remark], ...] = ()
 
 
 def design_sheet(
@@ -130,11 +137,11 @@ def design_sheet(
 
     Parameters
     ----------
-    share : of the hits that do not exceed the characteristic values; None takes that of the factors.
+    share : of the blocks that do not exceed the characteristic values; None takes that of the factors.
     measured : trajectories of this site, for the evidence.
     cell_m : side of the cells of maps; None for no maps.
     until_known : end as soon as the characteristic energy and height of every screen that blocks reach are known to
-        `KNOWN_TO`; else all releases fall.
+        `KNOWN_TO`, or as well as more blocks from the same places would tell; else all releases fall.
     holdout : whether the evidence tells how well a model predicts trajectories that it was not fitted to.
 
     Raises
@@ -166,7 +173,8 @@ def design_sheet(
         )
         if counted.blocks < counted.wanted and not (until_known and is_known(tally, share)):
             raise CancelledError
-        values = design_of(tally, factors, share)
+        places = int(np.unique(releases.place[: counted.blocks]).size)
+        values = design_of(tally, factors, share, places)
         if not values:
             names = ", ".join(screen.name for screen in screens)
             raise InputError(
@@ -175,22 +183,11 @@ def design_sheet(
             )
         maps = None if cells is None else cells.maps()
         models.append(_model_design(ground, releases, one, counted, tally, values, measured, maps, holdout, progress))
-    sheet = DesignSheet(title, ground, tuple(screens), factors, share, tuple(models), measured, ())
-    return replace(sheet, remarks=tuple(_remarks(sheet)))
-
-
-def design_of(tally: ScreenTally, factors: PartialFactors, share: float) -> dict[str, DesignValues]:
-    """Screen → what a barrier there must have, for those that blocks come to.
-
-    What comes to a screen is what the barriers above it do not hold; to a barrier itself come all of these.
-    """
-    hits, found = tally.hits, {}
-    hits = hits.take(hits.reaches)
-    for place, screen in enumerate(tally.screens):
-        own = hits.take(hits.screen == place)
-        if len(own):
-            found[screen.name] = design_values(screen, own, factors, tally.blocks, share)
-    return found
+    limit = len(releases) if until_known else None
+    sheet = DesignSheet(title, ground, tuple(screens), factors, share, tuple(models), measured, limit)
+    verdicts = tuple(_verdicts(sheet))
+    remarks = gravest_first([*(remark for _, remark in verdicts), *_remarks(sheet)])
+    return replace(sheet, remarks=tuple(remarks), verdicts=verdicts)
 
 
 def _model_design(
@@ -206,8 +203,8 @@ def _model_design(
     progress: Progress,
 ) -> ModelDesign:
     progress(f"Runs of {find_model(settings.model).title} to draw", 0, 0)
-    some = np.unique(np.linspace(0, len(releases) - 1, min(DRAWN, len(releases))).astype(np.intp))
-    drawn = simulate(ground, releases.take(some), settings)
+    some = np.unique(np.linspace(0, counted.blocks - 1, min(DRAWN, counted.blocks)).astype(np.intp))
+    drawn = simulate(ground, releases.take(some), settings, runs=some)  # of those that were counted, each as it was
     lines = np.degrees(run_figures(drawn).energy_line)[drawn.at_rest]
     evidence = None if measured is None else evidence_of(measured.impacts, settings, holdout, progress)
     return ModelDesign(settings, counted, tally, values, evidence, maps, drawn, lines[np.isfinite(lines)])
@@ -251,41 +248,65 @@ def held_share(tally: ScreenTally, screen: Screen) -> float:
     return figures.outcomes[OUTCOMES[HELD]] / figures.hits if figures.hits else np.nan
 
 
+def _verdicts(sheet: DesignSheet) -> Iterator[tuple[Verdict, Remark]]:
+    """Of each barrier and model; the evidence stands before what follows from it."""
+    for one in sheet.models:
+        title = find_model(one.settings.model).title
+        for screen in sheet.screens:
+            values = one.values.get(screen.name)
+            if values is not None:
+                found = verdict_remark(values, title)
+                if found is not None:
+                    yield found
+            elif screen.holds:
+                yield "not_known", Remark(_no_block(screen.name, one, title), "warning", screen.name)
+
+
+def _no_block(screen: str, one: ModelDesign, title: str) -> str:
+    """0 of n: with 95 % certainty at most 3/n, since (1 − 3/n)ⁿ is 5 %."""
+    most = 100 * (1 - 0.05 ** (1 / one.counted.blocks))
+    return (
+        f"No block of {one.counted.blocks} with {title} comes to {screen}: nothing is designed there. Up to "
+        f"{most:.2g} % may come (95 % certain)."
+    )
+
+
 def _remarks(sheet: DesignSheet) -> list[Remark]:
-    """What is not enough, and what is not known; the good news last."""
-    found = []
+    """What is not known, and why, beside the verdicts."""
+    found, share = [], f"{100 * sheet.share:g} %"
     for one in sheet.models:
         model, title = one.settings.model, find_model(one.settings.model).title
         for screen in sheet.screens:
             values = one.values.get(screen.name)
             if values is None:
-                text = f"No block with {title} comes to {screen.name}: nothing is designed there."
-                found.append(Remark(text, "warning", screen.name))
+                if not screen.holds:
+                    found.append(Remark(_no_block(screen.name, one, title), "warning", screen.name))
                 continue
-            if values.faults:
-                text = f"{screen.name} is not enough for {title}: {'; '.join(values.faults)}."
-                found.append(Remark(text, "problem", screen.name))
-            elif screen.holds:
-                found.append(Remark(f"{screen.name} is enough for what {title} says.", "note", screen.name))
             if not values.is_sample:
                 text = (
-                    f"Only {values.different} of {values.hits} hits at {screen.name} differ with {title}: it gives the "
-                    "same run to the same release. Release from an area, or blocks of several sizes; intervals are not "
-                    "told."
+                    f"Only {values.different} of {values.reach} blocks at {screen.name} differ with {title}: it gives "
+                    "the same run to the same release. Release from an area, or blocks of several sizes; intervals are "
+                    "not told."
                 )
                 found.append(Remark(text, "warning", screen.name))
             elif not values.is_known:
                 text = (
-                    f"{values.hits} hits at {screen.name} with {title} are too few for a {100 * sheet.share:g} % "
-                    "value: release more blocks."
+                    f"The {share} values at {screen.name} have no upper bound with {title}, which takes "
+                    f"{fewest(sheet.share)} independent blocks: nothing is designed there. {evidence_sentence(values)} "
+                    f"{more_words(values).capitalize()}."
                 )
                 found.append(Remark(text, "warning", screen.name))
-            elif max(values.energy_j.known_to, values.height_m.known_to) > KNOWN_TO:
+            elif values.known_to > KNOWN_TO:
                 text = (
                     f"At {screen.name} the energy is known to {100 * values.energy_j.known_to:.0f} % and the height to "
                     f"{100 * values.height_m.known_to:.0f} % with {title}; {100 * KNOWN_TO:.0f} % is usual."
                 )
+                if values.more is not None:
+                    text += f" {more_words(values).capitalize()}."
                 found.append(Remark(text, "advice", screen.name))
+        if sheet.limit is not None and one.counted.blocks == sheet.limit and not is_known(one.tally, sheet.share):
+            text = f"The limit of {sheet.limit} blocks ended the simulation with {title} before all values were known."
+            found.append(Remark(text, "advice", model))
         if one.evidence is None:
             text = (
                 f"Nothing measured on this site supports {title} here: its parameters are taken on trust."
@@ -293,6 +314,14 @@ def _remarks(sheet: DesignSheet) -> list[Remark]:
                 else f"Too few impacts were measured here to tell how well {title} fits them."
             )
             found.append(Remark(text, "warning", model))
+    unverified = sheet.factors.unverified(*ON)
+    if unverified:
+        names = ", ".join(f"{factor.symbol} = {factor.value:g}" for factor in unverified)
+        text = (
+            f"The needed values have in them factors that are not verified: {names}, together × "
+            f"{prod(factor.value for factor in unverified):.3g}. Check them against the standard before you sign."
+        )
+        found.append(Remark(text, "warning", "factors"))
     trees = sheet.models[0].settings.trees
     if trees is not None:
         text = (
@@ -300,4 +329,4 @@ def _remarks(sheet: DesignSheet) -> list[Remark]:
             "compare with a sheet without trees."
         )
         found.append(Remark(text, "warning", "trees"))
-    return gravest_first(found)
+    return found

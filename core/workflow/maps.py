@@ -118,7 +118,7 @@ def map_models(
     ----------
     cell_m : side of the cells, which cover the terrain; None for no maps.
     faces : whether contacts with each face of the mesh are counted.
-    until_known : end when the values that this share of the hits does not exceed are known at the screens; the
+    until_known : end when the values that this share of the blocks does not exceed are known at the screens; the
         simulations then have the blocks that were enough.
     record, first_run, threads, progress : see `run_models`. The maps do not depend on what is recorded.
 

@@ -3,15 +3,15 @@
 
 from collections.abc import Mapping, Sequence
 
+from ..hazard.design import design_of
 from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import HELD, OUTCOMES, OVER, THROUGH, Screen
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..remarks import Remark
+from ..simulation.convergence import fewest
 from ..simulation.engine import Simulation
-
-FEW = 20
-"""Fewer blocks at a screen do not tell a 95 % value."""
+from .barrier_verdicts import verdict_remark
 
 
 def tallies_of(
@@ -36,10 +36,16 @@ def screen_remarks(tallies: Mapping[str, ScreenTally]) -> tuple[Remark, ...]:
     remarks = []
     for model, tally in tallies.items():
         without, after = tally.figures(), tally.figures(with_barriers=True)
+        for values in design_of(tally).values():
+            verdict = verdict_remark(values, find_model(model).title)
+            remarks += [] if verdict is None else [verdict[1]]
         for figures, behind in zip(without, after, strict=True):
             remarks += _remarks_of_one(model, figures, behind)
     if any(screen.holds for tally in tallies.values() for screen in tally.screens):
-        text = "What barriers hold is told in hits.csv and screens.csv; the other tables are of the runs without them."
+        text = (
+            "What barriers hold is told in hits.csv and screens.csv; the other tables are of the runs without them. "
+            "Whether they are enough is told of the 95 % values without partial factors: rockfall design has these."
+        )
         remarks.append(Remark(text, "note", "screens"))
     return tuple(remarks)
 
@@ -54,8 +60,13 @@ def _remarks_of_one(model: str, figures: ScreenFigures, behind: ScreenFigures) -
     if figures.height_m:
         text += f", height of the centre {_value(figures.height_m)} m"
     remarks = [Remark(f"{text}.", "note", name)]
-    if n < FEW:
-        text = f"Only {n} block{'s' if n > 1 else ''} with {title} at {name}: too few for its 95 % values."
+    known = [one.quantile(0.95) for one in (figures.energy_j, figures.height_m) if one is not None]
+    if any(one.high != one.high for one in known):
+        worth = min(one.effective for one in known)
+        text = (
+            f"{n} block{'s' if n > 1 else ''} with {title} at {name}, worth {worth:.0f} independent ones, "
+            f"{'are' if n > 1 else 'is'} too few for an upper bound of the 95 % values, which takes {fewest(0.95)}."
+        )
         remarks.append(Remark(text, "warning", name))
     if figures.screen.holds:
         counts = [behind.outcomes[OUTCOMES[place]] for place in (HELD, OVER, THROUGH)]

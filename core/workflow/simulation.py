@@ -87,6 +87,8 @@ class Scenario:
     ----------
     terrain : the surface, or the cloud whose points the blocks meet.
     releases : puts the blocks on the ground, with their sizes, densities, number and velocities.
+    more_releases : k → the same with k times as many blocks, as far as no table says how many; None where it is not
+        known how.
     models : name → the parameters that are not to have their default, for all zones; in the order in which they run.
     draws : name → what each block of this model draws its parameters from, and friction.
     measured : what the model observed draws from; None where it does not run.
@@ -115,6 +117,7 @@ class Scenario:
     record: Recorded = "all"
     draws: Mapping[str, ParameterDraws] = field(default_factory=dict)
     trees: Trees | None = None
+    more_releases: Callable[[int], ReleaseSource] | None = None
 
     @property
     def settings(self) -> tuple[Settings, ...]:

@@ -14,9 +14,13 @@ from ...core.output import output_folder
 from ...core.progress import Progress
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.workflow.design_sheet import design_sheet
+from ...core.workflow.enough import as_many_as
 from ...core.workflow.simulation import ground_of
 from . import picks, reconstruction, screens, simulation_setup, store
 from .simulation_setup import Plan
+
+MOST_BLOCKS = 50_000
+"""So many fall at most with each model, until the values at the screens are known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +81,20 @@ def write(asked: Asked, folder: Path, progress: Progress) -> list[str]:
     ground = ground_of(scenario)
     sheet = design_sheet(
         ground,
-        scenario.releases(ground),
+        as_many_as(scenario, ground, MOST_BLOCKS),
         scenario.settings,
         asked.plan.screens,
         open_factors(asked.factors),
         title=asked.title,
         measured=asked.measured,
+        until_known=True,
         holdout=asked.holdout,
         progress=progress,
     )
     with output_folder(folder) as place:
         written = write_design(sheet, place, asked.inputs, drawn=is_there(FIGURES), progress=progress)
-        write_screens({one.settings.model: one.tally for one in sheet.models}, place / "screens.csv")
+        tallies = {one.settings.model: one.tally for one in sheet.models}
+        write_screens(tallies, place / "screens.csv", {one.settings.model: one.values for one in sheet.models})
     return [*written, "screens.csv"]
 
 

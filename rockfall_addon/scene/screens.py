@@ -13,18 +13,23 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.hazard.design import DesignValues, Verdict, design_of
 from ...core.hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ...core.hazard.screens import HELD, OUTCOMES, OVER, THROUGH, Screen
 from ...core.impact_models.registry import MODELS
 from ...core.terrain.raycast import cast_rays
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
+from ...core.workflow.barrier_verdicts import more_words
 from . import drawn_releases, store, terrain
 
 COLLECTION = "Screens"
 MOST_POSTS = 400
 """Places along a screen at which its foot is looked for."""
 SPACING_M = 1.0
+VERDICTS: dict[str, str] = {
+    "enough": "enough, without partial factors", "not_enough": "not enough", "not_known": "not known yet: {more}",
+}  # fmt: skip
 
 
 def objects_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -93,12 +98,19 @@ def screens_of(scene: bpy.types.Scene) -> tuple[Screen, ...]:
     ------
     RockfallError : one is no line.
     """
-    found = []
-    for obj in objects_of(scene):
-        settings = obj.rockfall_screen
-        capacity_j = 1000 * store.double(settings.capacity_kj) if settings.holds else None
-        found.append(Screen(obj.name, line_of(obj)[:, :2].copy(), store.double(settings.height_m), capacity_j))
-    return tuple(found)
+    return tuple(screen_of(obj) for obj in objects_of(scene))
+
+
+def screen_of(obj: bpy.types.Object) -> Screen:
+    """A screen for the core.
+
+    Raises
+    ------
+    RockfallError : it is no line.
+    """
+    settings = obj.rockfall_screen
+    capacity_j = 1000 * store.double(settings.capacity_kj) if settings.holds else None
+    return Screen(obj.name, line_of(obj)[:, :2].copy(), store.double(settings.height_m), capacity_j)
 
 
 def fence(scene: bpy.types.Scene, obj: bpy.types.Object) -> Array:
@@ -139,9 +151,33 @@ def results_of(tallies: Mapping[str, ScreenTally]) -> list[dict[str, object]]:
     """
     found = []
     for model, tally in tallies.items():
+        values = design_of(tally)
         for without, behind in zip(tally.figures(), tally.figures(with_barriers=True), strict=True):
-            found.append(_result(model, without, behind))
+            found.append(_result(model, without, behind) | _verdict(values.get(without.screen.name), without.screen))
     return found
+
+
+def _verdict(values: DesignValues | None, screen: Screen) -> dict[str, object]:
+    """Whether a barrier is enough for the 95 % values, and for which barrier that was found; nothing of a screen."""
+    if not screen.holds:
+        return {}
+    said = "no block comes" if values is None else more_words(values)
+    verdict = "not_known" if values is None else values.verdict
+    return {"verdict": verdict, "more": said, "barrier": _barrier(screen)}
+
+
+def _barrier(screen: Screen) -> list[float]:
+    """Height, capacity and corners, as a file keeps them."""
+    return np.round([screen.height_m, (screen.capacity_j or 0.0) / 1000, *screen.line.ravel()], 3).tolist()
+
+
+def verdict_of(results: Sequence[Mapping[str, object]], screen: Screen) -> Verdict | None:
+    """The worst verdict of all models on a barrier, as it stands now; None where it is another or nothing was found."""
+    found = [one["verdict"] for one in results if one["screen"] == screen.name and "verdict" in one]
+    now = _barrier(screen)
+    if any(one["barrier"] != now for one in results if one["screen"] == screen.name and "verdict" in one):
+        return None
+    return next((verdict for verdict in ("not_enough", "not_known", "enough") if verdict in found), None)
 
 
 def _result(model: str, without: ScreenFigures, behind: ScreenFigures) -> dict[str, object]:
@@ -184,12 +220,15 @@ def result_rows(results: Sequence[Mapping[str, object]], name: str) -> list[tupl
         if "held" in one:
             rows += [("Held", str(one["held"])), ("Over it, through it", f"{one['over']}, {one['through']}")]
             beyond = one["over"] + one["through"]
-            rows.append(("Passes", f"{_percent(beyond, one['hits'])} of the hits"))
+            rows.append(("Passes", f"{beyond} of {one['hits']} hits"))
         for key, text, unit in (
             ("energy_kj", "Energy, 95 %", "kJ"), ("height_m", "Height, 95 %", "m"), ("speed_mps", "Speed, 95 %", "m/s"),
         ):  # fmt: skip
             if one[key] is not None:
                 rows.append((text, _with_interval(one[key], unit)))
+        if one.get("verdict") in VERDICTS:
+            more = str(one.get("more", ""))
+            rows.append(("For the 95 % values", VERDICTS[one["verdict"]].format(more=more)))
         found.append((MODELS[one["model"]].title, rows))
     return found
 
@@ -204,5 +243,5 @@ def _with_interval(values: Sequence[float | None], unit: str) -> str:
         case False, False:
             return f"{value:.3g} {unit} ({low:.3g}–{high:.3g})"
         case False, True:
-            return f"{value:.3g} {unit} (≥ {low:.3g})"
-    return f"{value:.3g} {unit}"
+            return f"{value:.3g} {unit} ({low:.3g} to ?)"
+    return f"{value:.3g} {unit} (too few blocks)"

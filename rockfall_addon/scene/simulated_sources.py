@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the scene's settings say of a simulation, as a project states it, and where its blocks come from."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
@@ -119,8 +119,10 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
 
 def source_of(
     scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface
-) -> tuple[ReleaseSource, Mapping[str, Origin], tuple[Remark, ...]]:
+) -> tuple[Callable[[SimulationEntry], ReleaseSource], Mapping[str, Origin], tuple[Remark, ...]]:
     """What puts the blocks on the ground, when the blocks of each release start in the scene, and what is missing.
+
+    The first is asked with the entry, or with one of another number of blocks; it touches nothing of Blender.
 
     Raises
     ------
@@ -128,7 +130,7 @@ def source_of(
     """
     block = reconstruction.project_settings(scene, []).block
     if entry.releases.source != MEASURED:
-        return placed_source(entry, block), {}, ()
+        return lambda asked: placed_source(asked, block), {}, ()
     table, left_out = reconstruction.good_picks(scene)
     if entry.releases.trajectory:
         onward = table.trajectory == entry.releases.trajectory
@@ -136,7 +138,7 @@ def source_of(
             onward &= table.time_s >= entry.releases.time_s - SAME_TIME_S
         table = take(table, onward)
     measured = reconstruction.reconstruct_scene(scene, table, surface=surface)
-    return measured_source(entry, block, measured), _origins(measured), left_out
+    return lambda asked: measured_source(asked, block, measured), _origins(measured), left_out
 
 
 def fingerprint(scene: bpy.types.Scene, models: Collection[str], number: int | None = None) -> str:

@@ -14,6 +14,7 @@ from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
 from ...core.exchange.simulation_entry import SimulationEntry
 from ...core.exchange.simulation_output import default_records, write_simulations
+from ...core.exchange.simulation_project import times_as_many
 from ...core.exchange.trees import open_trees
 from ...core.hazard.barriers import with_barriers
 from ...core.hazard.screens import Screen, check_screens
@@ -92,8 +93,9 @@ def planned(scene: bpy.types.Scene, entry: SimulationEntry) -> Plan:
     RockfallError : something cannot be.
     """
     surface = ground(scene)
-    source, origins, left_out = simulated_sources.source_of(scene, entry, surface)
-    scenario = scenario_of(scene, entry, surface, source)
+    source_of, origins, left_out = simulated_sources.source_of(scene, entry, surface)
+    scenario = scenario_of(scene, entry, surface, source_of(entry))
+    scenario = replace(scenario, more_releases=lambda times: source_of(times_as_many(entry, times)))
     measured = None
     if any(MODELS[name].draws_from_impacts for name in entry.models):
         good, left_out = reconstruction.reconstruct_good(scene)

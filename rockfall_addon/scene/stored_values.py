@@ -259,6 +259,12 @@ def _results_at_screens(value: object) -> None:
                 _first, _low, _high = known
         if not all(isinstance(result[key], int) for key in ("blocks", "reach", "reach_with_barriers", "hits")):
             raise ValueError(result)
+        if "verdict" in result and not (
+            result["verdict"] in ("enough", "not_enough", "not_known")
+            and isinstance(result["more"], str)
+            and isinstance(result["barrier"], list)
+        ):
+            raise ValueError(result)
 
 
 def _texts(found: list) -> None:

@@ -18,6 +18,7 @@ from types import ModuleType
 
 import equations
 import impact_models
+import intervals
 import real
 import reconstruction
 import simulation
@@ -29,7 +30,7 @@ QUICK: dict[str, ModuleType] = {
     "impact_models": impact_models,
     "simulation": simulation,
 }
-LONG: dict[str, ModuleType] = {"reconstruction": reconstruction, "real": real}
+LONG: dict[str, ModuleType] = {"intervals": intervals, "reconstruction": reconstruction, "real": real}
 
 
 def quick_page(name: str) -> tuple[str, list[Check]]:

@@ -151,3 +151,33 @@ def test_the_design_sheet_of_a_drawn_screen(
     assert "No figures: this page was made where Matplotlib is not installed" in page
     bpy.ops.rockfall.remove_screen(name="road")
     assert not bpy.ops.rockfall.design_sheet.poll(), "there is nothing to design for"
+
+
+def test_a_barrier_is_green_only_while_it_is_known_to_be_enough(
+    slope: bpy.types.Scene, screen: bpy.types.Object, part
+) -> None:
+    screens, fences = part("rockfall_addon.scene.screens"), part("rockfall_addon.steps.simulation.fences")
+    settings, simulated = screen.rockfall_screen, slope.rockfall_simulation
+    settings.holds, settings.height_m, settings.capacity_kj = True, 60.0, 1e6
+
+    def shown() -> tuple[str, tuple[float, ...]]:
+        results = part("rockfall_addon.scene.simulation_setup").screen_results(slope)
+        ((_, rows),) = screens.result_rows(results, "road")
+        return dict(rows)["For the 95 % values"], fences._colour(screen, results)
+
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    words, colour = shown()
+    assert words.startswith("not known yet: about "), "40 blocks are released"
+    assert colour == fences.HOLDS
+    simulated.number = 400
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    words, colour = shown()
+    assert words == "enough, without partial factors"
+    assert colour == fences.JUDGED["enough"]
+    settings.height_m = 50.0
+    assert shown()[1] == fences.HOLDS, "nothing was found of a barrier of this height"
+    settings.capacity_kj = 0.1
+    assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+    words, colour = shown()
+    assert words == "not enough"
+    assert colour == fences.JUDGED["not_enough"]

@@ -10,10 +10,14 @@ from rockfall.core.hazard.screen_tally import ScreenTally
 from rockfall.core.hazard.screens import HELD, OVER, PASSES, THROUGH, Screen, check_screens, hits_at
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.reconstruction.free_flight import fly
+from rockfall.core.simulation.blocks import Blocks
+from rockfall.core.simulation.distributions import Distribution
 from rockfall.core.simulation.engine import Settings, Simulation, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.hits import hits_of
-from rockfall.core.simulation.release import make_releases
+from rockfall.core.simulation.polygons import Polygon
+from rockfall.core.simulation.release import join_releases, make_releases
+from rockfall.core.simulation.release_sources import in_polygon, on_points
 from rockfall.core.terrain.surface import Surface
 
 G = 9.81
@@ -90,6 +94,36 @@ def test_a_block_that_comes_back_crosses_twice_and_reaches_once() -> None:
     tally.add(simulation)
     figures = tally.figures()[0]
     assert (figures.blocks, figures.reach, figures.hits) == (1, 1, 2)
+    assert figures.energy_j is not None
+    assert figures.energy_j.quantile(0.95).count == 1, "one block is one observation"
+    assert figures.energy_j.greatest == tally.hits.energy_j.max()
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_an_area_counts_a_block_once_when_it_comes_in(backwards: bool) -> None:
+    """Thrown to the east from x = 0: through a square from x = 6 to 9, and out of one that they start in."""
+    corners = np.array([[6.0, -40.0], [9.0, -40.0], [9.0, 40.0], [6.0, 40.0], [6.0, -40.0]])
+    around = corners + np.array([-8.0, 0.0])
+    step = -1 if backwards else 1
+    simulation = thrown(5)
+    hits = hits_at(simulation, [Screen("house", corners[::step]), Screen("source", around[::step])])
+    assert hits.screen.tolist() == [0] * 5
+    np.testing.assert_allclose(hits.position[:, 0], 6.0, atol=1e-9)
+    lines = hits_at(simulation, [Screen("open", corners[:4])])
+    assert len(lines) == 5, "an outline that is not closed is a line"
+
+
+def test_blocks_know_the_place_that_they_are_released_from() -> None:
+    ground = plane()
+    points = np.array([[0.0, 0.0, np.nan], [5.0, 0.0, np.nan], [0.0, 0.0, np.nan]])
+    blocks = Blocks("sphere", Distribution("fixed", 0.5), (1.0, 1.0, 1.0), Distribution("fixed", 2650.0))
+    assert on_points(ground, points, blocks, 2).place.tolist() == [0, 0, 1, 1, 0, 0], "two stated points are one place"
+    square = Polygon("area", (np.array([[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]]),))
+    area = in_polygon(ground, [square], blocks, 4)
+    assert area.place.tolist() == [0, 1, 2, 3]
+    both = join_releases([on_points(ground, points, blocks, 1), area])
+    assert both.place.tolist() == [0, 1, 0, 2, 3, 4, 5]
+    assert both.take(np.array([2, 5])).place.tolist() == [0, 4]
 
 
 def test_blocks_that_fall_have_the_energy_of_their_fall() -> None:

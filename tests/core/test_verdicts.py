@@ -2,7 +2,14 @@
 """What is said of a fit: every sentence on its side of every limit, with what it is about and how grave it is."""
 
 import pytest
-from rockfall.core.analysis.verdicts import about_choice, about_holdout, about_likeness, about_number, about_use
+from rockfall.core.analysis.verdicts import (
+    about_choice,
+    about_holdout,
+    about_likeness,
+    about_number,
+    about_use,
+    clear_errors,
+)
 from rockfall.core.impact_models.machinery.parameters import ParameterSpec
 
 SPEC = ParameterSpec("rn", 0.3, 0.0, 2.0, (), "a number", "nowhere")
@@ -59,12 +66,12 @@ def test_a_parameter_without_effect():
     ("gain", "error", "severity", "text"),
     [
         (0.0, 0.1, "problem", "The data cannot tell: cube fits exactly as well."),
-        (0.19, 0.1, "problem", "The data cannot tell: cube fits about as well (score 0.190 ± 0.100 more)."),
-        (0.21, 0.1, "note", "sphere fits clearly better than cube (score 0.210 ± 0.100 less)."),
+        (0.23, 0.1, "problem", "The data cannot tell: cube fits about as well (score 0.230 ± 0.100 more)."),
+        (0.24, 0.1, "note", "sphere fits clearly better than cube (score 0.240 ± 0.100 less)."),
     ],
 )
 def test_choices(gain, error, severity, text):
-    remark = about_choice("inertia", "sphere", "cube", gain, error)
+    remark = about_choice("inertia", "sphere", "cube", gain, error, 9)  # 2.31 errors, Student's t
     assert (remark.text, remark.severity, remark.about) == (text, severity, "inertia")
 
 
@@ -75,19 +82,19 @@ SEEN = "On impacts it was not fitted to, the"
     ("default", "gain", "severity", "text"),
     [
         (0.0, 0.0, "note", "The defaults already agree exactly."),
-        (2.0, 0.21, "note", f"{SEEN} model is 10 % nearer than with its defaults (better in 7 of 9)."),
-        (2.0, -0.21, "warning", f"{SEEN} model is 10 % farther than with its defaults: keep the defaults."),
+        (2.0, 0.24, "note", f"{SEEN} model is 12 % nearer than with its defaults (better in 7 of 9)."),
+        (2.0, -0.24, "warning", f"{SEEN} model is 12 % farther than with its defaults: keep the defaults."),
         (
             2.0,
-            0.19,
+            0.23,
             "warning",
-            f"{SEEN} fit is not clearly better than the defaults (score 1.810 against 2.000, better in 7 of 9).",
+            f"{SEEN} fit is not clearly better than the defaults (score 1.770 against 2.000, better in 7 of 9).",
         ),
         (
             2.0,
-            -0.19,
+            -0.23,
             "warning",
-            f"{SEEN} fit is not clearly better than the defaults (score 2.190 against 2.000, better in 7 of 9).",
+            f"{SEEN} fit is not clearly better than the defaults (score 2.230 against 2.000, better in 7 of 9).",
         ),
     ],
 )
@@ -133,3 +140,12 @@ AMOUNTS = "(v_N2 to 0.12 m/s, v_T2 to 2.3 m/s, deviation to 4.6° on average)"
 def test_likeness(distance, scatter, severity, text):
     remark = about_likeness(distance, scatter, (0.123, 2.34, 4.56))
     assert (remark.text, remark.severity, remark.about) == (text, severity, "likeness")
+
+
+def test_few_trajectories_take_a_clearer_difference():
+    """Student's t of a table: 12.71 for one degree of freedom, 2.776 for four, 2.000 for sixty."""
+    found = [clear_errors(clusters) for clusters in (2, 5, 61)]
+    assert found == pytest.approx([12.706, 2.776, 2.000], abs=1e-3)
+    assert about_holdout(2.0, 1.7, 0.3, 0.1, 2, 2).severity == "warning"
+    assert about_holdout(2.0, 1.7, 0.3, 0.1, 4, 5).severity == "note"
+    assert about_choice("inertia", "sphere", "cube", 1.0, float("inf"), 1).severity == "problem"

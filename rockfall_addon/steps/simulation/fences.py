@@ -8,10 +8,12 @@ from gpu_extras.batch import batch_for_shader
 
 from ....core.errors import RockfallError
 from ....core.vectors import Array
-from ...scene import fingerprints, problems, screens, store
+from ...scene import fingerprints, problems, screens, simulation_setup, store
 
 MEASURES, HOLDS = (0.88, 0.89, 0.92), (1.0, 0.36, 0.78)
-"""Colours of a screen and of a barrier, which no model has."""
+"""Colours of a screen, and of a barrier of which nothing is known; no model has them."""
+JUDGED = {"enough": (0.25, 0.8, 0.4), "not_enough": (0.95, 0.25, 0.2), "not_known": HOLDS}
+"""Green is a barrier that is enough, red one that is not."""
 FILL, FAINT = 0.25, 0.3
 """Opacity of the area; of the lines where the terrain hides them."""
 WIDTH_PX, POST_M = 2.2, 5.0
@@ -39,6 +41,7 @@ def _draw() -> None:
     scene = context.scene
     if not context.space_data.overlay.show_overlays or not store.has_role(scene, store.SCREEN_ROLE):
         return
+    results = simulation_setup.screen_results(scene)
     shown = [obj for obj in screens.objects_of(scene) if obj.visible_get()]
     for key in _feet.keys() - {obj[store.ID] for obj in shown}:
         del _feet[key]
@@ -52,8 +55,7 @@ def _draw() -> None:
         for obj in shown:
             foot = _foot(scene, obj)
             if len(foot) > 1:
-                settings = obj.rockfall_screen
-                _draw_fence(foot, settings.height_m, HOLDS if settings.holds else MEASURES, scale)
+                _draw_fence(foot, obj.rockfall_screen.height_m, _colour(obj, results), scale)
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("NONE")
 
@@ -69,6 +71,13 @@ def _foot(scene: bpy.types.Scene, obj: bpy.types.Object) -> Array:
         return known[1]
     except RockfallError:
         return np.zeros((0, 3))
+
+
+def _colour(obj: bpy.types.Object, results: list[dict[str, object]]) -> tuple[float, float, float]:
+    """Of a screen or barrier: green only where the barrier as it stands was found to be enough."""
+    if not obj.rockfall_screen.holds:
+        return MEASURES
+    return JUDGED.get(screens.verdict_of(results, screens.screen_of(obj)), HOLDS)
 
 
 def _draw_fence(foot: Array, height_m: float, colour: tuple[float, float, float], scale: float) -> None:

@@ -213,7 +213,7 @@ def main() -> int:
     }
     os.environ.setdefault("REAL_BLENDER_ROOT", "/opt/real-blender")
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
-    where = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    where = f"{platform.system()} {platform.machine()}, {os.process_cpu_count()} cores"
     print(f"Python {platform.python_version()}, {where}, {commit.stdout.strip() or 'no git'}", flush=True)
     why_not = "" if os.access(SANDBOX, os.X_OK) else "There is no sandbox with a real Blender beside this checkout"
     if not why_not and os.geteuid():

@@ -306,7 +306,7 @@ def simulate(
         space.rows, count = recorded(np.arange(n), space.rows)
         rows = space.rows[:count]
     else:
-        cores = threads or os.cpu_count() or 1
+        cores = threads or os.process_cpu_count() or 1
         with ThreadPoolExecutor(cores) as pool:
             whole = take_turns(pool, cores, batch, releases.position[:, :2], told)
             begin = np.concatenate([[0], np.cumsum(results[:whole, 6].astype(np.intp))])

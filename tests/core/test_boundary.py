@@ -31,6 +31,7 @@ CORE_FLOORS = (
         "file_locks",
         "interrupts",
         "memory",
+        "numba_internals",
         "opencv",
         "output",
         "plausibility",
@@ -213,6 +214,14 @@ def test_every_python_file_names_its_licence() -> None:
         if path.suffix == ".py" and "SPDX-License-Identifier: GPL-3.0-or-later" not in path.read_text(encoding="utf-8")
     ]
     assert without == []
+
+
+def test_processors_are_those_of_this_process() -> None:
+    """A container or a queue may give a process fewer than the machine has."""
+    names = re.compile(r"\b(?:os|multiprocessing)\.cpu_" + "count|import cpu_" + "count")
+    found = [str(path.relative_to(ROOT)) for path in tracked_files() if path.suffix == ".py" and
+             names.search(path.read_text(encoding="utf-8"))]  # fmt: skip
+    assert found == []
 
 
 def test_tests_are_not_a_package() -> None:

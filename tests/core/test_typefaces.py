@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fonts by the letters that they have, with fonts that come with Matplotlib: the same on machines with other fonts."""
 
+import os
+import subprocess
+import sys
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -104,3 +107,13 @@ def test_pages_are_lettered_too(tmp_path: Path) -> None:
     assert b"DejaVuSans" not in plain
     assert b"DejaVuSans" in symbol
     assert b"STIX" in other
+
+
+def test_commands_pass_on_no_notes_of_matplotlib(tmp_path: Path) -> None:
+    """It has some to say about a home that cannot be written to."""
+    (tmp_path / "home").write_text("not a folder", encoding="utf-8")
+    code = "from rockfall.core.cli import main; main(['models']); import matplotlib.font_manager"
+    environment = {key: value for key, value in os.environ.items() if key != "MPLCONFIGDIR" and key[:4] != "XDG_"}
+    environment |= {"HOME": str(tmp_path / "home"), "TMPDIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert done.stderr == ""

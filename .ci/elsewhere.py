@@ -40,6 +40,7 @@ UNWELCOME = ("Traceback", "Warning", "Matplotlib", "matplotlib", "missing from f
 
 def main() -> int:
     python, options = (sys.argv[1], sys.argv[2:]) if len(sys.argv) > 1 else (sys.executable, [])
+    python = os.path.abspath(python)  # not what it links to: an environment of its own
     copy_checkout()
     settled = {**os.environ, "NUMBA_CACHE_DIR": str(KERNELS), "TZ": "Asia/Kathmandu", "PYTHONPATH": str(paths())}
     for name in ("LANG", "LANGUAGE", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"):

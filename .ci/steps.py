@@ -109,6 +109,7 @@ STEPS = (  # in the order in which they begin where they can: the longest way fi
         for i in range(1, WINDOWS + 1)
     ),
     Step("tests in Blender as a module", 1200, run("test blender"), (SET_UP,)),
+    Step("as on another machine", 900, '"$PYTHON" .ci/elsewhere.py .venv/bin/python', (SET_UP,)),
     Step("tests of the pages", 600, run("test browser"), (BROWSER,)),
     Step("from the demo's video to its impacts", 600, run("footage"), (SET_UP,)),
     Step("demo", 600, DEMO, (SET_UP,)),

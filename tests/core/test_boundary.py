@@ -227,6 +227,21 @@ def test_processors_are_those_of_this_process() -> None:
     assert found == []
 
 
+def test_equal_values_are_sorted_the_same_way_everywhere() -> None:
+    """What NumPy sorts with otherwise puts equal values in an order that depends on the processor."""
+    sorting = re.compile(r"np\.arg(?:sort|partition)\((?!.*kind=\"stable\")")
+    kernels = {"core/terrain/kernels.py"}  # compiled by numba, whose sorting is the same everywhere
+    found = [
+        f"{path.relative_to(ROOT).as_posix()}: {line.strip()}"
+        for package in ("core", "rockfall_addon")
+        for path in modules_of(package)
+        if path.relative_to(ROOT).as_posix() not in kernels
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if sorting.search(line)
+    ]
+    assert found == []
+
+
 def test_tests_are_not_a_package() -> None:
     assert list((ROOT / "tests").rglob("__init__.py")) == []
 

@@ -109,6 +109,7 @@ STEPS = (  # in the order in which they begin where they can: the longest way fi
         for i in range(1, WINDOWS + 1)
     ),
     Step("tests in Blender as a module", 1200, run("test blender"), (SET_UP,)),
+    Step("as on another machine", 900, '"$PYTHON" .ci/elsewhere.py .venv/bin/python', (SET_UP,)),
     Step("tests of the pages", 600, run("test browser"), (BROWSER,)),
     Step("from the demo's video to its impacts", 600, run("footage"), (SET_UP,)),
     Step("demo", 600, DEMO, (SET_UP,)),
@@ -213,7 +214,7 @@ def main() -> int:
     }
     os.environ.setdefault("REAL_BLENDER_ROOT", "/opt/real-blender")
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False)
-    where = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    where = f"{platform.system()} {platform.machine()}, {os.process_cpu_count()} cores"
     print(f"Python {platform.python_version()}, {where}, {commit.stdout.strip() or 'no git'}", flush=True)
     why_not = "" if os.access(SANDBOX, os.X_OK) else "There is no sandbox with a real Blender beside this checkout"
     if not why_not and os.geteuid():

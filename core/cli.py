@@ -7,6 +7,7 @@ when it is asked for, so that help is quick.
 
 import argparse
 import gc
+import logging
 import os
 import signal
 import sys
@@ -73,6 +74,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status: 0 done, 1 bad input, 2 usage, 130 interrupted, 141 output closed."""
     end_with_parent_if_asked()
     os.environ.setdefault(*ONE_THREAD)
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # such as where it keeps its list of fonts
     try:
         with handled(interrupt):
             status = _run(list(sys.argv[1:] if argv is None else argv))

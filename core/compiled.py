@@ -25,11 +25,17 @@ def kernel(function: Callable[..., Any], *, inline: bool = False, allocates: boo
     inline : whether it becomes a part of each compiled function that calls it.
     allocates : whether it makes arrays. If not, references to arrays are not counted in it: that is an atomic operation
         for each array of each call, on counters that all threads share.
+
+    Raises
+    ------
+    DependencyError : another version of numba, which lacks what this needs of it.
     """
     from numba import njit
 
     from .kept_code import KeptCode
+    from .numba_internals import check_numba
 
+    check_numba()
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "forceinline": inline, "_nrt": allocates}
     dispatcher: Any = njit(**options)(function)
     dispatcher._cache = KeptCode(dispatcher)
@@ -47,7 +53,7 @@ def in_chunks(function: Callable[[int, int], None], rows: int, chunk: int = CHUN
         if rows:
             function(0, rows)
         return
-    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+    with ThreadPoolExecutor(max_workers=os.process_cpu_count()) as pool:
         list(pool.map(lambda start: function(start, min(start + chunk, rows)), starts))
 
 

@@ -8,6 +8,7 @@ import threading
 
 import bpy
 
+from ..core.errors import DependencyError
 from . import preferences
 from .scene import models, preparation
 
@@ -38,5 +39,7 @@ def _prepare() -> None:
         prepare(models.ORDER, preparation.done)
     except ImportError as error:
         preferences.problem = f"A library cannot be loaded: {error}"
+    except DependencyError as error:
+        preferences.problem = str(error)
     finally:
         preparation.end()

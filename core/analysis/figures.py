@@ -16,6 +16,7 @@ from ..output import output_file
 from ..progress import Progress, silent
 from .curves import Curve, number
 from .graphs import Graph
+from .typefaces import FAMILIES, lettered
 from .variables import Variable, find_variable
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ LEAST_SIZE, LEAST_ALPHA = 0.4, 0.06
 """Of the points of a cloud."""
 
 STYLE: Any = {
-    "font.family": "sans-serif",
+    "font.family": list(FAMILIES),
     "font.sans-serif": ["Arial", "Helvetica", "Liberation Sans", "DejaVu Sans"],
     "mathtext.fontset": "dejavusans",
     "font.size": 7.0,
@@ -213,7 +214,7 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
         _save_picture(_Painter().paint(figure), Path(path))
         return
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
-    with rc_context(STYLE), output_file(path) as draft:
+    with rc_context(STYLE), lettered(figure), output_file(path) as draft:
         figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated)
 
 
@@ -230,7 +231,7 @@ class _Painter:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from PIL import Image
 
-        with rc_context(STYLE):
+        with rc_context(STYLE), lettered(figure):
             canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
             moving = [one for axes in figure.axes for one in axes.get_children() if one.get_animated()]
             moving.sort(key=lambda artist: artist.zorder)
@@ -255,7 +256,8 @@ def _lay_out(figure: "Figure") -> None:
     """Fix the places of the axes, which takes as long as to draw the figure; what is drawn in them comes later."""
     layout = figure.get_layout_engine()
     if layout is not None:
-        layout.execute(figure)
+        with lettered(figure):
+            layout.execute(figure)
     figure.set_layout_engine(None)
 
 

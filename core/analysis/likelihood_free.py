@@ -305,6 +305,6 @@ def places_of_truth(table: SimulatedSets, found: Posterior, number: int, seed: i
 
 def weighted_quantiles(values: Array, weight: Array, parts: Array) -> Array:
     """Quantiles of values (m,) with weights (m,)."""
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     up_to = np.cumsum(weight[order])
     return np.asarray(np.interp(parts, (up_to - weight[order] / 2) / up_to[-1], values[order]))

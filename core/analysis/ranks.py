@@ -88,7 +88,7 @@ def reach_test(reached: Mask, stayed: Mask, share: Array) -> float:
 
 def shared_ranks(values: Array) -> Array:
     """(n,) ranks from 1, n ≥ 1; equal values share the mean of theirs."""
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     ordered = values[order]
     first = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
     behind = np.r_[first[1:], values.size]

@@ -35,7 +35,7 @@ def theil_sen(
     """
     if x.size <= LISTED:
         return _of_all_pairs(x, y, confidence, interval, cluster)
-    order = np.argsort(x)
+    order = np.argsort(x, kind="stable")
     if (np.diff(x[order]) == 0.0).any():
         order = np.lexsort((y, x))
     x, y = np.ascontiguousarray(x[order]), np.ascontiguousarray(y[order])

@@ -136,7 +136,7 @@ def plain_means(values: Array, seen: Mask) -> Array:
 
 def crps(values: Array, weight: Array, observed: float) -> float:
     """Continuous ranked probability score of weighted values (m,) for what was observed; 0 is perfect, in its unit."""
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     x, w = values[order], weight[order] / weight.sum()
     up_to = np.cumsum(w)
     apart = float(w @ np.abs(x - observed))

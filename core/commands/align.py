@@ -280,7 +280,7 @@ def _summary(aligned: "Alignment", pairs: "Pairs", residual_px: Array) -> list[s
     ]
     sentences.append(f"Position: {', '.join(parts)} m.")
     size = norm(residual_px)
-    order = [i for i in np.argsort(-np.nan_to_num(size, nan=np.inf)) if used[i]][:WORST]
+    order = [i for i in np.argsort(-np.nan_to_num(size, nan=np.inf), kind="stable") if used[i]][:WORST]
     if order:
         of = [f" (frame {frame})" if aligned.keys and frame >= 0 else "" for frame in pairs.frame.tolist()]
         worst = [f"{pairs.name[i]}{of[i]} {size[i]:.2f} px" for i in order]

@@ -68,7 +68,7 @@ def _texts(
     parts: Sequence[Callable[[], DecimalColumns]], decimals: Mapping[str, int]
 ) -> Iterator[tuple[tuple[str, ...], bytes | memoryview]]:
     """The names of the columns and the text of each part, in order."""
-    cores = os.cpu_count() or 1
+    cores = os.process_cpu_count() or 1
     waiting: deque[Future[tuple[tuple[str, ...], bytes | memoryview]]] = deque()
     with ThreadPoolExecutor(cores) as pool:
         try:

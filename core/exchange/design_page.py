@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analysis.figures import STYLE
 from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.scores import Score
+from ..analysis.typefaces import lettered
 from ..analysis.variables import find_variable
 from ..hazard.design import KNOWN_TO, LEVELS_KJ, ON, DesignValues, Factor
 from ..hazard.screens import OUTCOMES, Screen
@@ -406,8 +408,11 @@ def _html(table: Table) -> str:
 
 
 def _picture(figure: "Figure") -> str:
+    from matplotlib import rc_context
+
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI)
+    with rc_context(STYLE), lettered(figure):
+        figure.savefig(buffer, format="png", dpi=DPI)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..analysis.figures import INK, MUTED, STYLE
+from ..analysis.typefaces import FAMILIES, families_for, lettered, quiet
 from ..output import output_file
 
 if TYPE_CHECKING:
@@ -98,13 +99,15 @@ def write_pdf(elements: Sequence[Element], path: Path, title: str) -> None:
     from matplotlib.figure import Figure
 
     with output_file(path) as part, rc_context(STYLE), PdfPages(part, metadata={"Title": title}) as pdf:
-        pages = lay_out(elements, measured_by_font())
+        with quiet():
+            pages = lay_out(elements, measured_by_font())
         for number, one in enumerate(pages, start=1):
             sheet = Figure(figsize=(PAGE_PT[0] / 72, PAGE_PT[1] / 72))
             one.texts.append((MARGIN_PT[0], PAGE_PT[1] - 34, "left", title, "note"))
             one.texts.append((PAGE_PT[0] - MARGIN_PT[2], PAGE_PT[1] - 34, "right", f"{number} of {len(pages)}", "note"))
             _draw(one, sheet)
-            pdf.savefig(sheet, dpi=FIGURE_DPI)
+            with lettered(sheet):
+                pdf.savefig(sheet, dpi=FIGURE_DPI)
 
 
 def measured_by_font() -> Measure:
@@ -117,6 +120,7 @@ def measured_by_font() -> Measure:
              for kind, style in STYLES.items()}  # fmt: skip
 
     def width(text: str, kind: str) -> float:
+        fonts[kind].set_family([*FAMILIES, *families_for(text)])
         return float(renderer.get_text_width_height_descent(text, fonts[kind], ismath=False)[0]) / FINE
 
     return width
@@ -270,7 +274,8 @@ def _pixels(figure: "Figure") -> Any:
     dpi = figure.dpi
     figure.set_dpi(FIGURE_DPI)
     canvas = FigureCanvasAgg(figure)
-    canvas.draw()
+    with lettered(figure):
+        canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba()).copy()
     figure.set_dpi(dpi)
     return pixels

@@ -177,7 +177,7 @@ def _piece(time_s: Array, pixel: Array, sigma: Array, begin: int, end: int, orig
     """
     part = slice(begin, end)
     when = time_s[part] - origin
-    near = np.argsort(np.abs(when))[:1] if end - begin > SHORTEST else np.zeros(0, dtype=np.intp)
+    near = np.argsort(np.abs(when), kind="stable")[:1] if end - begin > SHORTEST else np.zeros(0, dtype=np.intp)
     loose = sigma[part].copy()
     loose[near] *= 2
     scale = float(np.abs(when).max())

@@ -196,7 +196,7 @@ def search(here: Cover, looks: Appearance, streak: Array, most: int = 8) -> tupl
     score[model < 0.2 * np.sum(shape**2)] = 0  # less than a contrast of half a standard deviation
     grown = cv2.dilate(score, np.ones((2 * int(diameter // 3) + 1,) * 2))
     rows, columns = np.nonzero((score >= grown) & (score > 0.3))
-    order = np.argsort(-score[rows, columns])[:most]
+    order = np.argsort(-score[rows, columns], kind="stable")[:most]
     place = np.column_stack([columns[order], rows[order]]).astype(np.float64)
     return place + np.array([here.left, here.top]) - pad + 0.5, score[rows[order], columns[order]]
 

@@ -248,7 +248,7 @@ def _as_expected(state: State, here: Cover, expected: Expected, found: tuple[Arr
     away = np.hypot(*(pixel - expected.centre).T)
     needed = SURE if state.missed > 2 else ACCEPTED
     most = 1.0 if state.confirmed < CONFIRMED else np.inf  # scores above are of faint things
-    for i in np.argsort(-(np.minimum(score, most) - 0.3 * (away / expected.tight) ** 2)):
+    for i in np.argsort(0.3 * (away / expected.tight) ** 2 - np.minimum(score, most), kind="stable"):
         if away[i] <= expected.tight and score[i] >= needed - 0.1:
             seen = fit(here, state.looks, pixel[i], expected.step * state.looks.shutter)
             if seen is not None and seen.score >= needed and seen.visible > 0.15 and seen.contrast > HELD_CONTRAST:

@@ -26,6 +26,8 @@ SIGMA_ROWS = 256
 """Impacts whose deviations are computed at a time: their points stay in the processor's cache."""
 ROWS = 64
 """Impacts that are drawn at a time: their draws stay in the processor's cache."""
+NO_VARIANCE = 1e-13
+"""A variance that is a smaller part of the greatest one is none, but the error of its computation."""
 MOST_DIGITS = 3
 EVERYTHING = {
     "rn": (0.1, 2.0),
@@ -60,9 +62,17 @@ class ImpactErrors:
         return np.isfinite(self.covariance[:, 0, 0]), np.isfinite(self.covariance[:, 3, 3])
 
     def roots(self) -> Array:
-        """(n, 9, 9) whose columns are one standard deviation along each axis of the covariance."""
+        """(n, 9, 9) symmetric square roots of the covariance, whose columns are pairs of points and draws.
+
+        Notes
+        -----
+        Of all roots the one that is a continuous function of the covariance (Higham 2008, Functions of Matrices, 1.7).
+        Principal axes are not: their signs, and the axes themselves where two deviations are equal, are chosen by the
+        last bit of a library, and with them the points and the draws.
+        """
         size, axes = np.linalg.eigh(np.nan_to_num(self.covariance))
-        return axes * np.sqrt(np.maximum(size, 0.0))[:, None, :]
+        size = np.where(size > NO_VARIANCE * size[:, -1:], size, 0.0)
+        return (axes * np.sqrt(size)[:, None, :]) @ np.swapaxes(axes, 1, 2)
 
 
 def impact_sigmas(
@@ -82,8 +92,8 @@ def impact_sigmas(
 
     Notes
     -----
-    The root mean square deviation from the value over pairs of points √3 standard deviations to either side along each
-    axis of the errors, with a weight of 1/6 each (Julier & Uhlmann 2004): first-order propagation where a column is
+    The root mean square deviation from the value over pairs of points √3 times to either side along each column of the
+    root of the errors, with a weight of 1/6 each (Julier & Uhlmann 2004): first-order propagation where a column is
     linear, but true for R_N at grazing impacts too, where a small tilt of the normal changes it by half. The normal is
     that of the block's scale, without the roughness below it; it goes with the place, and is tilted by tilt/√2 about
     each of two axes at right angles to it, independent of everything else.

@@ -306,7 +306,7 @@ def simulate(
         space.rows, count = recorded(np.arange(n), space.rows)
         rows = space.rows[:count]
     else:
-        cores = threads or os.cpu_count() or 1
+        cores = threads or os.process_cpu_count() or 1
         with ThreadPoolExecutor(cores) as pool:
             whole = take_turns(pool, cores, batch, releases.position[:, :2], told)
             begin = np.concatenate([[0], np.cumsum(results[:whole, 6].astype(np.intp))])
@@ -331,7 +331,7 @@ def joined(parts: Sequence[Simulation], releases: Releases) -> Simulation:
     """Parts of a simulation as one, in the order of the runs; `releases` are those of all."""
     own = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _OF_RUNS}
     order = np.argsort(own["number"], kind="stable")
-    place = np.argsort(order)
+    place = np.argsort(order, kind="stable")
     begins = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     run = np.concatenate([place[part.records.run + begin] for part, begin in zip(parts, begins, strict=False)])
     rows = np.argsort(run, kind="stable")

@@ -132,7 +132,7 @@ def run_chunks(
             whole.merge(part)
         progress("Simulating", counted + finished, n)
 
-    cores = threads or os.cpu_count() or 1
+    cores = threads or os.process_cpu_count() or 1
     with ThreadPoolExecutor(cores) as pool:
         for begin, end in _rounds(n) if enough is not None else [(0, n)]:
 

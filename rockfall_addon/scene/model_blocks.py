@@ -158,7 +158,7 @@ def _lanes(begin_s: Array, duration_s: Array) -> list[list[int]]:
     lanes: list[list[int]] = []
     free_at: list[float] = []
     begins, durations = begin_s.tolist(), duration_s.tolist()
-    for i in np.argsort(begin_s).tolist():
+    for i in np.argsort(begin_s, kind="stable").tolist():
         lane = next((j for j, free in enumerate(free_at) if free <= begins[i]), len(lanes))
         if lane == len(lanes):
             lanes.append([])

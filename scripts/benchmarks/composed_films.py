@@ -22,7 +22,8 @@ PROJECT = Path(__file__).resolve().parents[2] / "assets" / "demo" / "footage" / 
 def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 8
     size = (int(sys.argv[2]), int(sys.argv[3])) if len(sys.argv) > 3 else (1280, 720)
-    print(f"{size[0]} × {size[1]}, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores; seconds, CPU in brackets")
+    load = f"load {os.getloadavg()[0]:.1f} on {os.process_cpu_count()} cores"
+    print(f"{size[0]} × {size[1]}, {load}; seconds, CPU in brackets")
     print("film            before the first   a frame (median)   whole film   frames")
     for kind in KINDS:
         start, cpu = time.perf_counter(), time.process_time()

@@ -88,7 +88,7 @@ def cpu(pool: Pool) -> float:
 def workers(triangles: float, blocks: int, repeats: int) -> None:
     work = work_on(triangles)
     releases, few = blocks_on(work.ground, blocks), blocks_on(work.ground, 4 * 4096)
-    print(f"{triangles:g} triangles, {blocks} blocks, maps of {CELL_M:g} m; {os.cpu_count()} cores", flush=True)
+    print(f"{triangles:g} triangles, {blocks} blocks, maps of {CELL_M:g} m; {os.process_cpu_count()} cores", flush=True)
     measured: dict[str, list[tuple[float, float]]] = {}
     with ExitStack() as opened:
         pools: dict[str, Pool] = {"1 thread": Threads(1), "2 threads": Threads(2)}
@@ -117,9 +117,9 @@ def many(triangles: float, blocks: int) -> None:
         memory = sum(
             one["metrics"]["memory"] for one in pool._client.scheduler_info()["workers"].values()
         ) + 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # fmt: skip
-    print(f"{blocks} blocks on {triangles:g} triangles with maps of {CELL_M:g} m, two workers on {os.cpu_count()} "
-          f"cores: placed in {placed:.0f} s, simulated in {took:.0f} s, {blocks / took:.0f} blocks/s, "
-          f"{memory / 1e9:.2f} GB in all processes")  # fmt: skip
+    print(f"{blocks} blocks on {triangles:g} triangles with maps of {CELL_M:g} m, two workers on "
+          f"{os.process_cpu_count()} cores: placed in {placed:.0f} s, simulated in {took:.0f} s, "
+          f"{blocks / took:.0f} blocks/s, {memory / 1e9:.2f} GB in all processes")  # fmt: skip
     print(f"10^9 blocks at this rate: {1e9 / blocks * took / 3600:.0f} h on these 2 workers, "
           f"{1e9 / blocks * took / 3600 / 64:.1f} h on 128")  # fmt: skip
 

@@ -139,7 +139,7 @@ def main() -> None:
     if arguments.child:
         all_cores(int(arguments.child[0]), arguments.child[1])
         return
-    print(f"{os.cpu_count()} cores; load {', '.join(f'{value:.1f}' for value in os.getloadavg())}")
+    print(f"{os.process_cpu_count()} cores; load {', '.join(f'{value:.1f}' for value in os.getloadavg())}")
     ground, releases = case(TRIANGLES, arguments.blocks)
     seconds = processor(partial(getattr, ground, "plan"))
     row("the terrain's triangles in plan, once", f"{seconds:.2f} s", "of CPU, compiled before" if seconds < 3 else "")

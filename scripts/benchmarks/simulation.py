@@ -147,7 +147,7 @@ def larger_terrain(ground: Ground, releases: Releases, repeats: int, threads: in
     clock = time.perf_counter
     one, _ = best(lambda: simulate(ground, releases, settings, record="ends", threads=1), repeats, clock)
     for count in sorted({2, threads}):
-        if count <= (os.cpu_count() or 1):
+        if count <= (os.process_cpu_count() or 1):
             more, _ = best(
                 lambda count=count: simulate(ground, releases, settings, record="ends", threads=count), repeats, clock
             )
@@ -264,13 +264,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blocks", type=int, default=5000)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--threads", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--threads", type=int, default=os.process_cpu_count() or 1)
     parser.add_argument("--quick", action="store_true", help="fewer blocks, nothing of 10 million triangles")
     parser.add_argument("--no-platrock", action="store_true")
     arguments = parser.parse_args()
     blocks, repeats = (1000, 3) if arguments.quick else (arguments.blocks, arguments.repeats)
     load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
-    print(f"{os.cpu_count()} cores; load {load} in the last 1, 5, 15 minutes")
+    print(f"{os.process_cpu_count()} cores; load {load} in the last 1, 5, 15 minutes")
     compilation()
     ground, releases = case(5e5, blocks)
     models(ground, releases, repeats)

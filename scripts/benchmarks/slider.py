@@ -248,7 +248,7 @@ def main() -> int:
     if done.returncode:
         print(f"{done.stdout}\nBlender ended with status {done.returncode}")
         return 1
-    print(f"Time in ms; {os.cpu_count()} processors.\n{HEADER}")
+    print(f"Time in ms; {os.process_cpu_count()} processors.\n{HEADER}")
     print("\n".join(line.removeprefix(ROW) for line in done.stdout.splitlines() if line.startswith(ROW)))
     return 0
 

@@ -159,7 +159,7 @@ def measured(case: Case, count: int = FALLS) -> Row:
 def page(folder: Path) -> str:
     """The chapter as Markdown, with reconstruction.csv beside it; a quarter of an hour on two cores."""
     cases = [(group.title, case) for group in GROUPS for case in group.cases]
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(os.process_cpu_count(), mp_context=get_context("spawn")) as pool:
         rows = dict(zip(cases, pool.map(measured, [case for _, case in cases]), strict=True))
     with (folder / "reconstruction.csv").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")

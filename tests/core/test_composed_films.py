@@ -463,8 +463,11 @@ def test_frames_and_stills_that_cannot_be_written_leave_nothing(
 
     file, out = tmp_path / "a file", tmp_path / "new" / "film"
     file.write_text("a person's")
-    wanted = {"a file": (file, "This is a file, not a folder"), "below a file": (file / "x", "Not a directory")}
-    out, words = wanted.get(how, (out, "No space left" if how == "full" else "Read-only file system"))
+    wanted = {
+        "a file": (file, "This is a file, not a folder"),
+        "below a file": (file / "x", os.strerror(errno.ENOTDIR)),
+    }
+    out, words = wanted.get(how, (out, os.strerror(errno.ENOSPC if how == "full" else errno.EROFS)))
 
     def refuse(*_unused: object, **_also: object) -> None:
         number = errno.ENOSPC if how == "full" else errno.EROFS

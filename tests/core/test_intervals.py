@@ -18,6 +18,7 @@ from rockfall.core.reconstruction.intervals import (
     INTERVALS,
     ImpactErrors,
     impact_intervals,
+    impact_sigmas,
     undetermined,
 )
 from rockfall.core.reconstruction.picks import make_picks
@@ -128,6 +129,20 @@ def test_a_grazing_impact_on_rough_ground_says_nothing_of_the_contact():
     assert undetermined("rn_contact", ends["rn_contact"])[0]
     assert np.isinf(ends["rn_contact"][0, 1])
     assert ends["rn"][0] == pytest.approx(1.5 * np.array([1 - 0.11, 1 + 0.13]), abs=0.06)
+
+
+def test_the_last_bit_changes_nothing():
+    """Equal deviations have no axes of their own: another processor's library gives others, turned in any way."""
+    v1, v2, normal = np.array([[3.0, 0.5, -4.0]]), np.array([[2.0, 0.2, 1.2]]), np.array([[0.0, 0.0, 1.0]])
+    known = errors(0.2, tilt=0.05)
+    noise = np.random.default_rng(2).normal(size=(20, 9, 9)) * 1e-16
+    ends, sigmas = [], []
+    for bits in (0 * noise[0], *noise):
+        one = replace(known, covariance=0.04 * (np.eye(9) + bits + bits.T)[None])
+        ends.append(list(impact_intervals(apparent(v1, v2, normal), v1, v2, normal, one).values()))
+        sigmas.append(impact_sigmas(apparent(v1, v2, normal), v1, v2, normal, np.ones(1), one)["rn"])
+    np.testing.assert_allclose(ends[1:], [ends[0]] * 20, rtol=1e-9)
+    np.testing.assert_allclose(sigmas[1:], [sigmas[0]] * 20, rtol=1e-9)
 
 
 def test_tables_keep_them(tmp_path):

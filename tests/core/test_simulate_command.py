@@ -2,7 +2,9 @@
 """``rockfall simulate``: tables that agree with each other, and bad input."""
 
 import csv
+import errno
 import json
+import os
 import re
 import signal
 from pathlib import Path
@@ -216,7 +218,7 @@ def test_a_full_disk_leaves_nothing(terrain: Path, releases: Path, tmp_path: Pat
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert status == 1
-    assert "cannot be written (File too large). Make room" in capsys.readouterr().err
+    assert f"cannot be written ({os.strerror(errno.EFBIG)}). Make room" in capsys.readouterr().err
     assert not out.parent.exists()
 
 

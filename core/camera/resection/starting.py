@@ -207,7 +207,7 @@ def _triples(pixels: Array, points: Array) -> np.ndarray:
         triples = np.array(list(combinations(range(n), 3)))
     else:
         draws = np.random.default_rng(0).random((1200, n))
-        triples = np.argsort(draws, axis=1)[:, :3]
+        triples = np.argsort(draws, axis=1, kind="stable")[:, :3]
     if len(triples) <= TRIPLES:
         return triples
     a, b = (pixels[triples[:, i]] - pixels[triples[:, 0]] for i in (1, 2))

@@ -29,6 +29,8 @@ DROPS_M = (42.1, 59.9, 10.2)
 
 HALF_WIDTH_M = 43.0
 ROWS, COLUMNS = 640, 236
+TIE_M = 1e-9
+"""Differences of height below this are none."""
 GRID_M, FINE_M = 0.5, 0.2
 
 
@@ -304,8 +306,10 @@ def terrain(seed: int) -> Terrain:
 def _faces(grid_z: Array) -> NDArray[np.int32]:
     corner = (np.arange(ROWS - 1)[:, None] * COLUMNS + np.arange(COLUMNS - 1)[None, :]).ravel()
     right, below, across = corner + 1, corner + COLUMNS, corner + COLUMNS + 1
-    # the diagonal with the smaller step keeps ridges and creases sharp
-    falling = (np.abs(grid_z[corner] - grid_z[across]) < np.abs(grid_z[right] - grid_z[below]))[:, None]
+    # The diagonal with the smaller step keeps ridges and creases sharp. Both steps are equal where hollows were filled:
+    # there the last bit, which differs between processors, must not choose.
+    steps = np.abs(grid_z[corner] - grid_z[across]), np.abs(grid_z[right] - grid_z[below])
+    falling = (steps[0] < steps[1] - TIE_M)[:, None]
     first = np.where(falling, np.column_stack([corner, below, across]), np.column_stack([corner, below, right]))
     second = np.where(falling, np.column_stack([corner, across, right]), np.column_stack([right, below, across]))
     return np.stack([first, second], axis=1).reshape(-1, 3).astype(np.int32)

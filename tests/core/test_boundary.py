@@ -31,6 +31,7 @@ CORE_FLOORS = (
         "file_locks",
         "interrupts",
         "memory",
+        "open_folders",
         "opencv",
         "output",
         "plausibility",

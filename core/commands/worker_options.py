@@ -102,6 +102,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
             *remarks_of(simulations, list(scenario.models)),
             *map_remarks(mapped.cells),
             *screen_remarks(mapped.screens),
+            *(remark for store in stores for remark in store.remarks),
         )
         remarks = gravest_first([*said])
         written = write_chunk_tables(stores, folder, simulations, mapped.screens, progress=progress)

@@ -18,7 +18,8 @@ from traceback import extract_tb
 
 from .children import end_with_parent_if_asked
 from .errors import InputError, RockfallError
-from .interrupts import Interrupt, handled, interrupt
+from .interrupts import Interrupt, handled, interrupt, never_lost
+from .output import complete
 
 DONE, BAD_INPUT, USAGE, SIGNALLED = 0, 1, 2, 128
 """The exit status; of a process that a signal has ended it is `SIGNALLED` plus its number: 130 after Ctrl+C."""
@@ -73,9 +74,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     end_with_parent_if_asked()
     os.environ.setdefault(*ONE_THREAD)
     try:
-        with handled(interrupt):
+        with handled(interrupt), never_lost():
             status = _run(list(sys.argv[1:] if argv is None else argv))
             sys.stdout.flush()
+    except KeyboardInterrupt as error:  # at the very end
+        return _interrupted(error)
     except OSError as error:
         closed = _is_closed_pipe(error)
         if not closed:
@@ -87,6 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str]) -> int:
+    complete.set([])
     try:
         arguments = _parser(argv).parse_args(argv)
         status: int = arguments.run(arguments)
@@ -108,7 +112,9 @@ def _run(argv: Sequence[str]) -> int:
 
 
 def _interrupted(error: KeyboardInterrupt) -> int:
-    print(f"rockfall: interrupted, {error if error.args else 'nothing was written'}.", file=sys.stderr)
+    written = complete.get()
+    said = f"{written[-1]} is complete" if written else "nothing was written"
+    print(f"rockfall: interrupted, {error if error.args else said}.", file=sys.stderr)
     return SIGNALLED + (error.number if isinstance(error, Interrupt) else signal.SIGINT)
 
 

@@ -50,11 +50,13 @@ def several_workers(arguments: argparse.Namespace) -> bool:
 
 
 class Done(NamedTuple):
-    """The names of the files that were written, what to say, and what is kept of it until the folder is complete."""
+    """The names of the files that were written, what to say, what is kept of it until the folder is complete, and the
+    number of a signal that has ended it before all was simulated."""
 
     written: list[str]
     remarks: "Sequence[Remark]"
     kept: "tuple[ChunkStore, ...]" = ()
+    asked: int = 0
 
 
 def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path, progress: PrintedProgress) -> Done:
@@ -96,7 +98,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
                     faces=work.faces, screens=work.screens, first_run=work.first_run, progress=counted,
                 )  # fmt: skip
             except CancelledError as error:
-                raise Interrupt(said=goes_on) from error
+                raise Interrupt(counted.asked, goes_on) from error
         simulations = mapped.simulations
         said = (
             *remarks_of(simulations, list(scenario.models)),

@@ -31,7 +31,7 @@ SAYS = "rockfall: "
 """Begins the message of a command that fails."""
 LOOK_S, PATIENCE_S = 0.1, 10.0
 """Between two looks whether a job is to end; until one that was asked to end is ended."""
-INTERRUPTED = (-15, -2, 130, 143)
+INTERRUPTED = (-15, -2, -1, 129, 130, 143)
 """Status of a process that a signal has ended."""
 MOST_LINES = 200
 """Of what a command says that is kept."""

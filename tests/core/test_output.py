@@ -204,7 +204,9 @@ def test_a_command_on_a_full_disk_says_which_file_and_keeps_the_old_output(tmp_p
     command = [sys.executable, "-c", code, "reconstruct", str(picks), "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    said = f"{out / 'impacts.csv'}: The file cannot be written" if room else f"{out}: The output cannot be written there"
+    said = (
+        f"{out / 'impacts.csv'}: The file cannot be written" if room else f"{out}: The output cannot be written there"
+    )
     assert done.stderr.startswith(f"rockfall: {said} (File too large). Make")
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 

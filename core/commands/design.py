@@ -14,6 +14,7 @@ from .options import (
     model_parameters,
     models_as_asked,
     not_negative,
+    seed,
     share,
     whole,
 )
@@ -53,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_model_option(parser, "models to design with (default: the project's, else noel_2017)")
     add_parameter_options(parser)
     parser.add_argument("--number", type=whole, metavar="N", help="blocks from each release (default: the project's)")
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default: the project's)")
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the random numbers (default: the project's)")
     parser.add_argument(
         "--cell",
         type=not_negative,

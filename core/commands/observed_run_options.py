@@ -21,6 +21,7 @@ from .options import (
     models_as_asked,
     naming,
     positive,
+    seed,
     terrain_as_asked,
     whole,
 )
@@ -63,9 +64,7 @@ def add_observed_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add_terrain_files(parser, "mesh, grid or cloud; a project names its own")
     add_parameter_options(parser)
-    parser.add_argument(
-        "--seed", type=whole, metavar="S", help="of the random numbers (default: the project's, else 0)"
-    )
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the random numbers (default: the project's, else 0)")
     section = parser.add_argument_group("sections (default: three contour levels, or three drops below the starts)")
     section.add_argument("--contours", metavar="Z,Z", help="heights in survey coordinates, below which blocks fall [m]")
     section.add_argument("--drops", metavar="H,H", help="heights below each block's own start [m]")

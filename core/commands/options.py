@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..constants import UNITS_M
 from ..errors import DependencyError, InputError, RockfallError
+from ..plausibility import GREATEST_SEED
 
 if TYPE_CHECKING:
     from ..exchange.database import Database
@@ -62,6 +63,13 @@ def whole(text: str) -> int:
     """A whole number of zero or more."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text} is not a whole number of zero or more")
+    return int(text)
+
+
+def seed(text: str) -> int:
+    """A seed of random numbers."""
+    if not text.isdecimal() or len(text) > 99 or int(text) > GREATEST_SEED:
+        raise argparse.ArgumentTypeError(f"{text:.40} is not a whole number from 0 to {GREATEST_SEED} (2^63 - 1)")
     return int(text)
 
 
@@ -202,7 +210,7 @@ def reading_as_asked(arguments: argparse.Namespace) -> "HowToRead":
 
 def add_incident_options(parser: argparse.ArgumentParser) -> None:
     """What the models are told of the incident block, and the seed of their chance."""
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="of the random numbers (default 0)")
     parser.add_argument(
         "--spin",
         choices=("rolling", "zero", "table"),

@@ -16,6 +16,7 @@ from .options import (
     add_terrain_files,
     add_terrain_options,
     positive,
+    seed,
     share,
     whole,
     whole_range,
@@ -53,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="posterior.csv of a back-analysis: each block draws its parameters, so results show what is not known",
     )
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the random numbers (default 0)")
     add_release_options(parser)
     add_tree_options(parser)
     motion = parser.add_argument_group("motion")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from .options import (
+    OF_PROJECT,
     add_figure_options,
     add_motion_options,
     add_out,
@@ -21,6 +22,7 @@ from .options import (
     models_as_asked,
     naming,
     positive,
+    refuse_terrain_options,
     seed,
     terrain_as_asked,
     whole,
@@ -137,6 +139,7 @@ def _of_project(
     for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density", "--zone-attribute"):
         if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, []):
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
+    refuse_terrain_options(arguments, *OF_PROJECT)
     file = Path(arguments.table)
     project = read_project(file)
     entry = project.stated_simulation

@@ -189,6 +189,28 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
 
 
+def refuse_terrain_options(arguments: argparse.Namespace, why: str, advice: str) -> None:
+    """Refuse the options of `add_terrain_options` where they would change nothing.
+
+    Raises
+    ------
+    InputError : one is given.
+    """
+    options = {"--up": ("auto",), "--unit": (1.0,), "--max-edge": (), "--ground-filter": ()}
+    given = [
+        option
+        for option, defaults in options.items()
+        if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, *defaults)
+    ]
+    given += [] if arguments.ground_only is None else ["--ground-only" if arguments.ground_only else "--all-points"]
+    if given:
+        raise InputError(f"{given[0]} tells how to read a terrain, and {why}", advice=advice)
+
+
+NO_TERRAIN = "no terrain is read", "Give it with --terrain, or leave the option out"
+OF_PROJECT = "a project says itself how to read its own", "Write it into [terrain] of the project"
+
+
 def terrain_as_asked(arguments: argparse.Namespace, files: Sequence[str], progress: "Progress") -> "Surface":
     """Read a terrain, of one file or several, with the options of `add_terrain_options`.
 

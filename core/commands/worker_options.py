@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError, RockfallError
+from ..extras import CLUSTER, demand
 from .options import whole
 from .progress import PrintedProgress, stopped_by_interrupt
 from .simulation_work import Work
@@ -44,6 +45,7 @@ def several_workers(arguments: argparse.Namespace) -> bool:
         raise InputError("--workers 0 compute nothing", advice="Give at least one")
     if arguments.threads is not None:
         raise InputError("--threads is of one process, and each worker has its own", advice="Leave out --threads")
+    demand(CLUSTER)
     if arguments.until_known is not None:
         raise InputError("--until-known is of one process, and workers do not ask it", advice="Leave out one of them")
     return True

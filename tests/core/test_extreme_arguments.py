@@ -147,3 +147,25 @@ def test_options_that_need_another_name_it(given, named, tmp_path, capsys):
     assert main([*words, "--model", "noel_2017", *given, "--out", str(tmp_path / "out")]) in (1, 2)
     assert named in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["align", "pairs.csv", "--size", "64x48", "--frames", "1", "5"], "--moving"),
+        (["align", "pairs.csv", "--size", "64x48", "--unit", "ft"], "--terrain"),
+        (["reconstruct", "picks.csv", "--max-edge", "3"], "--terrain"),
+        (["compare", "impacts.csv", "--all-points"], "--terrain"),
+        (["compare", "impacts.csv", "--drag"], "--terrain"),
+        (["simulate", "project.toml", "--unit", "ft"], "[terrain]"),
+        (["simulate", "project.toml", "--ground-filter"], "[terrain]"),
+        (["simulate", "project.toml", "--spin", "zero"], "--spin is what a project says itself"),
+        (["simulate", "project.toml", "--evenly"], "--evenly is what a project says itself"),
+        (["compare-runs", "project.toml", "--up", "y"], "[terrain]"),
+        (["back-analyse", "project.toml", "--model", "noel_2017", "--fit", "rn_limit", "--up", "z"], "[terrain]"),
+    ],
+)
+def test_an_option_that_would_change_nothing_is_refused_before_anything_is_read(words, named, tmp_path, capsys):
+    assert main([*words, "--out", str(tmp_path / "out")]) == 1
+    assert named in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -92,6 +92,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str]) -> int:
     complete.set([])
     try:
+        _check_characters(argv)
         arguments = _parser(argv).parse_args(argv)
         status: int = arguments.run(arguments)
     except SystemExit as leaving:  # argparse has printed its help or its complaint
@@ -109,6 +110,17 @@ def _run(argv: Sequence[str]) -> int:
         print(f"rockfall: {_in_words(error)}", file=sys.stderr)
         return BAD_INPUT
     return status
+
+
+def _check_characters(argv: Sequence[str]) -> None:
+    """Refuse names whose bytes are no text: what they name could be read, and no table could be written with it."""
+    for word in argv:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            raise InputError(
+                f"{word} has bytes that are no characters in UTF-8", advice="Rename it, or write it in other letters"
+            ) from None
 
 
 def _interrupted(error: KeyboardInterrupt) -> int:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Seeds, laws and options at and beyond their ends: taken, or refused in words before anything is read."""
 
+import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -169,3 +171,29 @@ def test_an_option_that_would_change_nothing_is_refused_before_anything_is_read(
     assert main([*words, "--out", str(tmp_path / "out")]) == 1
     assert named in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("option", ["--from-polygon", "--screen"])
+def test_a_name_with_half_a_character_is_refused_before_anything_falls(option, tmp_path, capsys):
+    """JSON can say it, and no table, no page and no GeoPackage can have it."""
+    write_ply(PLANE, tmp_path / "terrain.ply")
+    kind, ring = ("Polygon", [[[3, 10], [8, 10], [8, 30], [3, 10]]]) if "polygon" in option else (
+        "LineString", [[10, 0], [10, 50]]
+    )  # fmt: skip
+    geometry = {"type": kind, "coordinates": ring}
+    feature = {"type": "Feature", "properties": {"name": "a\ud800b"}, "geometry": geometry}
+    (tmp_path / "map.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    (tmp_path / "releases.csv").write_text("x_m,y_m\n5,20\n")
+    source = [] if "polygon" in option else [str(tmp_path / "releases.csv")]
+    words = ["simulate", *source, "--terrain", str(tmp_path / "terrain.ply"), "--model", "noel_2017"]
+    assert main([*words, option, str(tmp_path / "map.geojson"), "--out", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr().err
+    assert "map.geojson: " in said
+    assert "Simulating" not in said
+    assert "in Rockfall itself" not in said
+
+
+def test_a_name_whose_bytes_are_no_text_is_refused_at_once(tmp_path, capsys):
+    name = os.fsdecode(b"caf\xe9.csv") if os.name != "nt" else "caf\udce9.csv"
+    assert main(["reconstruct", name, "--out", str(tmp_path / "out")]) == 1
+    assert "bytes that are no characters" in capsys.readouterr().err

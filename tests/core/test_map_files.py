@@ -191,7 +191,7 @@ def test_codes_of_systems():
 def test_a_code_of_web_maps_before_epsg_had_one_is_written_as_that(tmp_path, code):
     rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
     shift = GlobalShift(800_000.0, 5_800_000.0, 0.0, f"EPSG:{code}")
-    cells = Cells(0.0, 0.0, 2.0, 3, 4)
+    cells = Cells(0.0, 0.0, 2.0, 4, 3)
     write_map(tmp_path / "a.tif", cells, np.ones((3, 4)), next(iter(LAYERS.values())), shift)
     with rasterio.open(tmp_path / "a.tif") as opened:
         assert opened.crs.to_epsg() == 3857
@@ -203,7 +203,7 @@ def test_a_code_of_web_maps_before_epsg_had_one_is_written_as_that(tmp_path, cod
 def test_a_code_that_no_file_has_room_for_is_named_in_words(tmp_path, crs):
     rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
     shift = GlobalShift(800_000.0, 5_800_000.0, 0.0, crs, "EPSG:70000")
-    write_map(tmp_path / "a.tif", Cells(0.0, 0.0, 2.0, 3, 4), np.ones((3, 4)), next(iter(LAYERS.values())), shift)
+    write_map(tmp_path / "a.tif", Cells(0.0, 0.0, 2.0, 4, 3), np.ones((3, 4)), next(iter(LAYERS.values())), shift)
     with rasterio.open(tmp_path / "a.tif") as opened:
         assert opened.crs is None
         assert opened.tags()["CRS"] == crs

@@ -42,7 +42,7 @@ COMMANDS = {
     "statistics": ["statistics", DEMO / "project.toml"],
     "compare": ["compare", DEMO / "project.toml", "--replicates", "50"],
     "calibrate": ["calibrate", DEMO / "project.toml", "--model", "noel_2017", "--fit", "rn_limit"],
-    "simulate": ["simulate", DEMO / "project.toml", "--number", "100", "--cell", "2"],
+    "simulate": ["simulate", DEMO / "project.toml", "--number", "20", "--cell", "2"],
     "simulate --workers": ["simulate", DEMO / "project.toml", "--number", "500", "--workers", "2"],
     "compare-runs": ["compare-runs", DEMO / "project.toml", "--number", "60"],
     "back-analyse": ["back-analyse", DEMO / "project.toml", "--model", "noel_2017", "--fit", "rn_limit"],

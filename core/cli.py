@@ -20,7 +20,8 @@ from traceback import extract_tb
 
 from .children import end_with_parent_if_asked
 from .errors import InputError, RockfallError
-from .interrupts import Interrupt, handled, interrupt
+from .interrupts import Interrupt, handled, interrupt, never_lost
+from .output import complete
 
 DONE, BAD_INPUT, USAGE, SIGNALLED = 0, 1, 2, 128
 """The exit status; of a process that a signal has ended it is `SIGNALLED` plus its number: 130 after Ctrl+C."""
@@ -76,9 +77,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault(*ONE_THREAD)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # such as where it keeps its list of fonts
     try:
-        with handled(interrupt):
+        with handled(interrupt), never_lost():
             status = _run(list(sys.argv[1:] if argv is None else argv))
             sys.stdout.flush()
+    except KeyboardInterrupt as error:  # at the very end
+        return _interrupted(error)
     except OSError as error:
         closed = _is_closed_pipe(error)
         if not closed:
@@ -90,7 +93,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str]) -> int:
+    complete.set([])
     try:
+        _check_characters(argv)
         arguments = _parser(argv).parse_args(argv)
         with _blends(argv):
             status: int = arguments.run(arguments)
@@ -120,8 +125,21 @@ def _blends(argv: Sequence[str]) -> AbstractContextManager[None]:
     return saved_blends(print)
 
 
+def _check_characters(argv: Sequence[str]) -> None:
+    """Refuse names whose bytes are no text: what they name could be read, and no table could be written with it."""
+    for word in argv:
+        try:
+            word.encode()
+        except UnicodeEncodeError:
+            raise InputError(
+                f"{word} has bytes that are no characters in UTF-8", advice="Rename it, or write it in other letters"
+            ) from None
+
+
 def _interrupted(error: KeyboardInterrupt) -> int:
-    print(f"rockfall: interrupted, {error if error.args else 'nothing was written'}.", file=sys.stderr)
+    written = complete.get()
+    said = f"{written[-1]} is complete" if written else "nothing was written"
+    print(f"rockfall: interrupted, {error if error.args else said}.", file=sys.stderr)
     return SIGNALLED + (error.number if isinstance(error, Interrupt) else signal.SIGINT)
 
 

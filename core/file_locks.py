@@ -12,6 +12,10 @@ else:
     import fcntl
 
 
+FAR = 1 << 30
+"""The byte that is locked on Windows, where nobody else can read what is locked: behind all that a file says."""
+
+
 def try_lock(descriptor: int) -> bool:
     """Lock an open file; False when somebody holds it, also this process through another descriptor.
 
@@ -19,7 +23,12 @@ def try_lock(descriptor: int) -> bool:
     """
     try:
         if sys.platform == "win32":
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+            at = os.lseek(descriptor, 0, os.SEEK_CUR)
+            os.lseek(descriptor, FAR, os.SEEK_SET)
+            try:
+                msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+            finally:
+                os.lseek(descriptor, at, os.SEEK_SET)
         else:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -2,14 +2,20 @@
 """Signals that ask the process to end: all are a KeyboardInterrupt, like Ctrl+C, so that everything is cleared away."""
 
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from threading import current_thread, main_thread
+from threading import Timer, current_thread, main_thread
 from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 """Ctrl+C, a polite end, a closed terminal, Ctrl+Break; each system has some of them."""
 ENDING = tuple(signal.Signals[name] for name in NAMES if name in signal.Signals.__members__)
+AGAIN_S = 0.05
 
 
 class Interrupt(KeyboardInterrupt):
@@ -59,3 +65,27 @@ def uninterrupted(said: str = "") -> Iterator[None]:
         yield
     if came:
         raise Interrupt(came[0], said)
+
+
+@contextmanager
+def never_lost() -> Iterator[None]:
+    """An `Interrupt` raised where Python drops exceptions comes again a moment later.
+
+    Python drops them in destructors, in what is called when garbage is collected, and in callbacks of compiled code, as
+    of the compiler that numba uses; a signal may come at any time, there too.
+    """
+    before = sys.unraisablehook
+
+    def again(dropped: "UnraisableHookArgs") -> None:
+        if not isinstance(dropped.exc_value, Interrupt):
+            before(dropped)
+            return
+        timer = Timer(AGAIN_S, signal.raise_signal, (dropped.exc_value.number,))
+        timer.daemon = True
+        timer.start()
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before

@@ -6,6 +6,7 @@ kept with a digest of its own code and of all functions and constants that it re
 """
 
 import hashlib
+import os
 import pickle
 import sys
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .open_folders import is_own
 from .output import write_bytes
 
 TREE = Path(__file__).parents[1]
@@ -34,7 +36,8 @@ class KeptCode:
     The directories are numba's: NUMBA_CACHE_DIR, else `CHECKOUT` if it is there, else beside the source, else the
     user's; with none to write to, code is compiled anew in each process. One file for each signature and kind of
     processor begins with a check sum over the digest and the code, and replaces an outdated one in one step: several
-    processes may read and write at once, nothing half-written or outdated is used, and nothing piles up.
+    processes may read and write at once, nothing half-written or outdated is used, and nothing piles up. A
+    file of another user, in a directory that several write to, is not used.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -74,7 +77,10 @@ class KeptCode:
             return None
         target.refresh()
         try:
-            kept = self._file(signature, target.codegen()).read_bytes()
+            with self._file(signature, target.codegen()).open("rb") as stream:
+                if not self._is_trusted(os.fstat(stream.fileno())):
+                    return None
+                kept = stream.read()
         except OSError:
             return None
         code = kept[32:]
@@ -96,6 +102,11 @@ class KeptCode:
 
     def flush(self) -> None:
         """Nothing is kept open."""
+
+    def _is_trusted(self, state: os.stat_result) -> bool:
+        """Whether it is of this user, of the system or of whom the source belongs to: what is kept is run."""
+        source = Path(self._function.__code__.co_filename)
+        return is_own(state) or state.st_uid in (0, source.stat().st_uid if source.exists() else 0)
 
     def _check(self, code: bytes) -> bytes:
         return hashlib.sha256(self._digest + code).digest()

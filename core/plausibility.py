@@ -31,6 +31,8 @@ BETWEEN: Mapping[str, tuple[float, float]] = {
     **dict.fromkeys(("position", "target", "shift"), (0.0, GREATEST_M)),
 }
 """Name → the least amount, of either sign, that can be if it is not zero, and the greatest."""
+GREATEST_SEED = 2**63 - 1
+"""Of random numbers: what fits into a whole number with a sign of 64 bits, also of a GeoPackage."""
 SIGMA, GREATEST_SIGMA = "sigma_", 1e50
 """A standard deviation of 1e20 says that nothing is known; squares stay finite."""
 

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..vectors import Array, Mask, norm
 from .options import (
+    NO_TERRAIN,
     add_fps,
     add_out,
     add_terrain_files,
@@ -20,6 +21,7 @@ from .options import (
     naming,
     not_negative,
     positive,
+    refuse_terrain_options,
     terrain_as_asked,
     whole,
 )
@@ -101,6 +103,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError("--moving follows the background through a video", advice="Give it with --video FILE")
     if arguments.moving == "full" and not arguments.terrain:
         raise InputError("--moving full needs the terrain", advice="Give it with --terrain MESH, or use rotation")
+    if arguments.frames and not arguments.moving:
+        raise InputError("--frames are those that a moving camera is followed through", advice="Give --moving, too")
+    if not arguments.terrain:
+        refuse_terrain_options(arguments, *NO_TERRAIN)
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
         progress(f"Reading {arguments.pairs}")

@@ -63,15 +63,16 @@ def run(arguments: argparse.Namespace) -> int:
     def make_command(job: "Job", draft: Path) -> list[str]:
         return [*program, arguments.each, *_arguments_of(job, options), "--out", str(draft)]
 
-    with PrintedProgress() as progress, stopped_by_interrupt(progress) as counted:
+    with PrintedProgress() as progress, stopped_by_interrupt(progress, keeps=True) as counted:
         outcomes = run_batch(batch, make_command, parallel=parallel, progress=counted)
     kept = sum(one.output is not None for one in outcomes)
     _print(outcomes)
     if kept or folder.is_dir():
         write_batch_summary(batch, outcomes)
         print(f"Written: {SUMMARY} in {out}")
-    if any(one.state == "not run" for one in outcomes):
-        raise Interrupt(said=f"{kept} of {len(jobs)} jobs are finished; the same command goes on with the others")
+    if counted.asked:
+        others = "; the same command goes on with the others" if kept < len(jobs) else ""
+        raise Interrupt(counted.asked, f"{kept} of {len(jobs)} jobs are finished{others}")
     return 1 if any(one.state == "failed" for one in outcomes) else 0
 
 

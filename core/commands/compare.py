@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2
+from ..errors import InputError
 from .options import (
+    NO_TERRAIN,
     add_figure_options,
     add_incident_options,
     add_model_option,
@@ -23,6 +25,7 @@ from .options import (
     models_as_asked,
     naming,
     not_negative,
+    refuse_terrain_options,
     terrain_as_asked,
     whole,
 )
@@ -75,6 +78,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ..impact_models.registry import COMPARED
     from ..output import output_folder
 
+    if not arguments.terrain:
+        refuse_terrain_options(arguments, *NO_TERRAIN)
+        if arguments.drag:
+            raise InputError("--drag is of flights over the terrain, and there is none", advice="Give --terrain, too")
     models = models_as_asked(arguments.model, COMPARED)
     parameters = model_parameters(arguments, models)
     measured = measured_as_asked(arguments, models)

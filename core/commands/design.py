@@ -14,6 +14,7 @@ from .options import (
     model_parameters,
     models_as_asked,
     not_negative,
+    seed,
     share,
     whole,
 )
@@ -68,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"blocks that fall at most with each model until the values are known (default {MOST_BLOCKS})",
     )
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default: the project's)")
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the random numbers (default: the project's)")
     parser.add_argument(
         "--cell",
         type=not_negative,

@@ -5,9 +5,11 @@ import argparse
 import webbrowser
 from collections.abc import Mapping
 from pathlib import Path
+from signal import SIGINT
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..interrupts import Interrupt
 from .options import add_incident_options, add_model_option, models_as_asked, naming, whole
 from .progress import PrintedProgress
 
@@ -76,6 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
             arguments.port,
             ready,
         )
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
+        if isinstance(error, Interrupt) and error.number != SIGINT:
+            raise
         print("\nStopped.")
     return 0

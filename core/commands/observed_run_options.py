@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from .options import (
+    OF_PROJECT,
     add_figure_options,
     add_motion_options,
     add_out,
@@ -21,6 +22,8 @@ from .options import (
     models_as_asked,
     naming,
     positive,
+    refuse_terrain_options,
+    seed,
     terrain_as_asked,
     whole,
 )
@@ -65,9 +68,7 @@ def add_observed_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add_terrain_files(parser, "mesh, grid or cloud; a project names its own")
     add_parameter_options(parser)
-    parser.add_argument(
-        "--seed", type=whole, metavar="S", help="of the random numbers (default: the project's, else 0)"
-    )
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the random numbers (default: the project's, else 0)")
     section = parser.add_argument_group("sections (default: three contour levels, or three drops below the starts)")
     section.add_argument("--contours", metavar="Z,Z", help="heights in survey coordinates, below which blocks fall [m]")
     section.add_argument("--drops", metavar="H,H", help="heights below each block's own start [m]")
@@ -141,6 +142,7 @@ def _of_project(
     for option in ("--terrain", "--stops", "--gravity", "--diameter", "--density", "--zone-attribute"):
         if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, []):
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
+    refuse_terrain_options(arguments, *OF_PROJECT)
     file = Path(arguments.table)
     project = read_project(file)
     entry = project.stated_simulation

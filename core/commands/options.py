@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..constants import UNITS_M
 from ..errors import MOST_OF_PATH, DependencyError, InputError, RockfallError, readable
+from ..plausibility import GREATEST_SEED
 
 if TYPE_CHECKING:
     from ..exchange.database import Database
@@ -62,6 +63,13 @@ def whole(text: str) -> int:
     """A whole number of zero or more."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text} is not a whole number of zero or more")
+    return int(text)
+
+
+def seed(text: str) -> int:
+    """A seed of random numbers."""
+    if not text.isdecimal() or len(text) > 99 or int(text) > GREATEST_SEED:
+        raise argparse.ArgumentTypeError(f"{text:.40} is not a whole number from 0 to {GREATEST_SEED} (2^63 - 1)")
     return int(text)
 
 
@@ -194,6 +202,28 @@ def add_terrain_options(parser: argparse.ArgumentParser) -> None:
     points.add_argument("--all-points", dest="ground_only", action="store_false", help="use the points of every class")
 
 
+def refuse_terrain_options(arguments: argparse.Namespace, why: str, advice: str) -> None:
+    """Refuse the options of `add_terrain_options` where they would change nothing.
+
+    Raises
+    ------
+    InputError : one is given.
+    """
+    options = {"--up": ("auto",), "--unit": (1.0,), "--max-edge": (), "--ground-filter": ()}
+    given = [
+        option
+        for option, defaults in options.items()
+        if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, *defaults)
+    ]
+    given += [] if arguments.ground_only is None else ["--ground-only" if arguments.ground_only else "--all-points"]
+    if given:
+        raise InputError(f"{given[0]} tells how to read a terrain, and {why}", advice=advice)
+
+
+NO_TERRAIN = "no terrain is read", "Give it with --terrain, or leave the option out"
+OF_PROJECT = "a project says itself how to read its own", "Write it into [terrain] of the project"
+
+
 def terrain_as_asked(arguments: argparse.Namespace, files: Sequence[str], progress: "Progress") -> "Surface":
     """Read a terrain, of one file or several, with the options of `add_terrain_options`.
 
@@ -221,7 +251,7 @@ def reading_as_asked(arguments: argparse.Namespace) -> "HowToRead":
 
 def add_incident_options(parser: argparse.ArgumentParser) -> None:
     """What the models are told of the incident block, and the seed of their chance."""
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="of the random numbers (default 0)")
     parser.add_argument(
         "--spin",
         choices=("rolling", "zero", "table"),

@@ -79,25 +79,48 @@ class PrintedProgress:
         self._is_open = False
 
 
-@contextmanager
-def stopped_by_interrupt(progress: Progress) -> Iterator[Progress]:
-    """Progress in which Ctrl+C, or SIGTERM, asks the work to end, so that it can keep what is finished; a second one
-    ends it."""
-    asked = 0
+class Stoppable:
+    """Progress in which the work ends when a signal has asked for it.
 
-    def ask(number: int, frame: FrameType | None) -> None:
-        nonlocal asked
-        if asked:
+    Attributes
+    ----------
+    asked : the number of that signal; 0 before any.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self.asked = progress, 0
+
+    def ask(self, number: int, frame: FrameType | None = None) -> None:
+        """Handle a signal: the first asks the work to end, a second one ends it."""
+        if self.asked:
             interrupt(number)
-        asked = number
+        self.asked = number
 
-    def told(text: str, done: int = 0, total: int = 0) -> None:
-        if asked:
+    def __call__(self, text: str, done: int = 0, total: int = 0) -> None:
+        """Now doing `text`."""
+        if self.asked:
             raise CancelledError
-        progress(text, done, total)
+        self._progress(text, done, total)
 
-    with handled(ask):
+
+@contextmanager
+def stopped_by_interrupt(progress: Progress, *, keeps: bool = False) -> Iterator[Stoppable]:
+    """Progress in which Ctrl+C, or SIGTERM, asks the work to end, so that it can keep what is finished; a second one
+    ends it.
+
+    Parameters
+    ----------
+    keeps : whether what the work has kept is used: who asks for it looks at `Stoppable.asked`, and interrupts later.
+
+    Raises
+    ------
+    Interrupt : the work was asked to end, whether or not it has done so.
+    """
+    stoppable = Stoppable(progress)
+    with handled(stoppable.ask):
         try:
-            yield told
+            yield stoppable
         except CancelledError as error:
-            raise Interrupt(asked) from error
+            raise Interrupt(stoppable.asked) from error
+    if stoppable.asked and not keeps:
+        raise Interrupt(stoppable.asked)

@@ -8,7 +8,17 @@ from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_
 from ..errors import InputError
 from ..extras import PARQUET, demand
 from ..reconstruction.sampling import STEP_S
-from .options import add_out, add_terrain_files, add_terrain_options, naming, not_negative, positive, terrain_as_asked
+from .options import (
+    NO_TERRAIN,
+    add_out,
+    add_terrain_files,
+    add_terrain_options,
+    naming,
+    not_negative,
+    positive,
+    refuse_terrain_options,
+    terrain_as_asked,
+)
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
@@ -123,6 +133,8 @@ def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Made
     from ..reconstruction.trajectory import reconstruct
     from ..workflow.uprightness import turned_picks
 
+    if not arguments.terrain:
+        refuse_terrain_options(arguments, *NO_TERRAIN)
     picks = read_picks(arguments.picks)
     surface = terrain_as_asked(arguments, arguments.terrain, progress) if arguments.terrain else None
     picks, turned = turned_picks(picks, surface)

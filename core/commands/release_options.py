@@ -48,7 +48,6 @@ def add_release_options(parser: argparse.ArgumentParser) -> None:
     source.add_argument(
         "--spin",
         choices=("rolling", "zero"),
-        default="rolling",
         help="after impacts where it was not measured: that of rolling (default) or none",
     )
     source.add_argument(
@@ -120,6 +119,8 @@ def releases_as_asked(arguments: argparse.Namespace) -> "tuple[ReleaseSource, di
         raise InputError(f"{' and '.join(given)} both say where blocks start", advice="Give one of them")
     if arguments.evenly and given != ["--from-line"]:
         raise InputError("--evenly goes with --from-line alone", advice="Leave it out")
+    if arguments.spin is not None and given != ["--from-impacts"]:
+        raise InputError("--spin goes with --from-impacts alone", advice="Leave it out")
     blocks = blocks_as_asked(arguments)
     number = 1 if arguments.number is None else arguments.number
     seed = 0 if arguments.seed is None else arguments.seed
@@ -251,4 +252,4 @@ def _from_impacts(
 
     impacts = read_impacts(arguments.from_impacts)
     with naming(arguments.from_impacts):
-        return from_impacts(ground, impacts, blocks, number, seed, spin=arguments.spin)
+        return from_impacts(ground, impacts, blocks, number, seed, spin=arguments.spin or "rolling")

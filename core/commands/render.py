@@ -10,7 +10,7 @@ from ..film.job import AS_SET_UP, BLEND, GRAPH_KINDS, Kind
 from ..film.presets import parse_frames
 from ..film.simulated import NUMBER, check_number
 from . import render_film
-from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, naming, whole
+from .options import add_model_option, add_parameter_options, model_parameters, models_as_asked, naming, seed, whole
 from .progress import PrintedProgress
 
 FILES = {"film": "rockfall.mp4", "still": "rockfall.png", "slope": "slope.png"}
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--number", type=whole, metavar="N", help=f"simulated blocks for each real one and model (default {NUMBER})"
     )
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the simulation's random numbers (default 0)")
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the simulation's random numbers (default 0)")
     add_parameter_options(parser)
     parser.add_argument(
         "--graphs",

@@ -12,6 +12,7 @@ from .options import (
     add_terrain_colours,
     model_parameters,
     models_as_asked,
+    seed,
     whole,
 )
 
@@ -32,7 +33,7 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--number", type=whole, metavar="N", help=f"simulated blocks for each real one and model (default {NUMBER})"
     )
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the simulation's random numbers (default 0)")
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the simulation's random numbers (default 0)")
     add_parameter_options(parser)
     parser.add_argument(
         "--as-observed",

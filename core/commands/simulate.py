@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..constants import GRAVITY_MPS2
+from ..interrupts import Interrupt
 from .options import (
     add_model_option,
     add_motion_options,
@@ -15,6 +16,7 @@ from .options import (
     add_terrain_files,
     add_terrain_options,
     positive,
+    seed,
     share,
     whole,
     whole_range,
@@ -52,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="posterior.csv of a back-analysis: each block draws its parameters, so results show what is not known",
     )
-    parser.add_argument("--seed", type=whole, metavar="S", help="of the random numbers (default 0)")
+    parser.add_argument("--seed", type=seed, metavar="S", help="of the random numbers (default 0)")
     add_release_options(parser)
     add_tree_options(parser)
     motion = parser.add_argument_group("motion")
@@ -134,6 +136,8 @@ def run(arguments: argparse.Namespace) -> int:
     for sentence in (*work.scenario.terrain.summary, *done.remarks):
         print(sentence)
     print(f"Written: {', '.join(done.written)} in {arguments.out}")
+    if done.asked:
+        raise Interrupt(done.asked, f"what was finished is written in {arguments.out}")
     return 0
 
 
@@ -143,7 +147,7 @@ def _simulate_here(arguments: argparse.Namespace, work: Work, folder: Path, prog
     from ..exchange.simulation_output import write_simulations
     from ..remarks import gravest_first
 
-    mapped = _fallen(arguments, work, progress)
+    mapped, asked = _fallen(arguments, work, progress)
     remarks = gravest_first(_remarks(mapped, work))
     written = write_simulations(
         mapped.simulations, folder, record=work.record, inputs=work.inputs, mapped=mapped, remarks=remarks,
@@ -154,28 +158,30 @@ def _simulate_here(arguments: argparse.Namespace, work: Work, folder: Path, prog
             mapped.simulations, folder / GEOPACKAGE, measured=work.measured, screens=work.screens, progress=progress
         )
         written.append(GEOPACKAGE)
-    return Done(written, remarks)
+    return Done(written, remarks, asked=asked)
 
 
-def _fallen(arguments: argparse.Namespace, work: Work, progress: PrintedProgress) -> "Mapped":
-    """The runs of all models, with their maps and what passed at screens; what is finished at an interrupt."""
+def _fallen(arguments: argparse.Namespace, work: Work, progress: PrintedProgress) -> "tuple[Mapped, int]":
+    """The runs of all models, with their maps and what passed at screens; what is finished at an interrupt, and the
+    number of its signal."""
     from ..exchange.simulation_output import recorded_for
     from ..workflow.maps import Mapped, map_models
     from ..workflow.simulation import run_models
 
     scenario, record = work.scenario, recorded_for(work.record, bool(work.scenario.structures))
-    with stopped_by_interrupt(progress) as counted:
+    with stopped_by_interrupt(progress, keeps=True) as counted:
         if work.cell_m is None and not work.faces and not work.screens:
             simulations = run_models(
                 work.ground, work.releases, scenario.settings,
                 record=record, first_run=work.first_run, threads=arguments.threads, progress=counted,
             )  # fmt: skip
-            return Mapped(simulations, {})
-        return map_models(
+            return Mapped(simulations, {}), counted.asked
+        mapped = map_models(
             work.ground, work.releases, scenario.settings, work.cell_m, work.screens, faces=work.faces,
             until_known=work.until_known, record=record, first_run=work.first_run, threads=arguments.threads,
             progress=counted,
         )  # fmt: skip
+        return mapped, counted.asked
 
 
 def _remarks(mapped: "Mapped", work: Work) -> "list[Remark]":

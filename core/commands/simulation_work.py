@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError
 from .options import (
+    OF_PROJECT,
     known_names,
     measured_as_asked,
     model_parameters,
     models_as_asked,
     naming,
     reading_as_asked,
+    refuse_terrain_options,
     terrain_as_asked,
 )
 from .progress import PrintedProgress
@@ -188,10 +190,11 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked:
     from ..exchange.simulation_project import open_simulation
     from ..terrain.surface import Surface
 
-    own = ["--terrain", "--structure", "--gravity", "--zone-attribute", *sources_given(arguments)[1:]]
-    for option in own:
-        if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, []):
+    own = ["--terrain", "--structure", "--gravity", "--zone-attribute", "--spin", "--evenly"]
+    for option in (*own, *sources_given(arguments)[1:]):
+        if getattr(arguments, option.strip("-").replace("-", "_")) not in (None, [], False):
             raise InputError(f"{option} is what a project says itself", advice="Write it into the project")
+    refuse_terrain_options(arguments, *OF_PROJECT)
     file = Path(arguments.releases)
     project = read_project(file)
     entry = project.stated_simulation

@@ -15,6 +15,7 @@ from .options import (
     figure_formats,
     impacts_as_asked,
     naming,
+    seed,
     tables_as_asked,
     whole,
 )
@@ -66,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=("X", "Y"),
         help="a further figure, of any two variables; can be given again",
     )
-    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the tests by exchange (default 0)")
+    parser.add_argument("--seed", type=seed, default=0, metavar="S", help="of the tests by exchange (default 0)")
     add_figure_options(parser)
 
 

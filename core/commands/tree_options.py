@@ -22,10 +22,12 @@ def add_tree_options(parser: argparse.ArgumentParser) -> None:
         help="a table of stems: x_m, y_m, dbh_cm; if known height_m, species or energy_factor, tree (a name)",
     )
     group.add_argument(
-        "--stems-per-hectare", type=positive, metavar="N", help="a forest drawn at random by the seed, with --dbh-cm"
+        "--stems-per-hectare", type=positive, metavar="N", help="a forest drawn at random by the seed, needs --dbh-cm"
     )
     group.add_argument(
-        "--dbh-cm", metavar="MEAN[,SD]", help="diameters at breast height [cm] of that forest: mean, standard deviation"
+        "--dbh-cm",
+        metavar="MEAN[,SD]",
+        help="diameters at breast height [cm] of the forest of --stems-per-hectare: mean, standard deviation",
     )
     group.add_argument("--trees-within", metavar="FILE", help="polygons of a map outside of which none are drawn")
     group.add_argument(
@@ -65,6 +67,14 @@ def trees_said(arguments: argparse.Namespace, stated: "TreesEntry | None" = None
             entry = replace(entry, dbh_cm=mean, dbh_sd_cm=sd)
         if arguments.trees_within is not None:
             entry = replace(entry, within=Path(arguments.trees_within))
+        if not entry.stems_per_hectare or not entry.dbh_cm:
+            given, lacking = "--stems-per-hectare", "--dbh-cm"
+            if not entry.stems_per_hectare:
+                given, lacking = "--dbh-cm" if arguments.dbh_cm is not None else "--trees-within", given
+            raise InputError(
+                f"{given} is of a forest that is drawn, which needs {lacking}, too",
+                advice="Give both, as in --stems-per-hectare 400 --dbh-cm 32,12",
+            )
     for option, name in (("tree_height", "height_m"), ("species", "species")):
         value = getattr(arguments, option)
         if value is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError, RockfallError
+from ..extras import CLUSTER, demand
 from .options import whole
 from .progress import PrintedProgress, stopped_by_interrupt
 from .simulation_work import Work
@@ -44,17 +45,20 @@ def several_workers(arguments: argparse.Namespace) -> bool:
         raise InputError("--workers 0 compute nothing", advice="Give at least one")
     if arguments.threads is not None:
         raise InputError("--threads is of one process, and each worker has its own", advice="Leave out --threads")
+    demand(CLUSTER)
     if arguments.until_known is not None:
         raise InputError("--until-known is of one process, and workers do not ask it", advice="Leave out one of them")
     return True
 
 
 class Done(NamedTuple):
-    """The names of the files that were written, what to say, and what is kept of it until the folder is complete."""
+    """The names of the files that were written, what to say, what is kept of it until the folder is complete, and the
+    number of a signal that has ended it before all was simulated."""
 
     written: list[str]
     remarks: "Sequence[Remark]"
     kept: "tuple[ChunkStore, ...]" = ()
+    asked: int = 0
 
 
 def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path, progress: PrintedProgress) -> Done:
@@ -96,12 +100,13 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
                     faces=work.faces, screens=work.screens, first_run=work.first_run, progress=counted,
                 )  # fmt: skip
             except CancelledError as error:
-                raise Interrupt(said=goes_on) from error
+                raise Interrupt(counted.asked, goes_on) from error
         simulations = mapped.simulations
         said = (
             *remarks_of(simulations, list(scenario.models)),
             *map_remarks(mapped.cells),
             *screen_remarks(mapped.screens),
+            *(remark for store in stores for remark in store.remarks),
         )
         remarks = gravest_first([*said])
         written = write_chunk_tables(stores, folder, simulations, mapped.screens, progress=progress)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Running many jobs, each a process of its own with its own folder; a job that is finished is not done again.
 
-A job's folder appears in one step, with ``job.json`` in it, which tells what it was made of. Where that is still so,
-the job is finished. Whatever ends the batch, half a job leaves nothing.
+A job's folder appears in one step, with ``job.json`` in it, which tells what it was made of, and the SHA-256 of each of
+its files. Where that is still so, the job is finished. Whatever ends the batch, half a job leaves nothing.
 """
 
+import hashlib
 import json
 import subprocess
 import time
@@ -31,7 +32,7 @@ SAYS = "rockfall: "
 """Begins the message of a command that fails."""
 LOOK_S, PATIENCE_S = 0.1, 10.0
 """Between two looks whether a job is to end; until one that was asked to end is ended."""
-INTERRUPTED = (-15, -2, 130, 143)
+INTERRUPTED = (-15, -2, -1, 129, 130, 143)
 """Status of a process that a signal has ended."""
 MOST_LINES = 200
 """Of what a command says that is kept."""
@@ -151,7 +152,8 @@ def _run_job(batch: Batch, job: Job, make_command: MakeCommand, stop: Event) -> 
     known: dict[str, Any] = {**place, "digest": digest, "inputs": inputs}
     folder = batch.out / job.name
     earlier = _record_of(folder)
-    if earlier is not None and earlier.get("digest") == digest:
+    differs = "" if earlier is None or earlier.get("digest") != digest else _difference(folder, earlier)
+    if earlier is not None and earlier.get("digest") == digest and not differs:
         return Outcome(
             **known,
             state="already done",
@@ -170,6 +172,8 @@ def _run_job(batch: Batch, job: Job, make_command: MakeCommand, stop: Event) -> 
                 one.relative_to(draft).as_posix() for one in draft.rglob("*") if one.is_file() and one.name != LOCK
             )
             said = said.replace(str(draft), str(folder))
+            if differs:
+                said = f"{differs}, so it was done again.\n{said}"
             record = {
                 "command": batch.command,
                 "options": options,
@@ -178,7 +182,7 @@ def _run_job(batch: Batch, job: Job, make_command: MakeCommand, stop: Event) -> 
                 "digest": digest,
                 "seconds": seconds,
                 "message": said,
-                "files": files,
+                "files": {file: _digest(draft / file) for file in files},
             }
             write_text(draft / RECORD, json.dumps(record, indent=2, ensure_ascii=False) + "\n")
             _remove_outdated(folder, earlier)
@@ -229,7 +233,7 @@ def _finished(command: Sequence[str], stop: Event) -> tuple[int, str, str]:
 
 
 def _record_of(folder: Path) -> dict[str, Any] | None:
-    """What a finished job has left; None where there is none, or one that is damaged or not whole.
+    """What a finished job has left; None where there is none, or one that is damaged.
 
     Its files are in the folder, whatever somebody has written into it: they are removed when the job is done again.
     """
@@ -237,20 +241,43 @@ def _record_of(folder: Path) -> dict[str, Any] | None:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
         files, _ = [Path(name) for name in record["files"]], float(record["seconds"])
         inside = not any(file.is_absolute() or file.drive or ".." in file.parts for file in files)
-        return record if inside and all((folder / file).is_file() for file in files) else None
+        return record if inside else None
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError):
         return None
+
+
+def _difference(folder: Path, record: dict[str, Any]) -> str:
+    """What of the output of a job is not as it was written; empty where all is."""
+    files = record["files"]
+    if not isinstance(files, dict):  # as before version 0.3
+        return "Its record does not say what was in its files"
+    for name, digest in files.items():
+        try:
+            if _digest(folder / name) != digest:
+                return f"{name} was not as it had been written"
+        except OSError:
+            return f"{name} was missing"
+    return ""
+
+
+def _digest(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _remove_outdated(folder: Path, record: dict[str, Any] | None) -> None:
     """Remove what the same job has made of other inputs, so that the new folder appears in one step."""
     if record is None:
         return
+    inner = {(folder / name).parent for name in record["files"]} - {folder}
+    inner |= {above for one in inner for above in one.parents if above.is_relative_to(folder) and above != folder}
+    if any(one.is_symlink() for one in (folder, *inner)):
+        return
     for name in (RECORD, *record["files"]):
         with suppress(OSError):
             (folder / name).unlink()
-    for inner in sorted((one for one in folder.rglob("*") if one.is_dir()), reverse=True):
+    for one in sorted(inner, reverse=True):
         with suppress(OSError):
-            inner.rmdir()
+            one.rmdir()
     with suppress(OSError):
         folder.rmdir()

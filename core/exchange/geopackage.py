@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..georeference import GlobalShift
+from ..georeference import GlobalShift, epsg_code
 from ..output import output_file
 from ..vectors import Array, Indices
 from .geopackage_schema import LAYER_STYLES, RTREE, SCHEMA, SYSTEMS, WGS_84
-from .geotiff_maps import UNKNOWN, epsg_code
+from .geotiff_maps import UNKNOWN
 
 APPLICATION_ID, USER_VERSION = 0x47504B47, 10400
 UNDEFINED_CARTESIAN = -1

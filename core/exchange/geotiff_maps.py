@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps as GeoTIFF (OGC 19-008r4): tiles of 32-bit floats with overviews, and what they mean in GDAL's metadata."""
 
-import re
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..georeference import GlobalShift
+from ..georeference import GlobalShift, epsg_code
 from ..hazard.cells import Cells
 from ..hazard.maps import Layer
 from ..output import output_file
@@ -28,12 +27,6 @@ PIXEL_SCALE, TIE_POINT, GEOKEYS, GDAL_METADATA, GDAL_NODATA = 33550, 33922, 3473
 DOUBLE, SHORT, ASCII = 12, 3, 2
 MODEL_TYPE, PROJECTED, RASTER_TYPE, AREA, PROJECTED_CRS, LINEAR_UNIT, METRE = 1024, 1, 1025, 1, 3072, 3076, 9001
 VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099
-
-
-def epsg_code(crs: str) -> int | None:
-    """2056 of "EPSG:2056"; None for a system of which only a name is known, or nothing, or in another unit."""
-    found = re.fullmatch(r"\s*EPSG\s*:\s*(\d+)\s*", crs, re.IGNORECASE)
-    return int(found[1]) if found else None
 
 
 def write_map(

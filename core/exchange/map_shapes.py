@@ -173,7 +173,10 @@ def _shapes(
 
 def _json(path: Path) -> dict[str, Any]:
     with reading(path, "GeoJSON file", "Export it again"):
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        content = json.loads(text)
+        if "\\ud" in text.lower():  # half of a pair is no character, and no table could be written with it
+            json.dumps(content, ensure_ascii=False).encode()
     if not isinstance(content, dict):
         raise InputError("This is no GeoJSON: it has no object", file=path, advice="Export it again")
     return content

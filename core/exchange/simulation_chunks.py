@@ -94,7 +94,8 @@ def simulate_in_chunks(
     for one in settings:
         began = time.perf_counter()
         decides = (ground, releases, one, first_run, size, tables, cell_m, faces, tuple(screens), versions())
-        store = ChunkStore(kept / content_digest(*decides)[:KEY_LETTERS])
+        scenario = content_digest(*decides)
+        store = ChunkStore(kept / scenario[:KEY_LETTERS], scenario)
         work = Work(ground, one, tallies, recorded, tables, kept_records)
         found = run_ensemble(work, releases, pool, first_run=first_run, size=size, store=store, progress=progress)
         ends = found.pop(RUNS).arrays()

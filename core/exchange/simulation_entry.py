@@ -235,7 +235,7 @@ def read_simulation(table: TomlTable) -> SimulationEntry:
         drag=table.flag("drag", False),
         observed=table.path("observed") if table.has("observed") else None,
         posterior=table.path("posterior") if table.has("posterior") else None,
-        seed=table.whole("seed", 0, zero_allowed=True),
+        seed=table.seed(),
         record=table.choices("record", RECORDS) if table.has("record") else None,
         cell_m=table.number("cell_m", 1.0) if table.has("cell_m") else None,
         faces=table.flag("faces", False),

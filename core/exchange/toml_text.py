@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..plausibility import implausible
+from ..plausibility import GREATEST_SEED, implausible
 from ..reading import reading
 from ..vectors import Array
 
@@ -132,6 +132,13 @@ class TomlTable:
 
     def optional_number(self, key: str, zero_allowed: bool = False) -> float | None:
         return self.number(key, REQUIRED, zero_allowed) if key in self._content else None
+
+    def seed(self, key: str = "seed") -> int:
+        """Of random numbers; 0 when it is missing."""
+        value = self.whole(key, 0, zero_allowed=True)
+        if value > GREATEST_SEED:
+            raise self.wrong(key, "is too large", f"Give a whole number from 0 to {GREATEST_SEED} (2^63 - 1)")
+        return value
 
     def whole(self, key: str, default: int = REQUIRED, zero_allowed: bool = False) -> int:
         value = self._taken(key, default, "a whole number")

@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..impact_models.machinery.parameters import suggestion
 from ..vectors import Array
 from .block_shapes import ROUND, SHAPES, Shape
-from .distributions import Distribution
+from .distributions import Distribution, check_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,8 @@ class Blocks:
 
     Raises
     ------
-    InputError : an unknown shape, proportions that are not above zero, a sphere or cube with unequal ones.
+    InputError : an unknown shape, proportions that are not above zero, a sphere or cube with unequal ones; a law with
+        diameters or densities that cannot be.
     """
 
     shape: Shape = "sphere"
@@ -61,6 +62,8 @@ class Blocks:
             raise InputError(
                 f"A {self.shape} has three equal diameters", advice="Choose box or ellipsoid, or one diameter"
             )
+        check_values(self.diameter, "diameter_m", "diameter")
+        check_values(self.density, "density_kgpm3", "density")
 
 
 def block_of(shape: Shape, d1: float, d2: float, d3: float, density_kgpm3: float = ROCK_DENSITY_KGPM3) -> Blocks:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..impact_models.machinery.parameters import suggestion
+from ..plausibility import implausible
 from ..vectors import Array
 
 Law = Literal["fixed", "uniform", "normal", "lognormal"]
@@ -17,6 +18,10 @@ LEAST_PART = 0.1
 """A normal law is cut off at this part of its mean: what it has below, negative sizes too, is not drawn."""
 MOST_CUT = 0.1
 """A normal law with more than this share below there is refused."""
+WIDEST = 100.0
+"""A standard deviation of a lognormal law with more than so many times its mean is refused."""
+RARE = 1e-4
+"""Values that fewer blocks have, at either end, do not make a law implausible."""
 FORMS = "0.5, 0.3..0.6, normal:MEAN,SD or lognormal:MEAN,SD"
 
 
@@ -52,6 +57,11 @@ class Distribution:
             raise InputError(f"{self.text} ends below its beginning", advice="Give the lowest value first")
         if self.law in ("normal", "lognormal") and self.second < 0:
             raise InputError(f"The standard deviation of {self.text} is negative", advice="Give zero or more")
+        if self.law == "lognormal" and self.second > WIDEST * self.first:
+            raise InputError(
+                f"The standard deviation of {self.text} is more than {WIDEST:g} times its mean",
+                advice="Give a smaller one: it is that of the values, not of their logarithms",
+            )
         if self.law == "normal" and self.cut > MOST_CUT:
             raise InputError(
                 f"{self.text} has {self.cut:.0%} of its values below a tenth of its mean, or below zero",
@@ -97,6 +107,25 @@ class Distribution:
             return np.maximum(drawn, LEAST_PART * self.first)
         spread = log(1.0 + (self.second / self.first) ** 2)
         return np.exp(log(self.first) - spread / 2 + sqrt(spread) * ndtri(inside))
+
+
+def check_values(law: Distribution, name: str, what: str) -> None:
+    """Refuse a law with values that cannot be.
+
+    Parameters
+    ----------
+    name, what : see `check_plausible`.
+
+    Raises
+    ------
+    InputError : one block in ten thousand, or more, has such a value.
+    """
+    ends = (law.first, law.second) if law.law == "uniform" else law.values(np.array([RARE, 1.0 - RARE])).tolist()
+    for value in ends:
+        problem = implausible(name, value)
+        if problem:
+            drawn = "" if law.law == "fixed" else f", which {law.text} gives to blocks,"
+            raise InputError(f"A {what} of {value:.3g}{drawn} {problem}", advice="Check it, its deviation and its unit")
 
 
 def parse_distribution(text: str) -> Distribution:

@@ -19,6 +19,7 @@ from ..impact_models.machinery.base import ImpactModel
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
 from ..memory import available_bytes
+from ..plausibility import GREATEST_SEED
 from ..progress import Progress, silent
 from ..reconstruction.drag import Drag
 from ..vectors import Array, Indices, Mask
@@ -366,6 +367,8 @@ def check_settings(ground: Ground, settings: Settings) -> tuple[Array, Array]:
     ):
         if not (np.isfinite(value) and value > 0):
             raise InputError(f"The {what} is {value}", advice="Give a number above zero")
+    if not 0 <= settings.seed <= GREATEST_SEED:
+        raise InputError("The seed is out of range", advice=f"Give a whole number from 0 to {GREATEST_SEED} (2^63 - 1)")
     for name in (*settings.zones, *settings.zone_friction):
         if name not in ground.zones:
             raise InputError(f"There is no zone {name!r}", advice=f"There are {', '.join(ground.zones)}")

@@ -173,6 +173,11 @@ def random_trees(
         raise InputError(
             f"The mean diameter is {mean_dbh_m:g} m", advice=f"Diameters are in cm, and below {100 * THICKEST_M:g}"
         )
+    if sd_dbh_m > THICKEST_M:
+        raise InputError(
+            f"The standard deviation of the diameters is {sd_dbh_m:g} m",
+            advice=f"It is in cm, and below {100 * THICKEST_M:g}",
+        )
     places = terrain.vertices if isinstance(terrain, Surface) else terrain.points
     low, high = places[:, :2].min(axis=0), places[:, :2].max(axis=0)
     expected = per_hectare * float(np.prod(high - low)) / HECTARE_M2

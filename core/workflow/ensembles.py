@@ -86,8 +86,12 @@ class Store(Protocol):
         """The chunks that are kept one by one."""
         ...
 
+    def lacking(self) -> frozenset[int]:
+        """The chunks that are added up, but whose tables are not there as they were written."""
+        ...
+
     def keep(self, number: int, chunk: Chunk) -> None:
-        """Keep a chunk."""
+        """Keep a chunk; of one that is added up already, its tables alone."""
         ...
 
     def keep_merged(self, arrays: Mapping[str, Arrays], numbers: frozenset[int]) -> None:
@@ -125,7 +129,7 @@ def run_ensemble(
     store: Store | None = None,
     progress: Progress = silent,
 ) -> dict[str, Tally]:
-    """Compute all chunks that the store does not have, and add all up.
+    """Compute all chunks that the store does not have as they were written, and add all up.
 
     Parameters
     ----------
@@ -142,11 +146,12 @@ def run_ensemble(
     if size < 1:
         raise InputError(f"A chunk of {size} runs is none", advice="Give at least one")
     numbers = range(-(-n // size))
-    tallies, done = _kept(work.tallies, store)
-    counted = sum(min(size, n - size * number) for number in done)
+    tallies, added, ready = _kept(work.tallies, store)
+    counted = sum(min(size, n - size * number) for number in ready)
     text = f"Simulating {find_model(work.settings.model).title}"
     progress(text, counted, n)
-    left = ((i, first_run + i * size, releases.take(slice(i * size, (i + 1) * size))) for i in numbers if i not in done)
+    parts = ((i, first_run + i * size, slice(i * size, (i + 1) * size)) for i in numbers if i not in ready)
+    left = ((i, first, releases.take(part)) for i, first, part in parts)
     alone = 0
 
     def beat() -> None:
@@ -155,32 +160,35 @@ def run_ensemble(
     for number, chunk in pool.compute(work, left, beat):
         if store is not None:
             store.keep(number, chunk)
-        _add(tallies, chunk.arrays)
-        done |= {number}
-        alone += 1
+        if number not in added:
+            _add(tallies, chunk.arrays)
+            added.add(number)
+            alone += 1
+        ready.add(number)
         counted += min(size, n - size * number)
         if store is not None and alone >= MERGED_EVERY:
-            store.keep_merged(_state(tallies), frozenset(done))
+            store.keep_merged(_state(tallies), frozenset(added))
             alone = 0
         progress(text, counted, n)
-    if len(done) < len(numbers):
+    if len(ready) < len(numbers):
         raise CancelledError
     return tallies
 
 
-def _kept(empty: Mapping[str, Tally], store: Store | None) -> tuple[dict[str, Tally], set[int]]:
-    """What the store has, and of which chunks."""
+def _kept(empty: Mapping[str, Tally], store: Store | None) -> tuple[dict[str, Tally], set[int], set[int]]:
+    """What the store has, of which chunks, and for which of them nothing is to be computed any more."""
     tallies = {name: tally.empty() for name, tally in empty.items()}
     if store is None:
-        return tallies, set()
+        return tallies, set(), set()
     arrays, numbers = store.merged()
-    done = set(numbers)
-    if done:
+    added = set(numbers)
+    if added:
         _add(tallies, arrays)
+    lacking = store.lacking()
     for number, one in store.single():
         _add(tallies, one)
-        done.add(number)
-    return tallies, done
+        added.add(number)
+    return tallies, added, added - lacking
 
 
 def _add(tallies: Mapping[str, Tally], arrays: Mapping[str, Arrays]) -> None:

@@ -11,6 +11,7 @@ from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.measured_rebounds import beyond_measured, beyond_sentence, measured_sentence
 from ..constants import GRAVITY_MPS2
 from ..errors import InputError
+from ..georeference import code_remarks
 from ..hazard.screens import Screen
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import find_model
@@ -266,7 +267,7 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
         remarks += _remarks_of_one(simulation)
     ground = simulations[0].ground
     remarks += _remarks_of_trees(simulations[0].settings.trees)
-    remarks += [*ground.remarks, *simulations[0].releases.remarks]
+    remarks += [*ground.remarks, *code_remarks(ground.shift.crs), *simulations[0].releases.remarks]
     remarks += _remarks_of_points(simulations[0])
     remarks += [Remark(text, "note", "terrain") for text in _fault_sentences(ground)]
     remarks += [Remark(f"No block meets {name}.", "note", name) for name in _not_met(simulations)]

@@ -92,22 +92,21 @@ def compare_whole_runs(
     Raises
     ------
     InputError : settings that cannot be, observed runs without a release.
-    CancelledError : the work was ended before the first model was finished. Later, the finished ones are compared.
+    CancelledError : the work was ended before all models were finished.
     """
     for name in observed.paths.name.tolist():
         if name not in releases.name:
             raise InputError("No block is released for this run", trajectory=name, advice="Give its release")
     simulations = _simulations(ground, releases, settings, threads, progress)
-    finished = tuple(one for one in simulations if len(one) == one.wanted)
-    if not finished:
+    if len(simulations) < len(settings) or any(len(one) < one.wanted for one in simulations):
         raise CancelledError
     progress("Comparing", 0, 0)
-    paths = {one.settings.model: simulated_paths(one) for one in finished}
+    paths = {one.settings.model: simulated_paths(one) for one in simulations}
     if not sections and observed.paths.impact_piece.size:
         sections = default_sections(observed.paths, FEWEST, ground.shift.z)
-    told = [one for one in remarks_of(simulations, [one.model for one in settings]) if one.severity != "note"]
+    told = [one for one in remarks_of(simulations) if one.severity != "note"]
     return ComparedSimulations(
-        compare_runs(observed, paths, ground, sections, seed=seed), finished, (*releases.remarks, *told)
+        compare_runs(observed, paths, ground, sections, seed=seed), simulations, (*releases.remarks, *told)
     )
 
 
@@ -120,12 +119,8 @@ def _simulations(
     done: list[Simulation] = []
     if plain or not drawing:
         done += run_models(ground, releases, plain, threads=threads, progress=progress)
-    try:
-        if all(len(one) == one.wanted for one in done):
-            done += [_from_others(ground, releases, one, threads, progress) for one in drawing]
-    except CancelledError:
-        if not done:
-            raise
+    if all(len(one) == one.wanted for one in done):
+        done += [_from_others(ground, releases, one, threads, progress) for one in drawing]
     models = [one.model for one in settings]
     return tuple(sorted(done, key=lambda one: models.index(one.settings.model)))
 

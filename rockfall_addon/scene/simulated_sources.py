@@ -27,6 +27,8 @@ from .simulation import Origin
 FILMED = ("MEASURED", "PICK")
 """Sources that need picks."""
 SAME_TIME_S = 1e-6
+GREATEST_SEED = 2**31 - 1
+"""Whole numbers of Blender's properties have 32 bits."""
 
 
 def missing(scene: bpy.types.Scene) -> str:
@@ -88,7 +90,9 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
         settings.models = set(entry.models)
     settings.contact = entry.contact
     settings.rolling, settings.friction, settings.use_drag = entry.rolling, entry.friction, entry.drag
-    settings.seed, settings.number = entry.seed, releases.number
+    settings.number = releases.number
+    if entry.seed <= GREATEST_SEED:
+        settings.seed = entry.seed
     simulated_trees.keep_entry(scene, entry.trees)
     settings.shape = releases.shape or "sphere"
     if releases.diameter is not None:
@@ -113,6 +117,8 @@ def keep_entry(scene: bpy.types.Scene, entry: SimulationEntry, left_out: Sequenc
             posterior.read(scene, entry.posterior)
         except RockfallError as error:
             absent.append(f"the posterior {entry.posterior.name} ({error})")
+    if entry.seed > GREATEST_SEED:
+        absent.append(f"the seed {entry.seed}, which is above {GREATEST_SEED}")
     absent += left_out
     return f"Of the project's simulation Blender leaves out {', '.join(absent)}." if absent else ""
 

@@ -406,3 +406,16 @@ def test_blocks_meet_the_points_of_the_terrain_where_that_is_chosen(drawn: bpy.t
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "out" / "project.toml")) == {"FINISHED"}
     assert bpy.context.scene.rockfall_simulation.contact == "points"
+
+
+def test_a_seed_that_blender_cannot_hold_is_said(scan: bpy.types.Scene, part) -> None:
+    """A property of Blender has 32 bits, a project 63."""
+    entry, sources = (
+        part("core.exchange.simulation_entry").SimulationEntry,
+        part("rockfall_addon.scene.simulated_sources"),
+    )
+    scan.rockfall_simulation.seed = 5
+    assert "the seed 2147483648, which is above 2147483647" in sources.keep_entry(scan, entry(seed=2**31))
+    assert scan.rockfall_simulation.seed == 5
+    assert sources.keep_entry(scan, entry(seed=2**31 - 1)) == ""
+    assert scan.rockfall_simulation.seed == 2**31 - 1

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from rockfall.core.children import rockfall_command
 from rockfall.core.cli import main
+from rockfall.core.commands.progress import PrintedProgress
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.batch import Batch, Outcome, run_batch
 from rockfall.core.exchange.job_inputs import digest_of, input_files, input_hashes
@@ -273,3 +274,66 @@ def test_a_record_or_a_project_that_is_nested_too_deeply_ends_no_batch(sites, tm
     assert {name: one.state for name, one in found.items()} == {
         "east": "done", "north": "already done", "west": "done",
     }  # fmt: skip
+
+
+def cut_short(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-5])
+
+
+def changed(file: Path) -> None:
+    file.write_bytes(file.read_bytes().replace(b"5", b"6"))
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (cut_short, "copy.txt was not as it had been written"),
+        (changed, "copy.txt was not as it had been written"),
+        (Path.unlink, "copy.txt was missing"),
+    ],
+)
+def test_a_finished_job_whose_files_differ_is_done_again_and_said(sites, tmp_path, damage, said):
+    out = tmp_path / "out"
+    run(batch_of(sites, out))
+    first = (out / "west" / "copy.txt").read_bytes()
+    (out / "west" / "notes.txt").write_text("mine")
+    damage(out / "west" / "copy.txt")
+    found = run(batch_of(sites, out))
+    assert {name: one.state for name, one in found.items()} == {
+        "east": "already done", "north": "already done", "west": "done",
+    }  # fmt: skip
+    assert found["west"].message == f"{said}, so it was done again.\n"
+    assert (out / "west" / "copy.txt").read_bytes() == first
+    assert (out / "west" / "notes.txt").read_text() == "mine"
+    assert {one.state for one in run(batch_of(sites, out)).values()} == {"already done"}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links")
+def test_a_job_that_is_done_again_removes_nothing_behind_a_link(sites, tmp_path):
+    out, photos = tmp_path / "out", tmp_path / "photos"
+    deep = WRITES.replace("copy.txt", "deep/copy.txt").replace("pathlib.Path(sys", "pathlib.Path(sys")
+    deep = f"import os, sys; os.mkdir(os.path.join(sys.argv[2], 'deep')); {deep}"
+    run(batch_of(sites, out), deep)
+    (out / "west" / "deep").rename(photos)
+    (out / "west" / "deep").symlink_to(photos)
+    (sites / "west" / "project.toml").write_text("other")
+    west = run(batch_of(sites, out), deep)["west"]
+    assert west.state == "failed"
+    assert "A link is in the output" in west.message
+    assert [one.name for one in photos.iterdir()] == ["copy.txt"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_batch_that_is_interrupted_has_the_status_of_the_signal(sites, tmp_path, monkeypatch, capsys, name):
+    number, sent = getattr(signal, name), []
+
+    def told(self, text: str, done: int = 0, total: int = 0) -> None:
+        if done and not sent:
+            sent.append(signal.raise_signal(number))
+
+    monkeypatch.setattr(PrintedProgress, "__call__", told)
+    out = tmp_path / "out"
+    assert main(["batch", str(sites), "simulate", "--number", "1", "--out", str(out)]) == 128 + number
+    assert "jobs are finished; the same command goes on with the others" in capsys.readouterr().err
+    assert sum(one["state"] == "not run" for one in outcomes(out).values()) >= 1

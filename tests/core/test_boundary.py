@@ -33,6 +33,7 @@ CORE_FLOORS = (
         "interrupts",
         "memory",
         "numba_internals",
+        "open_folders",
         "opencv",
         "output",
         "plausibility",

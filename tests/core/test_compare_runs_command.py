@@ -4,11 +4,14 @@
 import csv
 import json
 import re
+import shutil
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rockfall.core.cli import main
+from rockfall.core.commands.progress import PrintedProgress
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.engine import IMPACT, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
@@ -269,3 +272,30 @@ def test_bad_further_tables(site: Path, tmp_path: Path, capsys, more: list[str],
     assert main(asked(site, tmp_path / "out", "--number", "10", *more)) == 1
     assert problem in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("moment", [0, 0.3, 0.6, 0.9, 1])
+def test_a_signal_at_any_moment_ends_it_and_leaves_nothing(
+    site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, name: str, moment: float
+) -> None:
+    """Also while the second model runs, when the first one is finished, and when all are."""
+    number = getattr(signal, name, None) or pytest.skip("not on this system")
+    arguments = asked(site, tmp_path / "out", "--number", "6", "--tables-only", "--model", "noel_2017", "wyllie_2014")
+    calls: list[str] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(PrintedProgress, "__call__", lambda self, text, done=0, total=0: calls.append(text))
+        assert main(arguments) == 0
+    shutil.rmtree(tmp_path / "out")
+    left = [round(moment * (len(calls) - 1))]
+
+    def told(self: PrintedProgress, text: str, done: int = 0, total: int = 0) -> None:
+        if not left[0]:
+            signal.raise_signal(number)
+        left[0] -= 1
+
+    monkeypatch.setattr(PrintedProgress, "__call__", told)
+    capsys.readouterr()
+    assert main(arguments) == 128 + number
+    assert capsys.readouterr().err == "rockfall: interrupted, nothing was written.\n"
+    assert list(tmp_path.iterdir()) == []

@@ -4,6 +4,7 @@
 import csv
 import errno
 import os
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -405,12 +406,56 @@ def test_frames_that_a_power_cut_has_spoilt_are_drawn_again(tmp_path: Path) -> N
     noise = np.random.default_rng(0).integers(0, 255, (40, 60, 3), np.uint8)
     with frame_store(tmp_path / "f", {}) as store:
         store.fill(range(4), lambda _: noise, lambda *_: None)
-        good = store.file(0).read_bytes()
+        drawn = [store.file(k).read_bytes() for k in range(4)]
+        good = drawn[3]
         store.file(1).write_bytes(good[: len(good) // 2])
         store.file(2).write_bytes(b"")
         store.file(3).write_bytes(good[:-4] + bytes(4))
         assert store.fill(range(4), lambda _: noise, lambda *_: None) == 1
-        assert all(store.file(k).read_bytes() == good for k in range(4))
+        assert [store.file(k).read_bytes() for k in range(4)] == drawn
+        assert store.differing == [1, 2, 3]
+        assert store.remarks == [
+            "3 kept frames were not as drawn, and drawn again: 000001.png, 000002.png, 000003.png."
+        ]
+
+
+@pytest.mark.parametrize("how", ["another frame", "another film", "one bit"])
+def test_a_kept_frame_that_is_not_the_one_is_drawn_again(tmp_path: Path, how: str) -> None:
+    def draw(frame: int) -> np.ndarray:
+        return np.full((5, 7, 3), 10 * frame, np.uint8)
+
+    with frame_store(tmp_path / "other", {"film": "b"}) as store:
+        store.fill(range(3), draw, lambda *_: None)
+    with frame_store(tmp_path / "f", {"film": "a"}) as store:
+        store.fill(range(3), draw, lambda *_: None)
+        drawn = [store.file(k).read_bytes() for k in range(3)]
+        put = {"another frame": drawn[0], "another film": (tmp_path / "other" / "000001.png").read_bytes()}
+        store.file(1).write_bytes(put.get(how, drawn[1][:-20] + bytes([drawn[1][-20] ^ 1]) + drawn[1][-19:]))
+    with frame_store(tmp_path / "f", {"film": "a"}) as store:
+        assert store.fill(range(3), draw, lambda *_: None) == 2
+        assert [store.file(k).read_bytes() for k in range(3)] == drawn
+    picture = cv2.imread(str(tmp_path / "f" / "000001.png"))
+    np.testing.assert_array_equal(picture, draw(1))
+
+
+@pytest.mark.parametrize("named", ["film.json", ".lock", "000001.png", "notes.txt"])
+@pytest.mark.parametrize("ours", [False, True])
+def test_pictures_and_files_of_somebody_else_are_never_removed(tmp_path: Path, named: str, ours: bool) -> None:
+    """A sequence of pictures has such names, too."""
+    folder, draw = tmp_path / "f", lambda _: np.zeros((5, 7, 3), np.uint8)
+    folder.mkdir()
+    if ours:
+        with frame_store(folder, {"film": "a"}) as store:
+            store.fill(range(2), draw, lambda *_: None)
+    (folder / named).write_bytes(cv2.imencode(".png", draw(0))[1].tobytes())
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    allowed = ours and named == "notes.txt"
+    refused = nullcontext() if allowed else pytest.raises(InputError, match="holds other files")
+    with refused, frame_store(folder, {"film": "b"}) as store:
+        store.fill(range(2), draw, lambda *_: None)
+    after = {file.name: file.read_bytes() for file in folder.iterdir()}
+    assert after[named] == before[named]
+    assert allowed or {**after, ".lock": before.get(".lock")} == {**before, ".lock": before.get(".lock")}
 
 
 def test_a_full_disk_is_said_and_finished_frames_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@
 import errno
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -194,27 +195,167 @@ def test_a_full_disk_keeps_what_is_finished(work, ground, tmp_path, monkeypatch)
     releases, store, synced = blocks_on(ground), ChunkStore(tmp_path / "kept"), []
     really = os.fsync
 
-    def full_at_the_third(descriptor: int) -> None:
+    def full_at_the_sixth(descriptor: int) -> None:
         synced.append(descriptor)
-        if len(synced) == 3:
+        if len(synced) == 6:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         really(descriptor)
 
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fsync", full_at_the_third)
+        patch.setattr(os, "fsync", full_at_the_sixth)
         with pytest.raises(InputError, match=re.escape(os.strerror(errno.ENOSPC))) as caught:
             ends(work, releases, store=store)
     assert caught.value.file == tmp_path / "kept" / "000002.npz"
-    assert sorted(file.name for file in store.folder.iterdir()) == ["000000.npz", "000001.npz"]
+    assert sorted(file.name for file in store.folder.glob("*.npz")) == ["000000.npz", "000001.npz"]
     pool = Counting()
     assert same(ends(work, releases, pool, store=store), ends(work, releases))
     assert pool.computed == [2, 3, 4, 5, 6]
 
 
-def test_a_damaged_chunk_is_named(work, ground, tmp_path):
-    (tmp_path / "000001.npz").write_bytes(b"PK\x03\x04")
-    with pytest.raises(InputError, match=r"000001\.npz"):
-        ends(work, blocks_on(ground), store=ChunkStore(tmp_path))
+def cut_short(kept: Path) -> None:
+    table = kept / "000002.runs.csv"
+    table.write_bytes(b"".join(table.read_bytes().splitlines(keepends=True)[:-3]))
+
+
+def one_number_changed(kept: Path) -> None:
+    table = kept / "000002.runs.csv"
+    table.write_bytes(table.read_bytes().replace(b"noel_2017", b"noel_2016", 1))
+
+
+def missing(kept: Path) -> None:
+    (kept / "000002.runs.csv").unlink()
+
+
+def all_of_another(kept: Path) -> None:
+    for file in kept.glob("000001.*"):
+        shutil.copy(file, kept / file.name.replace("000001", "000002"))
+
+
+def sums_of_another(kept: Path) -> None:
+    shutil.copy(kept / "000001.npz", kept / "000002.npz")
+
+
+def of_another_seed(kept: Path) -> None:
+    (other,) = (folder for folder in kept.parent.iterdir() if folder != kept)
+    for file in other.glob("000002.*"):
+        shutil.copy(file, kept)
+
+
+def sums_damaged(kept: Path) -> None:
+    (kept / "000002.npz").write_bytes(b"PK\x03\x04")
+
+
+def one_sum_changed(kept: Path) -> None:
+    with np.load(kept / "000002.npz") as content:
+        values = dict(content)
+    name = next(key for key in values if key.endswith("/length_m"))
+    values[name] = values[name] + 1
+    np.savez(kept / "000002.npz", **values)
+
+
+def no_record(kept: Path) -> None:
+    (kept / "000002.json").unlink()
+
+
+def record_damaged(kept: Path) -> None:
+    (kept / "000002.json").write_text('{"chunk": 2, "tables": [')
+
+
+DAMAGES = {
+    cut_short: "runs.csv has 4 of 7 rows", one_number_changed: "runs.csv is another one",
+    missing: "runs.csv is missing",
+    all_of_another: "it was chunk 1", sums_of_another: "it was chunk 1", of_another_seed: "it is of another simulation",
+    sums_damaged: "it is damaged", one_sum_changed: "it is damaged", no_record: "its record is missing",
+    record_damaged: "its record is missing, damaged",
+}  # fmt: skip
+
+
+def write_chunked(ground: Ground, kept: Path, out: Path, pool: Counting, settings: Settings = SETTINGS) -> ChunkStore:
+    out.mkdir()
+    mapped, stores = simulate_in_chunks(
+        ground, blocks_on(ground), [settings], pool, kept, record=["impacts"], cell_m=5.0, size=SIZE
+    )
+    write_chunk_tables(stores, out, mapped.simulations, {}, size=SIZE)
+    for name, values in mapped.cells[settings.model].arrays().items():
+        (out / f"{name}.bin").write_bytes(np.asarray(values).tobytes())
+    return stores[0]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in folder.iterdir()}
+
+
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+def test_a_kept_chunk_that_differs_from_its_record_is_computed_again_and_said(ground, tmp_path, damage):
+    kept = tmp_path / "kept"
+    store = write_chunked(ground, kept, tmp_path / "first", Counting())
+    write_chunked(ground, kept, tmp_path / "other", Counting(), replace(SETTINGS, seed=6))
+    damage(store.folder)
+    pool = Counting()
+    again = write_chunked(ground, kept, tmp_path / "again", pool)
+    assert pool.computed == [2]
+    assert contents(tmp_path / "again") == contents(tmp_path / "first")
+    (remark,) = again.remarks
+    assert DAMAGES[damage] in remark.text
+    assert remark.severity == "warning"
+    third = Counting()
+    assert write_chunked(ground, kept, tmp_path / "third", third).remarks == []
+    assert third.computed == []
+
+
+@pytest.mark.parametrize("damage", [cut_short, missing, no_record], ids=lambda damage: damage.__name__)
+def test_tables_of_merged_chunks_are_made_again_and_counted_once(ground, tmp_path, monkeypatch, damage):
+    monkeypatch.setattr(ensembles, "MERGED_EVERY", 3)
+    store = write_chunked(ground, tmp_path / "kept", tmp_path / "first", Counting())
+    assert {file.name for file in store.folder.glob("*.npz")} == {"000006.npz", "merged.npz"}
+    damage(store.folder)
+    pool = Counting()
+    again = write_chunked(ground, tmp_path / "kept", tmp_path / "again", pool)
+    assert pool.computed == [2]
+    assert contents(tmp_path / "again") == contents(tmp_path / "first")
+    assert len(again.remarks) == 1
+
+
+def test_sums_of_merged_chunks_that_are_damaged_are_computed_again(ground, tmp_path, monkeypatch):
+    monkeypatch.setattr(ensembles, "MERGED_EVERY", 3)
+    store = write_chunked(ground, tmp_path / "kept", tmp_path / "first", Counting())
+    merged = store.folder / "merged.npz"
+    merged.write_bytes(merged.read_bytes()[:-100])
+    pool = Counting()
+    again = write_chunked(ground, tmp_path / "kept", tmp_path / "again", pool)
+    assert pool.computed == [0, 1, 2, 3, 4, 5]
+    assert contents(tmp_path / "again") == contents(tmp_path / "first")
+    assert again.remarks[0].text.startswith(
+        "6 kept chunks were not as written, and computed again (0: merged.npz: it is"
+    )
+
+
+def test_a_table_that_is_changed_while_it_is_used_is_refused(ground, tmp_path):
+    mapped, stores = simulate_in_chunks(
+        ground, blocks_on(ground), [SETTINGS], Counting(), tmp_path / "kept", record=[], size=SIZE
+    )
+    cut_short(stores[0].folder)
+    with pytest.raises(InputError, match="changed while it was used"):
+        write_chunk_tables(stores, tmp_path, mapped.simulations, {}, size=SIZE)
+
+
+def test_what_others_have_put_beside_kept_chunks_stays(work, ground, tmp_path):
+    store = ChunkStore(tmp_path / "kept" / "one")
+    ends(work, blocks_on(ground), store=store)
+    (store.folder / "mine.txt").write_text("mine")
+    store.remove()
+    assert [file.name for file in store.folder.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links")
+def test_kept_chunks_are_not_read_or_removed_through_a_link(work, ground, tmp_path):
+    true, link = ChunkStore(tmp_path / "true"), ChunkStore(tmp_path / "link")
+    ends(work, blocks_on(ground), store=true)
+    link.folder.symlink_to(true.folder)
+    with pytest.raises(InputError, match="which is a link"):
+        ends(work, blocks_on(ground), store=link)
+    link.remove()
+    assert len(list(true.folder.glob("*.npz"))) == 7
 
 
 def test_no_runs_are_refused(work, ground):

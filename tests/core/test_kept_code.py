@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from numba import njit
 from rockfall.core.kept_code import digest
 
@@ -157,3 +158,13 @@ def test_what_the_set_up_of_a_checkout_has_compiled_is_used(tmp_path: Path) -> N
     ours, others = eval(run(tmp_path, None, code).splitlines()[0])
     assert Path(ours).is_relative_to(kernels)
     assert not Path(others).is_relative_to(kernels)
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root can make files of other users")
+def test_code_that_another_user_has_left_is_not_run(tmp_path):
+    folder, cache = package(tmp_path / "a"), tmp_path / "cache"
+    assert run(folder, cache) == "7.0 0"
+    for file in cache.rglob("*.kernel"):
+        os.chown(file, 65534, 65534)
+    assert run(folder, cache) == "7.0 0"
+    assert run(folder, cache) == "7.0 1"

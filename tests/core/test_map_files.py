@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import tifffile
 from rockfall.core.errors import InputError
-from rockfall.core.exchange import geotiff_maps
+from rockfall.core.exchange.geopackage import write_geopackage
 from rockfall.core.exchange.geotiff_maps import write_map
 from rockfall.core.exchange.qgis_styles import line_style, point_style, raster_style
-from rockfall.core.georeference import GlobalShift
+from rockfall.core.georeference import GlobalShift, code_remarks, epsg_code
 from rockfall.core.hazard.cells import Cells
 from rockfall.core.hazard.classes import classes_of
 from rockfall.core.hazard.maps import LAYERS
@@ -182,5 +182,31 @@ def test_points_have_an_edge_that_is_seen_on_white_paper():
 
 
 def test_codes_of_systems():
-    assert geotiff_maps.epsg_code(" epsg:25832 ") == 25832
-    assert geotiff_maps.epsg_code("LV95") is None
+    assert epsg_code(" epsg:25832 ") == 25832
+    assert epsg_code("LV95") is None
+    assert code_remarks("EPSG:25832") == code_remarks("LV95") == code_remarks("") == []
+
+
+@pytest.mark.parametrize("code", [900913, 102100, 102113])
+def test_a_code_of_web_maps_before_epsg_had_one_is_written_as_that(tmp_path, code):
+    rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
+    shift = GlobalShift(800_000.0, 5_800_000.0, 0.0, f"EPSG:{code}")
+    cells = Cells(0.0, 0.0, 2.0, 4, 3)
+    write_map(tmp_path / "a.tif", cells, np.ones((3, 4)), next(iter(LAYERS.values())), shift)
+    with rasterio.open(tmp_path / "a.tif") as opened:
+        assert opened.crs.to_epsg() == 3857
+    (remark,) = code_remarks(shift.crs)
+    assert f"no code {code}; files are written with 3857" in remark.text
+
+
+@pytest.mark.parametrize("crs", ["EPSG:65536", "EPSG:102003", "EPSG:999999999", "EPSG:0", "EPSG:32767"])
+def test_a_code_that_no_file_has_room_for_is_named_in_words(tmp_path, crs):
+    rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
+    shift = GlobalShift(800_000.0, 5_800_000.0, 0.0, crs, "EPSG:70000")
+    write_map(tmp_path / "a.tif", Cells(0.0, 0.0, 2.0, 4, 3), np.ones((3, 4)), next(iter(LAYERS.values())), shift)
+    with rasterio.open(tmp_path / "a.tif") as opened:
+        assert opened.crs is None
+        assert opened.tags()["CRS"] == crs
+    (remark,) = code_remarks(crs)
+    assert remark.severity == "warning"
+    write_geopackage(tmp_path / "a.gpkg", [], shift)

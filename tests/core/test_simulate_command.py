@@ -261,11 +261,13 @@ def test_an_interrupted_simulation_keeps_and_says_what_is_finished(
     interrupted: list[int] = []
     monkeypatch.setattr(PrintedProgress, "__call__", told)
     capsys.readouterr()
-    assert main([*argv, "--threads", "1", "--out", str(tmp_path / "cut")]) == 0
+    assert main([*argv, "--threads", "1", "--out", str(tmp_path / "cut")]) == 128 + signal.SIGINT
     runs, whole = (rows_of(tmp_path / name / "runs.csv") for name in ("cut", "whole"))
     assert 0 < len(runs) < 300
     assert runs == whole[: len(runs)]
     said = f"Stopped by you: {len(runs)} of 300 blocks with Noël et al. 2017 are finished and kept."
-    assert said in capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert said in printed.out
+    assert printed.err == f"rockfall: interrupted, what was finished is written in {tmp_path / 'cut'}.\n"
     summary = json.loads((tmp_path / "cut" / "summary.json").read_text(encoding="utf-8"))
     assert (summary["blocks_wanted"], sum(summary["models"]["noel_2017"]["ends"].values())) == (300, len(runs))

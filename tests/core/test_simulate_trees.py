@@ -149,8 +149,8 @@ def test_a_bad_table_is_refused_where_it_is_bad(site: Path, tmp_path: Path, caps
 @pytest.mark.parametrize(
     ("more", "problem"),
     [
-        (["--stems-per-hectare", "400"], "no diameter at breast height"),
-        (["--dbh-cm", "30"], "no stems per hectare"),
+        (["--stems-per-hectare", "400"], "which needs --dbh-cm"),
+        (["--dbh-cm", "30"], "which needs --stems-per-hectare"),
         (["--stems-per-hectare", "400", "--dbh-cm", "thick"], "Write 32, or 32,12"),
         (["--tree-height", "4"], "there are none"),
         (["--trees", "inventory.geojson"], "not from a map of points"),

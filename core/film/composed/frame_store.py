@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The frames of a film as pictures in a folder, which a render that was ended goes on with.
 
-A frame is there as a whole or not at all. The folder says of what it is; frames of anything else are removed.
+A frame is there as a whole or not at all, and says of which film and of which number it is, with a digest of itself:
+one that differs is drawn again. The folder says of what it is; our frames of anything else are removed, and nobody
+else's.
 """
 
+import hashlib
 import json
 import os
 import re
@@ -11,10 +14,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from signal import SIGINT
+from zlib import crc32
 
-from ...errors import InputError
+from ...errors import InputError, readable
 from ...file_locks import holds, try_lock
 from ...interrupts import Interrupt
+from ...open_folders import NO_LINK
 from ...opencv import opencv
 from ...output import TRIES, made_folder, write_bytes, write_text
 from ...progress import Progress
@@ -23,8 +28,13 @@ from .canvas import Picture
 STATED = "film.json"
 LOCK = ".lock"
 FRAME = re.compile(r"[0-9]{6,}\.png")
-LAST_BYTES = b"IEND\xaeB`\x82"
-"""Of every PNG."""
+ABOUT = "frames of a film, drawn by Rockfall"
+"""Key of what `STATED` holds."""
+HEAD_BYTES = 33
+"""Of a PNG, before its first chunk that may be a text."""
+MARK = b"tEXtRockfall frame\0"
+MARK_BYTES = 8 + len(MARK) - 4 + 64 + 4
+MOST_SAID = 3
 COMPRESSION = 1
 """Of PNG: a film's frames are written once and read once."""
 
@@ -35,10 +45,21 @@ class FrameStore:
     Attributes
     ----------
     folder : where they lie.
+    differing : frames that were there and not as they had been drawn; they are drawn again.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, film: str) -> None:
+        self.folder, self._film = folder, film
+        self.differing: list[int] = []
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a user should know of the frames that were kept."""
+        if not self.differing:
+            return []
+        some = ", ".join(self.file(frame).name for frame in self.differing[:MOST_SAID])
+        more = " and others" if len(self.differing) > MOST_SAID else ""
+        return [f"{len(self.differing)} kept frames were not as drawn, and drawn again: {some}{more}."]
 
     def file(self, frame: int) -> Path:
         """Of a frame."""
@@ -55,12 +76,13 @@ class FrameStore:
         ------
         InputError : a frame cannot be written: the disk is full. Those that are finished stay.
         """
-        missing = [frame for frame in frames if not _is_whole(self.file(frame))]
+        missing = [frame for frame in frames if not _is_whole(self.file(frame), self._film)]
+        self.differing += [frame for frame in missing if self.file(frame).exists()]
         there = len(frames) - len(missing)
         for done, frame in enumerate(missing, start=there + 1):
             _, data = opencv().imencode(".png", draw(frame), [opencv().IMWRITE_PNG_COMPRESSION, COMPRESSION])
             try:
-                write_bytes(self.file(frame), data.tobytes())
+                write_bytes(self.file(frame), _marked(data.tobytes(), self._film, frame))
             except InputError as error:
                 kept = (
                     f"{done - 1} of {len(frames)} frames are finished and kept in {self.folder}: run it again to go on"
@@ -78,14 +100,24 @@ class FrameStore:
             self.folder.rmdir()
 
 
-def _is_whole(file: Path) -> bool:
-    """Whether a picture is there up to its last bytes: after a power cut it may not be."""
+def _digest(data: bytes, film: str, frame: int) -> bytes:
+    return hashlib.sha256(f"{film} {frame} ".encode() + data).hexdigest().encode()
+
+
+def _marked(data: bytes, film: str, frame: int) -> bytes:
+    """A picture (PNG) that says what it is."""
+    body = MARK + _digest(data, film, frame)
+    chunk = (len(body) - 4).to_bytes(4, "big") + body + crc32(body).to_bytes(4, "big")
+    return data[:HEAD_BYTES] + chunk + data[HEAD_BYTES:]
+
+
+def _is_whole(file: Path, film: str) -> bool:
+    """Whether a picture is that frame of the film, to its last byte: after a power cut it may not be."""
     try:
-        with file.open("rb") as picture:
-            picture.seek(-len(LAST_BYTES), os.SEEK_END)
-            return picture.read() == LAST_BYTES
-    except OSError:  # not there, or shorter
+        data = file.read_bytes()
+    except OSError:
         return False
+    return data == _marked(data[:HEAD_BYTES] + data[HEAD_BYTES + MARK_BYTES :], film, int(file.stem))
 
 
 @contextmanager
@@ -104,17 +136,19 @@ def frame_store(folder: Path, states: dict[str, object]) -> Iterator[FrameStore]
     with made_folder(folder):
         lock = _claim(folder)
         try:
-            _prepare(folder, json.dumps(states, indent=2, sort_keys=True))
-            yield FrameStore(folder)
+            stated = json.dumps({ABOUT: states}, indent=2, sort_keys=True)
+            film = hashlib.sha256(stated.encode()).hexdigest()
+            _prepare(folder, stated)
+            yield FrameStore(folder, film)
         except KeyboardInterrupt as error:
-            kept = sum(_is_whole(file) for file in folder.iterdir() if _is_frame(file))
+            kept = sum(_is_whole(file, film) for file in folder.iterdir() if _is_frame(file))
             if error.args or not kept:
                 raise
             said = f"{kept} frames are finished and kept in {folder}; the same command goes on with the others"
             raise Interrupt(error.number if isinstance(error, Interrupt) else SIGINT, said) from error
         finally:
             with suppress(OSError):
-                if not (folder / STATED).exists():  # it is no folder of frames, and nothing could be written
+                if not _is_ours(folder / STATED):  # it is no folder of frames, and nothing could be written
                     (folder / LOCK).unlink()
             os.close(lock)
 
@@ -124,7 +158,7 @@ def _claim(folder: Path) -> int:
     for _ in range(TRIES):
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT)
+            lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | NO_LINK)
         except FileNotFoundError:
             continue
         except OSError as error:
@@ -133,6 +167,9 @@ def _claim(folder: Path) -> int:
                 file=folder,
                 advice="Choose another folder with --out",
             ) from error
+        if os.fstat(lock).st_size:
+            os.close(lock)
+            raise _strange(folder, LOCK)
         if not try_lock(lock):
             os.close(lock)
             break
@@ -144,20 +181,30 @@ def _claim(folder: Path) -> int:
 
 def _prepare(folder: Path, states: str) -> None:
     stated = folder / STATED
-    strangers = [file.name for file in folder.iterdir() if not (file.name in (STATED, LOCK) or _is_frame(file))]
-    if strangers and not stated.is_file():
-        raise InputError(
-            f"The folder for the frames holds other files ({strangers[0]})",
-            file=folder,
-            advice="Choose another folder with --out",
-        )
-    try:
-        same = stated.read_text(encoding="utf-8") == states
-    except (OSError, UnicodeDecodeError):
-        same = False
-    if not same:
+    is_ours = _is_ours(stated)
+    for file in sorted(folder.iterdir()):
+        is_known = file.name == LOCK or (is_ours and file.name == STATED) or (_is_frame(file) and _may_go(file))
+        if not is_known and (not is_ours or FRAME.fullmatch(file.name)):
+            raise _strange(folder, file.name)
+    if not is_ours or stated.read_text(encoding="utf-8") != states:
         _remove_frames(folder)
         write_text(stated, states)
+
+
+def _strange(folder: Path, name: str) -> InputError:
+    return InputError(
+        f"The folder for the frames holds other files ({readable(name, 60)})",
+        file=folder,
+        advice="Move them, or choose another folder with --out",
+    )
+
+
+def _is_ours(stated: Path) -> bool:
+    """Whether a folder says that it is one of frames."""
+    try:
+        return not stated.is_symlink() and list(json.loads(stated.read_text(encoding="utf-8"))) == [ABOUT]
+    except (OSError, ValueError, TypeError, RecursionError):
+        return False
 
 
 def _is_frame(file: Path) -> bool:
@@ -165,7 +212,16 @@ def _is_frame(file: Path) -> bool:
     return FRAME.fullmatch(file.name) is not None
 
 
+def _may_go(file: Path) -> bool:
+    """Whether a picture is one that was drawn here, of whatever film, or begun and is empty."""
+    if file.is_symlink() or not file.is_file():
+        return False
+    with file.open("rb") as picture:
+        head = picture.read(HEAD_BYTES + 4 + len(MARK))
+    return not head or head[HEAD_BYTES + 4 :] == MARK
+
+
 def _remove_frames(folder: Path) -> None:
     for file in folder.iterdir():
-        if _is_frame(file):
+        if _is_frame(file) and _may_go(file):
             file.unlink()

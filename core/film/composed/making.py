@@ -91,7 +91,7 @@ def make_film(
     with made_folder(out), frame_store(folder, _states(request)) as store:
         kept = store.fill(wanted, lambda frame: film.canvas(frame).picture, progress)
         if images:
-            return Made(folder, len(wanted), kept, size, tuple(material.remarks))
+            return Made(folder, len(wanted), kept, size, (*material.remarks, *store.remarks))
         assert maker is not None
         file = out / f"{name}.mp4"
         with output_file(file) as draft:
@@ -102,7 +102,7 @@ def make_film(
             else:
                 check_film(draft, len(wanted), size, progress)
         store.remove()
-    return Made(file, len(wanted), kept, size, tuple(material.remarks))
+    return Made(file, len(wanted), kept, size, (*material.remarks, *store.remarks))
 
 
 def _span(film: ComposedFilm, frames: tuple[int, int] | None) -> tuple[int, int]:

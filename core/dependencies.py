@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from .errors import DependencyError
 
 PACKAGES = (
-    "numpy", "scipy", "trimesh", "numba", "llvmlite", "laspy", "lazrs", "startinpy", "mapbox_earcut", "shapefile", "tifffile",
-    "tomli_w", "cv2",
+    "numpy", "scipy", "trimesh", "numba", "llvmlite", "laspy", "lazrs", "startinpy", "mapbox_earcut", "shapefile",
+    "tifffile", "tomli_w", "cv2",
 )  # fmt: skip
 """Import names of the Python packages that Rockfall needs; all but NumPy travel in the extension as wheels."""
 DISTRIBUTIONS = {"cv2": "opencv_python_headless", "shapefile": "pyshp"}

@@ -182,12 +182,13 @@ def _remarks(mapped: "Mapped", work: Work) -> "list[Remark]":
     """What there is to say of them."""
     from ..workflow.enough import enough_remarks
     from ..workflow.maps import map_remarks
-    from ..workflow.screens import screen_remarks
+    from ..workflow.screens import outside_remarks, screen_remarks
     from ..workflow.simulation import remarks_of
 
     said = [
         *remarks_of(mapped.simulations, list(work.scenario.models)),
         *map_remarks(mapped.cells),
+        *outside_remarks(work.screens, work.ground),
         *screen_remarks(mapped.screens),
     ]
     if work.until_known is not None:

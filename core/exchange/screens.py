@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Screens and barriers from lines of a map, and screens.csv: what is known of them.
+"""Screens and barriers from lines and areas of a map, and screens.csv: what is known of them.
 
-Properties of a line, or further columns of a table of points, are ``height_m`` and ``capacity_kJ``: with both it is a
-barrier, which holds blocks; else it measures.
+An area is a screen along its outline. Properties of a line or area, or further columns of a table of points, are
+``height_m`` and ``capacity_kJ``: with both it is a barrier, which holds blocks; else it measures.
 """
 
 import csv
@@ -18,8 +18,10 @@ from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import OUTCOMES, Screen
 from ..output import output_stream
 from ..reading import reader
-from .map_shapes import MapShape, read_lines
+from ..vectors import Array
+from .map_shapes import MapShape, read_shapes
 from .simulation_entry import ScreenEntry
+from .zones import SHAPEFILE_LETTERS
 
 HEIGHT, CAPACITY = "height_m", "capacity_kJ"
 COLUMNS = (
@@ -33,13 +35,14 @@ QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1
 
 @reader("map of screens")
 def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
-    """The lines of a file as screens; those without a name have the file's.
+    """The lines of a file, and the outlines of its areas, as screens; those without a name have the file's.
 
     Raises
     ------
-    InputError : see `read_lines` and `Screen`; a capacity without a height, a value that is no number.
+    InputError : see `read_shapes` and `Screen`; an area with a hole, a capacity without a height, a value that
+        is no number.
     """
-    path, shapes = Path(path), read_lines(path, shift)
+    path, shapes = Path(path), read_shapes(path, shift)
     found = []
     for number, shape in enumerate(shapes, start=1):
         name = shape.name or (path.stem if len(shapes) == 1 else f"{path.stem} {number}")
@@ -50,7 +53,7 @@ def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
                 raise InputError(f"Barrier {name!r} has a capacity and no height", advice=f"Give it {HEIGHT} as well")
             height_m = np.inf if height is None else height
             capacity_j = None if capacity is None else 1000 * capacity
-            found.append(Screen(name, np.ascontiguousarray(shape.parts[0][:, :2]), height_m, capacity_j))
+            found.append(Screen(name, _line_of(shape, name), height_m, capacity_j, shapes.remarks))
         except InputError as error:
             raise InputError(error.problem, file=path, advice=error.advice) from error
     return tuple(found)
@@ -121,8 +124,18 @@ def _rows(model: str, barriers: bool, figures: ScreenFigures) -> Iterable[list[o
         yield [*first, name, unit, *("" if value != value else f"{factor * value:.6f}" for value in values)]
 
 
+def _line_of(shape: MapShape, name: str) -> Array:
+    """(k, 2) of a line; of an area its outline, closed."""
+    if len(shape.parts) > 1:
+        raise InputError(
+            f"The area of screen {name!r} has holes", advice="Give each outline as an area, or a line, of its own"
+        )
+    line = shape.parts[0][:, :2]
+    return np.ascontiguousarray(line if shape.kind == "line" else np.vstack([line, line[:1]]))
+
+
 def _number(shape: MapShape, name: str, key: str, path: Path) -> float | None:
-    value = shape.properties.get(key)
+    value = shape.properties.get(key, shape.properties.get(key[:SHAPEFILE_LETTERS]))
     if value is None or value == "":
         return None
     try:
@@ -136,7 +149,7 @@ def _refuse_nearly(shape: MapShape, name: str, path: Path) -> None:
     ours = {HEIGHT.lower(): HEIGHT, CAPACITY.lower(): CAPACITY}
     for key in shape.properties:
         near = get_close_matches(key.lower(), ours, n=1, cutoff=0.75)
-        if near and key not in (HEIGHT, CAPACITY):
+        if near and key not in (HEIGHT, CAPACITY, CAPACITY[:SHAPEFILE_LETTERS]):
             raise InputError(
                 f"Screen {name!r} has {key}",
                 file=path,

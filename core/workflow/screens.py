@@ -8,7 +8,9 @@ from ..hazard.screens import HELD, OUTCOMES, OVER, THROUGH, Screen
 from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..remarks import Remark
+from ..simulation.coverage import check_lines
 from ..simulation.engine import Simulation
+from ..simulation.ground import Ground
 
 FEW = 20
 """Fewer blocks at a screen do not tell a 95 % value."""
@@ -24,6 +26,18 @@ def tallies_of(
         tallies[simulation.settings.model] = tally = ScreenTally(screens)
         tally.add(simulation)
     return tallies
+
+
+def outside_remarks(screens: Sequence[Screen], ground: Ground) -> tuple[Remark, ...]:
+    """How the screens' files were read, and which screens are partly outside of the terrain.
+
+    Raises
+    ------
+    InputError : one is wholly outside.
+    """
+    lines, names = [screen.line for screen in screens], [screen.name for screen in screens]
+    read = dict.fromkeys(remark for screen in screens for remark in screen.remarks)
+    return (*read, *check_lines(ground.terrain, lines, names, "screen", "no block is seen there"))
 
 
 def screen_remarks(tallies: Mapping[str, ScreenTally]) -> tuple[Remark, ...]:

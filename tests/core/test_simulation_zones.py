@@ -175,8 +175,8 @@ def test_geojson_of_another_system_is_refused(tmp_path: Path) -> None:
     terrain = plane()
     there = Surface(terrain.vertices, terrain.faces, GlobalShift(EAST, NORTH, 0.0, "EPSG:2056"), "plane")
     zone = ({"name": "a", "rt": 0.4}, LOWER)
-    with pytest.raises(InputError, match="in EPSG:21781, the terrain in EPSG:2056"):
-        read_zones(geojson(tmp_path / "z.json", zone, crs="21781"), there, ["noel_2017"])
+    with pytest.raises(InputError, match="in EPSG:27572, the terrain in EPSG:2056"):
+        read_zones(geojson(tmp_path / "z.json", zone, crs="27572"), there, ["noel_2017"])
     path = tmp_path / "degrees.json"
     ring = [[7.4, 46.9], [7.5, 46.9], [7.5, 47.0], [7.4, 46.9]]
     path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}), encoding="utf-8")

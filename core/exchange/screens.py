@@ -5,7 +5,6 @@ An area is a screen along its outline. Properties of a line or area, or further 
 ``height_m`` and ``capacity_kJ``: with both it is a barrier, which holds blocks; else it measures.
 """
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..formats.csv_cells import CellWriter
 from ..georeference import GlobalShift
 from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import OUTCOMES, Screen
@@ -95,7 +95,7 @@ def write_screens(tallies: Mapping[str, ScreenTally], path: str | Path) -> None:
     tallies : model → what passes the screens.
     """
     with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
+        writer = CellWriter(stream)
         writer.writerow(COLUMNS)
         for model, tally in tallies.items():
             for barriers in (False, True) if any(screen.holds for screen in tally.screens) else (False,):

@@ -9,6 +9,7 @@ from rockfall.core.errors import InputError
 from rockfall.core.exchange.simulation_entry import TreesEntry
 from rockfall.core.exchange.trees import open_trees
 from rockfall.core.exchange.zones import read_zones
+from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.screens import Screen
 from rockfall.core.simulation.blocks import Blocks
 from rockfall.core.simulation.coverage import check_areas, parts_on, places_along, places_within
@@ -27,7 +28,7 @@ def plane() -> Surface:
     i = np.arange(100)[:, None] * 101 + np.arange(100)
     i = i.ravel()
     faces = np.concatenate([np.column_stack([i, i + 1, i + 102]), np.column_stack([i, i + 102, i + 101])])
-    return Surface(vertices, faces.astype(np.int32), name="plane")
+    return Surface(vertices, faces.astype(np.int32), GlobalShift(), "plane")
 
 
 def square(x: float, y: float, side: float = 40.0, name: str = "", number: int = 0) -> Polygon:
@@ -70,7 +71,7 @@ def test_release_areas_and_lines():
     whole = on_line(ground, [np.array([[10.0, 50, np.nan], [90, 50, np.nan]])], Blocks(), 5)
     assert not whole.remarks
     with pytest.raises(InputError, match=r"The line of releases far is wholly outside of the terrain"):
-        on_line(ground, [line + [100, 0, 0]], Blocks(), 5, names=["far"])
+        on_line(ground, [line + np.array([100.0, 0, 0])], Blocks(), 5, names=["far"])
 
 
 def test_screens():

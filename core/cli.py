@@ -11,13 +11,15 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from errno import EINVAL
 from importlib import import_module
 from pathlib import Path
 from traceback import extract_tb
+from typing import Any, TextIO
 
 from .children import end_with_parent_if_asked
-from .errors import InputError, RockfallError
+from .errors import InputError, RockfallError, visible
 from .interrupts import Interrupt, handled, interrupt
 
 DONE, BAD_INPUT, USAGE, SIGNALLED = 0, 1, 2, 128
@@ -89,7 +91,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str]) -> int:
     try:
         arguments = _parser(argv).parse_args(argv)
-        status: int = arguments.run(arguments)
+        with redirect_stdout(VisibleStream(sys.stdout)):
+            status: int = arguments.run(arguments)
     except SystemExit as leaving:  # argparse has printed its help or its complaint
         return leaving.code if isinstance(leaving.code, int) else USAGE
     except RockfallError as error:
@@ -105,6 +108,20 @@ def _run(argv: Sequence[str]) -> int:
         print(f"rockfall: {_in_words(error)}", file=sys.stderr)
         return BAD_INPUT
     return status
+
+
+class VisibleStream:
+    """A stream on which names from files cannot command the terminal, nor turn the letters of a line round."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        """Write what of a text is to be seen."""
+        return self.stream.write(visible(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
 
 
 def _interrupted(error: KeyboardInterrupt) -> int:

@@ -19,6 +19,7 @@ import numpy as np
 from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.scores import Score
 from ..analysis.variables import find_variable
+from ..errors import visible
 from ..hazard.design import LEVELS_KJ, DesignValues
 from ..hazard.screens import OUTCOMES
 from ..impact_models.registry import find_model
@@ -81,7 +82,7 @@ def write_design(
     for name, caption, figure in figures_of(sheet) if drawn else ():
         progress(f"Drawing {name}", 0, 0)
         figures.append((name, caption, figure))
-    write_text(folder / "design.html", page(sheet, tables, facts, figures))
+    write_text(folder / "design.html", visible(page(sheet, tables, facts, figures)))
     written = ["design.html"]
     if pdf and drawn:
         progress("Writing the PDF", 0, 0)
@@ -370,7 +371,10 @@ def _html(table: Table) -> str:
 
 
 def _picture(figure: "Figure") -> str:
+    from ..analysis.figures import show_names
+
     buffer = io.BytesIO()
+    show_names(figure)
     figure.savefig(buffer, format="png", dpi=DPI)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 

@@ -113,6 +113,13 @@ def _features(files: Mapping[str, bytes], encoding: str, path: Path) -> Iterator
     main = files[".shp"]
     if len(main) < 100 or int.from_bytes(main[:4], "big") != 9994:
         raise InputError("This is no shapefile", file=path, advice=ADVICE)
+    promised = 2 * int.from_bytes(main[24:28], "big", signed=True)
+    if promised != len(main):
+        raise InputError(
+            f"The file is cut short or damaged: its header promises {promised:,} bytes, and it has {len(main):,}",
+            file=path,
+            advice=ADVICE,
+        )
     records = _records(files.get(".dbf"), encoding, path)
     index = files.get(".shx")
     if index is not None and (len(index) < 100 or (len(index) - 100) % 8):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import examples
+import maps
 import numpy as np
 import shown
 import simulations
@@ -57,6 +58,7 @@ def cases(folder: Path) -> dict[str, Case]:
     package = {f"package/{path.name}": path.read_bytes() for path in (folder / "package").glob("*.[cj]s*")}
     found["package"] = Case(package, tuple(package), lambda at: _package(at / "package"))
     shutil.rmtree(folder, ignore_errors=True)
+    found |= {name: Case(maps.files(), damaged, read) for name, (damaged, read) in maps.readers().items()}
     return found | _simulations(terrains["b.ply"]) | _shown(terrains["b.ply"], folder) | _commands(terrains["b.ply"])
 
 

@@ -256,7 +256,7 @@ def test_bad_input_is_refused_in_words(cliff: Ground) -> None:
         (lambda: on_line(cliff, [line - np.array([0.0, 30.0, 0.0])], SMALL, 5), "no terrain at"),
         (lambda: on_line(cliff, [], SMALL, 5), "no line"),
         (lambda: on_points(cliff, np.array([[10.0, 10.0, 99.0]]), SMALL), "99.0 m from the terrain"),
-        (lambda: in_polygon(cliff, [square(500, 500, 510, 510)], SMALL, 5), "no terrain within"),
+        (lambda: in_polygon(cliff, [square(500, 500, 510, 510)], SMALL, 5), "wholly outside of the terrain"),
         (lambda: in_polygon(cliff, [square(2, 2, 9, 9)], SMALL, 5, steeper_than=1.0), "steeper than 57"),
         (lambda: square(2, 2, 9, 2), "fewer than three corners|no area"),
         (lambda: Polygon("x", (np.array([[0.0, 0], [1, 1], [2, 2], [3, 3]]),)), "polygon x has no area"),

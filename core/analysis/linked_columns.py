@@ -103,19 +103,19 @@ def chosen_columns(impacts: Impacts, predictions: Predictions) -> list[dict[str,
 
     Names, titles and keys in the table of points; the groups of texts, or the ends of the scale of numbers.
     """
-    found = []
+    found: list[dict[str, Any]] = []
     for name, title in column_titles([impacts]).items():
         column = find_column(impacts, name)
         key = f"m_{name}" if name in VARIABLES else f"c_{name}"
         if column.texts is not None:
-            groups: list[str] = list(dict.fromkeys(map(visible, column.texts[predictions.row].tolist())))
+            groups = list(dict.fromkeys(map(visible, column.texts[predictions.row].tolist())))
             if len(groups) > 1:
                 found.append({"name": name, "title": title, "key": key, "groups": groups})
         elif column.numbers is not None:
             values = column.numbers[predictions.row]
             if np.unique(values[np.isfinite(values)]).size > 1:
                 ends = colour_by([replace(column, numbers=values)], dark=False).ends
-                found.append({"name": name, "title": title, "key": key, "ends": [*(ends or (0.0, 1.0))]})
+                found.append({"name": name, "title": title, "key": key, "ends": list(ends or (0.0, 1.0))})
     return found
 
 

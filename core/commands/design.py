@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="lines across the slope, GeoJSON, a GeoPackage or a table; with the properties height_m and capacity_kJ a "
-        "barrier that stands there (a project can state its own: [[simulation.screens]])",
+        help="lines across the slope or areas, a shapefile, KML, GeoJSON, a GeoPackage or a table; with the "
+        "properties height_m and capacity_kJ a barrier that stands there (a project can state its own: [[simulation.screens]])",
     )
     parser.add_argument(
         "--factors",

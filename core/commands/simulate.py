@@ -70,8 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="lines across the slope, GeoJSON, a GeoPackage or a table of points: what passes there; with the "
-        "properties height_m and capacity_kJ a barrier, and what it holds",
+        help="lines across the slope or areas, a shapefile, KML, GeoJSON, a GeoPackage or a table: what passes "
+        "there; with the properties height_m and capacity_kJ a barrier, and what it holds",
     )
     motion.add_argument(
         "--contact",

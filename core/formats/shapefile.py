@@ -56,15 +56,21 @@ def read_shapefile(path: Path) -> Features:
     return Features(found, "", wkt)
 
 
-def _beside(path: Path) -> dict[str, bytes]:
-    """Ending → content of the parts of a shapefile."""
-    files = {".shp": path.read_bytes()}
+def parts_beside(path: Path) -> dict[str, Path]:
+    """Ending → file of what belongs to a shapefile and stands beside it; nothing for another file."""
+    if path.suffix.lower() not in SUFFIXES:
+        return {}
+    found = {}
     for suffix in BESIDE:
         for name in (path.with_suffix(suffix), path.with_suffix(suffix.upper())):
-            if name.is_file():
-                files[suffix] = name.read_bytes()
-                break
-    return files
+            if suffix not in found and name.is_file():
+                found[suffix] = name
+    return found
+
+
+def _beside(path: Path) -> dict[str, bytes]:
+    """Ending → content of the parts of a shapefile."""
+    return {".shp": path.read_bytes(), **{suffix: file.read_bytes() for suffix, file in parts_beside(path).items()}}
 
 
 def _zipped(path: Path) -> dict[str, bytes]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import examples
+import kept_chunks
 import maps
 import numpy as np
 import shown
@@ -57,6 +58,9 @@ def cases(folder: Path) -> dict[str, Case]:
     main(["merge", str(folder / "impacts.csv"), "--out", str(folder / "package")])
     package = {f"package/{path.name}": path.read_bytes() for path in (folder / "package").glob("*.[cj]s*")}
     found["package"] = Case(package, tuple(package), lambda at: _package(at / "package"))
+    kept = kept_chunks.files(terrains["b.ply"], folder / "chunks")
+    on = kept_chunks.reader(terrains["b.ply"], folder / "chunks")
+    found["kept chunks"] = Case(kept, tuple(kept), on, slow=True)
     shutil.rmtree(folder, ignore_errors=True)
     found |= {name: Case(maps.files(), damaged, read) for name, (damaged, read) in maps.readers().items()}
     return found | _simulations(terrains["b.ply"]) | _shown(terrains["b.ply"], folder) | _commands(terrains["b.ply"])

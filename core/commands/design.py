@@ -36,7 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FILE",
         help="lines across the slope or areas, a shapefile, KML, GeoJSON, a GeoPackage or a table; with the "
-        "properties height_m and capacity_kJ a barrier that stands there (a project can state its own: [[simulation.screens]])",
+        "properties height_m and capacity_kJ a barrier that stands there (a project can state its own: "
+        "[[simulation.screens]])",
     )
     parser.add_argument(
         "--factors",

@@ -22,11 +22,13 @@ POINT, LINE, POLYGON = 1, 2, 3
 ENVELOPE_BYTES = (0, 32, 48, 48, 64)
 ADVICE = "Save it again, or as GeoJSON"
 LAYERS = """
-    SELECT g.table_name, g.column_name, s.organization, s.organization_coordsys_id, s.definition
+    SELECT g.table_name, g.column_name, s.organization, s.organization_coordsys_id,
+        substr(s.definition, 1, 20000) AS definition
     FROM gpkg_geometry_columns AS g JOIN gpkg_contents AS c ON c.table_name = g.table_name
     LEFT JOIN gpkg_spatial_ref_sys AS s ON s.srs_id = g.srs_id
-    WHERE c.data_type = 'features' ORDER BY g.table_name
+    WHERE c.data_type = 'features' ORDER BY g.table_name LIMIT 201
 """
+MOST_LAYERS = 200
 METADATA = ("gpkg_geometry_columns", "gpkg_contents", "gpkg_spatial_ref_sys")
 
 
@@ -43,7 +45,10 @@ def read_geopackage(path: Path, kinds: Sequence[Kind]) -> Features:
             for table in METADATA:
                 _refuse_computed(database, table, path)
             found = []
-            for table, column, organization, code, definition in database.execute(LAYERS).fetchall():
+            layers = database.execute(LAYERS).fetchall()
+            if len(layers) > MOST_LAYERS:
+                raise ValueError(f"it has more than {MOST_LAYERS} layers")
+            for table, column, organization, code, definition in layers:
                 _refuse_computed(database, table, path)
                 features = tuple(_features(database, str(table), str(column)))
                 if any(feature.kind in kinds for feature in features):

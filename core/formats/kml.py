@@ -20,7 +20,7 @@ from .features import MOST_POINTS, Feature, Features
 
 SUFFIXES = (".kml", ".kmz")
 WGS84 = "EPSG:4326"
-DEEPEST = 100
+DEEPEST, MOST_ELEMENTS = 100, 2_000_000
 ADVICE = "Save it again, or as GeoJSON"
 
 
@@ -65,15 +65,17 @@ def _content(path: Path) -> bytes:
 
 def _tree(data: bytes, path: Path) -> Element:
     """The elements, their names without namespaces."""
-    builder, depth = TreeBuilder(), 0
+    builder, depth, elements = TreeBuilder(), 0, 0
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
     def start(name: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
+        nonlocal depth, elements
+        depth, elements = depth + 1, elements + 1
         if depth > DEEPEST:
             raise InputError("It is nested too deeply", file=path, advice=ADVICE)
+        if elements > MOST_ELEMENTS:
+            raise InputError(f"It has more than {MOST_ELEMENTS:,} elements", file=path, advice="Simplify it")
         builder.start(name.rpartition(":")[2], attributes)
 
     def end(name: str) -> None:

@@ -130,7 +130,7 @@ def _features(files: Mapping[str, bytes], encoding: str, path: Path) -> Iterator
     index = files.get(".shx")
     if index is not None and (len(index) < 100 or (len(index) - 100) % 8):
         index = None
-    left = MOST_POINTS
+    left, number = MOST_POINTS, 0
     with shapefile.Reader(shp=io.BytesIO(main), shx=None if index is None else io.BytesIO(index)) as reader:
         shapes: Iterator[Any] = (
             reader.iterShapes() if index is None else (reader.shape(i) for i in range((len(index) - 100) // 8))
@@ -156,13 +156,8 @@ def _features(files: Mapping[str, bytes], encoding: str, path: Path) -> Iterator
             groups = [(part,) for part in parts] if kind == "line" else outlines(parts, number, path)
             for group in groups:
                 yield Feature(kind, name, number, group, properties)
-    if records is not None and number_of(records) and not main[100:]:
-        raise InputError("It has rows in its .dbf, and no shapes", file=path, advice=ADVICE)
-
-
-def number_of(records: Sequence[Mapping[str, object] | None]) -> int:
-    """Rows that are not deleted."""
-    return sum(record is not None for record in records)
+    if records is not None and number < len(records):
+        raise InputError(f"It has {number} shapes, and {len(records)} rows in its .dbf", file=path, advice=ADVICE)
 
 
 def _records(dbf: bytes | None, encoding: str, path: Path) -> list[dict[str, object] | None] | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The chunks that an ensemble keeps on the disk, damaged: what goes on from them is what it would have been, or is refused."""
+"""The chunks that an ensemble keeps, damaged: what goes on from them is as it would have been, or is refused."""
 
 from collections.abc import Callable
 from functools import cache

@@ -53,7 +53,7 @@ def test_the_share_of_an_area():
     assert str(remark) == "75 % of the area of the zone b (feature 2) is outside of the terrain: it ends there."
     with pytest.raises(InputError, match=r"The zone c \(feature 3\) is wholly outside of the terrain\. Check"):
         check_areas(terrain, [square(10, 10), square(200, 10, name="c", number=3)], "zone", "x")
-    cloud = Cloud(terrain.vertices, terrain.shift)
+    cloud = Cloud(terrain.vertices, terrain.shift, "plane")
     (same,) = check_areas(cloud, [square(90, 10, name="b", number=2)], "zone", "it ends there")
     assert 70 < float(str(same).split(" ", maxsplit=1)[0]) <= 76
 

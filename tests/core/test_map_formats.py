@@ -265,6 +265,16 @@ def test_a_header_that_promises_more_than_there_is(tmp_path):
     table.write_bytes(data[:4] + struct.pack("<I", 2**32 - 1) + data[8:])
     with pytest.raises(InputError, match=r"Its \.dbf is cut short"):
         read_polygons(path, SHIFT)
+    table.write_bytes(data)
+    for cut in (whole[:-16], whole + bytes(8)):
+        path.write_bytes(cut)
+        with pytest.raises(InputError, match="its header promises 236 bytes"):
+            read_polygons(path, SHIFT)
+    path.write_bytes(whole)
+    two = write_shp(tmp_path / "two.shp", 5, [[closed(SQUARE)], [closed(FAR)]], ["a", "b"])
+    shutil.copy(two.with_suffix(".dbf"), table)
+    with pytest.raises(InputError, match=r"It has 1 shapes, and 2 rows in its \.dbf"):
+        read_polygons(path, SHIFT)
 
 
 def test_nothing_in_a_geopackage_is_computed(tmp_path):

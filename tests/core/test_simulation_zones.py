@@ -180,8 +180,9 @@ def test_geojson_of_another_system_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "degrees.json"
     ring = [[7.4, 46.9], [7.5, 46.9], [7.5, 47.0], [7.4, 46.9]]
     path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}), encoding="utf-8")
+    nowhere = Surface(terrain.vertices, terrain.faces, GlobalShift(EAST, NORTH, 0.0), "plane")
     with pytest.raises(InputError, match="seems to be in degrees"):
-        read_zones(path, there, ["noel_2017"])
+        read_zones(path, nowhere, ["noel_2017"])
 
 
 @pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])

@@ -108,9 +108,10 @@ def run(arguments: argparse.Namespace) -> int:
         measured = None
         if project.picks is not None and len(read_project_picks(project, None)[0]):
             measured = reconstruct_project(project, ground.surface)
+        placed = scenario.releases(ground)
         sheet = design_sheet(
             ground,
-            scenario.releases(ground),
+            placed,
             scenario.settings,
             screens,
             factors,
@@ -127,7 +128,7 @@ def run(arguments: argparse.Namespace) -> int:
         inputs = inputs | screen_files | videos
         written = write_design(sheet, folder, inputs, pdf=not arguments.no_pdf, progress=progress)
         write_screens({one.settings.model: one.tally for one in sheet.models}, folder / "screens.csv")
-    for remark in sheet.remarks:
+    for remark in (*sheet.remarks, *placed.remarks):
         print(remark)
     for one in sheet.models:
         for name, values in one.values.items():

@@ -61,18 +61,28 @@ def check_areas(terrain: Surface | Cloud, polygons: Sequence[Polygon], what: str
 
 
 def check_lines(
-    terrain: Surface | Cloud, lines: Sequence[Array], names: Sequence[str], what: str, then: str
+    terrain: Surface | Cloud,
+    lines: Sequence[Array],
+    names: Sequence[str],
+    what: str,
+    then: str,
+    *,
+    refuse: bool = True,
 ) -> tuple[Remark, ...]:
     """The same of lines, each (k, 2 or more) local [m].
 
+    Parameters
+    ----------
+    refuse : one that is wholly outside; else it is said as any other.
+
     Raises
     ------
-    InputError : one is wholly outside.
+    InputError : see `refuse`.
     """
     remarks = []
     for number, (line, name) in enumerate(zip(lines, names, strict=True), start=1):
         outside = beside(terrain, places_along(line[:, :2]))
-        remarks += _said(outside, named(what, name, number if len(lines) > 1 else 0), "length", then)
+        remarks += _said(outside, named(what, name, number if len(lines) > 1 else 0), "length", then, refuse)
     return tuple(remarks)
 
 
@@ -117,11 +127,11 @@ def parts_on(terrain: Surface | Cloud, line: Array) -> list[Array]:
     return found
 
 
-def _said(outside: Mask, what: str, of: str, then: str) -> list[Remark]:
-    if outside.all():
+def _said(outside: Mask, what: str, of: str, then: str, refuse: bool = True) -> list[Remark]:
+    if refuse and outside.all():
         raise InputError(f"The {what} is wholly outside of the terrain", advice=ADVICE)
     share = float(outside.mean())
     if share == 0.0:
         return []
-    text = f"{100 * share:.2g} % of the {of} of the {what} is outside of the terrain: {then}."
+    text = f"{100 * share:.3g} % of the {of} of the {what} is outside of the terrain: {then}."
     return [Remark(text, "warning", "outside")]

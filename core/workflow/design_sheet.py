@@ -33,6 +33,7 @@ from ..simulation.results import run_figures
 from ..vectors import Array
 from .enough import KNOWN_TO, in_chance_order, is_known
 from .hazard import Counted, run_chunks
+from .screens import outside_remarks
 
 DRAWN = 250
 """Runs of each model that are drawn, evenly among all."""
@@ -253,7 +254,8 @@ def held_share(tally: ScreenTally, screen: Screen) -> float:
 
 def _remarks(sheet: DesignSheet) -> list[Remark]:
     """What is not enough, and what is not known; the good news last."""
-    found = []
+    found = [*outside_remarks(sheet.screens, sheet.ground)]
+    found += [remark for remark in sheet.ground.remarks if remark.severity == "warning"]
     for one in sheet.models:
         model, title = one.settings.model, find_model(one.settings.model).title
         for screen in sheet.screens:

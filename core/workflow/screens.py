@@ -29,15 +29,10 @@ def tallies_of(
 
 
 def outside_remarks(screens: Sequence[Screen], ground: Ground) -> tuple[Remark, ...]:
-    """How the screens' files were read, and which screens are partly outside of the terrain.
-
-    Raises
-    ------
-    InputError : one is wholly outside.
-    """
+    """How the screens' files were read, and which screens are partly outside of the terrain; see `check_screens`."""
     lines, names = [screen.line for screen in screens], [screen.name for screen in screens]
     read = dict.fromkeys(remark for screen in screens for remark in screen.remarks)
-    return (*read, *check_lines(ground.terrain, lines, names, "screen", "no block is seen there"))
+    return (*read, *check_lines(ground.terrain, lines, names, "screen", "no block is seen there", refuse=False))
 
 
 def screen_remarks(tallies: Mapping[str, ScreenTally]) -> tuple[Remark, ...]:

@@ -21,7 +21,8 @@ from damage import damaged
 
 ROOT = Path(__file__).resolve().parents[2]
 SAVED = ROOT / "tests" / "data" / "saved_by_0.1.0.blend"
-LIMIT_S, MEMORY_BYTES = 240, 8_000_000_000
+LIMIT_S, NO_ANSWER_S, MEMORY_BYTES = 120, 1800, 8_000_000_000
+"""Of processor time; until a case is ended; of memory."""
 OPERATORS = ("reconstruct", "remove_set_aside", "export_tables")
 """What reads all that is stored."""
 PREFIX = "rockfall"
@@ -109,14 +110,19 @@ def one_case(seed: int, number: int, how: str, folder: Path) -> None:
         operate(folder)
 
 
+def _limit() -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S))
+
+
 def run(seed: int, number: int, how: str) -> tuple[int, str]:
     """Exit status and output of a case in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         words = [sys.executable, __file__, "--one", str(seed), str(number), how, folder]
         try:
             ended = subprocess.run(
-                words, capture_output=True, text=True, errors="replace", timeout=LIMIT_S, check=False,
-                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES)),
+                words, capture_output=True, text=True, errors="replace", timeout=NO_ANSWER_S, check=False,
+                preexec_fn=_limit,
             )  # fmt: skip
         except subprocess.TimeoutExpired as error:
             return -1, f"too long: {(error.stdout or b'')[-500:]!r}"

@@ -6,7 +6,9 @@ import json
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.simulation_entry import TreesEntry
+from rockfall.core.exchange.project import BlockEntry
+from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, TreesEntry
+from rockfall.core.exchange.simulation_project import placed_source
 from rockfall.core.exchange.trees import open_trees
 from rockfall.core.exchange.zones import read_zones
 from rockfall.core.georeference import GlobalShift
@@ -72,6 +74,19 @@ def test_release_areas_and_lines():
     assert not whole.remarks
     with pytest.raises(InputError, match=r"The line of releases far is wholly outside of the terrain"):
         on_line(ground, [line + np.array([100.0, 0, 0])], Blocks(), 5, names=["far"])
+
+
+def test_a_project_releases_from_a_map(tmp_path):
+    ground = make_ground(plane())
+    ring = [[80, 10], [120, 10], [120, 50], [80, 10]]
+    for source, geometry in (("polygon", {"type": "Polygon", "coordinates": [ring]}), ("line", None)):
+        geometry = geometry or {"type": "LineString", "coordinates": ring[:2]}
+        (tmp_path / "map.geojson").write_text(json.dumps(geometry))
+        entry = ReleaseEntry(source=source, file=tmp_path / "map.geojson", number=7, name="niche")
+        releases = placed_source(SimulationEntry(releases=entry), BlockEntry())(ground)
+        assert releases.name.tolist() == ["niche"] * 7
+        assert (releases.position[:, 0] > 79).all()
+        assert any("is outside of the terrain" in str(remark) for remark in releases.remarks)
 
 
 def test_screens():

@@ -133,5 +133,5 @@ def _said(outside: Mask, what: str, of: str, then: str, refuse: bool = True) -> 
     share = float(outside.mean())
     if share == 0.0:
         return []
-    text = f"{100 * share:.3g} % of the {of} of the {what} is outside of the terrain: {then}."
+    text = f"{100 * share:.{2 if share < 0.99 else 3}g} % of the {of} of the {what} is outside of the terrain: {then}."
     return [Remark(text, "warning", "outside")]

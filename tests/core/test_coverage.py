@@ -57,7 +57,7 @@ def test_the_share_of_an_area():
         check_areas(terrain, [square(10, 10), square(200, 10, name="c", number=3)], "zone", "x")
     cloud = Cloud(terrain.vertices, terrain.shift, "plane")
     (same,) = check_areas(cloud, [square(90, 10, name="b", number=2)], "zone", "it ends there")
-    assert 70 < float(str(same).split(" ", maxsplit=1)[0]) <= 76
+    assert 50 < float(str(same).split(" ", maxsplit=1)[0]) <= 76  # ground is known some way beyond the last point
 
 
 def test_release_areas_and_lines():
